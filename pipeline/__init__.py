@@ -1,0 +1,1 @@
+"""The nouns of boresight and the machine that runs its stages."""

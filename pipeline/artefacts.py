@@ -1,0 +1,246 @@
+"""What stages hand to each other: frozen dataclasses of arrays.
+
+Conventions: lengths mm, angles rad, times s, pixels with integer centres. Frames: C camera (x right, y down,
+z forward), P pipe (z along the pipe). ``T_pc`` maps C to P. NaN marks what was not measured.
+A field may be an array, a number, a string, a tuple of such, a nested artefact, or None: `pipeline.store`
+writes and reads any of these without further code.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+Byte = NDArray[np.uint8]
+
+
+class RingValidity(IntEnum):
+    """Why a ring sample is or is not used."""
+
+    VALID = 0
+    NO_LINE = 1
+    LOW_CONTRAST = 2
+    SATURATED = 3
+    GLINT = 4
+    GHOST = 5
+    OUTLIER = 6
+    OUT_OF_VIEW = 7
+    WIDTH = 8
+    FRAME_REJECTED = 9
+
+
+@dataclass(frozen=True)
+class RingSamples:
+    """Laser line positions in every laser frame, in polar coordinates about ``centre_px``.
+
+    Attributes
+    ----------
+    frame : (F,) int
+        Frame numbers of all frames in which the laser was on, used or not.
+    azimuth_rad : (A,)
+        Image azimuth atan2(v - centre_v, u - centre_u), uniform, first −π.
+    centre_px : (2,)
+        Origin (u, v) of the polar coordinates.
+    radius_px, sigma_px, width_px, amplitude : (F, A) float32
+        Line position along the azimuth, its 1 σ from noise alone, line width (1 σ of the profile) and height
+        above the background in grey levels. NaN where no line was found.
+    validity : (F, A) uint8
+        `RingValidity`; a saturated but usable sample stays VALID with a larger ``sigma_px``.
+    """
+
+    frame: Int
+    azimuth_rad: Float
+    centre_px: Float
+    radius_px: Float32
+    sigma_px: Float32
+    width_px: Float32
+    amplitude: Float32
+    validity: Byte
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(F, A) true where the sample may be used."""
+        return np.asarray(self.validity == RingValidity.VALID)
+
+    def pixels(self) -> Float:
+        """Return (F, A, 2) pixel coordinates (u, v) of the samples."""
+        direction = np.stack([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)], -1)
+        return np.asarray(self.centre_px + self.radius_px[..., None].astype(np.float64) * direction)
+
+
+@dataclass(frozen=True)
+class RingPoints:
+    """Triangulated ring samples in C; rows and columns are those of `RingSamples`.
+
+    Attributes
+    ----------
+    frame : (F,) int
+    azimuth_rad : (A,)
+    xyz_c : (F, A, 3) float32
+        Ray and calibrated laser surface intersected; NaN where invalid.
+    xyz_uncorrected_c : (F, A, 3) float32
+        The same with the sheet taken as the plane z = baseline (the seed paper's assumption).
+    noise_direction : (F, A, 3) float32
+        Change of ``xyz_c`` for +1 σ of image noise along the line's normal: the noise covariance is its
+        outer product with itself (rank one).
+    calibration_covariance : (F, A, 6) float32
+        Covariance from the instrument's uncertainty, entries xx, xy, xz, yy, yz, zz. Shared by all frames:
+        it does not average away.
+    """
+
+    frame: Int
+    azimuth_rad: Float
+    xyz_c: Float32
+    xyz_uncorrected_c: Float32
+    noise_direction: Float32
+    calibration_covariance: Float32
+
+
+@dataclass(frozen=True)
+class PipeAxis:
+    """The pipe's own, possibly curved, axis in P as a polyline with rotation-minimising frames.
+
+    Attributes
+    ----------
+    distance_mm : (K,)
+        Arc length, increasing, extended beyond the seen wall; distance 0 is next to the first camera.
+    origin_p : (K, 3)
+        Points of the axis in P.
+    R_pa : (K, 3, 3)
+        Columns: local x, y (section plane, azimuth atan2(y, x)) and tangent, in P.
+    """
+
+    distance_mm: Float
+    origin_p: Float
+    R_pa: Float
+
+
+@dataclass(frozen=True)
+class MotionEvent:
+    """Something of note in the motion: slip, stop, reversal, dropped or duplicated frame, lost track."""
+
+    kind: str
+    frame_from: int
+    frame_to: int
+    size: float
+    unit: str
+    note: str
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Pose of the camera in P at every frame, the pipe's axis, and what the motion showed.
+
+    Attributes
+    ----------
+    frame : (N,) int
+        All frames of the recording that have a pose.
+    time_s : (N,)
+    T_pc : (N, 4, 4)
+        Camera to pipe.
+    covariance : (N, 6, 6)
+        Of (translation in P, mm; rotation vector in C, rad): T = [R exp(w), t + d]. Relative to frame 0.
+    axis : PipeAxis
+    radius_mm : float
+        Mean radius of the pipe as used in the estimate.
+    encoder_scale : float
+        Estimated true distance over encoder distance; NaN without encoder.
+    encoder_scale_sigma : float
+    scale_sigma : float
+        Relative 1 σ of the distance scale from calibration (it does not average away).
+    events : tuple of MotionEvent
+    """
+
+    frame: Int
+    time_s: Float
+    T_pc: Float
+    covariance: Float
+    axis: PipeAxis
+    radius_mm: float
+    encoder_scale: float
+    encoder_scale_sigma: float
+    scale_sigma: float
+    events: tuple[MotionEvent, ...]
+
+
+@dataclass(frozen=True)
+class RadiusMap:
+    """The wall's radius over distance and azimuth about the pipe's own axis.
+
+    Attributes
+    ----------
+    distance_mm : (S,)
+        Uniform.
+    azimuth_rad : (A,)
+        Uniform in [−π, π), first −π.
+    radius_mm, sigma_mm, sigma_random_mm : (S, A) float32
+        Radius; total 1 σ (random and calibration); its random part. NaN where nothing was seen.
+    count : (S, A) int64
+        Ring samples that contributed.
+    misalignment_mm : (S, A) float32
+        Radius without laser misalignment correction minus ``radius_mm``.
+    """
+
+    distance_mm: Float
+    azimuth_rad: Float
+    radius_mm: Float32
+    sigma_mm: Float32
+    sigma_random_mm: Float32
+    count: Int
+    misalignment_mm: Float32
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Accumulated wall points in P.
+
+    Attributes
+    ----------
+    xyz_p, normal_p : (M, 3) float32
+    sigma_mm, radius_mm, distance_mm, azimuth_rad : (M,) float32
+    frame : (M,) int
+    """
+
+    xyz_p: Float32
+    normal_p: Float32
+    sigma_mm: Float32
+    radius_mm: Float32
+    distance_mm: Float32
+    azimuth_rad: Float32
+    frame: Int
+
+
+@dataclass(frozen=True)
+class Wall:
+    """Result of accumulation: cloud, radius map, and the axis both refer to."""
+
+    cloud: PointCloud
+    radius_map: RadiusMap
+    axis: PipeAxis
+
+
+@dataclass(frozen=True)
+class WallTexture:
+    """The wall's photo as a flat picture.
+
+    Attributes
+    ----------
+    bgra : (H, W, 4) uint8
+        Linear reflectance × 255 in B, G, R after one common gain; alpha 0 where nothing was textured.
+    distance_from_mm, mm_per_px : float
+        Row i's centre is at ``distance_from_mm + i * mm_per_px``.
+    azimuth_from_rad, rad_per_px : float
+        Column j's centre is at ``azimuth_from_rad + j * rad_per_px``.
+    """
+
+    bgra: Byte
+    distance_from_mm: float
+    mm_per_px: float
+    azimuth_from_rad: float
+    rad_per_px: float

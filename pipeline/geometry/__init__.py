@@ -1,0 +1,1 @@
+"""Rigid motion, pipe coordinates and robust fits."""

@@ -1,0 +1,1 @@
+"""Fisheye-native camera models behind one interface."""

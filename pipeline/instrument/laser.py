@@ -1,0 +1,129 @@
+"""The laser sheet as a surface of rays from the laser's axis.
+
+A sheet point at distance q from the axis and azimuth ψ has, in C,
+z = l + h cos(ψ − ψ_h) + q · slope(ψ), slope(ψ) = tan φ cos(ψ − ψ_φ) + tan ε₀ + Σ_m ε_m cos m(ψ − ψ_m),
+with baseline l, tilt φ, cone elevation ε₀ = (180° − opening angle) / 2, decentre height h, waviness ε_m
+(shared PHYSICS notes, "The instrument"). The tilt alone is exactly a plane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+_WAVES = (2, 3, 4)
+
+
+@dataclass(frozen=True)
+class LaserSheet:
+    """A laser sheet that may be tilted, conical, decentred and wavy.
+
+    Attributes
+    ----------
+    baseline_mm : float
+        Distance l from the camera's viewpoint to the laser's source along the optical axis.
+    tilt_x, tilt_y : float
+        tan φ cos ψ_φ and tan φ sin ψ_φ: slope of the sheet along x and y of C.
+    cone_rad : float
+        ε₀, positive when the sheet leans forward all round.
+    decentre_x_mm, decentre_y_mm : float
+        h cos ψ_h and h sin ψ_h.
+    waviness : tuple of float
+        (ε_m cos mψ_m, ε_m sin mψ_m) for m = 2, 3, 4, rad, flattened; six numbers.
+    line_sigma_mm : float
+        1 σ of the sheet's thickness at the wall.
+    wavelength_nm : float
+    """
+
+    baseline_mm: float
+    tilt_x: float = 0.0
+    tilt_y: float = 0.0
+    cone_rad: float = 0.0
+    decentre_x_mm: float = 0.0
+    decentre_y_mm: float = 0.0
+    waviness: tuple[float, ...] = (0.0,) * (2 * len(_WAVES))
+    line_sigma_mm: float = 0.15
+    wavelength_nm: float = 520.0
+
+    PARAMETER_NAMES = (
+        "baseline_mm", "tilt_x", "tilt_y", "cone_rad", "decentre_x_mm", "decentre_y_mm",
+        *(f"wave{m}_{part}" for m in _WAVES for part in ("cos", "sin")),
+    )  # fmt: skip
+
+    @property
+    def parameters(self) -> Float:
+        """(12,) geometric parameters in the order of ``PARAMETER_NAMES``."""
+        lead = [getattr(self, n) for n in self.PARAMETER_NAMES[:6]]
+        return np.array([*lead, *self.waviness], float)
+
+    def with_parameters(self, parameters: Float) -> LaserSheet:
+        """Return the sheet with other geometric parameters."""
+        lead = dict(zip(self.PARAMETER_NAMES[:6], map(float, parameters[:6]), strict=True))
+        return replace(self, **lead, waviness=tuple(float(p) for p in parameters[6:]))  # type: ignore[arg-type]
+
+    def slope(self, azimuth_rad: Float) -> Float:
+        """Return dz/dq (...) of the sheet's rays at azimuth ψ (...) in C."""
+        return np.asarray(self._slope_basis(azimuth_rad) @ self._slope_coefficients())
+
+    def height(self, azimuth_rad: Float) -> Float:
+        """Return z (...) in mm at which the ray of azimuth ψ leaves the axis."""
+        psi = np.asarray(azimuth_rad)
+        return np.asarray(
+            self.baseline_mm + self.decentre_x_mm * np.cos(psi) + self.decentre_y_mm * np.sin(psi)
+        )
+
+    def intersect(self, ray_c: Float) -> Float:
+        """Return the points (..., 3), mm in C, where camera rays (..., 3) meet the sheet.
+
+        NaN where a ray never meets it in front of the camera.
+        """
+        scale = self._ray_scale(np.asarray(ray_c, float))[0]
+        return np.asarray(ray_c * scale[..., None])
+
+    def intersect_jacobian(self, ray_c: Float) -> tuple[Float, Float]:
+        """Return derivatives of `intersect`: by ray (..., 3, 3) and by parameters (..., 3, 12)."""
+        d = np.asarray(ray_c, float)
+        scale, slope, rho, psi = self._ray_scale(d)
+        sink = self.height(psi) / scale
+        c, s = np.cos(psi), np.sin(psi)
+        dslope, dheight = self._azimuth_derivatives(psi)
+        by_psi = (dheight + scale * rho * dslope) / sink
+        d_rho = np.stack([c, s, np.zeros_like(c)], -1)
+        d_psi = np.stack([-s / rho, c / rho, np.zeros_like(c)], -1)
+        d_z = np.array([0.0, 0.0, 1.0])
+        gradient = (scale / sink)[..., None] * (slope[..., None] * d_rho - d_z) + by_psi[..., None] * d_psi
+        by_ray = scale[..., None, None] * np.eye(3) + d[..., :, None] * gradient[..., None, :]
+        height_basis = np.stack([np.ones_like(c), c, s], -1) / sink[..., None]
+        slope_basis = self._slope_basis(psi) * (scale * rho / sink)[..., None]
+        by_scale = np.concatenate(
+            [height_basis[..., :1], slope_basis[..., :3], height_basis[..., 1:], slope_basis[..., 3:]], -1
+        )
+        by_scale[..., 3] *= 1 + np.tan(self.cone_rad) ** 2
+        return by_ray, d[..., :, None] * by_scale[..., None, :]
+
+    def _ray_scale(self, d: Float) -> tuple[Float, Float, Float, Float]:
+        rho = np.hypot(d[..., 0], d[..., 1])
+        psi = np.arctan2(d[..., 1], d[..., 0])
+        slope = self.slope(psi)
+        sink = d[..., 2] - rho * slope
+        with np.errstate(divide="ignore", invalid="ignore"):
+            scale = np.where(sink > 1e-9, self.height(psi) / sink, np.nan)
+        return scale, slope, rho, psi
+
+    def _slope_coefficients(self) -> Float:
+        return np.array([self.tilt_x, self.tilt_y, np.tan(self.cone_rad), *self.waviness])
+
+    @staticmethod
+    def _slope_basis(psi: Float) -> Float:
+        psi = np.asarray(psi, float)
+        waves = [f(m * psi) for m in _WAVES for f in (np.cos, np.sin)]
+        return np.stack([np.cos(psi), np.sin(psi), np.ones_like(psi), *waves], -1)
+
+    def _azimuth_derivatives(self, psi: Float) -> tuple[Float, Float]:
+        waves = [f for m in _WAVES for f in (-m * np.sin(m * psi), m * np.cos(m * psi))]
+        basis = np.stack([-np.sin(psi), np.cos(psi), np.zeros_like(psi), *waves], -1)
+        dheight = -self.decentre_x_mm * np.sin(psi) + self.decentre_y_mm * np.cos(psi)
+        return basis @ self._slope_coefficients(), dheight

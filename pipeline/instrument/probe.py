@@ -1,0 +1,72 @@
+"""The probe: camera, laser sheet, shutter, lighting, and the covariance of what is believed of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.laser import LaserSheet
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """Shutter ``kind`` (``global`` or ``rolling``), exposure and, when rolling, readout time, in s."""
+
+    kind: str = "global"
+    exposure_s: float = 0.0015
+    readout_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """A ring of ``leds`` LEDs of radius ``radius_mm`` in the plane z = ``z_mm`` of C, facing forward."""
+
+    kind: str = "led_ring"
+    leds: int = 8
+    radius_mm: float = 11.0
+    z_mm: float = -1.0
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What is believed of the instrument.
+
+    Attributes
+    ----------
+    camera, laser, shutter, lighting
+    covariance : (P, P)
+        Of `parameter_names`: the camera's parameters followed by the laser's.
+    encoder_scale_sigma : float
+        Relative 1 σ of the encoder's scale.
+    calibrated_from : str
+        Name of the gauge run, empty when the numbers are merely stated.
+    """
+
+    camera: Camera
+    laser: LaserSheet
+    covariance: Float
+    shutter: Shutter = Shutter()
+    lighting: Lighting = Lighting()
+    encoder_scale_sigma: float = 0.002
+    calibrated_from: str = ""
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of all P parameters: camera, then laser."""
+        return (*self.camera.parameter_names, *LaserSheet.PARAMETER_NAMES)
+
+    def triangulate(self, uv: Float) -> Float:
+        """Return the wall points (..., 3), mm in C, of laser-line pixels (..., 2); NaN where impossible."""
+        return self.laser.intersect(self.camera.unproject(uv).ray)
+
+    def triangulate_jacobian(self, uv: Float) -> tuple[Float, Float]:
+        """Return derivatives of `triangulate`: by pixel (..., 3, 2), by parameters (..., 3, P)."""
+        ray = self.camera.unproject(uv).ray
+        by_ray, by_laser = self.laser.intersect_jacobian(ray)
+        rays = self.camera.unproject_jacobian(uv)
+        return by_ray @ rays.by_pixel, np.concatenate([by_ray @ rays.by_parameters, by_laser], -1)

@@ -1,0 +1,139 @@
+"""What every reader makes of its files: a `Recording`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Image = NDArray[np.uint8]
+Planes = Literal["grey", "bgr"]
+
+
+class Illumination(StrEnum):
+    """What lit the wall in a frame."""
+
+    LASER = "laser"
+    LED = "led"
+    BOTH = "both"
+
+
+@dataclass(frozen=True)
+class FrameTable:
+    """One row a frame: number (N,), time in s (N,) and illumination (N,) of `Illumination` values."""
+
+    frame: Int
+    time_s: Float
+    illumination: NDArray[np.str_]
+
+    def of(self, *kinds: Illumination) -> Int:
+        """Return the numbers of the frames lit in one of the ways named."""
+        return np.asarray(self.frame[np.isin(self.illumination, [k.value for k in kinds])])
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """Cable payout ``distance_mm`` (M,) on its own clock ``time_s`` (M,)."""
+
+    time_s: Float
+    distance_mm: Float
+
+
+@dataclass(frozen=True)
+class BoreSection:
+    """A stretch of known bore in a gauge."""
+
+    length_mm: float
+    diameter_mm: float
+
+
+@dataclass(frozen=True)
+class Marker:
+    """An ArUco marker's centre on the gauge wall."""
+
+    id: int
+    distance_mm: float
+    azimuth_deg: float
+
+
+@dataclass(frozen=True)
+class Fiducials:
+    """Markers of one dictionary and size on the gauge wall."""
+
+    dictionary: str
+    size_mm: float
+    columns_along: str
+    rows_along: str
+    markers: tuple[Marker, ...]
+
+
+@dataclass(frozen=True)
+class PipeFacts:
+    """What is known of the pipe beforehand; gauge runs also know bores and fiducials."""
+
+    nominal_diameter_mm: float
+    wall_thickness_mm: float | None = None
+    bore: tuple[BoreSection, ...] = ()
+    bore_tolerance_mm: float = 0.0
+    fiducials: Fiducials | None = None
+
+
+class FrameSource(Protocol):
+    """Delivers images by need and in order."""
+
+    def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
+        """Yield (frame number, image) for ascending frame numbers; None where a frame cannot be decoded.
+
+        ``grey`` gives (H, W) luma, ``bgr`` (H, W, 3). The array may be reused: copy it to keep it.
+        """
+
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """Width and height, px."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recorded run, opened; pixels are read by need.
+
+    Attributes
+    ----------
+    name, kind
+        ``kind`` is ``inspection`` or ``gauge``.
+    path
+        The folder or file it was opened from.
+    frames, encoder, pipe
+    frame_rate : float
+        Nominal, 1/s.
+    source
+        Delivers the images.
+    probe_file
+        Where the stated probe lies, if the recording names one.
+    content_key
+        Hash of everything that determines the content (files' bytes, not their times).
+    warnings
+        What the reader noticed and mended, for the report.
+    """
+
+    name: str
+    kind: str
+    path: Path
+    frames: FrameTable
+    encoder: Encoder | None
+    pipe: PipeFacts
+    frame_rate: float
+    source: FrameSource
+    probe_file: Path | None
+    content_key: str
+    warnings: tuple[str, ...] = ()
+
+    def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
+        """See `FrameSource.read`."""
+        return self.source.read(frames, planes)

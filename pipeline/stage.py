@@ -1,0 +1,117 @@
+"""What a stage is: a named, versioned, pure function from typed inputs and parameters to one typed output."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol, get_type_hints
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+
+class Parameters(BaseModel):
+    """Base of every stage's parameters: strict, immutable, unknown keys refused.
+
+    Each field carries ``description`` (meaning and unit) and its range, so that the documentation and
+    ``configs/default.yaml`` are made from it.
+    """
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Progress(Protocol):
+    """Told how far a stage is."""
+
+    def __call__(self, done: int, total: int) -> None:
+        """Report ``done`` of ``total`` units of work."""
+
+
+class Report(Protocol):
+    """Write-only sink of numbers for people; nothing computed may depend on it."""
+
+    def __call__(self, name: str, value: float | int | str, unit: str = "") -> None:
+        """Record one headline number, e.g. ``report("rejected: saturated", 12, "samples")``."""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What the runner lends a stage while it runs.
+
+    Attributes
+    ----------
+    logger
+        For messages to the log file and, from warnings on, to the user.
+    progress
+        To be called now and then; raises `pipeline.errors.Cancelled` when the user stopped the run.
+    report
+        Numbers for people.
+    random
+        Generator seeded from the key of the result, so that a repeated run draws the same numbers.
+    workers
+        How many threads or processes the stage may use.
+    """
+
+    logger: logging.Logger
+    progress: Progress
+    report: Report
+    random: np.random.Generator
+    workers: int = 2
+
+
+def _silent_progress(done: int, total: int) -> None:
+    """Ignore progress."""
+
+
+def _silent_report(name: str, value: float | int | str, unit: str = "") -> None:
+    """Ignore headline numbers."""
+
+
+def quiet_context(seed: int = 0, workers: int = 2) -> Context:
+    """Return a context without any display, for library use and tests."""
+    return Context(
+        logging.getLogger("boresight"),
+        _silent_progress,
+        _silent_report,
+        np.random.default_rng(seed),
+        workers,
+    )
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A step of the pipeline as a plain, picklable, module-level constant.
+
+    The runner wires stages by type: every argument of ``function`` other than ``parameters`` and
+    ``context`` is an artefact class made by an earlier stage, or one of the sources `Recording`, `Probe`.
+
+    Attributes
+    ----------
+    name
+        Unique name, used on the command line and in the configuration.
+    version
+        To be raised whenever the result for the same inputs changes.
+    parameters
+        Class of its parameters.
+    function
+        ``function(**artefacts, parameters=..., context=...) -> artefact``; module level, fully annotated.
+    summary
+        One line for ``boresight stages``.
+    """
+
+    name: str
+    version: str
+    parameters: type[Parameters]
+    function: Callable[..., Any] = field(repr=False)
+    summary: str = ""
+
+    def inputs(self) -> dict[str, type]:
+        """Return argument name to artefact class, in the order of the function's signature."""
+        hints = get_type_hints(self.function)
+        return {k: v for k, v in hints.items() if k not in ("parameters", "context", "return")}
+
+    def output(self) -> type:
+        """Return the artefact class that the stage makes."""
+        made: type = get_type_hints(self.function)["return"]
+        return made
