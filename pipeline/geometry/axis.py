@@ -67,7 +67,7 @@ def frames_at(axis: PipeAxis, distance_mm: Float) -> tuple[Float, Float]:
 
 def from_pipe(axis: PipeAxis, distance_mm: Float, azimuth_rad: Float, radius_mm: Float) -> Float:
     """Return points (..., 3) in P of pipe coordinates (...), which are broadcast together."""
-    s, psi, r = np.broadcast_arrays(distance_mm, azimuth_rad, radius_mm)
+    _, psi, r = np.broadcast_arrays(distance_mm, azimuth_rad, radius_mm)
     origin, rotation = frames_at(axis, np.asarray(distance_mm, float))
     across = rotation[..., :, 0] * np.cos(psi)[..., None] + rotation[..., :, 1] * np.sin(psi)[..., None]
     return np.asarray(origin + r[..., None] * across)
