@@ -1,0 +1,46 @@
+"""Pipe coordinates there and back, on a straight and on a bent axis."""
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts import PipeAxis
+from pipeline.geometry.pipe_axis import axis_frame, pipe_coordinates, wall_points
+
+
+def arc_axis(curvature_per_mm: float) -> PipeAxis:
+    """Axis bending toward +x in the x-z plane, with a point each 5 mm from -50 to 300 mm."""
+    s = np.arange(-50.0, 301.0, 5.0)
+    turn = s * curvature_per_mm
+    if curvature_per_mm:
+        x, z = (1 - np.cos(turn)) / curvature_per_mm, np.sin(turn) / curvature_per_mm
+    else:
+        x, z = 0 * s, s
+    tangent = np.stack([np.sin(turn), 0 * s, np.cos(turn)], -1)
+    side = np.stack([np.cos(turn), 0 * s, -np.sin(turn)], -1)
+    up = np.stack([0 * s, 1 + 0 * s, 0 * s], -1)
+    return PipeAxis(s, np.stack([x, 0 * s, z], -1), np.stack([side, up, tangent], -1))
+
+
+@pytest.mark.parametrize("curvature", [0.0, 4e-4, 2e-3])
+def test_points_return_to_their_coordinates(curvature: float) -> None:
+    axis = arc_axis(curvature)
+    s, psi = np.meshgrid(np.linspace(-10, 250, 27), np.linspace(-3.1, 3.1, 31), indexing="ij")
+    r = 50 + np.sin(3 * psi)
+    got_s, got_psi, got_r = pipe_coordinates(axis, wall_points(axis, s, psi, r))
+    np.testing.assert_allclose(got_s, s, atol=1e-4)
+    np.testing.assert_allclose(got_psi, psi, atol=1e-6)
+    np.testing.assert_allclose(got_r, r, atol=1e-4)
+
+
+def test_straight_axis_is_cylindrical_coordinates() -> None:
+    p = wall_points(arc_axis(0.0), np.array(12.0), np.array(np.pi / 2), np.array(25.0))
+    np.testing.assert_allclose(p, [0, 25, 12], atol=1e-12)
+
+
+def test_frames_are_rotations_and_straight_beyond_the_ends() -> None:
+    origin, frame = axis_frame(arc_axis(2e-3), np.array([-200.0, -51.0, 7.3, 400.0]))
+    np.testing.assert_allclose(
+        frame @ np.swapaxes(frame, -1, -2), np.broadcast_to(np.eye(3), (4, 3, 3)), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(frame), 1)
+    assert np.linalg.norm(origin[0] - origin[1]) == pytest.approx(149.0, abs=0.01)
