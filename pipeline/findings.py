@@ -1,0 +1,168 @@
+"""What is found in a measured wall: sections and defects, as frozen dataclasses.
+
+Lengths mm, azimuths rad in the pipe frame P. Clock positions are hours in [0, 12), 12 o'clock at −y, clockwise
+looking forward: azimuth = 30° · clock − 90°.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+class DefectKind(StrEnum):
+    """What a defect looks like by its shape alone."""
+
+    PIT = "pit"
+    CORROSION = "corrosion"
+    GOUGE = "gouge"
+    CRACK = "crack"
+    DENT = "dent"
+    DEPOSIT = "deposit"
+    WELD = "weld"
+
+    @property
+    def is_metal_loss(self) -> bool:
+        """True where the kind takes wall away, so that a wall loss and a POF class have a meaning."""
+        return self in (DefectKind.PIT, DefectKind.CORROSION, DefectKind.GOUGE, DefectKind.CRACK)
+
+
+@dataclass(frozen=True)
+class Sections:
+    """Cross-sections at uniform stations; every measure comes with its 1 σ. NaN where too little was seen.
+
+    A calliper diameter is D(ψ) = r(ψ) + r(ψ + π) about the fitted centre, of the section's smooth shape.
+
+    Attributes
+    ----------
+    distance_mm : (K,)
+        Centre of the station's slab.
+    coverage : (K,)
+        Seen fraction of the slab's cells, 0 to 1.
+    mean_diameter_mm, min_diameter_mm, max_diameter_mm : (K,)
+        Mean, smallest and largest calliper diameter.
+    ovality_nominal : (K,)
+        (D_max − D_min) / D_nominal.
+    ovality_mean : (K,)
+        (D_max − D_min) / D_mean.
+    ovality_astm_f1216 : (K,)
+        Largest |D − D_mean| / D_mean (ASTM F1216, X1.2, as a fraction).
+    ovality_harmonic_mm : (K,)
+        Amplitude a₂ of the radius' second harmonic.
+    major_axis_rad : (K,)
+        Azimuth in [0, π) of the largest calliper diameter.
+    centre_x_mm, centre_y_mm : (K,)
+        Centre of the section relative to the wall's own axis.
+    *_sigma : (K,)
+        1 σ of each: random part of this station and the calibration's part, which all stations share.
+    """
+
+    distance_mm: Float
+    coverage: Float
+    mean_diameter_mm: Float
+    mean_diameter_sigma_mm: Float
+    min_diameter_mm: Float
+    min_diameter_sigma_mm: Float
+    max_diameter_mm: Float
+    max_diameter_sigma_mm: Float
+    ovality_nominal: Float
+    ovality_nominal_sigma: Float
+    ovality_mean: Float
+    ovality_mean_sigma: Float
+    ovality_astm_f1216: Float
+    ovality_astm_f1216_sigma: Float
+    ovality_harmonic_mm: Float
+    ovality_harmonic_sigma_mm: Float
+    major_axis_rad: Float
+    centre_x_mm: Float
+    centre_y_mm: Float
+    centre_sigma_mm: Float
+
+
+@dataclass(frozen=True)
+class Defect:
+    """One defect of the wall.
+
+    Attributes
+    ----------
+    id : int
+        Number in order of distance, from 1.
+    kind : str
+        A `DefectKind`.
+    distance_from_mm, distance_to_mm : float
+    clock_from, clock_to : float
+        Hours, clockwise from one to the other; 0 to 12 all round.
+    length_mm, width_mm : float
+        Extent along the pipe and around it.
+    depth_mm, depth_sigma_mm : float
+        Extreme deviation from the pipe's own smooth shape, positive into the wall, and its 1 σ.
+    wall_loss_percent : float
+        Depth over wall thickness for metal loss; NaN where it has no meaning or the thickness is unknown.
+    confidence : float
+        Probability that the defect is there and of this kind.
+    frames : (N,) int
+        Frames whose ring touched it.
+    outline : (V, 2)
+        Closed polygon of (distance mm, azimuth rad); azimuth runs on beyond ±π rather than jumping.
+    pof_class : str
+        Dimension class of POF 100 for metal loss, else empty.
+    pacp_suggestion, en13508_suggestion : str
+        Codes that an inspector may choose: suggestions from the shape, not a coded inspection.
+    statement : str
+        What it is and why it was called so, in words.
+    """
+
+    id: int
+    kind: str
+    distance_from_mm: float
+    distance_to_mm: float
+    clock_from: float
+    clock_to: float
+    length_mm: float
+    width_mm: float
+    depth_mm: float
+    depth_sigma_mm: float
+    wall_loss_percent: float
+    confidence: float
+    frames: Int
+    outline: Float
+    pof_class: str
+    pacp_suggestion: str
+    en13508_suggestion: str
+    statement: str
+
+
+@dataclass(frozen=True)
+class Defects:
+    """All defects in order of distance, and what the search could have found.
+
+    Attributes
+    ----------
+    items : tuple of Defect
+    false_alarm_rate : float
+        Expected number of false reports in this recording.
+    smallest_depth_mm : float
+        Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
+    """
+
+    items: tuple[Defect, ...]
+    false_alarm_rate: float
+    smallest_depth_mm: float
+
+
+def clock_of_azimuth(azimuth_rad: Float | float) -> Float:
+    """Return the clock position (...), hours in [0, 12), of azimuths (...) in P."""
+    hours = np.mod(np.degrees(np.asarray(azimuth_rad, float)) / 30 + 3, 12)
+    return np.asarray(np.where(hours >= 12, 0.0, hours))
+
+
+def azimuth_of_clock(clock_hours: Float | float) -> Float:
+    """Return azimuths (...), rad in [−π, π), of clock positions (...) in hours."""
+    degrees = 30 * np.asarray(clock_hours, float) - 90
+    return np.asarray(np.radians(np.mod(degrees + 180, 360) - 180))
