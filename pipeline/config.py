@@ -1,0 +1,204 @@
+"""The typed, strict configuration of a run: the parameters of every stage, and where they come from."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+
+from pipeline.errors import InputError
+from pipeline.stage import Parameters, Stage
+
+_COMMAND_LINE = "--set"
+_WIDTH = 110
+
+
+@dataclass(frozen=True)
+class StageConfiguration:
+    """The parameters of one stage."""
+
+    stage: str
+    parameters: Parameters
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """The parameters of every stage, in the order of the pipeline."""
+
+    stages: tuple[StageConfiguration, ...]
+
+    def of(self, stage: str) -> Parameters:
+        """Return the parameters of a stage."""
+        return next(s.parameters for s in self.stages if s.stage == stage)
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """One value that someone asked for, and where."""
+
+    origin: Path
+    place: str
+    value: Any
+
+
+def resolve(
+    stages: Sequence[Stage], file: Path | None = None, assignments: Sequence[str] = ()
+) -> Configuration:
+    """Return the configuration: defaults, overridden by ``file``, overridden by ``assignments``.
+
+    Parameters
+    ----------
+    stages
+        Whose parameters are asked for.
+    file
+        YAML: a mapping of stage names to mappings of parameter names to values.
+    assignments
+        ``stage.parameter=value`` each, the value in YAML.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, an unknown key (naming the nearest right one) or a value of the
+        wrong type or out of range.
+    """
+    settings = [*(_settings_of_file(file) if file else ()), *(_setting_of(a) for a in assignments)]
+    known = [f"{s.name}.{p}" for s in stages for p in s.parameters.model_fields]
+    for setting in settings:
+        _check_known(setting, known)
+    return Configuration(tuple(StageConfiguration(s.name, _parameters_of(s, settings)) for s in stages))
+
+
+def default_text(stages: Sequence[Stage]) -> str:
+    """Return the default configuration as commented YAML: meaning, unit and range of every parameter."""
+    head = "# Default configuration, made from the program: boresight config --default\n"
+    return head + "".join(f"\n{_stage_text(s)}" for s in stages)
+
+
+def resolved_text(configuration: Configuration) -> str:
+    """Return a configuration as plain YAML."""
+    tree = {s.stage: s.parameters.model_dump(mode="json") for s in configuration.stages}
+    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+
+
+def _settings_of_file(file: Path) -> Iterator[_Setting]:
+    tree = _load(file)
+    for stage, content in tree.items():
+        if not isinstance(content, Mapping):
+            raise InputError(
+                file,
+                f"{content!r} where parameters of a stage belong",
+                place=str(stage),
+                expected="stage: {parameter: value}",
+                hint="see boresight config --default",
+            )
+        yield from (_Setting(file, f"{stage}.{name}", value) for name, value in content.items())
+
+
+def _load(file: Path) -> Mapping[str, Any]:
+    try:
+        tree = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(file, f"cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(file, "is not UTF-8 text", expected="a YAML file") from error
+    except yaml.YAMLError as error:
+        raise InputError(file, f"is not YAML: {error}") from error
+    if tree is None:
+        return {}
+    if not isinstance(tree, Mapping):
+        raise InputError(file, "holds no mapping", expected="stage: {parameter: value}")
+    return tree
+
+
+def _setting_of(assignment: str) -> _Setting:
+    place, equals, text = assignment.partition("=")
+    if not equals or "." not in place:
+        raise InputError(
+            _COMMAND_LINE, f"{assignment!r} is no assignment", expected="stage.parameter=value"
+        )
+    try:
+        return _Setting(Path(_COMMAND_LINE), place.strip(), yaml.safe_load(text))
+    except yaml.YAMLError as error:
+        raise InputError(_COMMAND_LINE, f"{text!r} is no value", place=place) from error
+
+
+def _check_known(setting: _Setting, known: Sequence[str]) -> None:
+    if setting.place in known:
+        return
+    nearest = difflib.get_close_matches(setting.place, known, n=1, cutoff=0.0)
+    raise InputError(
+        setting.origin,
+        "unknown key",
+        place=setting.place,
+        hint=f"did you mean {nearest[0]}? All keys: boresight config" if nearest else "",
+    )
+
+
+def _parameters_of(stage: Stage, settings: Sequence[_Setting]) -> Parameters:
+    mine = {s.place.partition(".")[2]: s for s in settings if s.place.partition(".")[0] == stage.name}
+    try:
+        # By way of JSON: strict, yet a YAML list may become a tuple and a word an enumeration member.
+        return stage.parameters.model_validate_json(
+            json.dumps({name: _number(s.value) for name, s in mine.items()}, default=str)
+        )
+    except ValidationError as error:
+        raise _refusal(stage, mine, error) from error
+
+
+def _number(value: Any) -> Any:
+    """Return the number that YAML 1.1 takes for a word, such as 1e-3; anything else unchanged."""
+    if isinstance(value, str):
+        try:
+            return float(value)
+        except ValueError:
+            return value
+    return value
+
+
+def _refusal(stage: Stage, mine: Mapping[str, _Setting], error: ValidationError) -> InputError:
+    first = error.errors(include_url=False)[0]
+    name = str(first["loc"][0]) if first["loc"] else ""
+    origin = mine[name].origin if name in mine else Path(_COMMAND_LINE)
+    field = stage.parameters.model_fields.get(name)
+    return InputError(
+        origin,
+        f"{first['msg']}, not {mine[name].value!r}" if name in mine else first["msg"],
+        place=f"{stage.name}.{name}" if name else stage.name,
+        expected=_meaning(field) if field else "",
+    )
+
+
+def _stage_text(stage: Stage) -> str:
+    head = _comment(stage.summary, "") + f"{stage.name}:"
+    model = stage.parameters()
+    lines = [_field_text(n, f, model) for n, f in stage.parameters.model_fields.items()]
+    return f"{head}\n{''.join(lines)}" if lines else f"{head} {{}}\n"
+
+
+def _field_text(name: str, field: FieldInfo, model: Parameters) -> str:
+    value = model.model_dump(mode="json")[name]
+    text = yaml.safe_dump({name: value}, default_flow_style=None, allow_unicode=True, width=1000)
+    return _comment(_meaning(field), "  ") + f"  {text}"
+
+
+def _meaning(field: FieldInfo) -> str:
+    limits = [
+        f"{word} {getattr(m, name)}"
+        for m in field.metadata
+        for name, word in (("ge", "from"), ("gt", "above"), ("le", "to"), ("lt", "below"))
+        if hasattr(m, name)
+    ]
+    return "; ".join(p for p in (field.description or "", " ".join(limits)) if p)
+
+
+def _comment(text: str, indent: str) -> str:
+    lines = textwrap.wrap(text, _WIDTH - len(indent) - 2)
+    return "".join(f"{indent}# {line}\n" for line in lines)

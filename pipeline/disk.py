@@ -1,0 +1,126 @@
+"""Writing so that a power cut leaves the old file or the new one, never half of either."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from pipeline.codec import Json
+from pipeline.errors import InputError
+
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class FileRecord:
+    """Size and SHA-256 by which a file is known to be whole."""
+
+    bytes: int
+    sha256: str
+
+    def matches(self, path: Path) -> bool:
+        """Return whether the file at ``path`` is there and has this size and content."""
+        return self.has_size_of(path) and record_of(path) == self
+
+    def has_size_of(self, path: Path) -> bool:
+        """Return whether the file at ``path`` is there and has this size: quick, for big files."""
+        return path.is_file() and path.stat().st_size == self.bytes
+
+
+class HashingWriter:
+    """A binary stream that passes everything on and keeps count and hash of it."""
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self._stream, self._hash, self._bytes = stream, hashlib.sha256(), 0
+
+    def write(self, data: Any) -> int:
+        """Write ``data``, any bytes-like object."""
+        self._hash.update(data)
+        self._bytes += memoryview(data).nbytes
+        return self._stream.write(data)
+
+    def record(self) -> FileRecord:
+        """Return size and hash of what was written so far."""
+        return FileRecord(self._bytes, self._hash.hexdigest())
+
+
+def record_of(path: Path) -> FileRecord:
+    """Return size and hash of a file."""
+    total, size = hashlib.sha256(), 0
+    with path.open("rb") as stream:
+        while chunk := stream.read(_CHUNK):
+            total.update(chunk)
+            size += len(chunk)
+    return FileRecord(size, total.hexdigest())
+
+
+def write_synced(path: Path, fill: Callable[[HashingWriter], object]) -> FileRecord:
+    """Let ``fill`` write the file, force it to the disk, return its record."""
+    with path.open("wb") as stream:
+        writer = HashingWriter(stream)
+        fill(writer)
+        stream.flush()
+        os.fsync(stream.fileno())
+    return writer.record()
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Replace a text file at one stroke."""
+    temporary = path.with_name(f".{path.name}.new")
+    write_synced(temporary, lambda w: w.write(text.encode()))
+    temporary.replace(path)
+    sync_folder(path.parent)
+
+
+def replace_json(path: Path, tree: Json) -> None:
+    """Replace a JSON file at one stroke."""
+    replace_text(path, json.dumps(tree, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def sync_folder(folder: Path) -> None:
+    """Force a folder's entries to the disk."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def sync_tree(folder: Path) -> None:
+    """Force every file and folder below ``folder`` to the disk."""
+    for path in sorted(folder.rglob("*")):
+        if path.is_dir():
+            sync_folder(path)
+        else:
+            with path.open("rb") as stream:
+                os.fsync(stream.fileno())
+    sync_folder(folder)
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder with all below it, if it is there."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+@contextmanager
+def disk_errors_named(folder: Path) -> Iterator[None]:
+    """Turn the operating system's refusals into an `InputError` about ``folder``."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            folder,
+            f"cannot be written: {error.strerror or error}",
+            expected="a folder that can be written, on a disk with room",
+            hint="free space or give another folder with -o; the same command then continues",
+        ) from error

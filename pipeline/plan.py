@@ -1,0 +1,119 @@
+"""The plan of a run: stages wired by the types of their arguments, and the key of every result."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pipeline.codec import Json, canonical
+from pipeline.config import Configuration
+from pipeline.errors import BoresightError
+from pipeline.stage import Parameters, Stage
+
+
+class PipelineError(BoresightError):
+    """Stages that do not fit together; found before anything runs."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Something the run starts from.
+
+    Attributes
+    ----------
+    kind
+        The class by which stages ask for it.
+    value
+        The thing itself.
+    key
+        Hash of its content.
+    """
+
+    kind: type
+    value: object
+    key: str
+
+
+@dataclass(frozen=True)
+class Step:
+    """A stage with its parameters, the classes of its arguments by name, and the key of its result."""
+
+    stage: Stage
+    parameters: Parameters
+    inputs: tuple[tuple[str, type], ...]
+    output: type
+    key: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run starts from and its steps, in an order that works."""
+
+    sources: tuple[Source, ...]
+    steps: tuple[Step, ...]
+
+    def step(self, name: str) -> Step:
+        """Return the step of a stage.
+
+        Raises
+        ------
+        PipelineError
+            When there is no such stage.
+        """
+        for step in self.steps:
+            if step.stage.name == name:
+                return step
+        raise PipelineError(f"no stage {name}; there are {', '.join(s.stage.name for s in self.steps)}")
+
+    def maker(self, kind: type) -> Step | None:
+        """Return the step that makes artefacts of class ``kind``, None for a source."""
+        return next((s for s in self.steps if s.output is kind), None)
+
+    def keys(self) -> dict[type, str]:
+        """Return the key of every source and result by its class."""
+        return {s.kind: s.key for s in self.sources} | {s.output: s.key for s in self.steps}
+
+
+def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Sequence[Source]) -> Plan:
+    """Wire the stages and derive their keys.
+
+    The key of a result is a hash of stage name, version, parameters and the keys of its inputs.
+
+    Raises
+    ------
+    PipelineError
+        When a stage asks for what no earlier stage makes, or two make the same.
+    """
+    keys = {s.kind: s.key for s in sources}
+    steps: list[Step] = []
+    for stage in stages:
+        _check_wiring(stage, keys, stages)
+        parameters = configuration.of(stage.name)
+        key = _key(stage, parameters, keys)
+        steps.append(Step(stage, parameters, tuple(stage.inputs().items()), stage.output(), key))
+        keys[stage.output()] = key
+    return Plan(tuple(sources), tuple(steps))
+
+
+def _check_wiring(stage: Stage, made: Mapping[type, str], stages: Sequence[Stage]) -> None:
+    if [s.name for s in stages].count(stage.name) > 1:
+        raise PipelineError(f"two stages are named {stage.name}")
+    if stage.output() in made:
+        raise PipelineError(f"stage {stage.name} makes {stage.output().__name__}, which is there already")
+    for kind in stage.inputs().values():
+        if kind not in made:
+            makers = [s.name for s in stages if s.output() is kind]
+            why = f"stage {makers[0]}, which must come before, makes it" if makers else "no stage makes it"
+            raise PipelineError(f"stage {stage.name} needs {kind.__name__}: {why}")
+
+
+def _key(stage: Stage, parameters: Parameters, keys: Mapping[type, str]) -> str:
+    inputs: dict[str, Json] = {name: keys[kind] for name, kind in stage.inputs().items()}
+    content: Json = {
+        "stage": stage.name,
+        "version": stage.version,
+        "parameters": parameters.model_dump(mode="json"),
+        "inputs": inputs,
+    }
+    return hashlib.sha256(canonical(content)).hexdigest()
