@@ -1,0 +1,221 @@
+"""probe.yaml: what is stated or was measured of the instrument, and its covariance."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from pipeline.errors import InputError
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Lighting, Probe, Shutter
+from pipeline.instrument.stated_uncertainty import (
+    UNCERTAINTY_KEYS,
+    covariance_from_stated,
+    stated_from_covariance,
+)
+from pipeline.yaml_file import Section, read_yaml
+
+Float = NDArray[np.float64]
+_KEYS = (
+    "camera", "laser", "shutter", "lighting", "standard_uncertainty", "covariance", "calibrated_from",
+)  # fmt: skip
+_CAMERA_KEYS = ("model", "image_size", "focal_px", "centre_px", "distortion")
+_LASER_KEYS = (
+    "baseline_mm", "opening_angle_deg", "tilt_deg", "tilt_direction_deg", "line_sigma_mm", "wavelength_nm",
+    "decentre_mm", "decentre_direction_deg", "waviness_rad",
+)  # fmt: skip
+_WAVES = len(LaserSheet(1.0).waviness)
+
+
+def read_probe(file: Path) -> Probe:
+    """Read a probe file, stated or calibrated.
+
+    Raises
+    ------
+    InputError
+        At the key that is missing, mistyped, not finite or out of range.
+    """
+    document = read_yaml(file)
+    document.refuse_unknown(_KEYS)
+    camera, laser = _camera(document.section("camera")), _laser(document.section("laser"))
+    names = (*camera.parameter_names, *LaserSheet.PARAMETER_NAMES)
+    stated = _optional(document, "standard_uncertainty")
+    stated.refuse_unknown(UNCERTAINTY_KEYS)
+    if document.has("covariance"):
+        covariance = _covariance(document.section("covariance"), names)
+    else:
+        covariance = covariance_from_stated(stated, names)
+    return Probe(
+        camera, laser, covariance,
+        shutter=_shutter(_optional(document, "shutter")),
+        lighting=_lighting(_optional(document, "lighting")),
+        encoder_scale_sigma=stated.number("encoder_scale", least=0) if stated.has("encoder_scale") else 0.002,
+        calibrated_from=document.text("calibrated_from") if document.has("calibrated_from") else "",
+    )  # fmt: skip
+
+
+def write_probe(probe: Probe, path: Path) -> None:
+    """Write a probe file; `read_probe` returns the same probe, its covariance bit for bit."""
+    document: dict[str, object] = {
+        "camera": _camera_mapping(probe.camera),
+        "laser": _laser_mapping(probe.laser),
+        "shutter": {
+            "kind": probe.shutter.kind,
+            "exposure_s": probe.shutter.exposure_s,
+            "readout_s": probe.shutter.readout_s,
+        },
+        "lighting": {
+            "kind": probe.lighting.kind,
+            "leds": probe.lighting.leds,
+            "radius_mm": probe.lighting.radius_mm,
+            "z_mm": probe.lighting.z_mm,
+        },
+        "standard_uncertainty": stated_from_covariance(probe),
+        "covariance": {"names": list(probe.parameter_names), "matrix": probe.covariance.tolist()},
+    }
+    if probe.calibrated_from:
+        document["calibrated_from"] = probe.calibrated_from
+    path.write_text(yaml.safe_dump(document, sort_keys=False, width=1000), "utf-8")
+
+
+def _optional(document: Section, key: str) -> Section:
+    """Return the section below a key, empty when it is absent."""
+    return document.section(key) if document.has(key) else Section(document.file, {}, key)
+
+
+def _camera(section: Section) -> Camera:
+    section.choice("model", ("kannala_brandt",))
+    section.refuse_unknown(_CAMERA_KEYS)
+    width, height = section.numbers("image_size", 2, least=1)
+    fx, fy = section.numbers("focal_px", 2, least=1e-3)
+    cx, cy = section.numbers("centre_px", 2)
+    k1, k2, k3, k4 = section.numbers("distortion", 4)
+    return KannalaBrandt((int(width), int(height)), (fx, fy), (cx, cy), (k1, k2, k3, k4))
+
+
+def _camera_mapping(camera: Camera) -> dict[str, object]:
+    fx, fy, cx, cy, *distortion = camera.parameters.tolist()
+    return {
+        "model": camera.model,
+        "image_size": list(camera.image_size),
+        "focal_px": [fx, fy],
+        "centre_px": [cx, cy],
+        "distortion": distortion,
+    }
+
+
+def _laser(section: Section) -> LaserSheet:
+    section.refuse_unknown(_LASER_KEYS)
+    opening = section.number("opening_angle_deg", above=90)
+    if opening >= 270:
+        raise section.fail("opening_angle_deg", f"is {opening}", "an angle between 90 and 270 degrees")
+    tilt_x, tilt_y = _polar(section, "tilt_deg", "tilt_direction_deg")
+    decentre_x, decentre_y = _polar(section, "decentre_mm", "decentre_direction_deg")
+    return LaserSheet(
+        baseline_mm=section.number("baseline_mm", above=0),
+        tilt_x=tilt_x,
+        tilt_y=tilt_y,
+        cone_rad=math.radians((180 - opening) / 2),
+        decentre_x_mm=decentre_x,
+        decentre_y_mm=decentre_y,
+        waviness=section.numbers("waviness_rad", _WAVES) if section.has("waviness_rad") else (0.0,) * _WAVES,
+        line_sigma_mm=section.number("line_sigma_mm", above=0),
+        wavelength_nm=section.number("wavelength_nm", above=0),
+    )
+
+
+def _polar(section: Section, size_key: str, direction_key: str) -> tuple[float, float]:
+    """Return the x and y parts of a size and a direction; an angle of tilt becomes a slope."""
+    if not section.has(size_key) and size_key != "tilt_deg":
+        return 0.0, 0.0
+    size = section.number(size_key)
+    if size_key == "tilt_deg":
+        if abs(size) >= 45:
+            raise section.fail(size_key, f"is {size}", "an angle between -45 and 45 degrees")
+        size = math.tan(math.radians(size))
+    direction = math.radians(section.number(direction_key)) if size else 0.0
+    return size * math.cos(direction), size * math.sin(direction)
+
+
+def _laser_mapping(laser: LaserSheet) -> dict[str, object]:
+    return {
+        "baseline_mm": laser.baseline_mm,
+        "opening_angle_deg": 180 - 2 * math.degrees(laser.cone_rad),
+        "tilt_deg": math.degrees(math.atan(math.hypot(laser.tilt_x, laser.tilt_y))),
+        "tilt_direction_deg": math.degrees(math.atan2(laser.tilt_y, laser.tilt_x)),
+        "decentre_mm": math.hypot(laser.decentre_x_mm, laser.decentre_y_mm),
+        "decentre_direction_deg": math.degrees(math.atan2(laser.decentre_y_mm, laser.decentre_x_mm)),
+        "waviness_rad": list(laser.waviness),
+        "line_sigma_mm": laser.line_sigma_mm,
+        "wavelength_nm": laser.wavelength_nm,
+    }
+
+
+def _shutter(section: Section) -> Shutter:
+    section.refuse_unknown(("kind", "exposure_s", "readout_s"))
+    usual = Shutter()
+    return Shutter(
+        section.choice("kind", ("global", "rolling")) if section.has("kind") else usual.kind,
+        section.number("exposure_s", above=0) if section.has("exposure_s") else usual.exposure_s,
+        section.number("readout_s", least=0) if section.has("readout_s") else usual.readout_s,
+    )
+
+
+def _lighting(section: Section) -> Lighting:
+    section.refuse_unknown(("kind", "leds", "radius_mm", "z_mm"))
+    usual = Lighting()
+    return Lighting(
+        section.choice("kind", ("led_ring",)) if section.has("kind") else usual.kind,
+        section.integer("leds", least=1) if section.has("leds") else usual.leds,
+        section.number("radius_mm", least=0) if section.has("radius_mm") else usual.radius_mm,
+        section.number("z_mm") if section.has("z_mm") else usual.z_mm,
+    )
+
+
+def _covariance(section: Section, names: tuple[str, ...]) -> Float:
+    """Return the covariance in the order of ``names``; a parameter that is not listed is held exact."""
+    section.refuse_unknown(("names", "matrix"))
+    listed = section.require("names", "a list of parameter names")
+    if not isinstance(listed, list) or len(set(map(str, listed))) != len(listed):
+        raise section.fail("names", "is not a list of different names", ", ".join(names))
+    unknown = [str(n) for n in listed if n not in names]
+    if unknown:
+        raise section.fail("names", f"names {unknown[0]!r}", f"among {', '.join(names)}")
+    try:
+        stated = np.array(section.require("matrix", "rows of numbers"), float)
+    except (TypeError, ValueError) as error:
+        raise section.fail("matrix", f"is not a table of numbers ({error})") from error
+    _refuse_improper(section, stated, len(listed))
+    place = [names.index(n) for n in listed]
+    full = np.zeros((len(names), len(names)))
+    full[np.ix_(place, place)] = stated
+    return full
+
+
+def _refuse_improper(section: Section, matrix: Float, size: int) -> None:
+    expected = f"a symmetric, positive semi-definite {size} x {size} matrix"
+    if matrix.shape != (size, size):
+        raise section.fail("matrix", f"has the shape {matrix.shape}", expected)
+    if not np.all(np.isfinite(matrix)) or np.any(np.diag(matrix) < 0):
+        raise section.fail("matrix", "holds values that are not finite, or negative variances", expected)
+    sigma = np.sqrt(np.diag(matrix))
+    scaled = matrix / np.where(sigma > 0, sigma, 1)[:, None] / np.where(sigma > 0, sigma, 1)
+    if not np.allclose(scaled, scaled.T, atol=1e-9) or np.linalg.eigvalsh(scaled)[:1].min(initial=0) < -1e-6:
+        raise section.fail("matrix", "is not a covariance", expected)
+
+
+def check_image_size(image_size: tuple[int, int], probe: Probe, file: Path) -> None:
+    """Raise `InputError` when images are not of the size that the probe's camera was calibrated for."""
+    if tuple(image_size) != tuple(probe.camera.image_size):
+        raise InputError(
+            file,
+            f"the images are {image_size[0]} x {image_size[1]} pixels",
+            expected="{} x {} as the probe's camera says".format(*probe.camera.image_size),
+            hint="give the probe file of this camera and this resolution with --probe",
+        )

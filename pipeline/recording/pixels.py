@@ -1,0 +1,56 @@
+"""Grey and colour planes of decoded frames."""
+
+from __future__ import annotations
+
+import av
+import cv2
+import numpy as np
+from av.video.reformatter import ColorRange, Colorspace
+
+from pipeline.recording.base import Image, Planes
+
+_PLANAR_LUMA = ("yuv", "gray", "nv12", "nv21")
+# Luma weights (red, blue) of ITU-R BT.601 and BT.709; swscale takes 601 where a stream names none.
+_WEIGHTS = {Colorspace.ITU709: (0.2126, 0.0722)}
+_BT601 = (0.299, 0.114)
+
+
+def pixels(frame: av.VideoFrame, planes: Planes) -> Image:
+    """Return a frame's luma as coded (H, W), or its colours (H, W, 3) in OpenCV's order.
+
+    Luma is not stretched: in a video of limited range, black is 16 and white 235.
+    """
+    if planes == "grey":
+        return _luma(frame)
+    return (
+        _bgr_444(frame) if frame.format.name in ("yuv444p", "yuvj444p") else frame.to_ndarray(format="bgr24")
+    )
+
+
+def _luma(frame: av.VideoFrame) -> Image:
+    name = frame.format.name
+    if name.startswith(_PLANAR_LUMA) and frame.format.components[0].bits == 8 and "yuyv" not in name:
+        return _plane(frame.planes[0])
+    return frame.to_ndarray(format="gray")
+
+
+def _plane(plane: av.video.plane.VideoPlane) -> Image:
+    """Return a view (H, W) of a plane of bytes, without its padding; keeps the frame's memory alive."""
+    return np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)[:, : plane.width]
+
+
+def _bgr_444(frame: av.VideoFrame) -> Image:
+    """Convert full-resolution chroma by one matrix, as swscale does, in a fifth of its time."""
+    full = frame.color_range == ColorRange.JPEG or frame.format.name == "yuvj444p"
+    yuv = cv2.merge([_plane(p) for p in frame.planes])
+    return np.asarray(cv2.transform(yuv, _yuv_to_bgr(frame.colorspace, full)), np.uint8)
+
+
+def _yuv_to_bgr(colorspace: int, full: bool) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Return the (3, 4) matrix from Y, U, V, 1 to B, G, R (ITU-R BT.601-7 and BT.709-6)."""
+    red, blue = _WEIGHTS.get(colorspace, _BT601)  # type: ignore[call-overload]
+    green = 1 - red - blue
+    luma, chroma, black = (1.0, 1.0, 0.0) if full else (255 / 219, 255 / 224, 16.0)
+    u, v = 2 * (1 - blue) * chroma, 2 * (1 - red) * chroma
+    matrix = np.array([[luma, u, 0], [luma, -u * blue / green, -v * red / green], [luma, 0, v]])
+    return np.column_stack([matrix, -matrix @ [black, 128, 128]])

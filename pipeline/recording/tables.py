@@ -1,0 +1,134 @@
+"""frames.csv and encoder.csv."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.errors import InputError
+from pipeline.recording.base import Encoder, FrameTable, Illumination
+
+FRAME_COLUMNS = ("frame", "time_s", "illumination")
+ENCODER_COLUMNS = ("time_s", "distance_mm")
+_KINDS = tuple(k.value for k in Illumination)
+
+
+def read_frame_table(file: Path) -> FrameTable:
+    """Read ``frame,time_s,illumination``; frame numbers and times must rise.
+
+    Raises
+    ------
+    InputError
+        With the line of what is missing, mistyped, not finite or out of order.
+    """
+    frame, time_s, illumination = [], [], []
+    for line, (number, time, light) in _rows(file, FRAME_COLUMNS):
+        frame.append(_whole(file, line, "frame", number))
+        time_s.append(_finite(file, line, "time_s", time))
+        illumination.append(_light(file, line, light))
+    if not frame:
+        raise InputError(file, "lists no frames", expected="one line a frame")
+    _refuse_backward(file, frame, "frame", strictly=True)
+    _refuse_backward(file, time_s, "time_s", strictly=True)
+    return FrameTable(np.array(frame, np.int64), np.array(time_s), np.array(illumination, np.str_))
+
+
+def read_encoder(file: Path) -> Encoder:
+    """Read ``time_s,distance_mm``; times must not run backwards.
+
+    Raises
+    ------
+    InputError
+        As `read_frame_table`; also with fewer than two lines.
+    """
+    rows = [
+        (_finite(file, line, "time_s", time), _finite(file, line, "distance_mm", distance))
+        for line, (time, distance) in _rows(file, ENCODER_COLUMNS)
+    ]
+    if len(rows) < 2:
+        raise InputError(
+            file, f"has {len(rows)} readings", expected="at least 2",
+            hint="take the key encoder out of recording.yaml to run without one",
+        )  # fmt: skip
+    table = np.array(rows)
+    _refuse_backward(file, table[:, 0].tolist(), "time_s", strictly=False)
+    return Encoder(table[:, 0], table[:, 1])
+
+
+def _rows(file: Path, columns: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield (line number, cells in the order of ``columns``)."""
+    try:
+        text = file.read_text("utf-8-sig")
+    except OSError as error:
+        raise InputError(file, f"cannot be read ({error.strerror})", expected=",".join(columns)) from error
+    except UnicodeDecodeError as error:
+        raise InputError(file, "is not UTF-8 text", expected=",".join(columns)) from error
+    rows = csv.reader(io.StringIO(text, newline=""))
+    try:
+        header = [h.strip() for h in next(rows, [])]
+        order = [_column(file, header, c) for c in columns]
+        for cells in rows:
+            if not any(c.strip() for c in cells):
+                continue
+            if len(cells) != len(header):
+                raise InputError(
+                    file, f"has {len(cells)} cells", place=f"line {rows.line_num}",
+                    expected=f"{len(header)} as in the first line",
+                    hint="the file may have been cut off while it was written",
+                )  # fmt: skip
+            yield rows.line_num, [cells[i].strip() for i in order]
+    except csv.Error as error:
+        raise InputError(file, f"is not a CSV file: {error}", place=f"line {rows.line_num}") from error
+
+
+def _column(file: Path, header: list[str], name: str) -> int:
+    if name in header:
+        return header.index(name)
+    near = difflib.get_close_matches(name, header, 1)
+    raise InputError(
+        file, f"has no column {name}", place="line 1", expected="a first line that names the columns",
+        hint=f"is {near[0]} meant?" if near else f"the first line is {','.join(header)[:80]!r}",
+    )  # fmt: skip
+
+
+def _finite(file: Path, line: int, name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(file, f"{name} is {text!r}", place=f"line {line}", expected="a finite number")
+    return value
+
+
+def _whole(file: Path, line: int, name: str, text: str) -> int:
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise InputError(file, f"{name} is {text!r}", place=f"line {line}", expected="a whole number from 0")
+    return int(text)
+
+
+def _light(file: Path, line: int, text: str) -> str:
+    if text not in _KINDS:
+        near = difflib.get_close_matches(text, _KINDS, 1)
+        raise InputError(
+            file, f"illumination is {text!r}", place=f"line {line}", expected=f"one of {', '.join(_KINDS)}",
+            hint=f"did you mean {near[0]}?" if near else "",
+        )  # fmt: skip
+    return text
+
+
+def _refuse_backward(file: Path, values: Sequence[float], name: str, *, strictly: bool) -> None:
+    for i in range(1, len(values)):
+        step = values[i] - values[i - 1]
+        if step < 0 or (strictly and step == 0):
+            raise InputError(
+                file, f"{name} goes from {values[i - 1]:g} to {values[i]:g}", place=f"reading {i + 1}",
+                expected=f"{name} that only rises",
+                hint="sort out what the recorder's clock did, or cut the file there",
+            )  # fmt: skip
