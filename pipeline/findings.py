@@ -1,7 +1,7 @@
 """What is found in a measured wall: sections and defects, as frozen dataclasses.
 
-Lengths mm, azimuths rad in the pipe frame P. Clock positions are hours in [0, 12), 12 o'clock at −y, clockwise
-looking forward: azimuth = 30° · clock − 90°.
+Lengths mm, azimuths rad in the pipe frame P. Clock positions are hours in [0, 12), 12 o'clock at −y,
+clockwise looking forward: azimuth = 30° · clock − 90°.
 """
 
 from __future__ import annotations

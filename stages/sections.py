@@ -1,0 +1,197 @@
+"""Wall to cross-sections: diameters, ovality under each named definition, centre, each with its 1 σ.
+
+A station's slab is averaged along the pipe, its shape is a truncated Fourier series about the fitted centre,
+and calliper diameters are read from that series: extremes of raw samples would grow with the noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from pipeline.artefacts import RadiusMap, Wall
+from pipeline.errors import UnusableError
+from pipeline.findings import Sections
+from pipeline.recording.base import Recording
+from pipeline.stage import Context, Parameters, Stage
+
+Float = NDArray[np.float64]
+
+_DIRECTIONS: Float = np.linspace(0, np.pi, 360, endpoint=False)
+
+
+class SectionParameters(Parameters):
+    """Parameters of the sections."""
+
+    spacing_mm: float = Field(
+        5.0, ge=0.5, le=1000.0, description="distance between stations and length of each slab, mm"
+    )
+    harmonics: int = Field(
+        6, ge=2, le=24, description="highest harmonic of the section's smooth shape, even, dimensionless"
+    )
+    min_coverage: float = Field(
+        0.6, ge=0.1, le=1.0, description="least seen fraction of the azimuths for a section to be measured"
+    )
+
+
+@dataclass(frozen=True)
+class _Slab:
+    """Mean radius (A,), its noise variance (A,), calibration variance and seen fraction of a station."""
+
+    radius_mm: Float
+    variance_mm2: Float
+    calibration_mm2: float
+    coverage: float
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """Fourier coefficients (mean; cos m, sin m …) about ``centre`` and their random covariance."""
+
+    centre: Float
+    coefficients: Float
+    covariance: Float
+
+
+def measure_sections(
+    recording: Recording, wall: Wall, parameters: SectionParameters, context: Context
+) -> Sections:
+    """Measure the cross-section at every station.
+
+    Raises
+    ------
+    UnusableError
+        When no radius was measured at all.
+    """
+    radius_map = wall.radius_map
+    if not np.isfinite(radius_map.radius_mm).any():
+        raise UnusableError("sections", "the wall has no measured radius", hint="look at the rings stage")
+    stations = _stations(radius_map.distance_mm, parameters.spacing_mm)
+    rows = []
+    for k, station in enumerate(stations):
+        slab = _slab(radius_map, station, parameters.spacing_mm)
+        if np.isfinite(slab.radius_mm).mean() >= parameters.min_coverage:
+            shape = _fit_shape(radius_map.azimuth_rad, slab, parameters.harmonics)
+            rows.append(_measures(station, slab, shape, recording.pipe.nominal_diameter_mm))
+        else:
+            rows.append(_unmeasured(station, slab.coverage))
+        context.progress(k + 1, len(stations))
+    table = np.array(rows)
+    context.report("sections measured", int(np.isfinite(table[:, 2]).sum()), "stations")
+    context.report("rejected: coverage too low", int(np.isnan(table[:, 2]).sum()), "stations")
+    return Sections(*table.T)
+
+
+def _stations(distance_mm: Float, spacing_mm: float) -> Float:
+    """Return the centres (K,) of slabs on a grid that is anchored at distance 0."""
+    first, last = distance_mm[0] / spacing_mm, distance_mm[-1] / spacing_mm
+    centres = (np.arange(np.floor(first), np.ceil(last) + 1) + 0.5) * spacing_mm
+    inside = (centres > distance_mm[0]) & (centres < distance_mm[-1])
+    return np.asarray(centres[inside] if inside.any() else np.array([distance_mm.mean()]))
+
+
+def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
+    step = float(np.diff(radius_map.distance_mm[:2])[0]) if len(radius_map.distance_mm) > 1 else spacing_mm
+    half = max(spacing_mm, step) / 2
+    rows = (radius_map.distance_mm >= station - half) & (radius_map.distance_mm < station + half)
+    radius = radius_map.radius_mm[rows].astype(float)
+    random = radius_map.sigma_random_mm[rows].astype(float) ** 2
+    total = radius_map.sigma_mm[rows].astype(float) ** 2
+    seen = np.isfinite(radius) & np.isfinite(random)
+    count = seen.sum(0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(seen, radius, 0).sum(0) / count
+        variance = np.where(seen, random, 0).sum(0) / count**2
+    excess = np.maximum(total - random, 0)[seen]
+    calibration = float(excess.mean()) if excess.size else np.nan
+    return _Slab(mean, variance, calibration, float(seen.mean()))
+
+
+def _basis(azimuth_rad: Float, harmonics: int) -> Float:
+    """Return the Fourier basis (N, 1 + 2 harmonics)."""
+    waves = [f(m * azimuth_rad) for m in range(1, harmonics + 1) for f in (np.cos, np.sin)]
+    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
+
+
+def _fit_shape(azimuth_rad: Float, slab: _Slab, harmonics: int) -> _Shape:
+    """Fit the series about the centre at which its first harmonic vanishes."""
+    seen = np.isfinite(slab.radius_mm)
+    psi, radius = azimuth_rad[seen], slab.radius_mm[seen]
+    centre = np.zeros(2)
+    for _ in range(4):
+        xy = radius[:, None] * np.stack([np.cos(psi), np.sin(psi)], -1) - centre
+        about = np.hypot(*xy.T)
+        basis = _basis(np.arctan2(xy[:, 1], xy[:, 0]), harmonics)
+        coefficients = np.linalg.lstsq(basis, about, rcond=None)[0]
+        centre = centre + coefficients[1:3]
+    residual = np.full(len(azimuth_rad), np.nan)
+    residual[seen] = about - basis @ coefficients
+    spread = max(float(np.var(residual[seen])), float(slab.variance_mm2[seen].mean()))
+    covariance = np.asarray(spread * _correlation_length(residual) * np.linalg.inv(basis.T @ basis), float)
+    return _Shape(centre, np.asarray(coefficients, float), covariance)
+
+
+def _correlation_length(residual: Float) -> float:
+    """Return how many neighbouring samples share one independent value: 1 + 2 Σ ρ_k up to its first zero."""
+    filled = np.nan_to_num(residual)
+    power = np.abs(np.fft.rfft(filled)) ** 2
+    rho = np.fft.irfft(power, len(filled))
+    if rho[0] <= 0:
+        return 1.0
+    rho = rho[1 : len(rho) // 4] / rho[0]
+    negative = np.flatnonzero(rho <= 0)
+    return float(1 + 2 * rho[: negative[0] if negative.size else None].sum())
+
+
+def _measures(station: float, slab: _Slab, shape: _Shape, nominal_mm: float) -> Float:
+    """Return one row of `Sections`, in the order of its fields."""
+    theta, cov = shape.coefficients, shape.covariance
+    calibration = 2 * np.sqrt(slab.calibration_mm2)
+    calliper = _calliper_basis((len(theta) - 1) // 2)
+    diameter = calliper @ theta
+    high, low = calliper[np.argmax(diameter)], calliper[np.argmin(diameter)]
+    middle = calliper.mean(0)
+    mean, most, least = middle @ theta, high @ theta, low @ theta
+    far = max((high, low), key=lambda g: abs(float((g - middle) @ theta)))
+    span, reach = (high - low) @ theta, abs(float((far - middle) @ theta))
+    amplitude = float(np.hypot(*theta[3:5]))
+    direction = np.zeros(len(theta))
+    direction[3:5] = theta[3:5] / amplitude if amplitude > 0 else np.sqrt(0.5)
+
+    def noise(g: Float) -> float:
+        return float(np.sqrt(g @ cov @ g))
+
+    def absolute(g: Float) -> float:
+        return float(np.hypot(noise(g), calibration))
+
+    def relative(g: Float, value: float, base: float, base_sigma: float) -> float:
+        return float(np.hypot(noise(g) / base, value / base**2 * base_sigma))
+
+    return np.array([
+        station, slab.coverage,
+        mean, absolute(middle), least, absolute(low), most, absolute(high),
+        span / nominal_mm, relative(high - low, span, nominal_mm, 0.0),
+        span / mean, relative(high - low, span, mean, absolute(middle)),
+        reach / mean, relative(far - middle, reach, mean, absolute(middle)),
+        amplitude, noise(direction),
+        _DIRECTIONS[np.argmax(diameter)], *shape.centre, np.sqrt(np.trace(cov[1:3, 1:3]) / 2),
+    ])  # fmt: skip
+
+
+def _calliper_basis(harmonics: int) -> Float:
+    """Return (360, 1 + 2 harmonics): coefficients to diameter D(ψ) = r(ψ) + r(ψ + π), ψ over half a turn."""
+    return _basis(_DIRECTIONS, harmonics) + _basis(_DIRECTIONS + np.pi, harmonics)
+
+
+def _unmeasured(station: float, coverage: float) -> Float:
+    row = np.full(len(fields(Sections)), np.nan)
+    row[:2] = station, coverage
+    return row
+
+
+SECTIONS = Stage(
+    "sections", "1", SectionParameters, measure_sections, "diameters, ovality and centre at every station"
+)
