@@ -116,16 +116,24 @@ class Fields:
         expected = "a positive number" if positive else "a finite number"
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(place, f"is {_kind(value)}", expected, _number_hint(value))
-        if not math.isfinite(value) or (positive and value <= 0):
-            raise self.error(place, f"is {value}", expected)
-        return float(value)
+        number = _as_float(value)
+        if not math.isfinite(number) or (positive and number <= 0):
+            raise self.error(place, f"is {number}", expected)
+        return number
 
     def _size(self, key: str, value: object, expected: str) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
             raise self.error(key, f"holds {_kind(value)}", expected)
         if not 1 <= value <= LARGEST_SIDE_PX:
-            raise self.error(key, f"holds {value}", expected)
+            raise self.error(key, f"holds {_as_float(value):.17g}", expected)
         return value
+
+
+def _as_float(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _kind(value: object) -> str:
@@ -134,8 +142,10 @@ def _kind(value: object) -> str:
             return "empty"
         case str():
             return f"the text {value[:40]!r}"
-        case bool() | int() | float():
-            return f"{value}"
+        case bool():
+            return "yes or no"
+        case int() | float():
+            return "a number"
         case Mapping():
             return "a mapping"
         case Sequence():

@@ -12,13 +12,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.instrument.camera.base import Projection, ProjectionJacobian, Rays, RaysJacobian
+from pipeline.instrument.camera.inverse import invert_increasing, smallest_positive_root
+from pipeline.instrument.camera.radial import Polar, RadialCamera
 
 Float = NDArray[np.float64]
+_NODES = 256
 
 
 @dataclass(frozen=True)
-class KannalaBrandt:
+class KannalaBrandt(RadialCamera):
     """Kannala-Brandt fisheye camera.
 
     Attributes
@@ -40,11 +42,6 @@ class KannalaBrandt:
     parameter_names = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4")
 
     @property
-    def centre_px(self) -> Float:
-        """(2,) principal point."""
-        return np.array(self.centre)
-
-    @property
     def parameters(self) -> Float:
         """(8,) fx, fy, cx, cy, k1..k4."""
         return np.array([*self.focal_px, *self.centre, *self.distortion], float)
@@ -57,93 +54,43 @@ class KannalaBrandt:
     @cached_property
     def theta_max(self) -> float:
         """Largest polar angle, rad, up to which ρ(θ) grows; at most π."""
-        theta = np.linspace(0, np.pi, 2000)
-        falling = np.flatnonzero(self._slope(theta) <= 0)
-        return float(theta[falling[0] - 1] if falling.size else np.pi)
+        k1, k2, k3, k4 = self.distortion
+        squared = smallest_positive_root([1.0, 3 * k1, 5 * k2, 7 * k3, 9 * k4])
+        return float(min(np.sqrt(squared), np.pi))
+
+    @cached_property
+    def rho_max(self) -> float:
+        """ρ(`theta_max`)."""
+        return float(self._rho(np.array(self.theta_max)))
+
+    @property
+    def affine_matrix(self) -> Float:
+        """(2, 2) diagonal of fx and fy."""
+        return np.diag(self.focal_px)
 
     def _rho(self, theta: Float) -> Float:
         k1, k2, k3, k4 = self.distortion
         t2 = theta * theta
         return np.asarray(theta * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)))))
 
-    def _slope(self, theta: Float) -> Float:
+    def _growth(self, theta: Float) -> Float:
         k1, k2, k3, k4 = self.distortion
         t2 = theta * theta
         return np.asarray(1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4))))
 
+    def _slope(self, theta: Float, rho: Float) -> Float:
+        return self._growth(theta)
+
     def _theta(self, rho: Float) -> Float:
-        """Invert ρ(θ) by Newton steps kept inside [0, theta_max]."""
-        theta = np.minimum(rho, self.theta_max)
-        for _ in range(30):
-            step = (self._rho(theta) - rho) / np.maximum(self._slope(theta), 1e-6)
-            theta = np.clip(theta - step, 0, self.theta_max)
-            if not np.any(np.abs(step) > 1e-14):
-                break
-        return np.asarray(theta)
+        return invert_increasing(self._rho, self._growth, rho, np.linspace(0, self.theta_max, _NODES))
 
-    def project(self, xyz_c: Float) -> Projection:
-        """Project (..., 3) points; NaN and invalid beyond `theta_max` or at the viewpoint."""
-        p = np.asarray(xyz_c, float)
-        r = np.hypot(p[..., 0], p[..., 1])
-        theta = np.arctan2(r, p[..., 2])
-        valid = (theta <= self.theta_max) & (r + np.abs(p[..., 2]) > 0) & np.isfinite(theta)
-        rho = self._rho(theta)
-        scale = np.where(r > 0, rho / np.where(r > 0, r, 1.0), 0.0)
-        uv = p[..., :2] * scale[..., None] * np.array(self.focal_px) + self.centre_px
-        return Projection(np.where(valid[..., None], uv, np.nan), valid)
-
-    def unproject(self, uv: Float) -> Rays:
-        """Return unit rays of (..., 2) pixels; NaN where no ray maps there."""
-        m = (np.asarray(uv, float) - self.centre_px) / np.array(self.focal_px)
-        rho = np.hypot(m[..., 0], m[..., 1])
-        valid = rho <= self._rho(np.array(self.theta_max))
-        theta = self._theta(np.where(valid, rho, 0.0))
-        unit = m / np.where(rho > 0, rho, 1.0)[..., None]
-        ray = np.concatenate([unit * np.sin(theta)[..., None], np.cos(theta)[..., None]], -1)
-        return Rays(np.where(valid[..., None], ray, np.nan), valid)
-
-    def project_jacobian(self, xyz_c: Float) -> ProjectionJacobian:
-        """Return d uv / d point (..., 2, 3) and d uv / d parameters (..., 2, 8)."""
-        p = np.asarray(xyz_c, float)
-        x, y, z = p[..., 0], p[..., 1], p[..., 2]
-        r = np.maximum(np.hypot(x, y), 1e-12)
-        theta = np.arctan2(r, z)
-        c, s = x / r, y / r
-        n2 = r * r + z * z
-        g = self._slope(theta)
-        rho = self._rho(theta)
-        radial = np.stack([c * z / n2, s * z / n2, -r / n2], -1) * g[..., None]
-        tangential = np.stack([-s, c, np.zeros_like(c)], -1) * (rho / r)[..., None]
-        f = np.array(self.focal_px)
-        unit, normal = np.stack([c, s], -1), np.stack([-s, c], -1)
-        by_point = (unit[..., None] * radial[..., None, :] + normal[..., None] * tangential[..., None, :]) * f[
-            :, None
-        ]
-        return ProjectionJacobian(by_point, self._by_parameters(theta, unit))
-
-    def _by_parameters(self, theta: Float, unit: Float) -> Float:
-        out = np.zeros((*theta.shape, 2, 8))
-        rho = self._rho(theta)
-        out[..., 0, 0], out[..., 1, 1] = rho * unit[..., 0], rho * unit[..., 1]
+    def _by_parameters(self, polar: Polar) -> Float:
+        out = np.zeros((*polar.theta.shape, 2, 8))
+        m = polar.rho[..., None] * polar.unit
+        out[..., 0, 0], out[..., 1, 1] = m[..., 0], m[..., 1]
         out[..., 0, 2], out[..., 1, 3] = 1, 1
         for i in range(4):
-            out[..., :, 4 + i] = (theta ** (2 * i + 3))[..., None] * unit * np.array(self.focal_px)
-        return out
-
-    def unproject_jacobian(self, uv: Float) -> RaysJacobian:
-        """Return d ray / d uv (..., 3, 2) and d ray / d parameters (..., 3, 8).
-
-        By the implicit function theorem: on unit rays, d ray/d uv is the inverse of d uv/d ray in the
-        tangent plane, and d ray/d parameters = −(d ray/d uv)(d uv/d parameters).
-        """
-        m = (np.asarray(uv, float) - self.centre_px) / np.array(self.focal_px)
-        rho = np.maximum(np.hypot(m[..., 0], m[..., 1]), 1e-12)
-        theta = self._theta(rho)
-        unit = m / rho[..., None]
-        normal = np.stack([-unit[..., 1], unit[..., 0]], -1)
-        sin, cos = np.sin(theta)[..., None], np.cos(theta)[..., None]
-        e_theta = np.concatenate([unit * cos, -sin], -1) / self._slope(theta)[..., None]
-        e_psi = np.concatenate([normal * sin, np.zeros_like(sin)], -1) / rho[..., None]
-        by_m = e_theta[..., None] * unit[..., None, :] + e_psi[..., None] * normal[..., None, :]
-        by_pixel = by_m / np.array(self.focal_px)
-        return RaysJacobian(by_pixel, -by_pixel @ self._by_parameters(theta, unit))
+            out[..., :, 4 + i] = (
+                (polar.theta ** (2 * i + 3))[..., None] * polar.unit * np.array(self.focal_px)
+            )
+        return np.where(np.isnan(polar.theta)[..., None, None], np.nan, out)
