@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts import PipeAxis
-from pipeline.geometry.pipe_axis import axis_frame, pipe_coordinates, wall_points
+from pipeline.geometry.axis import frames_at, from_pipe, to_pipe
 
 
 def arc_axis(curvature_per_mm: float) -> PipeAxis:
@@ -26,19 +26,19 @@ def test_points_return_to_their_coordinates(curvature: float) -> None:
     axis = arc_axis(curvature)
     s, psi = np.meshgrid(np.linspace(-10, 250, 27), np.linspace(-3.1, 3.1, 31), indexing="ij")
     r = 50 + np.sin(3 * psi)
-    got_s, got_psi, got_r = pipe_coordinates(axis, wall_points(axis, s, psi, r))
+    got_s, got_psi, got_r = to_pipe(axis, from_pipe(axis, s, psi, r))
     np.testing.assert_allclose(got_s, s, atol=1e-4)
     np.testing.assert_allclose(got_psi, psi, atol=1e-6)
     np.testing.assert_allclose(got_r, r, atol=1e-4)
 
 
 def test_straight_axis_is_cylindrical_coordinates() -> None:
-    p = wall_points(arc_axis(0.0), np.array(12.0), np.array(np.pi / 2), np.array(25.0))
+    p = from_pipe(arc_axis(0.0), np.array(12.0), np.array(np.pi / 2), np.array(25.0))
     np.testing.assert_allclose(p, [0, 25, 12], atol=1e-12)
 
 
 def test_frames_are_rotations_and_straight_beyond_the_ends() -> None:
-    origin, frame = axis_frame(arc_axis(2e-3), np.array([-200.0, -51.0, 7.3, 400.0]))
+    origin, frame = frames_at(arc_axis(2e-3), np.array([-200.0, -51.0, 7.3, 400.0]))
     np.testing.assert_allclose(
         frame @ np.swapaxes(frame, -1, -2), np.broadcast_to(np.eye(3), (4, 3, 3)), atol=1e-12
     )
