@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,9 +17,11 @@ from pydantic.fields import FieldInfo
 
 from pipeline.errors import InputError
 from pipeline.stage import Parameters, Stage
+from pipeline.yaml_file import read_yaml
 
 _COMMAND_LINE = "--set"
 _WIDTH = 110
+_EXPONENT = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+")
 
 
 @dataclass(frozen=True)
@@ -89,8 +92,7 @@ def resolved_text(configuration: Configuration) -> str:
 
 
 def _settings_of_file(file: Path) -> Iterator[_Setting]:
-    tree = _load(file)
-    for stage, content in tree.items():
+    for stage, content in read_yaml(file).values.items():
         if not isinstance(content, Mapping):
             raise InputError(
                 file,
@@ -102,28 +104,10 @@ def _settings_of_file(file: Path) -> Iterator[_Setting]:
         yield from (_Setting(file, f"{stage}.{name}", value) for name, value in content.items())
 
 
-def _load(file: Path) -> Mapping[str, Any]:
-    try:
-        tree = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(file, f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(file, "is not UTF-8 text", expected="a YAML file") from error
-    except yaml.YAMLError as error:
-        raise InputError(file, f"is not YAML: {error}") from error
-    if tree is None:
-        return {}
-    if not isinstance(tree, Mapping):
-        raise InputError(file, "holds no mapping", expected="stage: {parameter: value}")
-    return tree
-
-
 def _setting_of(assignment: str) -> _Setting:
     place, equals, text = assignment.partition("=")
     if not equals or "." not in place:
-        raise InputError(
-            _COMMAND_LINE, f"{assignment!r} is no assignment", expected="stage.parameter=value"
-        )
+        raise InputError(_COMMAND_LINE, f"{assignment!r} is no assignment", expected="stage.parameter=value")
     try:
         return _Setting(Path(_COMMAND_LINE), place.strip(), yaml.safe_load(text))
     except yaml.YAMLError as error:
@@ -154,13 +138,10 @@ def _parameters_of(stage: Stage, settings: Sequence[_Setting]) -> Parameters:
 
 
 def _number(value: Any) -> Any:
-    """Return the number that YAML 1.1 takes for a word, such as 1e-3; anything else unchanged."""
-    if isinstance(value, str):
-        try:
-            return float(value)
-        except ValueError:
-            return value
-    return value
+    """Return the numbers that YAML 1.1 takes for words, such as 1e-3; anything else unchanged."""
+    if isinstance(value, list):
+        return [_number(v) for v in value]
+    return float(value) if isinstance(value, str) and _EXPONENT.fullmatch(value) else value
 
 
 def _refusal(stage: Stage, mine: Mapping[str, _Setting], error: ValidationError) -> InputError:
@@ -185,8 +166,7 @@ def _stage_text(stage: Stage) -> str:
 
 def _field_text(name: str, field: FieldInfo, model: Parameters) -> str:
     value = model.model_dump(mode="json")[name]
-    text = yaml.safe_dump({name: value}, default_flow_style=None, allow_unicode=True, width=1000)
-    return _comment(_meaning(field), "  ") + f"  {text}"
+    return _comment(_meaning(field), "  ") + f"  {name}: {json.dumps(value, ensure_ascii=False)}\n"
 
 
 def _meaning(field: FieldInfo) -> str:

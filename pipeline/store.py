@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.codec import CodecError, Json, canonical, decode, encode
 from pipeline.disk import FileRecord, disk_errors_named, remove, replace_json, sync_folder, write_synced
-from pipeline.summary import Number
+from pipeline.outcome import Number
 
 _FORMAT = 1
 _MANIFEST = "manifest.json"

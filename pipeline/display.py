@@ -1,0 +1,90 @@
+"""What a user sees while stages run."""
+
+from __future__ import annotations
+
+from types import TracebackType
+from typing import Protocol, Self
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from pipeline.outcome import StageOutcome, State
+
+
+class Display(Protocol):
+    """Is told how the stages stand."""
+
+    def started(self, stage: str) -> None:
+        """Hear that a stage started."""
+
+    def progressed(self, done: int, total: int) -> None:
+        """Hear how far the running stage is."""
+
+    def ended(self, outcome: StageOutcome) -> None:
+        """Hear how a stage ended."""
+
+
+class SilentDisplay:
+    """Shows nothing: for library use and tests."""
+
+    def started(self, stage: str) -> None:
+        """Ignore."""
+
+    def progressed(self, done: int, total: int) -> None:
+        """Ignore."""
+
+    def ended(self, outcome: StageOutcome) -> None:
+        """Ignore."""
+
+
+class ProgressDisplay:
+    """A bar with the time left for the running stage, and a line for each stage that ended."""
+
+    def __init__(self, console: Console) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description:<12}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("for"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+        )
+        self._console = console
+        self._task: TaskID | None = None
+
+    def __enter__(self) -> Self:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def started(self, stage: str) -> None:
+        """Open a bar."""
+        self._task = self._progress.add_task(stage, total=None)
+
+    def progressed(self, done: int, total: int) -> None:
+        """Move the bar."""
+        if self._task is not None:
+            self._progress.update(self._task, completed=done, total=total)
+
+    def ended(self, outcome: StageOutcome) -> None:
+        """Replace the bar by a line."""
+        if self._task is not None:
+            self._progress.remove_task(self._task)
+            self._task = None
+        time = f"{outcome.seconds:8.1f} s" if outcome.state == State.COMPLETED else " " * 10
+        self._console.print(f"  {outcome.name:<12} {outcome.state.value:<10}{time}", highlight=False)

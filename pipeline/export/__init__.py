@@ -1,0 +1,1 @@
+"""Writers of a run folder's files: one artefact in, finished files out."""

@@ -1,0 +1,119 @@
+"""What an exporter is, and how its files reach the run folder at one stroke."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from pipeline.codec import canonical
+from pipeline.disk import (
+    FileRecord,
+    disk_errors_named,
+    record_of,
+    remove,
+    replace_json,
+    sync_folder,
+    sync_tree,
+)
+from pipeline.run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class Exporter:
+    """A writer of files for people.
+
+    Attributes
+    ----------
+    name
+        What it writes, for messages.
+    write
+        ``write(artefact, ..., folder)``: writes finished files into ``folder``. Arguments other than
+        ``folder`` are artefacts or sources, wired by type as those of stages are.
+    version
+        To be raised whenever the files for the same artefacts change.
+    """
+
+    name: str
+    write: Callable[..., None] = field(repr=False)
+    version: str = "1"
+
+    def inputs(self) -> dict[str, type]:
+        """Return argument name to class, in the order of the function's signature."""
+        hints = get_type_hints(self.write)
+        return {k: v for k, v in hints.items() if k not in ("folder", "return")}
+
+    def key(self, keys: Mapping[type, str]) -> str:
+        """Return the hash of what its files are made from."""
+        inputs = {name: keys[kind] for name, kind in self.inputs().items()}
+        return hashlib.sha256(canonical([self.name, self.version, dict(inputs)])).hexdigest()
+
+
+def publish(exporter: Exporter, artefacts: Mapping[type, object], key: str, run: RunFolder) -> None:
+    """Write an exporter's files and put each in place whole.
+
+    Raises
+    ------
+    InputError
+        When the disk is full or cannot be written; files already in place stay as they were.
+    """
+    arguments = {name: artefacts[kind] for name, kind in exporter.inputs().items()}
+    temporary = run.internal / f".new-{exporter.name}"
+    with disk_errors_named(run.path):
+        try:
+            remove(temporary)
+            temporary.mkdir(parents=True)
+            exporter.write(**arguments, folder=temporary)
+            _put_in_place(exporter, temporary, key, run)
+        except OSError:
+            remove(temporary)
+            raise
+
+
+def is_published(exporter: Exporter, key: str, run: RunFolder) -> bool:
+    """Return whether the files in place are those made from ``key``, whole."""
+    stated, files = _read_receipt(exporter, run)
+    return stated == key and all(r.matches(run.path / name) for name, r in files.items())
+
+
+def published_key(exporter: Exporter, run: RunFolder) -> str:
+    """Return the key that the files in place were made from, empty when there are none."""
+    return _read_receipt(exporter, run)[0]
+
+
+def withdraw(exporter: Exporter, run: RunFolder) -> None:
+    """Remove an exporter's files, so that a folder never mixes the results of two configurations."""
+    _, files = _read_receipt(exporter, run)
+    with disk_errors_named(run.path):
+        for name in sorted({Path(n).parts[0] for n in files}):
+            remove(run.path / name)
+        remove(_receipt(exporter, run))
+
+
+def _put_in_place(exporter: Exporter, temporary: Path, key: str, run: RunFolder) -> None:
+    sync_tree(temporary)
+    written = sorted(p for p in temporary.rglob("*") if p.is_file())
+    files = {p.relative_to(temporary).as_posix(): asdict(record_of(p)) for p in written}
+    for path in sorted(temporary.iterdir()):
+        if path.is_dir():
+            remove(run.path / path.name)
+        path.replace(run.path / path.name)
+    temporary.rmdir()
+    sync_folder(run.path)
+    _receipt(exporter, run).parent.mkdir(exist_ok=True)
+    replace_json(_receipt(exporter, run), {"key": key, "files": files})  # type: ignore[dict-item]
+
+
+def _read_receipt(exporter: Exporter, run: RunFolder) -> tuple[str, dict[str, FileRecord]]:
+    try:
+        tree: dict[str, Any] = json.loads(_receipt(exporter, run).read_text(encoding="utf-8"))
+        return str(tree["key"]), {n: FileRecord(**r) for n, r in tree["files"].items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return "", {}
+
+
+def _receipt(exporter: Exporter, run: RunFolder) -> Path:
+    return run.internal / "exports" / f"{exporter.name}.json"

@@ -1,0 +1,45 @@
+"""report.html: gathers what the report page tells from the results of a completed run."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.export.run_record import program_version
+from pipeline.findings import Defects, Sections
+from pipeline.instrument.probe import Probe
+from pipeline.outcome import Results, StageOutcome
+from pipeline.recording.base import Recording
+from pipeline.review.report import write_report
+from pipeline.review.summary import ReportedNumber, RunSummary, StageRecord
+
+_STANDS_ON = ("numpy", "scipy", "opencv-contrib-python-headless", "av")
+
+
+def write_report_page(results: Results, recording: Recording, probe: Probe, folder: Path) -> None:
+    """Write ``report.html`` from the results of a completed run."""
+    write_report(_summary(results, recording, probe), folder)
+
+
+def _summary(results: Results, recording: Recording, probe: Probe) -> RunSummary:
+    stages = results.outcome.stages
+    return RunSummary(
+        recording=recording,
+        probe=probe,
+        created="",
+        rings=results.of(RingSamples),
+        trajectory=results.of(Trajectory),
+        wall=results.of(Wall),
+        texture=results.of(WallTexture),
+        sections=results.of(Sections),
+        defects=results.of(Defects),
+        numbers=tuple(ReportedNumber(s.name, n.name, n.value, n.unit) for s in stages for n in s.numbers),
+        stages=tuple(_record(s) for s in stages),
+        versions=(("boresight", program_version()), *((p, version(p)) for p in _STANDS_ON)),
+        inputs=(("recording", recording.content_key),),
+    )
+
+
+def _record(stage: StageOutcome) -> StageRecord:
+    return StageRecord(stage.name, stage.version, stage.state.value, stage.seconds, stage.key, stage.problem)

@@ -1,0 +1,81 @@
+"""run.json: what was run, on what, with which parameters, and how it stands."""
+
+from __future__ import annotations
+
+import math
+import resource
+from collections.abc import Iterable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from pipeline.codec import Json
+from pipeline.config import Configuration
+from pipeline.disk import disk_errors_named, replace_json
+from pipeline.outcome import Number, RunOutcome, StageOutcome
+from pipeline.plan import Plan
+from pipeline.recording.base import Recording
+
+_FORMAT = 1
+
+
+def program_version() -> str:
+    """Return the version of boresight, ``unknown`` when it is not installed."""
+    try:
+        return version("boresight")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def write_run_record(
+    recording: Recording,
+    probe_file: Path,
+    configuration: Configuration,
+    plan: Plan,
+    outcome: RunOutcome,
+    folder: Path,
+) -> None:
+    """Replace ``run.json`` at one stroke.
+
+    Raises
+    ------
+    InputError
+        When the disk is full or cannot be written.
+    """
+    inputs: dict[str, Json] = {s.kind.__name__.lower(): s.key for s in plan.sources}
+    tree: Json = {
+        "format": _FORMAT,
+        "program": {"name": "boresight", "version": program_version()},
+        "state": outcome.state.value,
+        "problem": outcome.problem,
+        "recording": {"name": recording.name, "kind": recording.kind, "path": str(recording.path)},
+        "probe": {"path": str(probe_file)},
+        "input_sha256": inputs,
+        "configuration": {c.stage: c.parameters.model_dump(mode="json") for c in configuration.stages},
+        "stages": [_stage(s) for s in outcome.stages],
+        "metrics": _numbers(outcome.metrics),
+        "reader_warnings": list(recording.warnings),
+        "peak_memory_mib": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+    }
+    with disk_errors_named(folder):
+        replace_json(folder / "run.json", tree)
+
+
+def _stage(outcome: StageOutcome) -> Json:
+    return {
+        "name": outcome.name,
+        "version": outcome.version,
+        "key": outcome.key,
+        "state": outcome.state.value,
+        "seconds": outcome.seconds,
+        "numbers": _numbers(outcome.numbers),
+        "problem": outcome.problem,
+    }
+
+
+def _numbers(numbers: Iterable[Number]) -> list[Json]:
+    return [{"name": n.name, "value": _finite(n.value), "unit": n.unit} for n in numbers]
+
+
+def _finite(value: float | int | str) -> Json:
+    """Return the value, None for what JSON cannot write."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value

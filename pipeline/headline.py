@@ -1,0 +1,63 @@
+"""The few numbers of a run that anyone asks for first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from pipeline.artefacts import RingSamples, Trajectory, Wall
+from pipeline.findings import Defects
+from pipeline.outcome import Number
+
+
+def headline(artefacts: Mapping[type, object]) -> tuple[Number, ...]:
+    """Return headline numbers, with units, of whatever artefacts are there."""
+    numbers: list[Number] = []
+    for kind, measure in (
+        (RingSamples, _of_rings),
+        (Trajectory, _of_trajectory),
+        (Wall, _of_wall),
+        (Defects, _of_defects),
+    ):
+        if kind in artefacts:
+            numbers.extend(measure(artefacts[kind]))  # type: ignore[operator]
+    return tuple(numbers)
+
+
+def _of_rings(rings: RingSamples) -> Iterator[Number]:
+    used = np.any(rings.valid, axis=1)
+    yield Number("laser frames", len(rings.frame), "frames")
+    yield Number("laser frames without a usable ring", int(np.sum(~used)), "frames")
+    yield Number("usable ring samples", round(100 * float(np.mean(rings.valid)), 2), "%")
+
+
+def _of_trajectory(trajectory: Trajectory) -> Iterator[Number]:
+    z = trajectory.T_pc[:, 2, 3]
+    yield Number("distance travelled", round(float(np.sum(np.abs(np.diff(z)))), 2), "mm")
+    yield Number("relative 1 sigma of the distance scale", round(trajectory.scale_sigma, 6))
+    yield Number("motion events", len(trajectory.events))
+
+
+def _of_wall(wall: Wall) -> Iterator[Number]:
+    radius = wall.radius_map
+    seen = np.isfinite(radius.radius_mm)
+    rows = np.flatnonzero(seen.any(axis=1))
+    if not rows.size:
+        return
+    core = slice(rows[0], rows[-1] + 1)
+    length = float(radius.distance_mm[rows[-1]] - radius.distance_mm[rows[0]])
+    diameter = 2 * float(np.mean(radius.radius_mm[seen], dtype=np.float64))
+    yield Number("inspected length", round(length, 2), "mm")
+    yield Number("wall seen", round(100 * float(np.mean(seen[core])), 2), "%")
+    yield Number("mean diameter", round(diameter, 3), "mm")
+    yield Number("median 1 sigma of the radius", round(float(np.median(radius.sigma_mm[seen])), 4), "mm")
+    random = float(np.median(radius.sigma_random_mm[seen]))
+    yield Number("median 1 sigma of the radius, random part", round(random, 4), "mm")
+
+
+def _of_defects(defects: Defects) -> Iterator[Number]:
+    yield Number("defects", len(defects.items))
+    depths = [abs(d.depth_mm) for d in defects.items]
+    if depths:
+        yield Number("deepest defect", round(max(depths), 3), "mm")

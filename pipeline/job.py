@@ -1,0 +1,85 @@
+"""One run of the pipeline over one recording, from opened inputs to a finished run folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from pipeline.codec import digest
+from pipeline.config import Configuration
+from pipeline.display import Display
+from pipeline.errors import InputError
+from pipeline.export.exporter import Exporter
+from pipeline.export.run_record import write_run_record
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import check_image_size, read_probe
+from pipeline.interrupt import stop_wish
+from pipeline.outcome import RunOutcome
+from pipeline.plan import Plan, Source, make_plan
+from pipeline.recording import open_recording
+from pipeline.recording.base import Recording
+from pipeline.run_folder import claimed, logged
+from pipeline.runner import Runner, Selection
+from pipeline.stage import Stage
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be run, and where its results go."""
+
+    recording: Recording
+    probe: Probe
+    probe_file: Path
+    stages: tuple[Stage, ...]
+    exporters: tuple[Exporter, ...]
+    configuration: Configuration
+    folder: Path
+
+    def plan(self) -> Plan:
+        """Return the wired plan; raises `pipeline.plan.PipelineError` when stages do not fit together."""
+        sources = (
+            Source(Recording, self.recording, self.recording.content_key),
+            Source(Probe, self.probe, digest(self.probe)),
+        )
+        return make_plan(self.stages, self.configuration, sources)
+
+
+def open_job(
+    recording: Path,
+    folder: Path,
+    probe: Path | None,
+    stages: Sequence[Stage],
+    exporters: Sequence[Exporter],
+    configuration: Configuration,
+) -> Job:
+    """Open the inputs of a job; ``probe`` None means the probe that the recording names.
+
+    Raises
+    ------
+    InputError
+        When the recording or the probe cannot be used.
+    """
+    opened = open_recording(recording)
+    file = probe or opened.probe_file
+    if file is None:
+        raise InputError(recording, "names no probe", hint="give one with --probe FILE")
+    believed = read_probe(file)
+    check_image_size(opened.source.image_size, believed, file)
+    return Job(opened, believed, file, tuple(stages), tuple(exporters), configuration, folder)
+
+
+def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
+    """Run a job in its folder; raises as `pipeline.runner.Runner.run` and `pipeline.run_folder.claimed`."""
+    plan = job.plan()
+    selection.check(plan)
+    with claimed(job.folder) as folder, logged(folder) as logger, stop_wish() as wish:
+        record = partial(_record, job, plan)
+        workers = len(os.sched_getaffinity(0))
+        return Runner(plan, job.exporters, folder, record, display, logger, wish, workers).run(selection)
+
+
+def _record(job: Job, plan: Plan, outcome: RunOutcome) -> None:
+    write_run_record(job.recording, job.probe_file, job.configuration, plan, outcome, job.folder)

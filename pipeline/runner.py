@@ -1,0 +1,251 @@
+"""Runs a plan: reuses what is whole, computes what is missing, and leaves a clear account of every ending."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.display import Display
+from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
+from pipeline.export.exporter import Exporter, is_published, publish, published_key, withdraw
+from pipeline.headline import headline
+from pipeline.outcome import Number, Results, RunOutcome, StageOutcome, State
+from pipeline.plan import Plan, Step
+from pipeline.run_folder import RunFolder
+from pipeline.stage import Context
+from pipeline.store import Provenance, Stored
+
+
+class FailedError(BoresightError):
+    """A bug: something broke that no input should break. The log holds the traceback."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which stages to run.
+
+    Attributes
+    ----------
+    recompute_from
+        Compute this stage and all after it again; empty to reuse all that is there.
+    only
+        Run this stage alone; empty for all.
+    resume
+        False to compute everything again.
+    """
+
+    recompute_from: str = ""
+    only: str = ""
+    resume: bool = True
+
+    def check(self, plan: Plan) -> None:
+        """Raise `pipeline.plan.PipelineError` when a stage named is not in the plan."""
+        for name in filter(None, (self.recompute_from, self.only)):
+            plan.step(name)
+
+    def skips(self, step: Step) -> bool:
+        """Return whether a step is not to be computed even when its result is missing."""
+        return bool(self.only) and step.stage.name != self.only
+
+    def recomputes(self, step: Step, plan: Plan) -> bool:
+        """Return whether a step is to be computed even when its result is there."""
+        if self.skips(step):
+            return False
+        names = [s.stage.name for s in plan.steps]
+        since = self.recompute_from
+        return not self.resume or (bool(since) and names.index(step.stage.name) >= names.index(since))
+
+
+class Runner:
+    """Runs one plan in one claimed run folder.
+
+    Parameters
+    ----------
+    plan
+        The stages, wired and keyed.
+    exporters
+        Writers of files for people; each runs as soon as its inputs are there.
+    folder
+        A claimed run folder.
+    record
+        Called with the outcome at every change; writes run.json.
+    display, logger, wish, workers
+        Where progress goes, where messages go, the user's wish to stop, and how many threads to use.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        exporters: Sequence[Exporter],
+        folder: RunFolder,
+        record: Callable[[RunOutcome], None],
+        display: Display,
+        logger: logging.Logger,
+        wish: threading.Event,
+        workers: int = 2,
+    ) -> None:
+        self._plan, self._exporters, self._folder, self._record = plan, exporters, folder, record
+        self._display, self._logger, self._wish, self._workers = display, logger, wish, workers
+        self._keys = plan.keys() | {Results: _key_of_all(plan)}
+        self._outcomes = {
+            s.stage.name: StageOutcome(s.stage.name, s.stage.version, s.key) for s in plan.steps
+        }
+        self._artefacts: dict[type, object] = {s.kind: s.value for s in plan.sources}
+        self._at = ""
+
+    def run(self, selection: Selection) -> RunOutcome:
+        """Run the stages selected.
+
+        Raises
+        ------
+        UnusableError, InputError, Cancelled
+            As a stage raised it; what was completed before is kept.
+        FailedError
+            For anything else that a stage or exporter raised; the traceback is in the log.
+        """
+        selection.check(self._plan)
+        try:
+            self._withdraw_stale()
+            self._note(State.RUNNING)
+            for step in self._plan.steps:
+                self._complete(step, selection)
+            return self._finish(selection)
+        except BoresightError as error:
+            self._end(_state_of(error), str(error))
+            raise
+        except Exception as error:
+            self._logger.exception("%s failed", self._at)
+            self._end(State.FAILED, f"{type(error).__name__}: {error}")
+            raise FailedError(
+                f"{self._at} failed: {type(error).__name__}: {error}\n"
+                f"This is a fault of the program. The log with the details: {self._folder.log}"
+            ) from error
+
+    def _complete(self, step: Step, selection: Selection) -> None:
+        self._at = f"stage {step.stage.name}"
+        self._stop_if_wished()
+        name, key = step.stage.name, step.key
+        store, again = self._folder.store, selection.recomputes(step, self._plan)
+        stored = None if again else store.read(name, key, step.output)
+        state = State.REUSED
+        if stored is None:
+            if selection.skips(step):
+                return
+            self._check_inputs(step)
+            stored, state = self._compute(step), State.COMPLETED
+        self._artefacts[step.output] = stored.artefact
+        made = stored.provenance
+        self._settle(replace(self._outcomes[name], state=state, seconds=made.seconds, numbers=made.numbers))
+        self._publish_ready()
+
+    def _compute(self, step: Step) -> Stored:
+        name = step.stage.name
+        self._outcomes[name] = replace(self._outcomes[name], state=State.RUNNING)
+        self._note(State.RUNNING)
+        self._display.started(name)
+        self._logger.info("stage %s starts, key %s", name, step.key)
+        numbers: list[Number] = []
+        start = time.monotonic()
+        artefact = step.stage.function(
+            **{argument: self._artefacts[kind] for argument, kind in step.inputs},
+            parameters=step.parameters,
+            context=self._context(step, numbers),
+        )
+        provenance = Provenance(
+            name, step.stage.version, step.key, round(time.monotonic() - start, 3), tuple(numbers)
+        )
+        self._folder.store.write(artefact, provenance)
+        stored = self._folder.store.read(name, step.key, step.output)
+        if stored is None:
+            raise TypeError(f"stage {name} made a {type(artefact).__name__} that does not read back")
+        return stored
+
+    def _context(self, step: Step, numbers: list[Number]) -> Context:
+        def progress(done: int, total: int) -> None:
+            self._stop_if_wished()
+            self._display.progressed(done, total)
+
+        def report(name: str, value: float | int | str, unit: str = "") -> None:
+            self._logger.info("%s: %s = %s %s", step.stage.name, name, value, unit)
+            numbers.append(Number(name, value, unit))
+
+        random = np.random.default_rng(int(step.key, 16))
+        return Context(self._logger, progress, report, random, self._workers)
+
+    def _stop_if_wished(self) -> None:
+        if self._wish.is_set():
+            raise Cancelled("stopped; the same command continues from here")
+
+    def _check_inputs(self, step: Step) -> None:
+        for _, kind in step.inputs:
+            maker = self._plan.maker(kind)
+            if kind not in self._artefacts and maker is not None:
+                raise InputError(
+                    self._folder.path,
+                    f"holds no result of stage {maker.stage.name}, which {step.stage.name} needs",
+                    hint="run without --only, or that stage first",
+                )
+
+    def _settle(self, outcome: StageOutcome) -> None:
+        self._outcomes[outcome.name] = outcome
+        self._logger.info("stage %s %s, %.1f s", outcome.name, outcome.state.value, outcome.seconds)
+        self._display.ended(outcome)
+        self._note(State.RUNNING)
+
+    def _publish_ready(self) -> None:
+        for exporter in self._exporters:
+            kinds = exporter.inputs().values()
+            self._at = f"writing {exporter.name}"
+            if all(k in self._artefacts for k in kinds):
+                key = exporter.key(self._keys)
+                if not is_published(exporter, key, self._folder):
+                    publish(exporter, self._artefacts, key, self._folder)
+
+    def _withdraw_stale(self) -> None:
+        for exporter in self._exporters:
+            known = all(k in self._keys for k in exporter.inputs().values())
+            if not known or published_key(exporter, self._folder) != exporter.key(self._keys):
+                withdraw(exporter, self._folder)
+
+    def _finish(self, selection: Selection) -> RunOutcome:
+        if not selection.only:
+            outcome = self._outcome(State.COMPLETED, "")
+            self._artefacts[Results] = Results(outcome, tuple(self._artefacts.values()))
+            self._publish_ready()
+        return self._note(State.COMPLETED)
+
+    def _end(self, state: State, problem: str) -> None:
+        """Account for an ending that is not completion; the disk may be the very cause of it."""
+        self._logger.info("ended: %s: %s", state.value, problem)
+        for name, outcome in self._outcomes.items():
+            if outcome.state == State.RUNNING:
+                self._outcomes[name] = replace(outcome, state=state, problem=problem)
+                self._display.ended(self._outcomes[name])
+        try:
+            self._note(state, problem)
+        except InputError as error:
+            self._logger.warning("run.json could not be written: %s", error)
+
+    def _note(self, state: State, problem: str = "") -> RunOutcome:
+        outcome = self._outcome(state, problem)
+        self._record(outcome)
+        return outcome
+
+    def _outcome(self, state: State, problem: str) -> RunOutcome:
+        return RunOutcome(state, tuple(self._outcomes.values()), headline(self._artefacts), problem)
+
+
+def _state_of(error: BoresightError) -> State:
+    if isinstance(error, Cancelled):
+        return State.CANCELLED
+    return State.UNUSABLE if isinstance(error, UnusableError | InputError) else State.FAILED
+
+
+def _key_of_all(plan: Plan) -> str:
+    return hashlib.sha256("".join(s.key for s in plan.steps).encode()).hexdigest()
