@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,8 +61,8 @@ class _StrictLoader(yaml.SafeLoader):
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark
-            raise yaml.MarkedYAMLError(problem="aliases are not used here", problem_mark=mark)
+            event = self.get_event()  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(problem="aliases are not used here", problem_mark=event.start_mark)
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
@@ -163,9 +164,9 @@ class Section:
         wanted += f" of at least {least:g}" if least > -math.inf else ""
         wanted += f" greater than {above:g}" if above > -math.inf else ""
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(key, f"is {_short(value)}", wanted, "write it with a decimal point, without unit")
-        if not math.isfinite(value) or value < least or value <= above:
-            raise self.fail(key, f"is {value!r}", wanted)
+            raise self.fail(key, f"is {_short(value)}", wanted, _number_hint(value))
+        if not abs(value) <= sys.float_info.max or value < least or value <= above:
+            raise self.fail(key, f"is {_short(value)}", wanted)
         return float(value)
 
 
@@ -173,3 +174,11 @@ def _short(value: object) -> str:
     """Return a value's text, cut to what fits a message."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _number_hint(value: object) -> str:
+    """Say what to write instead, e.g. of ``1e-3``, which YAML takes for text."""
+    try:
+        return f"write {float(value)!r} without quotes" if isinstance(value, str) else ""
+    except ValueError:
+        return "write a plain number, without a unit"

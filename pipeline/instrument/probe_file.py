@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,7 @@ import yaml
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.instrument.camera.base import Camera
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Lighting, Probe, Shutter
 from pipeline.instrument.stated_uncertainty import (
@@ -25,7 +25,6 @@ Float = NDArray[np.float64]
 _KEYS = (
     "camera", "laser", "shutter", "lighting", "standard_uncertainty", "covariance", "calibrated_from",
 )  # fmt: skip
-_CAMERA_KEYS = ("model", "image_size", "focal_px", "centre_px", "distortion")
 _LASER_KEYS = (
     "baseline_mm", "opening_angle_deg", "tilt_deg", "tilt_direction_deg", "line_sigma_mm", "wavelength_nm",
     "decentre_mm", "decentre_direction_deg", "waviness_rad",
@@ -43,7 +42,8 @@ def read_probe(file: Path) -> Probe:
     """
     document = read_yaml(file)
     document.refuse_unknown(_KEYS)
-    camera, laser = _camera(document.section("camera")), _laser(document.section("laser"))
+    camera = camera_from_mapping(document.section("camera").values, file)
+    laser = _laser(document.section("laser"))
     names = (*camera.parameter_names, *LaserSheet.PARAMETER_NAMES)
     stated = _optional(document, "standard_uncertainty")
     stated.refuse_unknown(UNCERTAINTY_KEYS)
@@ -63,51 +63,21 @@ def read_probe(file: Path) -> Probe:
 def write_probe(probe: Probe, path: Path) -> None:
     """Write a probe file; `read_probe` returns the same probe, its covariance bit for bit."""
     document: dict[str, object] = {
-        "camera": _camera_mapping(probe.camera),
+        "camera": camera_to_mapping(probe.camera),
         "laser": _laser_mapping(probe.laser),
-        "shutter": {
-            "kind": probe.shutter.kind,
-            "exposure_s": probe.shutter.exposure_s,
-            "readout_s": probe.shutter.readout_s,
-        },
-        "lighting": {
-            "kind": probe.lighting.kind,
-            "leds": probe.lighting.leds,
-            "radius_mm": probe.lighting.radius_mm,
-            "z_mm": probe.lighting.z_mm,
-        },
+        "shutter": asdict(probe.shutter),
+        "lighting": asdict(probe.lighting),
         "standard_uncertainty": stated_from_covariance(probe),
         "covariance": {"names": list(probe.parameter_names), "matrix": probe.covariance.tolist()},
     }
     if probe.calibrated_from:
         document["calibrated_from"] = probe.calibrated_from
-    path.write_text(yaml.safe_dump(document, sort_keys=False, width=1000), "utf-8")
+    path.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=1000), "utf-8")
 
 
 def _optional(document: Section, key: str) -> Section:
     """Return the section below a key, empty when it is absent."""
     return document.section(key) if document.has(key) else Section(document.file, {}, key)
-
-
-def _camera(section: Section) -> Camera:
-    section.choice("model", ("kannala_brandt",))
-    section.refuse_unknown(_CAMERA_KEYS)
-    width, height = section.numbers("image_size", 2, least=1)
-    fx, fy = section.numbers("focal_px", 2, least=1e-3)
-    cx, cy = section.numbers("centre_px", 2)
-    k1, k2, k3, k4 = section.numbers("distortion", 4)
-    return KannalaBrandt((int(width), int(height)), (fx, fy), (cx, cy), (k1, k2, k3, k4))
-
-
-def _camera_mapping(camera: Camera) -> dict[str, object]:
-    fx, fy, cx, cy, *distortion = camera.parameters.tolist()
-    return {
-        "model": camera.model,
-        "image_size": list(camera.image_size),
-        "focal_px": [fx, fy],
-        "centre_px": [cx, cy],
-        "distortion": distortion,
-    }
 
 
 def _laser(section: Section) -> LaserSheet:

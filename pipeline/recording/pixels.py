@@ -6,13 +6,12 @@ import av
 import cv2
 import numpy as np
 from av.video.reformatter import ColorRange, Colorspace
+from numpy.typing import NDArray
 
 from pipeline.recording.base import Image, Planes
 
-_PLANAR_LUMA = ("yuv", "gray", "nv12", "nv21")
-# Luma weights (red, blue) of ITU-R BT.601 and BT.709; swscale takes 601 where a stream names none.
-_WEIGHTS = {Colorspace.ITU709: (0.2126, 0.0722)}
-_BT601 = (0.299, 0.114)
+# Luma weights (red, blue) of ITU-R BT.709 and BT.601; swscale takes 601 where a stream names none.
+_BT709, _BT601 = (0.2126, 0.0722), (0.299, 0.114)
 
 
 def pixels(frame: av.VideoFrame, planes: Planes) -> Image:
@@ -22,33 +21,38 @@ def pixels(frame: av.VideoFrame, planes: Planes) -> Image:
     """
     if planes == "grey":
         return _luma(frame)
-    return (
-        _bgr_444(frame) if frame.format.name in ("yuv444p", "yuvj444p") else frame.to_ndarray(format="bgr24")
-    )
+    if frame.format.name in ("yuv444p", "yuvj444p"):
+        return _bgr_444(frame)
+    return np.asarray(frame.to_ndarray(format="bgr24"), np.uint8)
 
 
 def _luma(frame: av.VideoFrame) -> Image:
-    name = frame.format.name
-    if name.startswith(_PLANAR_LUMA) and frame.format.components[0].bits == 8 and "yuyv" not in name:
-        return _plane(frame.planes[0])
-    return frame.to_ndarray(format="gray")
+    """Return the luma plane without a copy where there is one of 8 bits."""
+    name, bits = frame.format.name, frame.format.components[0].bits
+    if name.startswith("gray"):
+        return _plane((frame if bits == 8 else frame.reformat(format="gray")).planes[0])
+    if frame.format.is_rgb or frame.format.has_palette:
+        return np.asarray(cv2.cvtColor(frame.to_ndarray(format="bgr24"), cv2.COLOR_BGR2GRAY), np.uint8)
+    planar = name.startswith(("yuv", "nv")) and bits == 8
+    return _plane((frame if planar else frame.reformat(format="yuv420p")).planes[0])
 
 
 def _plane(plane: av.video.plane.VideoPlane) -> Image:
     """Return a view (H, W) of a plane of bytes, without its padding; keeps the frame's memory alive."""
-    return np.frombuffer(plane, np.uint8).reshape(plane.height, plane.line_size)[:, : plane.width]
+    return np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)[:, : plane.width]
 
 
 def _bgr_444(frame: av.VideoFrame) -> Image:
     """Convert full-resolution chroma by one matrix, as swscale does, in a fifth of its time."""
     full = frame.color_range == ColorRange.JPEG or frame.format.name == "yuvj444p"
+    weights = _BT709 if frame.colorspace == Colorspace.ITU709 else _BT601
     yuv = cv2.merge([_plane(p) for p in frame.planes])
-    return np.asarray(cv2.transform(yuv, _yuv_to_bgr(frame.colorspace, full)), np.uint8)
+    return np.asarray(cv2.transform(yuv, _yuv_to_bgr(weights, full)), np.uint8)
 
 
-def _yuv_to_bgr(colorspace: int, full: bool) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def _yuv_to_bgr(weights: tuple[float, float], full: bool) -> NDArray[np.float64]:
     """Return the (3, 4) matrix from Y, U, V, 1 to B, G, R (ITU-R BT.601-7 and BT.709-6)."""
-    red, blue = _WEIGHTS.get(colorspace, _BT601)  # type: ignore[call-overload]
+    red, blue = weights
     green = 1 - red - blue
     luma, chroma, black = (1.0, 1.0, 0.0) if full else (255 / 219, 255 / 224, 16.0)
     u, v = 2 * (1 - blue) * chroma, 2 * (1 - red) * chroma

@@ -12,19 +12,33 @@ import numpy as np
 from pipeline.errors import InputError
 from pipeline.recording.base import Image, Int, Planes
 from pipeline.recording.pixels import pixels
+from pipeline.recording.selection import ascending, complete
 
 # Fixed, so that which frames of a damaged file are given up does not depend on the machine.
 _THREADS = 4
 # Restarting the decoder costs about as much as decoding this many frames.
 _RESTART_FRAMES = 8
+# A decoder holds back at most this many frames: 16 for reordering and one a thread.
+_HELD_BACK = 16 + _THREADS
 
 
 @dataclass(frozen=True)
 class VideoIndex:
-    """Presentation times ``pts`` (N,) of all frames, ascending, and numbers of those that can be sought."""
+    """What a file lists without being decoded.
+
+    Attributes
+    ----------
+    pts : (N,) int
+        Presentation times of all frames, ascending, in the stream's unit.
+    keyframes : (K,) int
+        Numbers of the frames at which decoding can begin.
+    timed : bool
+        Whether packets carry presentation times; if not, frames are numbered as they come, from the first.
+    """
 
     pts: Int
     keyframes: Int
+    timed: bool
 
 
 @dataclass(frozen=True)
@@ -49,53 +63,43 @@ class VideoSource:
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`; frames beyond the end of the file yield None."""
-        wanted = np.asarray(frames, np.int64)
-        if wanted.size and (np.any(np.diff(wanted) <= 0) or wanted[0] < 0):
-            raise ValueError("frame numbers must ascend")
+        wanted = ascending(frames)
         for stretch in _stretches(wanted[wanted < self.count], self.index.keyframes):
-            yield from self._read_stretch(stretch, planes)
-        for missing in wanted[wanted >= self.count]:
-            yield int(missing), None
-
-    def _read_stretch(self, wanted: Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
-        """Yield the wanted frames, from the keyframe before the first of them."""
-        pending = iter(wanted.tolist())
-        next_wanted = next(pending, None)
-        for number, frame in self._decode_from(int(wanted[0])):
-            while next_wanted is not None and next_wanted < number:
-                yield next_wanted, None
-                next_wanted = next(pending, None)
-            if number == next_wanted:
+            for number, frame in complete(stretch, self._decode(stretch)):
                 yield number, None if frame is None else pixels(frame, planes)
-                next_wanted = next(pending, None)
-            if next_wanted is None:
-                return
-        while next_wanted is not None:
-            yield next_wanted, None
-            next_wanted = next(pending, None)
+        yield from ((int(number), None) for number in wanted[wanted >= self.count])
 
-    def _decode_from(self, first: int) -> Iterator[tuple[int, av.VideoFrame | None]]:
-        """Yield frames from the keyframe at or before ``first`` on; None where damage reaches a frame.
+    def _decode(self, wanted: Int) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Yield trusted frames from the keyframe before the first wanted one on.
 
-        After damage nothing is trusted before the next keyframe: later frames are predicted from it.
+        After damage nothing is trusted before the next keyframe, since later frames are predicted from it.
         """
-        start = self.index.keyframes[np.searchsorted(self.index.keyframes, first, "right") - 1]
-        keyframes = set(self.index.keyframes.tolist())
-        expected, damaged = int(start), False
+        index = self.index
+        start = int(index.keyframes[np.searchsorted(index.keyframes, wanted[0], "right") - 1])
+        only = index.pts[wanted] if index.timed and index.keyframes.size == index.pts.size else None
+        expected, damaged = start, False
         with av.open(str(self.path)) as container:
             stream = _prepare(container)
             if start > 0:
-                container.seek(int(self.index.pts[start]), stream=stream)
-            for frame in _decoded(container, stream):
-                if frame is None:
+                container.seek(int(index.pts[start]), stream=stream)
+            for frame in _decoded(container, stream, only):
+                number = self._number(frame, expected)
+                if number is None or frame is None or number < start:
                     damaged = True
                     continue
-                number = int(np.searchsorted(self.index.pts, frame.pts))
-                if number < start:
-                    continue
-                damaged = (damaged or number > expected) and number not in keyframes
+                gap = number > expected and only is None
+                damaged = frame.is_corrupt or ((damaged or gap) and number not in index.keyframes)
                 expected = number + 1
-                yield number, None if damaged or frame.is_corrupt else frame
+                if not damaged and _size(frame) == self.image_size:
+                    yield number, frame
+
+    def _number(self, frame: av.VideoFrame | None, expected: int) -> int | None:
+        """Return a frame's number; None where it is not known."""
+        if not self.index.timed:
+            return expected
+        if frame is None or frame.pts is None:
+            return None
+        return int(np.searchsorted(self.index.pts, frame.pts))
 
 
 def open_video(path: Path) -> VideoSource:
@@ -122,6 +126,10 @@ def open_video(path: Path) -> VideoSource:
     return VideoSource(path, index, size)
 
 
+def _size(frame: av.VideoFrame) -> tuple[int, int]:
+    return frame.width, frame.height
+
+
 def _prepare(container: av.container.InputContainer) -> av.VideoStream:
     """Return the first video stream, set to decode on several threads and to report damage."""
     if not container.streams.video:
@@ -129,37 +137,62 @@ def _prepare(container: av.container.InputContainer) -> av.VideoStream:
     stream = container.streams.video[0]
     stream.codec_context.thread_type = "AUTO"
     stream.codec_context.thread_count = _THREADS
-    stream.codec_context.options = {"err_detect": "explode"}
+    stream.codec_context.options = {"err_detect": "crccheck+explode"}
     return stream
 
 
 def _list_frames(container: av.container.InputContainer, stream: av.VideoStream) -> VideoIndex:
-    pts, key = [], []
+    pts: list[int | None] = []
+    key: list[bool] = []
     try:
         for packet in container.demux(stream):
-            if packet.pts is not None and packet.size:
+            if packet.size:
                 pts.append(packet.pts)
                 key.append(packet.is_keyframe)
     except av.FFmpegError:
         pass  # a damaged tail: what was listed so far stands, the table of frames tells what is missing
-    order = np.argsort(np.array(pts, np.int64), kind="stable")
+    known = [p for p in pts if p is not None]
+    # AVI keeps no presentation times: with frames out of order, what it gives are times of decoding.
+    reordered_avi = container.format.name == "avi" and stream.codec_context.has_b_frames
+    if len(known) < len(pts) or reordered_avi:
+        return VideoIndex(np.arange(len(pts)), np.zeros(1, np.int64), timed=False)
+    order = np.argsort(np.array(known, np.int64), kind="stable")
     keyframes = np.flatnonzero(np.array(key, bool)[order])
-    return VideoIndex(np.array(pts, np.int64)[order], np.union1d(keyframes, [0]))
+    return VideoIndex(np.array(known, np.int64)[order], np.union1d(keyframes, [0]), timed=True)
 
 
 def _decoded(
-    container: av.container.InputContainer, stream: av.VideoStream
+    container: av.container.InputContainer, stream: av.VideoStream, only: Int | None
 ) -> Iterator[av.VideoFrame | None]:
-    """Yield decoded frames in order of presentation; None where the decoder met damage."""
+    """Yield decoded frames in order of presentation; None where the decoder met damage.
+
+    Where every frame stands for itself, just the packets presented at the times ``only`` are decoded.
+    """
     packets = container.demux(stream)
-    while True:
-        try:
-            packet = next(packets, None)
-            if packet is None:
-                return
-            yield from packet.decode()
-        except av.FFmpegError:
-            yield None
+    while (packet := _next_packet(packets)) is not None:
+        if only is None or packet.pts is None or packet.pts in only:
+            yield from _decode_packet(stream, packet)
+    for _ in range(_HELD_BACK):
+        yield from _decode_packet(stream, None)
+
+
+def _next_packet(packets: Iterator[av.Packet[av.VideoStream]]) -> av.Packet[av.VideoStream] | None:
+    """Return the next packet with content; None at the end of what can be read."""
+    try:
+        return next((p for p in packets if p.size), None)
+    except av.FFmpegError:
+        return None
+
+
+def _decode_packet(
+    stream: av.VideoStream, packet: av.Packet[av.VideoStream] | None
+) -> list[av.VideoFrame | None]:
+    try:
+        return list(stream.decode(packet))
+    except av.EOFError:
+        return []
+    except av.FFmpegError:
+        return [None]
 
 
 def _stretches(wanted: Int, keyframes: Int) -> list[Int]:
