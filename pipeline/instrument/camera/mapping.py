@@ -7,13 +7,22 @@ from pathlib import Path
 
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.equidistant import Equidistant
-from pipeline.instrument.camera.fields import Fields, nearest
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.camera.pinhole import Pinhole
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem
+from pipeline.instrument.camera.section_values import focal_pair, image_size, number_list, pair
 from pipeline.instrument.camera.unified import Unified
+from pipeline.yaml_file import Section
 
-SCARAMUZZA_TERMS = 15
+SCARAMUZZA_TERMS = (3, 15)
+_COMMON = ("model", "image_size", "centre_px")
+_KEYS: Mapping[str, tuple[str, ...]] = {
+    "kannala_brandt": (*_COMMON, "focal_px", "distortion"),
+    "equidistant": (*_COMMON, "focal_px"),
+    "scaramuzza": (*_COMMON, "polynomial", "affine"),
+    "unified": (*_COMMON, "focal_px", "xi", "distortion"),
+    "pinhole": (*_COMMON, "focal_px", "distortion"),
+}
 
 
 def camera_from_mapping(mapping: Mapping[str, object], file: Path) -> Camera:
@@ -25,83 +34,56 @@ def camera_from_mapping(mapping: Mapping[str, object], file: Path) -> Camera:
         Naming the key at fault: missing, unknown, of another type or length, not finite, or not positive
         where it must be; or an unknown model, with the nearest known one.
     """
-    fields = Fields(mapping, file, "camera")
-    name = fields.text("model")
-    if name not in MODELS:
-        raise fields.error(
-            "model", f"unknown camera model {name!r}{nearest(name, MODELS)}", ", ".join(MODELS)
-        )
-    camera = MODELS[name](fields)
-    fields.refuse_others()
-    return camera
+    section = Section(file, mapping, "camera")
+    model = section.choice("model", tuple(_KEYS))
+    section.refuse_unknown(_KEYS[model])
+    return _READERS[model](section)
 
 
 def camera_to_mapping(camera: Camera) -> dict[str, object]:
     """Return the ``camera:`` section that `camera_from_mapping` reads back to the same camera."""
-    shared: dict[str, object] = {"model": camera.model, "image_size": list(camera.image_size)}
-    match camera:
-        case KannalaBrandt():
-            return shared | _lists(
-                focal_px=camera.focal_px, centre_px=camera.centre, distortion=camera.distortion
-            )
-        case Equidistant():
-            return shared | _lists(focal_px=camera.focal_px, centre_px=camera.centre)
-        case Scaramuzza():
-            return shared | _lists(
-                centre_px=camera.centre, polynomial=camera.polynomial, affine=camera.affine
-            )
-        case Unified():
-            lists = _lists(focal_px=camera.focal_px, centre_px=camera.centre, distortion=camera.distortion)
-            return shared | {"xi": float(camera.xi)} | lists
-        case Pinhole():
-            return shared | _lists(
-                focal_px=camera.focal_px, centre_px=camera.centre, distortion=camera.distortion
-            )
-        case _:
-            raise TypeError(f"no mapping is known for {type(camera).__name__}")
+    values: dict[str, object] = {"model": camera.model, "image_size": [int(n) for n in camera.image_size]}
+    attributes = {"centre_px": "centre"}
+    for key in _KEYS[camera.model][2:]:
+        value = getattr(camera, attributes.get(key, key))
+        values[key] = [float(v) for v in value] if isinstance(value, tuple) else float(value)
+    return values
 
 
-def _lists(**values: tuple[float, ...]) -> dict[str, object]:
-    return {key: [float(v) for v in value] for key, value in values.items()}
+def _kannala_brandt(section: Section) -> Camera:
+    k1, k2, k3, k4 = section.numbers("distortion", 4)
+    return KannalaBrandt(*_size_focal_centre(section), (k1, k2, k3, k4))
 
 
-def _focal_and_centre(fields: Fields) -> tuple[tuple[int, int], tuple[float, float], tuple[float, float]]:
-    return fields.image_size(), fields.pair("focal_px", positive=True), fields.pair("centre_px")
+def _equidistant(section: Section) -> Camera:
+    return Equidistant(*_size_focal_centre(section))
 
 
-def _kannala_brandt(fields: Fields) -> Camera:
-    k1, k2, k3, k4 = fields.numbers("distortion", 4)
-    return KannalaBrandt(*_focal_and_centre(fields), (k1, k2, k3, k4))
+def _pinhole(section: Section) -> Camera:
+    k1, k2, p1, p2, k3 = section.numbers("distortion", 5)
+    return Pinhole(*_size_focal_centre(section), (k1, k2, p1, p2, k3))
 
 
-def _equidistant(fields: Fields) -> Camera:
-    return Equidistant(*_focal_and_centre(fields))
+def _unified(section: Section) -> Camera:
+    size, focal, centre = _size_focal_centre(section)
+    k1, k2, p1, p2 = section.numbers("distortion", 4)
+    return Unified(size, section.number("xi", least=0.0), focal, centre, (k1, k2, p1, p2))
 
 
-def _pinhole(fields: Fields) -> Camera:
-    k1, k2, p1, p2, k3 = fields.numbers("distortion", 5)
-    return Pinhole(*_focal_and_centre(fields), (k1, k2, p1, p2, k3))
-
-
-def _unified(fields: Fields) -> Camera:
-    size, focal, centre = _focal_and_centre(fields)
-    k1, k2, p1, p2 = fields.numbers("distortion", 4)
-    xi = fields.number("xi")
-    if xi < 0:
-        raise fields.error("xi", f"is {xi}", "a number from 0 (pinhole) up")
-    return Unified(size, xi, focal, centre, (k1, k2, p1, p2))
-
-
-def _scaramuzza(fields: Fields) -> Camera:
-    c, d, e = fields.numbers("affine", 3)
-    polynomial = fields.numbers("polynomial", 3, SCARAMUZZA_TERMS)
+def _scaramuzza(section: Section) -> Camera:
+    c, d, e = section.numbers("affine", 3)
+    polynomial = number_list(section, "polynomial", *SCARAMUZZA_TERMS)
     problem = scaramuzza_problem(polynomial, (c, d, e))
     if problem:
-        raise fields.error(*problem)
-    return Scaramuzza(fields.image_size(), fields.pair("centre_px"), tuple(polynomial), (c, d, e))
+        raise section.fail(*problem)
+    return Scaramuzza(image_size(section, "image_size"), pair(section, "centre_px"), polynomial, (c, d, e))
 
 
-MODELS: Mapping[str, Callable[[Fields], Camera]] = {
+def _size_focal_centre(section: Section) -> tuple[tuple[int, int], tuple[float, float], tuple[float, float]]:
+    return image_size(section, "image_size"), focal_pair(section, "focal_px"), pair(section, "centre_px")
+
+
+_READERS: Mapping[str, Callable[[Section], Camera]] = {
     "kannala_brandt": _kannala_brandt,
     "equidistant": _equidistant,
     "scaramuzza": _scaramuzza,
