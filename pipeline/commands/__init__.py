@@ -1,0 +1,1 @@
+"""One thin command each; `pipeline.cli` attaches them by name."""
