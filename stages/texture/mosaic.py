@@ -1,0 +1,82 @@
+"""The flat picture while it is made: tiles are opened by their first view and blended after their last."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Byte
+from pipeline.instrument.probe import Probe
+from pipeline.recording.base import Image
+from stages.texture.blend import TileStack
+from stages.texture.grid import FlatGrid
+from stages.texture.photometry import Light
+from stages.texture.project import project_tile
+from stages.texture.surface import SurfacePatch, WallSurface
+from stages.texture.views import LitViews, TileViews
+
+
+class Mosaic:
+    """Blended colours and sample counts of all pixels; holds samples only of the tiles in view.
+
+    Attributes
+    ----------
+    colour : (H, W, 3) uint16
+        Reflectance in units of 1 / `REFLECTANCE_SCALE` grey level.
+    count : (H, W) uint8
+        Samples behind each pixel; 0 where there was none.
+    """
+
+    def __init__(
+        self,
+        grid: FlatGrid,
+        surface: WallSurface,
+        probe: Probe,
+        views: LitViews,
+        plan: Sequence[TileViews],
+        light: Light,
+        laser_band_mm: float,
+    ) -> None:
+        self._grid, self._surface, self._probe = grid, surface, probe
+        self._views, self._plan, self._light, self._band = views, plan, light, laser_band_mm
+        self._tiles = grid.tiles()
+        self._open: dict[int, tuple[SurfacePatch, TileStack]] = {}
+        self.colour: NDArray[np.uint16] = np.zeros((grid.rows, grid.columns, 3), np.uint16)
+        self.count: Byte = np.zeros((grid.rows, grid.columns), np.uint8)
+
+    def add(self, view: int, image: Image | None, pool: Executor) -> None:
+        """Sample one view, in order, into every tile that wants it; None when there is no such image."""
+        tiles = [t for t, chosen in enumerate(self._plan) if view in chosen.views]
+        usable = image is not None and np.isfinite(self._light.gain[view])
+        for tile in tiles:
+            self._ensure_open(tile)
+        if usable:
+            list(pool.map(lambda tile: self._sample(tile, view, image), tiles))
+        done = [tile for tile in tiles if self._plan[tile].views[-1] == view]
+        list(pool.map(self._close, done))
+
+    def _ensure_open(self, tile: int) -> None:
+        if tile not in self._open:
+            patch = self._grid.node_patch(self._tiles[tile], self._surface)
+            stack = TileStack(len(self._plan[tile].views), self._grid.tile_rows, self._grid.columns)
+            self._open[tile] = patch, stack
+
+    def _sample(self, tile: int, view: int, image: Image) -> None:
+        patch, stack = self._open[tile]
+        gap = self._band if self._views.laser_on[view] else 0.0
+        stack.add(
+            image,
+            project_tile(
+                patch, self._views.T_cp[view], self._probe, self._light.field,
+                float(self._light.gain[view]), self._plan[tile].reach_mm, gap,
+            ),
+        )  # fmt: skip
+
+    def _close(self, tile: int) -> None:
+        colour, count = self._open.pop(tile)[1].blend()
+        rows = slice(self._tiles[tile].first_row, self._tiles[tile].last_row)
+        inside = rows.stop - rows.start
+        self.colour[rows], self.count[rows] = colour[:inside], count[:inside]

@@ -1,0 +1,74 @@
+"""Where a tile's pixels lie in a view, how bright white wall is there, and what the sample is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.artefacts import Float, Float32
+from pipeline.geometry.rigid import transform
+from pipeline.instrument.probe import Probe
+from stages.texture.grid import NODE_PX
+from stages.texture.light import LightField
+from stages.texture.surface import SurfacePatch
+from stages.texture.views import sheet_distance_mm
+
+_BORDER_PX = 3.0
+
+
+@dataclass(frozen=True)
+class TileProjection:
+    """Per pixel of a tile: ``uv`` (n, m, 2), ``inverse_brightness`` (n, m) and ``weight`` (n, m), 0 to 1."""
+
+    uv: Float32
+    inverse_brightness: Float32
+    weight: Float32
+
+
+def project_tile(
+    patch: SurfacePatch, T_cp: Float, probe: Probe, light: LightField, gain: float, reach_mm: float, gap_mm: float
+) -> TileProjection:
+    """Project the nodes of a tile exactly and the pixels between them by linear interpolation.
+
+    Parameters
+    ----------
+    patch
+        The wall at the nodes of `FlatGrid.node_patch`.
+    T_cp, probe, light, gain
+        Pose, instrument, light over the image, and exposure of the view.
+    reach_mm
+        Distance from the laser sheet at which the weight has fallen to nothing.
+    gap_mm
+        Half width of the band about the laser line that is not used; 0 where the laser was off.
+    """
+    xyz_c = transform(T_cp, patch.xyz_p)
+    uv, valid = probe.camera.project(xyz_c)
+    width, height = probe.camera.image_size
+    inside = (uv > _BORDER_PX) & (uv < np.array([width, height]) - 1 - _BORDER_PX)
+    brightness = gain * light.brightness(xyz_c, patch.normal_p @ T_cp[:3, :3].T)
+    from_sheet = sheet_distance_mm(probe.laser, xyz_c)
+    usable = cv2.erode((valid & inside.all(-1) & (brightness > 0.01)).astype(np.uint8), np.ones((3, 3)))
+    worth = np.clip(1 - (from_sheet / reach_mm) ** 2, 0, 1) ** 2 * _quality(uv, brightness)
+    weight = _enlarge(worth * usable)
+    if gap_mm > 0:
+        weight = np.where(np.abs(_enlarge(from_sheet)) < gap_mm, np.float32(0), weight)
+    inverse = _enlarge(1 / np.maximum(brightness, 0.01))
+    return TileProjection(_enlarge(np.where(valid[..., None], uv, -100.0)), inverse, weight)
+
+
+def _quality(uv: Float, brightness: Float) -> Float:
+    """Return image pixels per wall area times brightness, relative to the best: shot noise and sharpness."""
+    down, right = np.gradient(uv, axis=0), np.gradient(uv, axis=1)
+    density = np.abs(down[..., 0] * right[..., 1] - down[..., 1] * right[..., 0])
+    quality = np.nan_to_num(density * brightness)
+    return np.asarray(quality / max(float(quality.max()), 1e-12))
+
+
+def _enlarge(nodes: Float) -> Float32:
+    """Return node values (n, m) or (n, m, 2) at all pixels, linearly; the outer ring of nodes is cut off."""
+    big = cv2.resize(
+        nodes.astype(np.float32), None, fx=NODE_PX, fy=NODE_PX, interpolation=cv2.INTER_LINEAR
+    )
+    return np.asarray(big[NODE_PX:-NODE_PX, NODE_PX:-NODE_PX], np.float32)

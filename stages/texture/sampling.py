@@ -1,0 +1,114 @@
+"""Samples of wall cells in lit frames: what the photometry is estimated from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Float, Int
+from pipeline.geometry.rigid import transform
+from pipeline.instrument.probe import Probe
+from pipeline.recording.base import Image
+from stages.texture.light import irradiance
+from stages.texture.surface import WallSurface
+from stages.texture.views import LitViews, sheet_distance_mm
+
+_CELL_COLUMNS = 48
+_CELL_RADII = 0.04
+_SHRINK = 8
+_DARK, _BRIGHT = 3.0, 245.0
+
+
+@dataclass(frozen=True)
+class LightSamples:
+    """Brightness of wall cells in frames, flat arrays (N,).
+
+    Attributes
+    ----------
+    log_ratio
+        log of grey level over irradiance.
+    theta_rad, azimuth_rad
+        Where in the image.
+    cell, view
+        Which wall cell, which view.
+    """
+
+    log_ratio: Float
+    theta_rad: Float
+    azimuth_rad: Float
+    cell: Int
+    view: Int
+
+
+class LightSampler:
+    """Takes samples of the wall cells from one frame after another."""
+
+    def __init__(
+        self, surface: WallSurface, probe: Probe, views: LitViews, reach_mm: float, laser_band_mm: float
+    ) -> None:
+        self._probe, self._views = probe, views
+        self._reach, self._band = reach_mm, laser_band_mm
+        radius = surface.mean_radius_mm
+        first, last = surface.seen_mm
+        self._cell_mm = _CELL_RADII * radius
+        self._radius = radius
+        self._distance = np.arange(first, last, self._cell_mm)
+        azimuth = -np.pi + 2 * np.pi / _CELL_COLUMNS * np.arange(_CELL_COLUMNS)
+        self._patch = surface.patch(self._distance, azimuth)
+        self._reference = float(self._at_sheet(radius))
+        self._parts: list[LightSamples] = []
+
+    def add(self, view: int, image: Image | None) -> None:
+        """Take the samples of one frame, ``image`` (H, W, 3); none where there is no image."""
+        if image is None:
+            return
+        rows = self._rows_near(view)
+        T_cp = self._views.T_cp[view]
+        xyz_c = transform(T_cp, self._patch.xyz_p[rows])
+        normal_c = self._patch.normal_p[rows] @ T_cp[:3, :3].T
+        small = cv2.resize(
+            image.mean(2, dtype=np.float32), None, fx=1 / _SHRINK, fy=1 / _SHRINK, interpolation=cv2.INTER_AREA
+        )
+        uv = ((self._probe.camera.project(xyz_c).uv + 0.5) / _SHRINK - 0.5).astype(np.float32)
+        grey = cv2.remap(small, uv[..., 0], uv[..., 1], cv2.INTER_LINEAR)
+        light = irradiance(self._probe.lighting, xyz_c, normal_c) / self._reference
+        use = self._usable(view, xyz_c) & (grey > _DARK) & (grey < _BRIGHT) & (light > 0.01)
+        cell = np.arange(rows.start * _CELL_COLUMNS, rows.stop * _CELL_COLUMNS).reshape(grey.shape)
+        theta = np.arctan2(np.hypot(xyz_c[..., 0], xyz_c[..., 1]), xyz_c[..., 2])
+        azimuth = np.arctan2(xyz_c[..., 1], xyz_c[..., 0])
+        ratio = np.log(grey[use] / light[use])
+        self._parts.append(
+            LightSamples(ratio, theta[use], azimuth[use], cell[use], np.full(ratio.shape, view))
+        )
+
+    def samples(self) -> LightSamples:
+        """Return all samples taken so far."""
+        fields = ("log_ratio", "theta_rad", "azimuth_rad", "cell", "view")
+        if not self._parts:
+            none, whole = np.zeros(0), np.zeros(0, np.int64)
+            return LightSamples(none, none, none, whole, whole)
+        return LightSamples(*(np.concatenate([getattr(p, f) for p in self._parts]) for f in fields))
+
+    @property
+    def reference(self) -> float:
+        """Irradiance at the laser ring of a centred probe."""
+        return self._reference
+
+    def _rows_near(self, view: int) -> slice:
+        middle = self._views.distance_mm[view] + self._probe.laser.baseline_mm
+        reach = self._reach + self._views.lean[view] * self._radius + self._cell_mm
+        start, stop = np.searchsorted(self._distance, [middle - reach, middle + reach])
+        return slice(int(start), int(stop))
+
+    def _usable(self, view: int, xyz_c: Float) -> NDArray[np.bool_]:
+        from_sheet = np.abs(sheet_distance_mm(self._probe.laser, xyz_c))
+        near = from_sheet < self._reach
+        return near & (from_sheet > 2 * self._band) if self._views.laser_on[view] else near
+
+    def _at_sheet(self, radius: float) -> Float:
+        point = np.array([radius, 0.0, self._probe.laser.baseline_mm])
+        return irradiance(self._probe.lighting, point, np.array([-1.0, 0.0, 0.0]))
+

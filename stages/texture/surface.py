@@ -1,0 +1,140 @@
+"""The wall as a surface without gaps: points and normals for any distance and azimuth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from pipeline.artefacts import Float, PipeAxis, RadiusMap, Wall
+from pipeline.errors import UnusableError
+from pipeline.geometry.axis import frames_at
+
+_SEEN_ROW = 0.2
+
+
+@dataclass(frozen=True)
+class SurfacePatch:
+    """Wall points ``xyz_p`` and inward unit normals ``normal_p``, both (n, m, 3) in P."""
+
+    xyz_p: Float
+    normal_p: Float
+
+
+@dataclass(frozen=True)
+class WallSurface:
+    """Smoothed radii r(s, ψ) with gaps filled, about the pipe's axis.
+
+    Attributes
+    ----------
+    axis : PipeAxis
+    distance_mm : (S,)
+        Uniform.
+    radius_mm : (S, A) float32
+        First column at −π, columns uniform.
+    along, around : (S, A) float32
+        ∂r/∂s and ∂r/∂ψ / r: slopes of the wall along and around.
+    seen_mm : (float, float)
+        First and last distance at which the ring saw the wall.
+    """
+
+    axis: PipeAxis
+    distance_mm: Float
+    radius_mm: NDArray[np.float32]
+    along: NDArray[np.float32]
+    around: NDArray[np.float32]
+    seen_mm: tuple[float, float]
+
+    @property
+    def mean_radius_mm(self) -> float:
+        """Mean radius of the wall."""
+        return float(self.radius_mm.mean(dtype=np.float64))
+
+    def patch(self, distance_mm: Float, azimuth_rad: Float) -> SurfacePatch:
+        """Return the points and normals on the grid of distances (n,) and azimuths (m,).
+
+        Beyond its ends the wall goes on with the radii of its last row.
+        """
+        where = self._indices(distance_mm, azimuth_rad)
+        r, along, around = (self._sample(a, where) for a in (self.radius_mm, self.along, self.around))
+        origin, frame = frames_at(self.axis, distance_mm)
+        x, y, z = (frame[:, None, :, i] for i in range(3))
+        c, s = np.cos(azimuth_rad)[None, :, None], np.sin(azimuth_rad)[None, :, None]
+        outward, turning = c * x + s * y, c * y - s * x
+        normal = around[..., None] * turning + along[..., None] * z - outward
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        return SurfacePatch(origin[:, None] + r[..., None] * outward, normal)
+
+    def _indices(self, distance_mm: Float, azimuth_rad: Float) -> Float:
+        """Return (2, n, m) row and column indices into the radius map."""
+        row = (distance_mm - self.distance_mm[0]) / (self.distance_mm[1] - self.distance_mm[0])
+        column = np.mod((azimuth_rad + np.pi) / (2 * np.pi), 1.0) * self.radius_mm.shape[1]
+        last = len(self.distance_mm) - 1
+        return np.stack(np.meshgrid(np.clip(row, 0, last), column, indexing="ij"))
+
+    @staticmethod
+    def _sample(values: NDArray[np.float32], where: Float) -> Float:
+        return np.asarray(map_coordinates(values, where, np.float64, order=1, mode="grid-wrap"))
+
+
+def wall_surface(wall: Wall, smoothing_mm: float, shading_mm: float) -> WallSurface:
+    """Return the surface of a measured wall.
+
+    Parameters
+    ----------
+    wall
+        Measured radii; NaN where nothing was seen.
+    smoothing_mm
+        1 σ of the smoothing of the radii, against their noise.
+    shading_mm
+        1 σ of the smoothing of the slopes, which are noisier.
+
+    Raises
+    ------
+    UnusableError
+        When fewer than two rows of the radius map hold radii.
+    """
+    seen = np.flatnonzero(np.isfinite(wall.radius_map.radius_mm).mean(1) >= _SEEN_ROW)
+    if len(seen) < 2:
+        raise UnusableError(
+            "texture", f"{len(seen)} rows of the radius map hold radii", limit="two rows",
+            hint="look at the counts of the stages rings and accumulate",
+        )  # fmt: skip
+    rows = slice(seen[0], seen[-1] + 1)
+    distance = wall.radius_map.distance_mm[rows]
+    step = _steps(wall.radius_map)
+    radius = smoothed(wall.radius_map.radius_mm[rows], tuple(smoothing_mm / s for s in step))
+    shape = smoothed(radius, tuple(shading_mm / s for s in step))
+    along = np.gradient(shape, step[0], axis=0)
+    around = (np.roll(shape, -1, 1) - np.roll(shape, 1, 1)) / (2 * step[1])
+    return WallSurface(
+        wall.axis, distance, radius, along.astype(np.float32), around.astype(np.float32),
+        (float(distance[0]), float(distance[-1])),
+    )  # fmt: skip
+
+
+def smoothed(radius_mm: NDArray[np.float32], sigma_px: tuple[float, ...]) -> NDArray[np.float32]:
+    """Return radii (S, A) smoothed by a Gaussian, NaN filled from ever farther neighbours.
+
+    Normalised convolution (H. Knutsson, C.-F. Westin, CVPR 1993), wrapped around the pipe.
+    """
+    known = np.isfinite(radius_mm)
+    mode = ("nearest", "wrap")
+    out = np.full(radius_mm.shape, np.nan)
+    value, weight = np.where(known, radius_mm, 0.0), known.astype(float)
+    sigma = np.maximum(sigma_px, 0.3)
+    while np.isnan(out).any():
+        total = gaussian_filter(weight, sigma, mode=mode)
+        mean = gaussian_filter(value, sigma, mode=mode) / np.maximum(total, 1e-12)
+        out = np.where(np.isnan(out) & (total > 1e-3), mean, out)
+        sigma = 2 * sigma
+    return out.astype(np.float32)
+
+
+def _steps(radius_map: RadiusMap) -> tuple[float, float]:
+    """Return the map's cell size along and around, mm."""
+    radius = float(np.nanmean(radius_map.radius_mm))
+    around = float(radius_map.azimuth_rad[1] - radius_map.azimuth_rad[0]) * radius
+    return float(radius_map.distance_mm[1] - radius_map.distance_mm[0]), around

@@ -1,0 +1,100 @@
+"""Lit frames with their poses, and which of them shows which tile best."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.artefacts import Float, Int, Trajectory
+from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.geometry.rigid import inverse
+from pipeline.instrument.laser import LaserSheet
+from pipeline.recording.base import Illumination, Recording
+from stages.texture.grid import FlatGrid
+from stages.texture.surface import WallSurface
+
+
+@dataclass(frozen=True)
+class LitViews:
+    """Lit frames that have a pose.
+
+    Attributes
+    ----------
+    frame : (V,) int
+    laser_on : (V,) bool
+    T_cp : (V, 4, 4)
+        Pipe to camera.
+    distance_mm : (V,)
+        Of the camera along the axis.
+    lean : (V,)
+        Sine of the angle between optical axis and pipe axis.
+    """
+
+    frame: Int
+    laser_on: Int
+    T_cp: Float
+    distance_mm: Float
+    lean: Float
+
+
+@dataclass(frozen=True)
+class TileViews:
+    """Views (indices into `LitViews`) to blend into one tile, seen up to ``reach_mm`` from the laser sheet."""
+
+    views: Int
+    reach_mm: float
+
+
+def lit_views(recording: Recording, trajectory: Trajectory) -> LitViews:
+    """Return the lit frames for which the trajectory holds a pose."""
+    lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
+    frame, pose, _ = np.intersect1d(trajectory.frame, lit, return_indices=True)
+    laser_on = np.isin(frame, recording.frames.of(Illumination.BOTH))
+    T_pc = trajectory.T_pc[pose]
+    distance, _, _ = to_pipe(trajectory.axis, T_pc[:, :3, 3])
+    tangent = frames_at(trajectory.axis, distance)[1][:, :, 2]
+    lean = np.linalg.norm(np.cross(T_pc[:, :3, 2], tangent), axis=-1)
+    return LitViews(frame, laser_on, inverse(T_pc), distance, lean)
+
+
+def sheet_distance_mm(laser: LaserSheet, xyz_c: Float) -> Float:
+    """Return how far points (..., 3) in C lie beyond the laser sheet along the optical axis."""
+    psi = np.arctan2(xyz_c[..., 1], xyz_c[..., 0])
+    rho = np.hypot(xyz_c[..., 0], xyz_c[..., 1])
+    return np.asarray(xyz_c[..., 2] - laser.height(psi) - rho * laser.slope(psi))
+
+
+def plan_tiles(
+    grid: FlatGrid, surface: WallSurface, views: LitViews, laser: LaserSheet, reach_mm: float, most: int
+) -> list[TileViews]:
+    """Choose the views of each tile: those in which it lies nearest to the laser sheet.
+
+    There a picture point and the wall point measured by the ring coincide whatever the errors of camera and
+    motion. Where views are rare the reach is widened until three of them show every row. Of several passes
+    the one with the most views is taken, so that a tile need not be kept until the probe returns.
+    """
+    half_tile = grid.tile_rows * grid.mm_per_px / 2
+    return [
+        _tile_views(
+            grid.centre_mm(tile) - views.distance_mm - laser.baseline_mm,
+            half_tile, views.lean * surface.mean_radius_mm, reach_mm, most,
+        )
+        for tile in grid.tiles()
+    ]  # fmt: skip
+
+
+def _tile_views(offset_mm: Float, half_tile: float, lean_mm: Float, reach_mm: float, most: int) -> TileViews:
+    nearest = np.sort(np.abs(offset_mm))[:3]
+    reach = max(reach_mm, float(nearest[-1]) + half_tile) if len(nearest) else reach_mm
+    candidates = np.flatnonzero(np.abs(offset_mm) < reach + half_tile + lean_mm)
+    chosen = _longest_pass(candidates)
+    spread = chosen[np.argsort(offset_mm[chosen], kind="stable")]
+    pick = np.unique(np.round(np.linspace(0, len(spread) - 1, min(most, len(spread)))).astype(int))
+    return TileViews(np.sort(spread[pick]), reach)
+
+
+def _longest_pass(candidates: Int) -> Int:
+    """Return the longest stretch of consecutive views."""
+    passes = np.split(candidates, np.flatnonzero(np.diff(candidates) > 1) + 1)
+    return max(passes, key=len)
