@@ -10,7 +10,6 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from pipeline.errors import InputError
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Lighting, Probe, Shutter
@@ -178,14 +177,3 @@ def _refuse_improper(section: Section, matrix: Float, size: int) -> None:
     scaled = matrix / np.where(sigma > 0, sigma, 1)[:, None] / np.where(sigma > 0, sigma, 1)
     if not np.allclose(scaled, scaled.T, atol=1e-9) or np.linalg.eigvalsh(scaled)[:1].min(initial=0) < -1e-6:
         raise section.fail("matrix", "is not a covariance", expected)
-
-
-def check_image_size(image_size: tuple[int, int], probe: Probe, file: Path) -> None:
-    """Raise `InputError` when images are not of the size that the probe's camera was calibrated for."""
-    if tuple(image_size) != tuple(probe.camera.image_size):
-        raise InputError(
-            file,
-            f"the images are {image_size[0]} x {image_size[1]} pixels",
-            expected="{} x {} as the probe's camera says".format(*probe.camera.image_size),
-            hint="give the probe file of this camera and this resolution with --probe",
-        )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from itertools import islice
 from typing import TypeVar
 
 import numpy as np
@@ -10,6 +13,9 @@ import numpy as np
 from pipeline.recording.base import Int
 
 Item = TypeVar("Item")
+Made = TypeVar("Made")
+_THREADS = 2
+_AHEAD = 4
 
 
 def ascending(frames: Sequence[int] | Int) -> Int:
@@ -36,3 +42,18 @@ def complete(wanted: Int, found: Iterator[tuple[int, Item]]) -> Iterator[tuple[i
     while due is not None:
         yield due, None
         due = next(pending, None)
+
+
+def decoded_ahead(
+    items: Iterator[tuple[int, Item]], decode: Callable[[Item], Made]
+) -> Iterator[tuple[int, Made]]:
+    """Yield (number, decoded item) in order, decoding a few ahead on other threads."""
+    ahead: deque[tuple[int, Future[Made]]] = deque()
+    with ThreadPoolExecutor(_THREADS) as pool:
+        for number, item in islice(items, _AHEAD):
+            ahead.append((number, pool.submit(decode, item)))
+        while ahead:
+            number, made = ahead.popleft()
+            yield number, made.result()
+            for later, item in islice(items, 1):
+                ahead.append((later, pool.submit(decode, item)))

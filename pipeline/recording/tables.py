@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.errors import InputError
 from pipeline.recording.base import Encoder, FrameTable, Illumination
+from pipeline.recording.checks import refuse_backward
 
 FRAME_COLUMNS = ("frame", "time_s", "illumination")
 ENCODER_COLUMNS = ("time_s", "distance_mm")
@@ -34,8 +35,8 @@ def read_frame_table(file: Path) -> FrameTable:
         illumination.append(_light(file, line, light))
     if not frame:
         raise InputError(file, "lists no frames", expected="one line a frame")
-    _refuse_backward(file, frame, "frame", strictly=True)
-    _refuse_backward(file, time_s, "time_s", strictly=True)
+    refuse_backward(file, frame, "frame", strictly=True)
+    refuse_backward(file, time_s, "time_s", strictly=True)
     return FrameTable(np.array(frame, np.int64), np.array(time_s), np.array(illumination, np.str_))
 
 
@@ -57,7 +58,7 @@ def read_encoder(file: Path) -> Encoder:
             hint="take the key encoder out of recording.yaml to run without one",
         )  # fmt: skip
     table = np.array(rows)
-    _refuse_backward(file, table[:, 0].tolist(), "time_s", strictly=False)
+    refuse_backward(file, table[:, 0].tolist(), "time_s", strictly=False)
     return Encoder(table[:, 0], table[:, 1])
 
 
@@ -121,14 +122,3 @@ def _light(file: Path, line: int, text: str) -> str:
             hint=f"did you mean {near[0]}?" if near else "",
         )  # fmt: skip
     return text
-
-
-def _refuse_backward(file: Path, values: Sequence[float], name: str, *, strictly: bool) -> None:
-    for i in range(1, len(values)):
-        step = values[i] - values[i - 1]
-        if step < 0 or (strictly and step == 0):
-            raise InputError(
-                file, f"{name} goes from {values[i - 1]:g} to {values[i]:g}", place=f"reading {i + 1}",
-                expected=f"{name} that only rises",
-                hint="sort out what the recorder's clock did, or cut the file there",
-            )  # fmt: skip
