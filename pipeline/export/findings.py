@@ -1,0 +1,66 @@
+"""Sections and defects as tables and JSON."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.findings import Defect, Defects, Sections
+
+_DEGREES = {"major_axis_rad": "major_axis_deg"}
+_TABLE = (
+    "id", "kind", "distance_from_mm", "distance_to_mm", "clock_from", "clock_to", "length_mm", "width_mm",
+    "depth_mm", "depth_sigma_mm", "wall_loss_percent", "confidence", "frames", "pof_class", "pacp_suggestion",
+    "en13508_suggestion", "statement",
+)  # fmt: skip
+
+
+def write_sections(sections: Sections, folder: Path) -> None:
+    """Write ``sections.csv``: a row a station; empty where too little was seen."""
+    names = [f.name for f in fields(Sections)]
+    columns = [np.degrees(getattr(sections, n)) if n in _DEGREES else getattr(sections, n) for n in names]
+    with (folder / "sections.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([_DEGREES.get(n, n) for n in names])
+        writer.writerows([_number(v) for v in row] for row in zip(*columns, strict=True))
+
+
+def write_defects(defects: Defects, folder: Path) -> None:
+    """Write ``defects.csv`` and ``defects.json``: a list of defects in order of distance."""
+    records = [_record(d) for d in defects.items]
+    (folder / "defects.json").write_text(
+        json.dumps(records, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
+    with (folder / "defects.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_TABLE)
+        writer.writerows([_cell(record[name]) for name in _TABLE] for record in records)
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}" if math.isfinite(value) else ""
+
+
+def _record(defect: Defect) -> dict[str, object]:
+    """Return the defect as JSON holds it; a number that is not known is null."""
+    record: dict[str, object] = {}
+    for f in fields(Defect):
+        value = getattr(defect, f.name)
+        if isinstance(value, float):
+            value = round(value, 4) if math.isfinite(value) else None
+        elif isinstance(value, np.ndarray):
+            value = np.round(value, 4).tolist()
+        record[f.name] = value
+    return record
+
+
+def _cell(value: object) -> str:
+    """Return a cell's text; numbers of frames stand apart by blanks."""
+    if isinstance(value, list):
+        return " ".join(str(v) for v in value)
+    return "" if value is None else str(value)

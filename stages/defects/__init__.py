@@ -1,0 +1,73 @@
+"""Wall to defects: what stands off the pipe's own smooth shape, told from noise, measured, named.
+
+1. Take the pipe's own slowly varying shape out (`relief`), and the motion of single rings.
+2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
+3. Hysteresis to instances with outlines; all-round beads are welds (`segment`).
+4. Depth as the extreme of a 1 mm mean, without what noise adds to an extreme, ± 1 σ (`depth`).
+5. Kind from named features as a probability; codes; words (`classify`, `codes`, `describe`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import norm
+
+from pipeline.artefacts import Wall, WallTexture
+from pipeline.errors import UnusableError
+from pipeline.findings import Defects
+from pipeline.recording.base import Recording
+from pipeline.stage import Context, Stage
+from stages.defects.depth import Depth, measure_depth, noise_field
+from stages.defects.describe import Scene, describe
+from stages.defects.detect import Detection, detect
+from stages.defects.parameters import DefectParameters
+from stages.defects.relief import smooth_shape_removed
+from stages.defects.segment import Region, segment
+
+__all__ = ["DEFECTS", "DefectParameters", "find_defects"]
+
+_MIN_CELLS = 1000
+
+
+def find_defects(
+    recording: Recording, wall: Wall, texture: WallTexture, parameters: DefectParameters, context: Context
+) -> Defects:
+    """Find, outline, measure and name the defects of a wall.
+
+    Raises
+    ------
+    UnusableError
+        When too little of the wall was measured to know its own shape.
+    """
+    seen = int(np.isfinite(wall.radius_map.radius_mm).sum())
+    if seen < _MIN_CELLS:
+        raise UnusableError(
+            "defects", f"{seen} cells of the wall were measured", limit=f"at least {_MIN_CELLS}"
+        )
+    relief = smooth_shape_removed(wall.radius_map, parameters)
+    detection = detect(relief, parameters.false_alarms)
+    regions = segment(relief, detection, parameters)
+    noise = noise_field(relief, regions)
+    measured: list[tuple[Region, Depth]] = []
+    for k, region in enumerate(regions):
+        measured.append((region, measure_depth(relief, region, noise, parameters.draws, context.random)))
+        context.progress(k + 1, len(regions))
+    kept = [(r, d) for r, d in measured if abs(d.depth_mm) >= parameters.min_depth_mm]
+    kept.sort(key=lambda pair: (pair[0].row, pair[0].column))
+    scene = Scene(relief, wall.cloud, texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
+    items = tuple(describe(n + 1, region, depth, scene) for n, (region, depth) in enumerate(kept))
+    context.report("defects", len(items), "")
+    context.report("rejected: shallower than the smallest depth", len(measured) - len(kept), "detections")
+    return Defects(items, parameters.false_alarms, _smallest_depth(detection, parameters))
+
+
+def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float:
+    """Return the depth at which nine of ten defects of 3 mm × 3 mm pass both the threshold and the limit."""
+    chance = float(norm.ppf(0.9))
+    found = (detection.threshold + chance) * detection.small_sigma_mm
+    return max(found, parameters.min_depth_mm + chance * detection.small_sigma_mm)
+
+
+DEFECTS = Stage(
+    "defects", "1", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
+)

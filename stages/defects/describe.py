@@ -1,0 +1,156 @@
+"""From a measured region to a `Defect`: place, clock, outline, frames, words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from pipeline.artefacts import PointCloud, WallTexture
+from pipeline.findings import Defect, DefectKind, clock_of_azimuth
+from stages.defects.classify import Features, features_of, probabilities
+from stages.defects.codes import en13508_suggestion, pacp_suggestion, pof_class
+from stages.defects.depth import Depth
+from stages.defects.relief import Relief
+from stages.defects.segment import Region
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a defect is described against."""
+
+    relief: Relief
+    cloud: PointCloud
+    texture: WallTexture
+    wall_thickness_mm: float | None
+    min_depth_mm: float
+
+
+def describe(number: int, region: Region, depth: Depth, scene: Scene) -> Defect:
+    """Return the defect of a region whose depth was measured."""
+    features = features_of(scene.relief, region, depth)
+    likely = probabilities(features, region)
+    kind, share = next(iter(likely.items()))
+    real = float(norm.cdf((abs(depth.depth_mm) - scene.min_depth_mm / 2) / depth.sigma_mm))
+    clock_from, clock_to = _clock(scene.relief, region)
+    first = float(scene.relief.distance_mm[region.row] - scene.relief.cell_mm[0] / 2)
+    loss = kind.is_metal_loss and scene.wall_thickness_mm
+    return Defect(
+        id=number,
+        kind=str(kind),
+        distance_from_mm=first,
+        distance_to_mm=first + features.length_mm,
+        clock_from=clock_from,
+        clock_to=clock_to,
+        length_mm=features.length_mm,
+        width_mm=features.width_mm,
+        depth_mm=depth.depth_mm,
+        depth_sigma_mm=depth.sigma_mm,
+        wall_loss_percent=100 * depth.depth_mm / loss if loss else float("nan"),
+        confidence=share * real,
+        frames=_frames(scene.cloud, scene.relief, region),
+        outline=_outline(scene.relief, region),
+        pof_class=(
+            pof_class(features.length_mm, features.width_mm, scene.wall_thickness_mm)
+            if kind.is_metal_loss
+            else ""
+        ),
+        pacp_suggestion=pacp_suggestion(kind, features.direction_rad),
+        en13508_suggestion=en13508_suggestion(kind),
+        statement=_statement(features, likely, depth, _darkness(scene, region)),
+    )
+
+
+def _azimuths(relief: Relief, region: Region) -> tuple[float, float]:
+    """Return the region's first and last edge, rad, the last not less than the first."""
+    step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
+    first = float(relief.azimuth_rad[0]) + (region.column - 0.5) * step
+    return first, first + region.mask.shape[1] * step
+
+
+def _clock(relief: Relief, region: Region) -> tuple[float, float]:
+    if region.all_round:
+        return 0.0, 12.0
+    hours = clock_of_azimuth(np.array(_azimuths(relief, region)))
+    return float(hours[0]), float(hours[1])
+
+
+def _cells_of(cloud: PointCloud, relief: Relief) -> tuple[Int, Int]:
+    """Return row (M,) and column (M,) in the map of the cloud's points."""
+    step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
+    row = np.rint((cloud.distance_mm - relief.distance_mm[0]) / relief.cell_mm[0]).astype(np.int64)
+    column = np.rint((cloud.azimuth_rad - relief.azimuth_rad[0]) / step).astype(np.int64)
+    return row, column % len(relief.azimuth_rad)
+
+
+def _frames(cloud: PointCloud, relief: Relief, region: Region) -> Int:
+    row, column = _cells_of(cloud, relief)
+    row, column = row - region.row, (column - region.column) % len(relief.azimuth_rad)
+    near = (row >= 0) & (row < region.mask.shape[0]) & (column < region.mask.shape[1])
+    inside = region.mask[row[near], column[near]]
+    return np.asarray(np.unique(cloud.frame[near][inside]), np.int64)
+
+
+def _outline(relief: Relief, region: Region) -> Float:
+    """Return the region's outer contour (V, 2) of (distance mm, azimuth rad)."""
+    first, last = _azimuths(relief, region)
+    top = float(relief.distance_mm[region.row] - relief.cell_mm[0] / 2)
+    bottom = top + region.mask.shape[0] * relief.cell_mm[0]
+    if region.all_round:
+        return np.array([[top, first], [top, last], [bottom, last], [bottom, first]])
+    # parts of one joined defect are bridged, so that one polygon holds them all
+    bridge = np.ones((3, 3), np.uint8)
+    mask = np.pad(region.mask.astype(np.uint8), 1)
+    while cv2.connectedComponents(mask)[0] > 2:
+        mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, bridge)
+        bridge = np.ones(np.add(bridge.shape, 2), np.uint8)
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    polygon = cv2.approxPolyDP(max(contours, key=cv2.contourArea), 0.7, True)[:, 0].astype(float)
+    scale = (bottom - top) / region.mask.shape[0], (last - first) / region.mask.shape[1]
+    return np.stack([top + (polygon[:, 1] - 0.5) * scale[0], first + (polygon[:, 0] - 0.5) * scale[1]], -1)
+
+
+def _darkness(scene: Scene, region: Region) -> float:
+    """Return by which fraction the photo is darker inside than in a frame around; NaN where unknown."""
+    texture, relief = scene.texture, scene.relief
+    margin = max(4, min(region.mask.shape) // 2)
+    rows = np.arange(region.row - margin, region.row + region.mask.shape[0] + margin)
+    columns = np.arange(region.column - margin, region.column + region.mask.shape[1] + margin)
+    s = relief.distance_mm[0] + rows * relief.cell_mm[0]
+    psi = relief.azimuth_rad[0] + columns * (relief.azimuth_rad[1] - relief.azimuth_rad[0])
+    i = np.rint((s - texture.distance_from_mm) / texture.mm_per_px).astype(int)
+    j = np.rint((psi - texture.azimuth_from_rad) / texture.rad_per_px).astype(int)
+    j %= max(1, round(2 * np.pi / texture.rad_per_px))
+    known = np.ix_((i >= 0) & (i < texture.bgra.shape[0]), j < texture.bgra.shape[1])
+    photo = texture.bgra[np.ix_(i[known[0][:, 0]], j[known[1][0]])]
+    inside = np.pad(region.mask, margin)[known]
+    grey, seen = photo[..., :3].mean(-1), photo[..., 3] > 0
+    if not (inside & seen).any() or not (~inside & seen).any():
+        return float("nan")
+    return float(1 - grey[inside & seen].mean() / max(1.0, float(grey[~inside & seen].mean())))
+
+
+def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth, darkness: float) -> str:
+    """Say what it is and why it was called so."""
+    kinds = list(likely)
+    way = "into the wall" if depth.depth_mm > 0 else "inward"
+    words = f"{kinds[0].capitalize()}, {abs(depth.depth_mm):.2f} ± {depth.sigma_mm:.2f} mm {way}"
+    if kinds[0] is DefectKind.WELD:
+        return f"{words}, {features.length_mm:.0f} mm along the pipe. Called so because it goes all round."
+    words += (
+        f", {features.length_mm:.1f} mm along × {features.width_mm:.1f} mm around. Called so for its slimmest "
+        f"extent of {features.slim_mm:.1f} mm, {features.elongation:.1f} times as long as slim, "
+        f"uneven by {100 * features.roughness:.0f} % of its depth"
+    )
+    words += f"; {kinds[1]} is {100 * likely[kinds[1]]:.0f} % likely." if len(kinds) > 1 else "."
+    if abs(darkness) > 0.1:
+        words += (
+            f" The photo is {100 * abs(darkness):.0f} % {'darker' if darkness > 0 else 'brighter'} there."
+        )
+    return words
