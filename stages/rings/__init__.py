@@ -1,0 +1,10 @@
+"""Frames -> ring samples: sub-pixel radius, σ, width, amplitude and validity at every azimuth."""
+
+from pipeline.stage import Stage
+from stages.rings.extract import RingParameters, extract_rings
+
+__all__ = ["RINGS", "RingParameters", "extract_rings"]
+
+RINGS = Stage(
+    "rings", "1", RingParameters, extract_rings, "laser frames to sub-pixel ring samples with their σ"
+)

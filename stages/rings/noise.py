@@ -1,0 +1,89 @@
+"""Noise and clipping of the images, learned from the recording itself."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Float
+from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response, first_at_least
+from stages.rings.search import Image
+from stages.rings.sectors import Sectors
+
+QUANTISATION_VARIANCE = 1 / 12
+_BINS, _BIN_LEVELS = 32, 8.0
+_ABSOLUTE_TO_SIGMA = np.sqrt(np.pi / 2)
+_CLIPS_TOGETHER = 0.97
+
+
+def dark_response(image: Image) -> Response:
+    """Return a first guess from the image alone: median level, robust noise of neighbouring pixels, no knee."""
+    level = float(np.median(image))
+    step = np.diff(image.astype(np.float32), axis=1)
+    variance = (1.4826 * float(np.median(np.abs(step)))) ** 2 / 2
+    return Response(level, variance + QUANTISATION_VARIANCE, 0.0, np.inf, 0.0)
+
+
+def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Response) -> Response:
+    """Return ``guess`` with the variance at black and per level that the fit's residuals show.
+
+    Mean absolute residuals are used: a few misfitted sectors do not count for more than their number.
+    """
+    total, count = np.zeros(_BINS), np.zeros(_BINS)
+    _residuals_by_level(
+        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, fit.radius_px, fit.width_px,
+        fit.amplitude, fit.background, guess.black, guess.knee, total, count,
+    )  # fmt: skip
+    used = count > 50
+    if used.sum() < 2:
+        return guess
+    level = (np.arange(_BINS) + 0.5)[used] * _BIN_LEVELS
+    variance = (_ABSOLUTE_TO_SIGMA * total[used] / count[used]) ** 2
+    weight = np.sqrt(count[used]) / variance
+    design = np.stack([np.ones_like(level), level], 1) * weight[:, None]
+    dark, per_level = np.linalg.lstsq(design, variance * weight, rcond=None)[0]
+    return guess._replace(
+        variance=max(float(dark), QUANTISATION_VARIANCE), variance_per_level=max(float(per_level), 0.0)
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def _residuals_by_level(  # type: ignore[no-untyped-def]
+    image, start, pixel, radius, r, width, amplitude, background, black, knee, total, count
+):
+    for a in range(r.size):
+        if not np.isfinite(r[a]):
+            continue
+        half = WINDOW_WIDTHS * width[a]
+        k = first_at_least(radius, start[a], start[a + 1], r[a] - half)
+        while k < start[a + 1] and radius[k] < r[a] + half:
+            x = (radius[k] - r[a]) / width[a]
+            m = background[a] + amplitude[a] * np.exp(-0.5 * x * x)
+            level = int((m - black) / _BIN_LEVELS)
+            if 0 <= level < total.size and m < knee:
+                total[level] += abs(image[pixel[k]] - m)
+                count[level] += 1.0
+            k += 1
+
+
+def clipping_knee(
+    grey: NDArray[np.uint8], bgr: NDArray[np.uint8], line: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Return the grey level at which the line's strongest channel clips, and the slope beyond it.
+
+    Grey is a fixed linear mixture of the channels, and a laser line keeps its colour: both are read off the
+    pixels of the ``line`` (H, W).
+    """
+    colour, level = bgr[line].astype(float), grey[line].astype(float)
+    white = float(np.iinfo(bgr.dtype).max)
+    strongest = int(np.argmax(colour.mean(0)))
+    open_ = (colour < 0.95 * white).all(1)
+    bright = open_ & (colour[:, strongest] > np.median(colour[:, strongest]))
+    if bright.sum() < 50:
+        return white, 0.0
+    *weights, black = np.linalg.lstsq(np.c_[colour[open_], np.ones(open_.sum())], level[open_], rcond=None)[0]
+    ratio = np.median(colour[bright] / colour[bright, strongest, None], axis=0)
+    share: Float = np.maximum(np.array(weights) * ratio, 0)
+    beyond = share[ratio < _CLIPS_TOGETHER].sum() / share.sum()
+    return float(black + white * share.sum()), float(beyond)

@@ -1,0 +1,270 @@
+"""Matched fit of the line's profile in every azimuth sector, with the Cramér–Rao σ of its position.
+
+The pixels of a sector near the ring are modelled as a Gaussian across the line on a linear background,
+
+    m(ρ, δ) = A exp(−x² / 2w²) + b₀ + b₁ (ρ − r₀),  x = ρ − r − r′(ψ) δ,
+
+seen through a response that bends at the clipping level, and fitted by weighted Gauss–Newton steps. With
+weights 1 / variance the inverse normal matrix is the inverse Fisher information, hence the Cramér–Rao bound.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Float
+from stages.rings.sectors import Sectors
+
+# Sums may be reordered; NaN keeps its meaning.
+FAST = {"reassoc", "contract", "arcp", "nsz"}
+WINDOW_WIDTHS = 5.5
+_FLANK = 0.6
+_STEPS = 10
+_LOG_WIDTH_PRIOR = 0.3
+_SETTLED_PX, _SETTLED_LOG_WIDTH = 0.004, 0.01
+
+
+class Response(NamedTuple):
+    """How grey levels follow light, and their noise.
+
+    ``black``: level without light; ``variance`` there and ``variance_per_level`` above it (shot noise); beyond
+    ``knee`` a channel clips and the level rises only by ``beyond`` (< 1) per level of the unclipped line.
+    """
+
+    black: float
+    variance: float
+    variance_per_level: float
+    knee: float
+    beyond: float
+
+
+class ProfileFit(NamedTuple):
+    """Fitted profiles, (A,) each; NaN where none could be fitted.
+
+    ``radius_px``, ``width_px`` (1 σ), ``amplitude`` and ``background`` in grey levels, ``sigma_px`` and
+    ``amplitude_sigma`` from the Fisher information, ``chi2`` per degree of freedom, ``unclipped_below`` and
+    ``unclipped_above``: pixels of the line's inner and outer flank (0.5 to 2.5 widths) that did not clip.
+    """
+
+    radius_px: Float
+    width_px: Float
+    amplitude: Float
+    background: Float
+    sigma_px: Float
+    amplitude_sigma: Float
+    chi2: Float
+    clipped: Float
+    unclipped_below: Float
+    unclipped_above: Float
+
+
+def fit_line(
+    image: NDArray[np.uint8] | NDArray[np.float32],
+    sectors: Sectors,
+    seed_px: Float,
+    width_px: float,
+    response: Response,
+) -> ProfileFit:
+    """Fit the line near ``seed_px`` (A,) in every sector of ``image`` (H, W); NaN seeds are left out."""
+    known = np.isfinite(seed_px)
+    filled = np.where(known, seed_px, np.nanmean(seed_px)) if known.any() else seed_px
+    slope = (np.roll(filled, -1) - np.roll(filled, 1)) / (
+        2 * (sectors.azimuth_rad[1] - sectors.azimuth_rad[0])
+    )
+    out = np.empty((len(ProfileFit._fields), len(seed_px)))
+    _fit_sectors(
+        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad,
+        seed_px, slope, width_px, response, out,
+    )  # fmt: skip
+    return ProfileFit(*out)
+
+
+@numba.njit(cache=True, nogil=True)
+def first_at_least(values, low, high, limit):  # type: ignore[no-untyped-def]
+    """Index of the first of the rising ``values[low:high]`` that is >= ``limit``."""
+    while low < high:
+        middle = (low + high) >> 1
+        if values[middle] < limit:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+def _guess(image, pixel, radius, low, high, r0, width):  # type: ignore[no-untyped-def]
+    """Background at r0, its slope, line height, and whether both flanks were seen."""
+    edge = _FLANK * WINDOW_WIDTHS * width
+    top, inner, inners, outer, outers = 0.0, 0.0, 0, 0.0, 0
+    for k in range(low, high):
+        y = float(image[pixel[k]])
+        x = radius[k] - r0
+        if x < -edge:
+            inner += y
+            inners += 1
+        elif x > edge:
+            outer += y
+            outers += 1
+        elif abs(x) < width and y > top:
+            top = y
+    if inners == 0 or outers == 0:
+        return 0.0, 0.0, 0.0, False
+    inner /= inners
+    outer /= outers
+    b0 = 0.5 * (inner + outer)
+    return b0, (outer - inner) / ((1 + _FLANK) * WINDOW_WIDTHS * width), max(top - b0, 1.0), True
+
+
+@numba.njit(cache=True, nogil=True)
+def _factor(n):  # type: ignore[no-untyped-def]
+    """Replace the lower triangle of ``n`` by its Cholesky factor; False when it is not positive."""
+    for i in range(n.shape[0]):
+        for j in range(i + 1):
+            s = n[i, j]
+            for k in range(j):
+                s -= n[i, k] * n[j, k]
+            if i != j:
+                n[i, j] = s / n[j, j]
+            elif s <= 1e-12:
+                return False
+            else:
+                n[i, i] = np.sqrt(s)
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _solve(n, v):  # type: ignore[no-untyped-def]
+    """Solve L Lᵀ x = v in place."""
+    for i in range(v.size):
+        for k in range(i):
+            v[i] -= n[i, k] * v[k]
+        v[i] /= n[i, i]
+    for i in range(v.size - 1, -1, -1):
+        for k in range(i + 1, v.size):
+            v[i] -= n[k, i] * v[k]
+        v[i] /= n[i, i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _inverse_diagonal(n, index, v):  # type: ignore[no-untyped-def]
+    """Entry (index, index) of (L Lᵀ)⁻¹, with ``v`` as working space."""
+    s = 0.0
+    for i in range(index, v.size):
+        v[i] = 1.0 if i == index else 0.0
+        for k in range(index, i):
+            v[i] -= n[i, k] * v[k]
+        v[i] /= n[i, i]
+        s += v[i] * v[i]
+    return s
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, response, n, v):  # type: ignore[no-untyped-def]
+    """Fill ``n`` (5, 5) and ``v`` (5,) at parameters p = (r, ln w, A, b0, b1); return χ²."""
+    r, height, b0, b1 = p[0], p[2], p[3], p[4]
+    iw = np.exp(-p[1])
+    black, variance, per_level, knee, beyond = response
+    n00 = n10 = n11 = n20 = n21 = n22 = n30 = n31 = n32 = n33 = n40 = n41 = n42 = n43 = n44 = 0.0
+    v0 = v1 = v2 = v3 = v4 = chi2 = 0.0
+    for k in range(low, high):
+        t = radius[k] - r0
+        x = (radius[k] - r - slope * offset[k]) * iw
+        e = np.exp(-0.5 * x * x)
+        m = height * e + b0 + b1 * t
+        gain = 1.0
+        if m > knee:
+            m = knee + beyond * (m - knee)
+            gain = beyond
+        weight = 1.0 / (variance + per_level * max(m - black, 0.0))
+        residual = image[pixel[k]] - m
+        e *= gain
+        d0 = height * e * x * iw
+        d1 = height * e * x * x
+        d4 = gain * t
+        w0, w1, w2, w3, w4 = weight * d0, weight * d1, weight * e, weight * gain, weight * d4
+        chi2 += weight * residual * residual
+        v0 += w0 * residual
+        v1 += w1 * residual
+        v2 += w2 * residual
+        v3 += w3 * residual
+        v4 += w4 * residual
+        n00 += w0 * d0
+        n10 += w1 * d0
+        n11 += w1 * d1
+        n20 += w2 * d0
+        n21 += w2 * d1
+        n22 += w2 * e
+        n30 += w3 * d0
+        n31 += w3 * d1
+        n32 += w3 * e
+        n33 += w3 * gain
+        n40 += w4 * d0
+        n41 += w4 * d1
+        n42 += w4 * e
+        n43 += w4 * gain
+        n44 += w4 * d4
+    n[0, 0], n[1, 0], n[1, 1], n[2, 0], n[2, 1], n[2, 2] = n00, n10, n11, n20, n21, n22
+    n[3, 0], n[3, 1], n[3, 2], n[3, 3] = n30, n31, n32, n33
+    n[4, 0], n[4, 1], n[4, 2], n[4, 3], n[4, 4] = n40, n41, n42, n43, n44
+    v[0], v[1], v[2], v[3], v[4] = v0, v1, v2, v3, v4
+    return chi2
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+def _flank_counts(radius, offset, low, high, r0, p, slope, knee):  # type: ignore[no-untyped-def]
+    """Clipped pixels, and unclipped ones on the inner and the outer flank."""
+    clipped, inner, outer = 0, 0, 0
+    w = np.exp(p[1])
+    for k in range(low, high):
+        x = (radius[k] - p[0] - slope * offset[k]) / w
+        if p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * (radius[k] - r0) > knee:
+            clipped += 1
+        elif -2.5 < x < -0.5:
+            inner += 1
+        elif 0.5 < x < 2.5:
+            outer += 1
+    return clipped, inner, outer
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, response, out):  # type: ignore[no-untyped-def]
+    n, v, p = np.empty((5, 5)), np.empty(5), np.empty(5)
+    half = WINDOW_WIDTHS * width
+    prior = 1.0 / _LOG_WIDTH_PRIOR**2
+    for a in range(seed.size):
+        out[:, a] = np.nan
+        r0 = seed[a]
+        if not np.isfinite(r0):
+            continue
+        low = first_at_least(radius, start[a], start[a + 1], r0 - half)
+        high = first_at_least(radius, low, start[a + 1], r0 + half)
+        b0, b1, height, seen = _guess(image, pixel, radius, low, high, r0, width)
+        if not seen or high - low <= v.size:
+            continue
+        p[0], p[1], p[2], p[3], p[4] = r0, np.log(width), height, b0, b1
+        chi2, settled = 0.0, False
+        for _ in range(_STEPS):
+            chi2 = _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope[a], response, n, v)
+            n[1, 1] += prior
+            v[1] += prior * (np.log(width) - p[1])
+            if not _factor(n):
+                break
+            _solve(n, v)
+            settled = abs(v[0]) < _SETTLED_PX and abs(v[1]) < _SETTLED_LOG_WIDTH
+            v[0] = min(max(v[0], -width), width)
+            v[1] = min(max(v[1], -0.3), 0.3)
+            p += v
+            if settled or abs(p[0] - r0) > half:
+                break
+        if not settled or abs(p[0] - r0) > half or p[2] <= 0.0:
+            continue
+        out[0, a], out[1, a], out[2, a], out[3, a] = p[0], np.exp(p[1]), p[2], p[3]
+        out[4, a] = np.sqrt(_inverse_diagonal(n, 0, v))
+        out[5, a] = np.sqrt(_inverse_diagonal(n, 2, v))
+        out[6, a] = chi2 / (high - low - v.size)
+        clipped, inner, outer = _flank_counts(radius, offset, low, high, r0, p, slope[a], response[3])
+        out[7, a], out[8, a], out[9, a] = clipped, inner, outer

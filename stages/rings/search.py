@@ -1,0 +1,191 @@
+"""Where the line is, to a pixel: in a band about the ring seen last, or anywhere when there is none."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Float
+from stages.rings.profile import FAST, first_at_least
+from stages.rings.sectors import Sectors
+
+Image = NDArray[np.uint8] | NDArray[np.float32]
+BAND_WIDTHS = 10.0
+_REACH_WIDTHS = 4.0
+_SMALLEST_RADIUS_PX = 12
+_CREDIT = 6.0
+_JUMP = 18.0
+_TRIAL_WIDTHS_PX = (1.0, 2.0, 4.0)
+
+
+class Peaks(NamedTuple):
+    """Best line candidate of every sector, and the best other one, (A,) each.
+
+    ``radius_px`` and ``score`` (amplitude over its noise), ``rival_px`` and ``rival_score``: the best candidate
+    at least four line widths away.
+    """
+
+    radius_px: Float
+    score: Float
+    rival_px: Float
+    rival_score: Float
+
+
+def matched_template(width_px: float) -> Float:
+    """Gaussian of 1 σ ``width_px`` made blind to constant and linear background, of unit norm."""
+    reach = max(2, int(np.ceil(_REACH_WIDTHS * width_px)))
+    t = np.arange(-reach, reach + 1.0)
+    template = np.exp(-0.5 * (t / width_px) ** 2)
+    template -= template.mean()
+    return np.asarray(template / np.linalg.norm(template))
+
+
+def detection_limit(positions: float) -> float:
+    """Score that the largest of ``positions`` independent Gaussian noise values exceeds once in a hundred."""
+    return float(np.sqrt(2 * np.log(100 * max(positions, 2.0))))
+
+
+def search_band(
+    image: Image, sectors: Sectors, low_px: Float, high_px: Float, width_px: float, noise: float
+) -> Peaks:
+    """Find the best matched-filter peak of every sector between ``low_px`` and ``high_px`` (A,)."""
+    out = np.full((4, len(low_px)), np.nan)
+    template = matched_template(width_px)
+    _search_sectors(
+        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template, 4 * width_px, out
+    )  # fmt: skip
+    out[1] /= noise
+    out[3] /= noise
+    return Peaks(*out)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _search_sectors(image, start, pixel, radius, low_px, high_px, template, apart, out):  # type: ignore[no-untyped-def]
+    reach = template.size // 2
+    size = int(np.nanmax(high_px - low_px)) + 2 * reach + 4
+    total, count, response = np.empty(size), np.empty(size), np.empty(size)
+    for a in range(low_px.size):
+        if not np.isfinite(low_px[a]):
+            continue
+        first = int(np.floor(low_px[a])) - reach
+        bins = int(np.ceil(high_px[a])) + reach + 1 - first
+        total[:bins] = 0.0
+        count[:bins] = 0.0
+        k = first_at_least(radius, start[a], start[a + 1], first - 0.5)
+        seen = -1
+        while k < start[a + 1]:
+            b = int(radius[k] - first + 0.5)
+            if b >= bins:
+                break
+            total[b] += image[pixel[k]]
+            count[b] += 1.0
+            seen = b
+            k += 1
+        before = -1
+        for b in range(seen + 1):
+            if count[b] > 0:
+                total[b] /= count[b]
+                for gap in range(before + 1, b):
+                    total[gap] = total[b] if before < 0 else total[before]
+                before = b
+        best, at = 0.0, -1
+        for b in range(reach, seen + 1 - reach):
+            s = 0.0
+            for j in range(-reach, reach + 1):
+                s += template[j + reach] * total[b + j]
+            response[b] = s
+            if s > best:
+                best, at = s, b
+        if at < 0:
+            continue
+        shift = 0.0
+        if reach < at < seen - reach:
+            bend = response[at - 1] - 2 * response[at] + response[at + 1]
+            if bend < 0:
+                shift = 0.5 * (response[at - 1] - response[at + 1]) / bend
+        out[0, a], out[1, a] = first + at + shift, best
+        second, there = 0.0, -1
+        for b in range(reach, seen + 1 - reach):
+            if abs(b - at) >= apart and response[b] > second:
+                second, there = response[b], b
+        out[2, a], out[3, a] = first + there, second
+
+
+def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, float]:
+    """Find the ring anywhere in the image: radius (A,), NaN where no line stands out, and trial line width.
+
+    The closed path of the largest summed matched-filter score is found by dynamic programming in the polar
+    image, for several line widths; scores are capped, so that a glint cannot outvote the ring.
+    """
+    polar = _polar_image(image, sectors)
+    best_total, best = -np.inf, (np.full(len(sectors.azimuth_rad), np.nan), _TRIAL_WIDTHS_PX[0])
+    for width in _TRIAL_WIDTHS_PX:
+        score = cv2.filter2D(polar, cv2.CV_32F, matched_template(width)[None].astype(np.float32)) / noise
+        score[np.isnan(score)] = 0
+        credit = np.clip(score, 0, _CREDIT)
+        path = _closed_path(credit.astype(np.float32), _JUMP)
+        at_path = score[np.arange(len(path)), path]
+        total = float(np.minimum(at_path, 10 * _CREDIT).sum())
+        if total > best_total:
+            found = at_path > detection_limit(polar.size)
+            radius = np.where(found, path + float(_SMALLEST_RADIUS_PX), np.nan)
+            best_total, best = total, (radius, width)
+    return best
+
+
+def _polar_image(image: Image, sectors: Sectors) -> NDArray[np.float32]:
+    width, height = sectors.image_size
+    u, v = sectors.centre_px
+    corners = np.hypot(np.array([u, u, width - u, width - u]), np.array([v, height - v, v, height - v]))
+    radius = np.arange(_SMALLEST_RADIUS_PX, int(corners.max()))
+    map_u = u + radius * np.cos(sectors.azimuth_rad)[:, None]
+    map_v = v + radius * np.sin(sectors.azimuth_rad)[:, None]
+    out = cv2.remap(
+        image.astype(np.float32), map_u.astype(np.float32), map_v.astype(np.float32),
+        cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"),
+    )  # fmt: skip
+    return np.asarray(out)
+
+
+@numba.njit(cache=True, nogil=True)
+def _closed_path(credit, jump):  # type: ignore[no-untyped-def]
+    """Path (A,) of largest credit (A, R) minus |step| in px, at most ``jump`` a step, around the circle.
+
+    Walked twice around; the middle turn is returned, where neither end is felt.
+    """
+    azimuths, radii = credit.shape
+    steps = 2 * azimuths
+    origin = np.empty((steps, radii), np.int16)
+    value = np.zeros(radii, np.float32)
+    moved = np.empty(radii, np.float32)
+    for s in range(steps):
+        top = 0
+        for r in range(radii):
+            moved[r] = value[r]
+            origin[s, r] = r
+            if value[r] > value[top]:
+                top = r
+        for r in range(1, radii):
+            if moved[r - 1] - 1 > moved[r]:
+                moved[r] = moved[r - 1] - 1
+                origin[s, r] = origin[s, r - 1]
+        for r in range(radii - 2, -1, -1):
+            if moved[r + 1] - 1 > moved[r]:
+                moved[r] = moved[r + 1] - 1
+                origin[s, r] = origin[s, r + 1]
+        for r in range(radii):
+            if value[top] - jump > moved[r]:
+                moved[r] = value[top] - jump
+                origin[s, r] = top
+            value[r] = moved[r] + credit[s % azimuths, r]
+    path = np.empty(azimuths, np.int64)
+    at = np.argmax(value)
+    for s in range(steps - 1, -1, -1):
+        if azimuths // 2 <= s < azimuths // 2 + azimuths:
+            path[s % azimuths] = at
+        at = origin[s, at]
+    return path
