@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -13,16 +13,20 @@ from pipeline.outcome import Number
 
 def headline(artefacts: Mapping[type, object]) -> tuple[Number, ...]:
     """Return headline numbers, with units, of whatever artefacts are there."""
-    numbers: list[Number] = []
-    for kind, measure in (
-        (RingSamples, _of_rings),
-        (Trajectory, _of_trajectory),
-        (Wall, _of_wall),
-        (Defects, _of_defects),
-    ):
-        if kind in artefacts:
-            numbers.extend(measure(artefacts[kind]))  # type: ignore[operator]
-    return tuple(numbers)
+    return tuple(number for artefact in artefacts.values() for number in _of(artefact))
+
+
+def _of(artefact: object) -> Iterable[Number]:
+    match artefact:
+        case RingSamples():
+            return _of_rings(artefact)
+        case Trajectory():
+            return _of_trajectory(artefact)
+        case Wall():
+            return _of_wall(artefact)
+        case Defects():
+            return _of_defects(artefact)
+    return ()
 
 
 def _of_rings(rings: RingSamples) -> Iterator[Number]:

@@ -15,12 +15,13 @@ from pipeline.errors import InputError
 from pipeline.export.exporter import Exporter
 from pipeline.export.run_record import write_run_record
 from pipeline.instrument.probe import Probe
-from pipeline.instrument.probe_file import check_image_size, read_probe
+from pipeline.instrument.probe_file import read_probe
 from pipeline.interrupt import stop_wish
 from pipeline.outcome import RunOutcome
 from pipeline.plan import Plan, Source, make_plan
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
+from pipeline.recording.checks import check_probe_fits
 from pipeline.run_folder import claimed, logged
 from pipeline.runner import Runner, Selection
 from pipeline.stage import Stage
@@ -67,7 +68,7 @@ def open_job(
     if file is None:
         raise InputError(recording, "names no probe", hint="give one with --probe FILE")
     believed = read_probe(file)
-    check_image_size(opened.source.image_size, believed, file)
+    check_probe_fits(opened, believed)
     return Job(opened, believed, file, tuple(stages), tuple(exporters), configuration, folder)
 
 

@@ -119,7 +119,7 @@ def _write_arrays(folder: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str,
 
 
 def _write_array(path: Path, array: NDArray[Any]) -> FileRecord:
-    return write_synced(path, lambda w: np.lib.format.write_array(w, array, allow_pickle=False))  # type: ignore[arg-type]
+    return write_synced(path, lambda w: np.lib.format.write_array(w, array, allow_pickle=False))
 
 
 def _load(folder: Path, name: str) -> NDArray[Any]:

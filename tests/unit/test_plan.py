@@ -1,0 +1,61 @@
+"""Stages are wired by type before anything runs; keys change with whatever a result depends on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.config import resolve
+from pipeline.plan import PipelineError, Plan, Source, make_plan
+from pipeline.recording.base import Recording
+from pipeline.stage import Stage
+from tests.toys import DRAW, SMOOTH, TOTAL, TOYS, toy_recording
+
+
+def plan_of(*stages: Stage, key: str = "0" * 64, assignments: tuple[str, ...] = ()) -> Plan:
+    recording = toy_recording()
+    return make_plan(stages, resolve(stages, None, assignments), (Source(Recording, recording, key),))
+
+
+def keys(plan: Plan) -> list[str]:
+    return [s.key for s in plan.steps]
+
+
+@pytest.mark.parametrize(
+    ("stages", "message"),
+    [
+        ((SMOOTH, DRAW, TOTAL), "stage smooth needs Drawn: stage draw, which must come before"),
+        ((DRAW, TOTAL), "stage total needs Smoothed: no stage makes it"),
+        ((DRAW, replace(DRAW, name="again")), "stage again makes Drawn, which is there already"),
+        ((DRAW, DRAW), "two stages are named draw"),
+    ],
+)
+def test_what_does_not_fit_is_refused(stages: tuple[Stage, ...], message: str) -> None:
+    with pytest.raises(PipelineError, match=message):
+        plan_of(*stages)
+
+
+def test_a_missing_source_is_refused() -> None:
+    with pytest.raises(PipelineError, match="stage draw needs Recording: no stage makes it"):
+        make_plan(TOYS, resolve(TOYS), ())
+
+
+def test_keys_are_the_same_again() -> None:
+    assert keys(plan_of(*TOYS)) == keys(plan_of(*TOYS))
+    assert len(set(keys(plan_of(*TOYS)))) == len(TOYS)
+
+
+def test_a_parameter_changes_the_keys_from_its_stage_on() -> None:
+    before, after = keys(plan_of(*TOYS)), keys(plan_of(*TOYS, assignments=("smooth.width=5",)))
+    assert [a == b for a, b in zip(before, after, strict=True)] == [True, False, False]
+
+
+def test_a_version_changes_the_keys_from_its_stage_on() -> None:
+    before, after = keys(plan_of(*TOYS)), keys(plan_of(DRAW, replace(SMOOTH, version="2"), TOTAL))
+    assert [a == b for a, b in zip(before, after, strict=True)] == [True, False, False]
+
+
+def test_another_recording_changes_every_key() -> None:
+    before, after = keys(plan_of(*TOYS)), keys(plan_of(*TOYS, key="1" * 64))
+    assert not set(before) & set(after)

@@ -1,0 +1,215 @@
+"""Nothing is done twice, every ending is accounted for, and a folder never mixes two configurations."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.display import SilentDisplay
+from pipeline.errors import Cancelled, InputError, UnusableError
+from pipeline.job import run_job
+from pipeline.outcome import RunOutcome, State
+from pipeline.plan import PipelineError
+from pipeline.runner import FailedError, Selection
+from pipeline.stage import Context
+from tests.shared_data import PROJECT_ROOT
+from tests.toys import DRAW, SMOOTH, Drawn, DrawParameters, run_toys, toy_job
+
+
+def states(outcome: RunOutcome) -> list[str]:
+    return [s.state.value for s in outcome.stages]
+
+
+def record(folder: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((folder / "run.json").read_text("utf-8"))
+    return content
+
+
+def snapshot(folder: Path) -> dict[str, tuple[int, int]]:
+    """Identity and time of every file: what is written again differs."""
+    names = (p for p in folder.rglob("*") if p.is_file() and p.name not in ("run.json", "run.log", "lock"))
+    return {str(p.relative_to(folder)): (p.stat().st_ino, p.stat().st_mtime_ns) for p in names}
+
+
+def test_a_second_call_does_nothing_again(tmp_path: Path) -> None:
+    assert states(run_toys(tmp_path / "run")) == ["completed"] * 3
+    before = snapshot(tmp_path / "run")
+    assert states(run_toys(tmp_path / "run")) == ["reused"] * 3
+    assert snapshot(tmp_path / "run") == before
+
+
+def test_run_json_tells_what_was_run(tmp_path: Path) -> None:
+    outcome = run_toys(tmp_path / "run", "smooth.width=5")
+    told = record(tmp_path / "run")
+    assert told["format"] == 1
+    assert told["state"] == "completed"
+    assert told["configuration"]["smooth"]["width"] == 5
+    assert told["configuration"]["draw"]["count"] == DrawParameters().count
+    assert told["input_sha256"]["recording"] == "0" * 64
+    assert len(told["input_sha256"]["probe"]) == 64
+    assert [s["key"] for s in told["stages"]] == [s.key for s in outcome.stages]
+    assert told["stages"][0]["numbers"] == [{"name": "rejected: dull", "value": 7, "unit": "numbers"}]
+    assert told["reader_warnings"] == ["mended"]
+
+
+def test_numbers_of_reused_stages_are_told_again(tmp_path: Path) -> None:
+    first = run_toys(tmp_path / "run")
+    again = run_toys(tmp_path / "run")
+    assert [s.numbers for s in again.stages] == [s.numbers for s in first.stages]
+
+
+def test_the_same_numbers_in_another_folder(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        run_toys(tmp_path / name)
+    a, b = (np.load(tmp_path / n / "numbers.dir" / "values.npy") for n in ("a", "b"))
+    assert np.array_equal(a, b)
+
+
+def test_a_parameter_recomputes_from_its_stage_on(tmp_path: Path) -> None:
+    run_toys(tmp_path / "run")
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert states(run_toys(tmp_path / "run", "smooth.width=5")) == ["reused", "completed", "completed"]
+    assert (tmp_path / "run" / "report.html").read_text() != page
+    assert states(run_toys(tmp_path / "run")) == ["reused"] * 3
+    assert (tmp_path / "run" / "report.html").read_text() == page
+
+
+@pytest.mark.parametrize(
+    ("selection", "expected"),
+    [
+        (Selection(recompute_from="smooth"), ["reused", "completed", "completed"]),
+        (Selection(resume=False), ["completed"] * 3),
+        (Selection(only="smooth"), ["reused"] * 3),
+        (Selection(only="smooth", resume=False), ["reused", "completed", "reused"]),
+    ],
+)
+def test_selection(tmp_path: Path, selection: Selection, expected: list[str]) -> None:
+    run_toys(tmp_path / "run")
+    assert states(run_toys(tmp_path / "run", selection=selection)) == expected
+
+
+def test_only_computes_one_stage_and_asks_for_what_it_needs(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no result of stage draw, which smooth needs"):
+        run_toys(tmp_path / "run", selection=Selection(only="smooth"))
+    outcome = run_toys(tmp_path / "run", selection=Selection(only="draw"))
+    assert states(outcome) == ["completed", "waiting", "waiting"]
+    assert not (tmp_path / "run" / "report.html").exists()
+
+
+def test_an_unknown_stage_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(PipelineError, match="no stage smoth; there are draw, smooth, total"):
+        run_toys(tmp_path / "run", selection=Selection(only="smoth"))
+    assert not (tmp_path / "run").exists()
+
+
+def test_unusable_keeps_what_was_completed(tmp_path: Path) -> None:
+    with pytest.raises(UnusableError):
+        run_toys(tmp_path / "run", "smooth.unusable_above=0.001")
+    told = record(tmp_path / "run")
+    assert told["state"] == "unusable"
+    assert [s["state"] for s in told["stages"]] == ["completed", "unusable", "waiting"]
+    assert "too large" in told["problem"]
+    assert states(run_toys(tmp_path / "run")) == ["reused", "completed", "completed"]
+
+
+def test_a_bug_leaves_its_traceback_in_the_log(tmp_path: Path) -> None:
+    with pytest.raises(
+        FailedError, match=r"stage smooth failed: ZeroDivisionError: the toy broke(?s:.*)run\.log"
+    ):
+        run_toys(tmp_path / "run", "smooth.fails=true")
+    log = (tmp_path / "run" / ".boresight" / "run.log").read_text()
+    assert "Traceback" in log
+    assert "ZeroDivisionError: the toy broke" in log
+    assert record(tmp_path / "run")["state"] == "failed"
+    assert states(run_toys(tmp_path / "run")) == ["reused", "completed", "completed"]
+
+
+def test_files_of_another_configuration_do_not_stay(tmp_path: Path) -> None:
+    run_toys(tmp_path / "run")
+    with pytest.raises(FailedError):
+        run_toys(tmp_path / "run", "smooth.fails=true")
+    assert not (tmp_path / "run" / "report.html").exists()
+    assert not (tmp_path / "run" / "numbers.dir").exists()
+
+
+@pytest.mark.parametrize("name", ["report.html", "numbers.dir/values.npy"])
+@pytest.mark.parametrize("damage", [Path.unlink, lambda p: p.write_bytes(b"edited")])
+def test_a_file_lost_or_changed_is_written_again(tmp_path: Path, name: str, damage: Any) -> None:
+    run_toys(tmp_path / "run")
+    whole = (tmp_path / "run" / name).read_bytes()
+    damage(tmp_path / "run" / name)
+    assert states(run_toys(tmp_path / "run")) == ["reused"] * 3
+    assert (tmp_path / "run" / name).read_bytes() == whole
+
+
+def stop_in_the_middle(*, parameters: DrawParameters, context: Context) -> Drawn:
+    context.progress(1, 4)
+    os.kill(os.getpid(), signal.SIGINT)
+    context.progress(2, 4)
+    raise AssertionError("it went on")
+
+
+def test_ctrl_c_stops_at_the_next_progress(tmp_path: Path) -> None:
+    job = toy_job(tmp_path / "run")
+    job = replace(job, stages=(replace(DRAW, function=stop_in_the_middle), *job.stages[1:]))
+    with pytest.raises(Cancelled, match="the same command continues"):
+        run_job(job, Selection(), SilentDisplay())
+    assert record(tmp_path / "run")["state"] == State.CANCELLED
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def answer_something_else(drawn: Drawn, *, parameters: Any, context: Context) -> SMOOTH.output():  # type: ignore[valid-type]
+    return drawn
+
+
+def test_a_stage_that_breaks_its_word_fails(tmp_path: Path) -> None:
+    job = toy_job(tmp_path / "run")
+    job = replace(job, stages=(DRAW, replace(SMOOTH, function=answer_something_else), job.stages[2]))
+    with pytest.raises(FailedError, match="stage smooth"):
+        run_job(job, Selection(), SilentDisplay())
+
+
+def test_a_foreign_folder_is_refused_untouched(tmp_path: Path) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(InputError, match="not those of a boresight run"):
+        run_toys(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.txt"]
+    with pytest.raises(InputError, match="is a file"):
+        run_toys(tmp_path / "thesis.txt")
+
+
+def test_a_folder_that_cannot_be_written_is_told() -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        run_toys(Path("/proc/boresight-run"))
+
+
+def test_two_processes_do_not_share_a_folder(tmp_path: Path) -> None:
+    arguments = [sys.executable, "-m", "tests.toys", str(tmp_path / "run"), "draw.pause_s=1"]
+    other = subprocess.Popen(arguments, cwd=PROJECT_ROOT)
+    try:
+        lock = tmp_path / "run" / ".boresight" / "lock"
+        while not lock.is_file() or not lock.read_text():
+            assert other.poll() is None
+        with pytest.raises(InputError, match=f"process {other.pid} is at work"):
+            run_toys(tmp_path / "run")
+    finally:
+        other.kill()
+        other.wait()
+    assert lock.read_text() == str(other.pid)
+    assert states(run_toys(tmp_path / "run"))[1:] == ["completed"] * 2
+
+
+def test_a_moved_run_goes_on(tmp_path: Path) -> None:
+    run_toys(tmp_path / "run")
+    shutil.move(tmp_path / "run", tmp_path / "moved")
+    assert states(run_toys(tmp_path / "moved")) == ["reused"] * 3

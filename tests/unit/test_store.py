@@ -1,0 +1,179 @@
+"""Results come back exactly as they were, and what is not whole never comes back."""
+
+from __future__ import annotations
+
+import math
+import resource
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from numpy.typing import NDArray
+
+from pipeline.codec import digest, encode
+from pipeline.errors import InputError
+from pipeline.outcome import Number
+from pipeline.store import Provenance, Store
+from tests.toys import Mood
+
+
+@dataclass(frozen=True)
+class Leaf:
+    name: str
+    size: float
+    array: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Tree:
+    leaf: Leaf | None
+    leaves: tuple[Leaf, ...]
+    mood: Mood
+    count: int
+    flag: bool
+    mixed: tuple[float | int | str | bool | None, ...]
+    array: NDArray[Any]
+
+
+KEY = "ab" * 32
+PROVENANCE = Provenance("grow", "1", KEY, 1.5, (Number("rejected: dry", 3, "leaves"),))
+
+dtypes = st.sampled_from(
+    [np.float64, np.float32, np.int64, np.uint8, np.bool_, np.dtype("<U5"), np.dtype(">f4")]
+)
+arrays = dtypes.flatmap(
+    lambda d: hnp.arrays(d, hnp.array_shapes(min_dims=0, max_dims=3, min_side=0, max_side=4))
+)
+texts = st.text(st.characters(codec="utf-8"), max_size=8)
+leaves = st.builds(Leaf, name=texts, size=st.floats(), array=arrays)
+trees = st.builds(
+    Tree,
+    leaf=st.none() | leaves,
+    leaves=st.lists(leaves, max_size=3).map(tuple),
+    mood=st.sampled_from(Mood),
+    count=st.integers(),
+    flag=st.booleans(),
+    mixed=st.lists(st.floats() | st.integers() | texts | st.booleans() | st.none(), max_size=4).map(tuple),
+    array=arrays,
+)
+
+
+def same(a: Any, b: Any) -> bool:
+    """Equality to the last bit: types, dtypes, NaN and the sign of zero included."""
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, np.ndarray):
+        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    if is_dataclass(a):
+        return all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    if isinstance(a, float):
+        return (math.isnan(a) and math.isnan(b)) or (a == b and math.copysign(1, a) == math.copysign(1, b))
+    return bool(a == b)
+
+
+def tree() -> Tree:
+    leaf = Leaf("oak", 2.5, np.arange(12.0).reshape(3, 4))
+    return Tree(leaf, (leaf, leaf), Mood.WILD, 3, True, (1, 1.0, "x", None, True), np.arange(1000))
+
+
+@given(trees)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_what_is_read_is_what_was_written(tmp_path: Path, artefact: Tree) -> None:
+    store = Store(tmp_path)
+    store.write(artefact, PROVENANCE)
+    stored = store.read("grow", KEY, Tree)
+    assert stored is not None
+    assert same(stored.artefact, artefact)
+    assert stored.provenance == PROVENANCE
+    assert digest(stored.artefact) == digest(artefact)
+
+
+def test_big_arrays_are_mapped_and_all_are_read_only(tmp_path: Path) -> None:
+    big = Leaf("big", 0.0, np.arange(1_000_000.0))
+    Store(tmp_path).write(Tree(big, (), Mood.CALM, 0, False, (), np.arange(3)), PROVENANCE)
+    stored = Store(tmp_path).read("grow", KEY, Tree)
+    assert stored is not None
+    assert isinstance(stored.artefact.leaf.array.base, np.memmap)
+    for array in (stored.artefact.leaf.array, stored.artefact.array):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+@pytest.mark.parametrize("value", [{"a": 1}, [1], b"x", np.array([object()]), 1j, Path("x")])
+def test_what_cannot_be_stored_is_refused_by_name(value: object) -> None:
+    with pytest.raises(TypeError, match=r"^leaf\.array"):
+        encode(Tree(Leaf("a", 0.0, value), (), Mood.CALM, 0, True, (), np.arange(1)))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("change", [{"count": 4}, {"flag": 1}, {"mood": Mood.CALM}, {"mixed": (1.0, 1)}])
+def test_other_content_has_another_digest(change: dict[str, Any]) -> None:
+    from dataclasses import replace
+
+    assert digest(tree()) == digest(tree())
+    assert digest(replace(tree(), **change)) != digest(tree())
+    assert digest(replace(tree(), array=np.arange(1000, dtype=np.int32))) != digest(tree())
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-2])
+
+
+def flip_bit(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+@pytest.mark.parametrize("damage", [truncate, flip_bit, empty, Path.unlink])
+@pytest.mark.parametrize("name", ["manifest.json", "array.npy", "leaf.array.npy"])
+def test_damaged_results_are_discarded(tmp_path: Path, damage: Callable[[Path], None], name: str) -> None:
+    store = Store(tmp_path)
+    store.write(tree(), PROVENANCE)
+    folder = tmp_path / f"grow-{KEY[:12]}"
+    damage(folder / name)
+    assert store.read("grow", KEY, Tree) is None
+    assert not folder.exists()
+    store.write(tree(), PROVENANCE)
+    assert store.read("grow", KEY, Tree) is not None
+
+
+def test_the_result_of_another_key_or_class_is_discarded(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.write(tree(), PROVENANCE)
+    assert store.read("grow", KEY[:-1] + "c", Tree) is None
+    store.write(tree(), PROVENANCE)
+    assert store.read("grow", KEY, Leaf) is None
+
+
+@contextmanager
+def file_size_limit(limit: int) -> Iterator[None]:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.parametrize("limit", [0, 100, 5000])
+def test_a_full_disk_is_told_and_leaves_nothing_that_looks_whole(tmp_path: Path, limit: int) -> None:
+    store = Store(tmp_path)
+    with file_size_limit(limit), pytest.raises(InputError, match="cannot be written"):
+        store.write(tree(), PROVENANCE)
+    assert store.read("grow", KEY, Tree) is None
+    assert not list(tmp_path.iterdir())
+    store.write(tree(), PROVENANCE)
+    assert store.read("grow", KEY, Tree) is not None
