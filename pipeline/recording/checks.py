@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
-from pipeline.recording.base import Encoder, FrameTable, Recording
+from pipeline.recording.base import Encoder, Float, FrameTable, Recording
 
 # A step of the encoder counts as a jump when it is this many times the usual largest, and this long.
 _JUMP_FACTOR, _JUMP_MM = 10.0, 1.0
@@ -63,7 +63,7 @@ def _jumps(encoder: Encoder) -> tuple[str, ...]:
     return (f"the encoder jumps by up to {step_mm.max():.1f} mm at {at} ({jumps.size} in all)",)
 
 
-def refuse_backward(file: Path, values: Sequence[float], name: str, *, strictly: bool) -> None:
+def refuse_backward(file: Path, values: Sequence[float] | Float, name: str, *, strictly: bool) -> None:
     """Raise `InputError` at the first value that is less than (``strictly``: not above) its predecessor."""
     steps = np.diff(np.asarray(values, float))
     wrong = np.flatnonzero(steps <= 0 if strictly else steps < 0)

@@ -1,0 +1,154 @@
+"""Which topics of a bag hold the frames, their light and the encoder, and what these say."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import InputError
+from pipeline.recording.bag_file import Bag
+from pipeline.recording.bag_images import IMAGE_TYPES
+from pipeline.recording.base import Encoder, FrameTable, Illumination, Int
+from pipeline.recording.checks import refuse_backward
+from pipeline.yaml_file import Section
+
+IMAGE_TOPICS = ("/camera/image_raw", "/camera/image_raw/compressed", "/camera/image/compressed")
+ILLUMINATION_TOPIC, ILLUMINATION_TYPE = "/illumination", "std_msgs/msg/String"
+ENCODER_TOPIC, ENCODER_TYPE = "/encoder/distance_mm", "std_msgs/msg/Float64"
+# Stamps of the camera's driver count when they run with the recorder's clock to within this time.
+_SAME_CLOCK_NS = 5_000_000_000
+_KINDS = tuple(k.value for k in Illumination)
+
+
+@dataclass(frozen=True)
+class Topics:
+    """Topic and type of the images; topics of illumination and encoder, empty where there is none."""
+
+    image: str
+    image_type: str
+    illumination: str
+    encoder: str
+
+
+def choose_topics(types: Mapping[str, str], section: Section, path: Path) -> Topics:
+    """Return the topics to read: those that the YAML file names, else the usual ones.
+
+    Raises
+    ------
+    InputError
+        When a named topic is not there or of another type, or several could be the images.
+    """
+    named = section.section("topics") if section.has("topics") else Section(section.file, {}, "topics")
+    named.refuse_unknown(("image", "illumination", "encoder"))
+    image = _named(named, "image", types, IMAGE_TYPES) or _usual_image(types, path)
+    illumination = _named(named, "illumination", types, (ILLUMINATION_TYPE,))
+    encoder = _named(named, "encoder", types, (ENCODER_TYPE,))
+    if not illumination and types.get(ILLUMINATION_TOPIC) == ILLUMINATION_TYPE:
+        illumination = ILLUMINATION_TOPIC
+    if not encoder and types.get(ENCODER_TOPIC) == ENCODER_TYPE:
+        encoder = ENCODER_TOPIC
+    return Topics(image, types[image], illumination, encoder)
+
+
+def frames_of(bag: Bag, topics: Topics, section: Section) -> tuple[Int, FrameTable, int]:
+    """Return when the images were recorded (N,) in ns, the table of frames, and its time 0 in ns.
+
+    Raises
+    ------
+    InputError
+        When there are no images, their times run backwards, or nothing says what lit them.
+    """
+    recorded, stamped = [], []
+    for time_ns, coded in bag.messages(topics.image):
+        stamp = bag.decode(coded, topics.image_type).header.stamp
+        recorded.append(time_ns)
+        stamped.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
+    if not recorded:
+        raise InputError(bag.files[0], "holds no image", place=f"topic {topics.image}")
+    recorded_ns, stamped_ns = np.array(recorded, np.int64), np.array(stamped, np.int64)
+    same_clock = bool(np.all(np.abs(stamped_ns - recorded_ns) < _SAME_CLOCK_NS))
+    taken_ns = stamped_ns if same_clock else recorded_ns
+    time_s = (taken_ns - taken_ns[0]) * 1e-9
+    refuse_backward(bag.files[0], time_s, f"the time of {topics.image}", strictly=True)
+    light = _lights(bag, topics, section, recorded_ns)
+    return recorded_ns, FrameTable(np.arange(time_s.size), time_s, light), int(taken_ns[0])
+
+
+def encoder_of(bag: Bag, topics: Topics, start_ns: int) -> Encoder | None:
+    """Return the encoder's readings, time counted from ``start_ns``; None where there is no such topic."""
+    if not topics.encoder:
+        return None
+    rows = [(t - start_ns, bag.decode(c, ENCODER_TYPE).data) for t, c in bag.messages(topics.encoder)]
+    if len(rows) < 2:
+        raise InputError(
+            bag.files[0], f"has {len(rows)} readings", place=f"topic {topics.encoder}", expected="at least 2"
+        )
+    time_s, distance_mm = np.array([r[0] for r in rows]) * 1e-9, np.array([r[1] for r in rows], float)
+    wrong = np.flatnonzero(~np.isfinite(distance_mm))
+    if wrong.size:
+        place = f"topic {topics.encoder}, message {wrong[0] + 1}"
+        raise InputError(bag.files[0], f"is {distance_mm[wrong[0]]}", place=place, expected="a finite number")
+    return Encoder(time_s, distance_mm)
+
+
+def _lights(bag: Bag, topics: Topics, section: Section, recorded_ns: Int) -> NDArray[np.str_]:
+    """Return what lit each image: by its own message, by the latest message, or by a stated pattern."""
+    if not topics.illumination:
+        pattern = _pattern(section)
+        return np.array([pattern[i % len(pattern)] for i in range(recorded_ns.size)], np.str_)
+    place = f"topic {topics.illumination}"
+    messages = list(bag.messages(topics.illumination))
+    words = [bag.decode(coded, ILLUMINATION_TYPE).data for _, coded in messages]
+    for i, word in enumerate(words):
+        if word not in _KINDS:
+            at = f"{place}, message {i + 1}"
+            raise InputError(bag.files[0], f"is {word!r}", place=at, expected=f"one of {', '.join(_KINDS)}")
+    if len(words) == recorded_ns.size:
+        return np.array(words, np.str_)
+    latest = np.searchsorted(np.array([t for t, _ in messages], np.int64), recorded_ns, "right") - 1
+    if latest[0] < 0:
+        raise InputError(
+            bag.files[0], f"has {len(words)} messages, the first after the first image", place=place,
+            expected=f"one for each of the {recorded_ns.size} images, or one before the first image",
+        )  # fmt: skip
+    return np.array(words, np.str_)[latest]
+
+
+def _pattern(section: Section) -> list[str]:
+    """Return the pattern of illumination that the YAML file states."""
+    expected = f"a list of {', '.join(_KINDS)}, or a topic {ILLUMINATION_TOPIC} in the bag"
+    value = section.require("illumination", expected)
+    if not isinstance(value, list) or not value or any(v not in _KINDS for v in value):
+        raise section.fail("illumination", f"is {value!r}", expected)
+    return [str(v) for v in value]
+
+
+def _named(named: Section, key: str, types: Mapping[str, str], wanted: Sequence[str]) -> str:
+    """Return the topic that the YAML file names for a role, empty where it names none."""
+    if not named.has(key):
+        return ""
+    topic = named.text(key)
+    if types.get(topic) in wanted:
+        return topic
+    found = f"a {types[topic]}" if topic in types else "not in the bag"
+    near = difflib.get_close_matches(topic, types, 1)
+    hint = f"did you mean {near[0]}?" if near else f"the bag holds {', '.join(sorted(types)) or 'nothing'}"
+    raise named.fail(key, f"{topic} is {found}", f"a topic of type {' or '.join(wanted)}", hint)
+
+
+def _usual_image(types: Mapping[str, str], path: Path) -> str:
+    """Return the usual image topic, or the only one that could be."""
+    images = [topic for topic, kind in sorted(types.items()) if kind in IMAGE_TYPES]
+    usual = [topic for topic in IMAGE_TOPICS if topic in images]
+    if usual or len(images) == 1:
+        return (usual or images)[0]
+    raise InputError(
+        path, f"has {len(images)} topics of images{': ' if images else ''}{', '.join(images)}",
+        expected=f"{IMAGE_TOPICS[0]} or one topic of type {' or '.join(IMAGE_TYPES)}",
+        hint="name it in the YAML file beside the bag: topics: {image: /name}",
+    )  # fmt: skip
