@@ -83,7 +83,7 @@ def _offsets(defect, distance_mm, azimuth_rad, radius_mm):
 def relief(defect, distance_mm, azimuth_rad, radius_mm, rng):
     """Return the change of radius (S, A) that the defect makes."""
     along, around = _offsets(defect, distance_mm, azimuth_rad, radius_mm)
-    q = np.hypot(along / (defect.length_mm / 2), around / (defect.width_mm / 2))
+    q = np.hypot(along / (defect.length_mm / 2), around / max(defect.width_mm / 2, 1e-3))
     if defect.kind == "weld":
         return defect.depth_mm * np.exp(-((2.2 * along / defect.length_mm) ** 2)) + 0 * around
     if defect.kind == "dent":

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.findings import Defects, Sections
 from pipeline.instrument.probe import Probe
+from pipeline.model import Overlays
 from pipeline.recording.base import Recording
 
 
@@ -41,7 +42,7 @@ class RunSummary:
     recording, probe
     created : str
         When the run was made, ISO 8601, or empty.
-    rings, trajectory, wall, texture, sections, defects
+    rings, trajectory, wall, texture, overlays, sections, defects
     numbers : tuple of ReportedNumber
         In the order of being reported. Names that begin with ``rejected`` account for what was not used.
     stages : tuple of StageRecord
@@ -58,6 +59,7 @@ class RunSummary:
     trajectory: Trajectory | None = None
     wall: Wall | None = None
     texture: WallTexture | None = None
+    overlays: Overlays | None = None
     sections: Sections | None = None
     defects: Defects | None = None
     numbers: tuple[ReportedNumber, ...] = ()

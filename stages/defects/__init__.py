@@ -1,6 +1,7 @@
 """Wall to defects: what stands off the pipe's own smooth shape, told from noise, measured, named.
 
-1. Take the pipe's own slowly varying shape out (`relief`), and the motion of single rings.
+1. Take the pipe's own slowly varying shape out (`relief`), and the motion of single rings; once more when it
+   is known where the defects are.
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis to instances with outlines; all-round beads are welds (`segment`).
 4. Depth as the extreme of a 1 mm mean, without what noise adds to an extreme, ± 1 σ (`depth`).
@@ -22,7 +23,7 @@ from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, detect
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
-from stages.defects.segment import Region, segment
+from stages.defects.segment import Region, footprint, segment
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
@@ -44,8 +45,12 @@ def find_defects(
         raise UnusableError(
             "defects", f"{seen} cells of the wall were measured", limit=f"at least {_MIN_CELLS}"
         )
-    relief = smooth_shape_removed(wall.radius_map, parameters)
+    relief = smooth_shape_removed(
+        wall.radius_map, parameters, np.zeros(wall.radius_map.radius_mm.shape, bool)
+    )
     detection = detect(relief, parameters.false_alarms)
+    known = footprint(relief, segment(relief, detection, parameters))
+    relief = smooth_shape_removed(wall.radius_map, parameters, known)
     regions = segment(relief, detection, parameters)
     noise = noise_field(relief, regions)
     measured: list[tuple[Region, Depth]] = []

@@ -28,7 +28,7 @@ class Depth:
 
 @dataclass(frozen=True)
 class NoiseField:
-    """Where noise may be drawn from: the relief's 1 mm mean over the clean wall, scaled to the stated noise."""
+    """Where noise is drawn from: the 1 mm mean of the clean wall, scaled to the stated noise."""
 
     smooth_mm: Float
     clean: Mask
@@ -75,9 +75,9 @@ def measure_depth(
 ) -> Depth:
     """Measure the depth of one region.
 
-    The extreme of a noisy surface exceeds the surface's extreme. By how much, and how it scatters, is found by
-    adding noise as the clean wall shows it to the smoothed surface (parametric bootstrap: Efron & Tibshirani,
-    An Introduction to the Bootstrap, 1993, ch. 10).
+    The extreme of a noisy surface exceeds the surface's extreme. By how much, and how it scatters, is found
+    by adding noise as the clean wall shows it to the smoothed surface (parametric bootstrap: Efron &
+    Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10).
     """
     source = relief.all_mm if region.all_round else relief.local_mm
     surface = region.sign * region.cut(millimetre_mean(source, relief.cell_mm))
@@ -95,7 +95,7 @@ def measure_depth(
 
 
 def _shape_sigma(relief: Relief, depth_mm: float) -> float:
-    """Return 1 σ from the pipe's own shape below the defect: five harmonics of a ring, known to its roughness.
+    """Return 1 σ of the pipe's own shape below the defect: a ring's five harmonics, given its roughness.
 
     What the defect's own foot takes from them is at most a few per cent of its depth.
     """

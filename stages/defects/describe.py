@@ -105,11 +105,10 @@ def _outline(relief: Relief, region: Region) -> Float:
     if region.all_round:
         return np.array([[top, first], [top, last], [bottom, last], [bottom, first]])
     # parts of one joined defect are bridged, so that one polygon holds them all
-    bridge = np.ones((3, 3), np.uint8)
-    mask = np.pad(region.mask.astype(np.uint8), 1)
+    mask, bridge = np.pad(region.mask.astype(np.uint8), 1), 3
     while cv2.connectedComponents(mask)[0] > 2:
-        mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, bridge)
-        bridge = np.ones(np.add(bridge.shape, 2), np.uint8)
+        closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((bridge, bridge), np.uint8))
+        mask, bridge = np.asarray(closed, np.uint8), bridge + 2
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     polygon = cv2.approxPolyDP(max(contours, key=cv2.contourArea), 0.7, True)[:, 0].astype(float)
     scale = (bottom - top) / region.mask.shape[0], (last - first) / region.mask.shape[1]
@@ -144,8 +143,8 @@ def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth
     if kinds[0] is DefectKind.WELD:
         return f"{words}, {features.length_mm:.0f} mm along the pipe. Called so because it goes all round."
     words += (
-        f", {features.length_mm:.1f} mm along × {features.width_mm:.1f} mm around. Called so for its slimmest "
-        f"extent of {features.slim_mm:.1f} mm, {features.elongation:.1f} times as long as slim, "
+        f", {features.length_mm:.1f} mm along × {features.width_mm:.1f} mm around. Called so for its "
+        f"slimmest extent of {features.slim_mm:.1f} mm, {features.elongation:.1f} times as long as slim, "
         f"uneven by {100 * features.roughness:.0f} % of its depth"
     )
     words += f"; {kinds[1]} is {100 * likely[kinds[1]]:.0f} % likely." if len(kinds) > 1 else "."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -21,7 +22,7 @@ _DIRECTIONS = 8
 
 @dataclass(frozen=True)
 class Template:
-    """A Gaussian bump of 1 σ ``long_mm`` along ``direction_rad`` (from the pipe's axis) and ``short_mm`` across."""
+    """A Gaussian bump: 1 σ ``long_mm`` along ``direction_rad`` from the pipe's axis, ``short_mm`` across."""
 
     long_mm: float
     short_mm: float
@@ -86,14 +87,16 @@ def detect(relief: Relief, false_alarms: float) -> Detection:
 def _threshold(relief: Relief, bank: tuple[Template, ...], false_alarms: float) -> float:
     """Return the level that Gaussian fields exceed ``false_alarms`` times in all.
 
-    Expected Euler characteristic of the excursion set of a smooth Gaussian field (Adler & Taylor, Random Fields
-    and Geometry, 2007, § 11.7); a field filtered with a Gaussian of 1 σ b has gradient variance 1/(2 b²).
+    Expected Euler characteristic of the excursion set of a smooth Gaussian field (Adler & Taylor, Random
+    Fields and Geometry, 2007, § 11.7); a field filtered with a Gaussian of 1 σ b has gradient variance
+    1 / (2 b²).
     """
     area = float(relief.seen.sum()) * relief.cell_mm[0] * relief.cell_mm[1]
-    density = sum(1 / (2 * t.long_mm * t.short_mm) for t in bank)
+    density = sum(0.5 / (t.long_mm * t.short_mm) for t in bank)
 
     def excess(u: float) -> float:
-        return 2 * area * density * (2 * np.pi) ** -1.5 * u * float(np.exp(-0.5 * u * u)) - false_alarms
+        expected: float = 2 * area * density * u * math.exp(-0.5 * u * u) / (2 * math.pi) ** 1.5
+        return expected - false_alarms
 
     return float(brentq(excess, 1.0, 40.0)) if excess(1.0) > 0 else 1.0
 

@@ -1,4 +1,4 @@
-"""What is left of the wall when its own smooth shape is taken out: slow shape, ring-wise motion, welds, relief."""
+"""What is left of the wall when its own smooth shape and the motion of single rings are taken out."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_lsq_spline
-from scipy.ndimage import gaussian_filter1d, label, median_filter
+from scipy.ndimage import find_objects, gaussian_filter1d, label, median_filter
 
 from pipeline.artefacts import RadiusMap
 from stages.defects.parameters import DefectParameters
@@ -63,14 +63,16 @@ class Relief:
         return np.isfinite(self.sigma_mm)
 
 
-def smooth_shape_removed(radius_map: RadiusMap, parameters: DefectParameters) -> Relief:
-    """Return the relief of a wall.
+def smooth_shape_removed(radius_map: RadiusMap, parameters: DefectParameters, known: Mask) -> Relief:
+    """Return the relief of a wall; ``known`` (S, A) marks defects that are known and kept out of all fits.
 
-    The slow shape is mean radius and harmonics 1 and 2 (off-centre, oval), each a spline along the pipe fitted
-    robustly, so that neither a defect nor a weld pulls it. What a single ring has of these harmonics beyond the
-    slow shape is error of motion unless it stands out: then it is a weld.
+    The slow shape is mean radius and harmonics 1 and 2 (off-centre, oval), each a spline along the pipe
+    fitted robustly, so that neither a defect nor a weld pulls it. What a single ring has of these harmonics
+    beyond the slow shape is error of motion unless it stands out: then it is a weld. Even there, the first
+    harmonic is motion: a ring cannot tell it from the probe's own shift.
     """
-    radius = radius_map.radius_mm.astype(float)
+    measured = radius_map.radius_mm.astype(float)
+    radius = np.where(known, np.nan, measured)
     basis = _basis(radius_map.azimuth_rad)
     step = float(radius_map.distance_mm[1] - radius_map.distance_mm[0])
     coefficients = _ring_harmonics(radius, basis)
@@ -79,10 +81,13 @@ def smooth_shape_removed(radius_map: RadiusMap, parameters: DefectParameters) ->
     rings = _ring_harmonics(deviation, basis)
     welds = _weld_rows(deviation, rings[:, 0], step, parameters)
     motion = _interpolated_across(rings, welds, round(2.0 / step))
-    everything = deviation - motion @ basis.T
-    local = deviation - np.where(_rows(welds, len(rings))[:, None], rings, motion) @ basis.T
+    beads = _rows(welds, len(rings))[:, None] & np.isfinite(rings)
+    shifted = motion.copy()
+    shifted[:, 1:3] = np.where(beads, rings, motion)[:, 1:3]
+    everything = measured - (slow + shifted) @ basis.T
+    local = measured - (slow + np.where(beads, rings, motion)) @ basis.T
     sigma, noise = _spread(local, radius_map)
-    mean = float(np.nanmedian(radius))
+    mean = float(np.nanmedian(measured))
     return Relief(
         radius_map.distance_mm, radius_map.azimuth_rad, mean, local, everything, sigma, noise, welds
     )
@@ -165,9 +170,8 @@ def _weld_rows(
 
 
 def _runs(mask: Mask) -> list[slice]:
-    labels, count = label(mask)
-    ends = [np.flatnonzero(labels == k + 1) for k in range(count)]
-    return [slice(int(e[0]), int(e[-1]) + 1) for e in ends]
+    labels, _ = label(mask)
+    return [rows for (rows,) in find_objects(labels)]
 
 
 def _all_round(height: Float, peak: float) -> bool:
@@ -199,18 +203,16 @@ def _interpolated_across(rings: Float, bands: tuple[slice, ...], margin: int) ->
 def _spread(local: Float, radius_map: RadiusMap) -> tuple[Float, Float]:
     """Return 1 σ of a cell of the relief, and its noise part.
 
-    Natural roughness is what the wall scatters beyond its stated noise. Rows that scatter more than that (flanks
-    of a bead, a badly placed ring) are trusted less.
+    Natural roughness is what the wall scatters beyond its stated noise. Rows that scatter more than that
+    (flanks of a bead, a badly placed ring) are trusted less.
     """
     noise = radius_map.sigma_random_mm.astype(float)
     noise = np.where(np.isfinite(local), noise, np.nan)
-    total = (_MAD * np.nanmedian(np.abs(local))) ** 2
-    roughness = max(0.0, float(total - np.nanmedian(noise) ** 2))
+    total = (_MAD * float(np.nanmedian(np.abs(local)))) ** 2
+    roughness = max(0.0, total - float(np.nanmedian(noise)) ** 2)
     sigma = np.sqrt(noise**2 + roughness)
-    filled = np.where(np.isfinite(local), np.abs(local), np.nan)
-    empty = ~np.isfinite(filled).any(1)
-    filled[empty] = 0.0
-    row = _MAD * np.nanmedian(filled, 1)
-    typical = np.sqrt(np.nanmean(np.where(empty[:, None], 0.0, sigma) ** 2, 1))
-    excess = np.maximum(row / np.maximum(typical, 1e-9), 1.0)
-    return np.where(np.isfinite(local), sigma * excess[:, None], np.nan), noise
+    measured = np.isfinite(local).any(1)
+    excess = np.ones((len(local), 1))
+    row = _MAD * np.nanmedian(np.abs(local[measured]), 1)
+    excess[measured, 0] = np.maximum(row / np.sqrt(np.nanmean(sigma[measured] ** 2, 1)), 1.0)
+    return sigma * excess, noise

@@ -18,6 +18,7 @@ Mask = NDArray[np.bool_]
 
 _EIGHT = np.ones((3, 3), int)
 _REACH_MM = 80.0
+_FOOT_MM = 10.0
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Region:
 
 
 def millimetre_mean(image: Float, cell_mm: tuple[float, float]) -> Float:
-    """Return the mean over 1 mm × 1 mm of what was seen; NaN where less than half was. Periodic in azimuth."""
+    """Return the mean over 1 mm × 1 mm, periodic in azimuth; NaN where less than half of it was seen."""
     size = tuple(max(1, round(1.0 / c)) for c in cell_mm)
     pad = size[1]
     wide = np.concatenate([image[:, -pad:], image, image[:, :pad]], 1)
@@ -68,6 +69,16 @@ def segment(relief: Relief, detection: Detection, parameters: DefectParameters) 
         grown = _grown(sign * smooth, seeds, relief, parameters)
         regions += _instances(_joined(grown, relief, parameters.join_mm), grown, sign)
     return (*regions, *(_weld(relief, band) for band in relief.welds))
+
+
+def footprint(relief: Relief, regions: tuple[Region, ...]) -> Mask:
+    """Return the cells (S, A) of all local defects with a margin for their feet."""
+    mask = np.zeros(relief.local_mm.shape, bool)
+    for region in regions:
+        if not region.all_round:
+            i, j = np.nonzero(region.mask)
+            mask[region.row + i, (region.column + j) % mask.shape[1]] = True
+    return _joined(mask, relief, _FOOT_MM)
 
 
 def _grown(height: Float, seeds: Mask, relief: Relief, parameters: DefectParameters) -> Mask:

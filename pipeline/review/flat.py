@@ -1,0 +1,133 @@
+"""Flat pictures of the wall for the report: distance to the right, 12 o'clock in the middle."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import WallTexture
+from pipeline.findings import Defect
+from pipeline.model import Overlay, Overlays
+
+Float = NDArray[np.float64]
+Byte = NDArray[np.uint8]
+
+TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
+_PAPER = 235
+_GAMMA = 2.2
+
+
+@dataclass(frozen=True)
+class FlatImage:
+    """A picture of the wall, rows along distance and columns along azimuth, and where its pixels lie."""
+
+    bgra: Byte
+    distance_from_mm: float
+    mm_per_px: float
+    azimuth_from_rad: float
+    rad_per_px: float
+    nearest: bool = False
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of the wall as shown: distances, azimuths (the top one first), and pixels."""
+
+    distance_from_mm: float
+    distance_to_mm: float
+    azimuth_from_rad: float
+    azimuth_to_rad: float
+    width_px: int
+    height_px: int
+
+    def x_percent(self, distance_mm: float) -> float:
+        """Return the place of a distance from the left, %."""
+        span = self.distance_to_mm - self.distance_from_mm
+        return 100 * (distance_mm - self.distance_from_mm) / span
+
+    def y_percent(self, azimuth_rad: float) -> float:
+        """Return the place of an azimuth from the top, %."""
+        return 100 * (azimuth_rad - self.azimuth_from_rad) / (self.azimuth_to_rad - self.azimuth_from_rad)
+
+
+def photo(texture: WallTexture) -> FlatImage:
+    """Return the wall's photo, encoded for the screen."""
+    table = np.round(255 * (np.arange(256) / 255) ** (1 / _GAMMA)).astype(np.uint8)
+    bgra = np.dstack([table[texture.bgra[..., :3]], texture.bgra[..., 3]])
+    return FlatImage(
+        bgra, texture.distance_from_mm, texture.mm_per_px, texture.azimuth_from_rad, texture.rad_per_px
+    )
+
+
+def overlay_image(overlays: Overlays, overlay: Overlay) -> FlatImage:
+    """Return an overlay's error colours."""
+    s, psi = overlays.distance_mm, overlays.azimuth_rad
+    return FlatImage(
+        overlay.bgra, float(s[0]), float(s[1] - s[0]), float(psi[0]), float(psi[1] - psi[0]), nearest=True
+    )
+
+
+def windows(from_mm: float, to_mm: float, radius_mm: float, pixels: int) -> tuple[Window, ...]:
+    """Cut a wall into strips that lie below each other, all together of about ``pixels`` pixels."""
+    around = 2 * np.pi * radius_mm
+    count = int(np.clip(np.ceil((to_mm - from_mm) / (4 * around)), 1, 6))
+    length = (to_mm - from_mm) / count
+    scale = np.sqrt(pixels / count / (length * around))
+    width = int(np.clip(round(length * scale), 64, 1600))
+    height = int(np.clip(round(around * scale), 64, 1000))
+    return tuple(
+        Window(from_mm + k * length, from_mm + (k + 1) * length, TOP_RAD, TOP_RAD + 2 * np.pi, width, height)
+        for k in range(count)
+    )
+
+
+def window_about(defect: Defect, radius_mm: float, width_px: int) -> Window:
+    """Return the surroundings of a defect; for a weld a quarter of the circumference about 12 o'clock."""
+    first, last = float(defect.outline[:, 1].min()), float(defect.outline[:, 1].max())
+    if last - first > np.pi:
+        first, last = -0.75 * np.pi, -0.25 * np.pi
+    half = 0.5 * max(1.6 * defect.length_mm, 1.6 * (last - first) * radius_mm, 12.0)
+    along, about = (defect.distance_from_mm + defect.distance_to_mm) / 2, (first + last) / 2
+    turn = half / radius_mm
+    return Window(along - half, along + half, about - turn, about + turn, width_px, width_px)
+
+
+def seen_through(image: FlatImage, window: Window) -> Byte:
+    """Return the part of a picture that a window shows, (H, W, 3) BGR on a light ground."""
+    s = np.linspace(window.distance_from_mm, window.distance_to_mm, 2 * window.width_px + 1)[1::2]
+    psi = np.linspace(window.azimuth_from_rad, window.azimuth_to_rad, 2 * window.height_px + 1)[1::2]
+    row = (s - image.distance_from_mm) / image.mm_per_px
+    turn = 2 * np.pi / image.rad_per_px
+    column = np.mod((psi - image.azimuth_from_rad) / image.rad_per_px, turn)
+    wide = np.concatenate([image.bgra, image.bgra[:, :2]], 1)
+    x, y = np.meshgrid(column, row, indexing="ij")
+    bgra = _remapped(wide, x, y, image.nearest, window.width_px / max(1.0, float(np.ptp(row))))
+    alpha = bgra[..., 3:].astype(float) / 255
+    return np.asarray(np.round(alpha * bgra[..., :3] + (1 - alpha) * _PAPER), np.uint8)
+
+
+def _remapped(image: Byte, x: Float, y: Float, nearest: bool, shrink: float) -> Byte:
+    """Return ``image`` at (x, y); blurred first when it is shrunk, and in strips, for OpenCV's size limit."""
+    if shrink < 0.5 and not nearest:
+        image = cv2.GaussianBlur(image, (0, 0), 0.35 / shrink)  # type: ignore[assignment]
+    first, last = max(0, int(np.floor(y.min())) - 2), int(np.ceil(y.max())) + 3
+    part = np.ascontiguousarray(image[first : max(first + 1, last)])
+    mode = cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR
+    return np.asarray(
+        cv2.remap(
+            part, x.astype(np.float32), (y - first).astype(np.float32), mode, borderMode=cv2.BORDER_CONSTANT
+        ),
+        np.uint8,
+    )
+
+
+def data_uri(bgr: Byte, quality: int = 82) -> str:
+    """Return a picture (H, W, 3) as a JPEG inside an address."""
+    encoded, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not encoded:
+        raise OSError("report.html: a picture cannot be encoded")
+    return "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
