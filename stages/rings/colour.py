@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import Float
+from stages.rings.noise import QUANTISATION_VARIANCE
+from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors
+from stages.rings.trace import RingTrace
 
 _BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
 _LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
@@ -26,22 +29,20 @@ def mix(bgr: NDArray[np.uint8], weights: Float) -> NDArray[np.float32]:
 
 
 def discriminant_weights(
-    bgr: NDArray[np.uint8], sectors: Sectors, radius_px: Float, width_px: float, band_px: float
-) -> Float | None:
-    """Return (3,) Fisher discriminant weights between line and wall beside it; None where it is undefined.
+    bgr: NDArray[np.uint8], sectors: Sectors, trace: RingTrace, otherwise: Float
+) -> Float:
+    """Return (3,) Fisher discriminant weights between line and wall beside it.
 
     The wall's colour covariance holds both its reflectance and the sensor's noise, so the mixture has the best
-    ratio of line height to what is not line. Scaled so that the line keeps its height in the strongest channel.
+    ratio of line height to what is not line. Scaled so that the line keeps its height in the strongest channel;
+    ``otherwise`` is returned where line and wall do not differ in colour.
     """
-    sector = np.repeat(np.arange(len(radius_px)), np.diff(sectors.start))
-    away = np.abs(sectors.radius_px - radius_px[sector]) / width_px
-    line = bgr.reshape(-1, 3)[sectors.pixel[away < _LINE_WIDTHS]].astype(float)
-    beside = (away > _WALL_WIDTHS) & (away * width_px < band_px)
-    wall = bgr.reshape(-1, 3)[sectors.pixel[beside]].astype(float)
-    if len(line) < 100 or len(wall) < 100:
-        return None
+    radius, width = trace.radius_everywhere(), trace.width_px
+    line = bgr.reshape(-1, 3)[sectors.pixels_near(radius, 0, _LINE_WIDTHS * width)].astype(float)
+    wall = bgr.reshape(-1, 3)[sectors.pixels_near(radius, _WALL_WIDTHS * width, BAND_WIDTHS * width)].astype(
+        float
+    )
     rise = line.mean(0) - wall.mean(0)
-    covariance = np.cov(wall.T) + np.eye(3) / 12
-    weights = np.linalg.solve(covariance, rise)
+    weights = np.linalg.solve(np.cov(wall.T) + np.eye(3) * QUANTISATION_VARIANCE, rise)
     gain = float(weights @ rise / rise.max())
-    return weights / gain if gain > 0 else None
+    return weights / gain if gain > 0 else otherwise

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import islice
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from pipeline.artefacts import Byte, Float32, Int, RingSamples, RingValidity
+from pipeline.artefacts import Float, Int, RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
-from pipeline.recording.base import Illumination, Recording
+from pipeline.recording.base import Illumination, Planes, Recording
 from pipeline.stage import Context, Parameters
 from stages.rings.colour import discriminant_weights, excess_weights, mix
-from stages.rings.noise import clipping_knee, dark_response, noise_response
-from stages.rings.profile import ProfileFit, Response
-from stages.rings.search import BAND_WIDTHS, Image
+from stages.rings.noise import clipping_of, noise_response
+from stages.rings.profile import Clipping
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
 from stages.rings.validity import mark_outliers, wander_px
@@ -52,11 +52,14 @@ def extract_rings(
             "rings", "the laser is on in no frame", hint="check frames.csv, column illumination"
         )
     sectors = cut_sectors(recording.source.image_size, probe.camera.centre_px, parameters.azimuths)
-    traces: dict[int, RingTrace | None] = {}
+    traces: dict[int, RingTrace] = {}
+    done = 0
     for frame, trace in _traces(recording, probe, sectors):
-        traces[frame] = _covered(trace, parameters.least_coverage)
-        context.progress(len(traces), len(frames))
-    if not any(traces.values()):
+        if trace is not None and trace.coverage >= parameters.least_coverage:
+            traces[frame] = trace
+        done += 1
+        context.progress(done, len(frames))
+    if not traces:
         raise UnusableError(
             "rings", "no laser ring was found in any frame", frames=frames.tolist(),
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
@@ -75,13 +78,9 @@ def _laser_traces(
     recording: Recording, frames: Int, sectors: Sectors
 ) -> Iterator[tuple[int, RingTrace | None]]:
     """Trace frames lit by the laser alone, in the luma plane."""
-    if not len(frames):
-        return
-    response = _learn_response(recording, frames, sectors)
-    before = None
+    clipping, trace = _learn_clipping(recording, frames[:_LEARNING_FRAMES], sectors), None
     for frame, image in recording.read(frames, "grey"):
-        trace = None if image is None else trace_ring(image, sectors, response, before)
-        before = trace if _covered(trace, 0.5) else None
+        trace = None if image is None else trace_ring(image, sectors, clipping, trace)
         yield frame, trace
 
 
@@ -89,66 +88,42 @@ def _lit_traces(
     recording: Recording, frames: Int, probe: Probe, sectors: Sectors
 ) -> Iterator[tuple[int, RingTrace | None]]:
     """Trace frames in which the wall is lit too, in the mixture of channels that shows the line best."""
-    if not len(frames):
-        return
-    weights, before, response = excess_weights(probe.laser.wavelength_nm), None, None
+    weights, trace = excess_weights(probe.laser.wavelength_nm), None
     for frame, bgr in recording.read(frames, "bgr"):
-        trace = None
-        if bgr is not None:
-            image = mix(bgr, weights)
-            response = response or dark_response(image)
-            trace = trace_ring(image, sectors, response, before)
-        before = trace if _covered(trace, 0.5) else None
-        if bgr is not None and before is not None:
-            band = BAND_WIDTHS * before.width_px
-            weights = _or(
-                discriminant_weights(bgr, sectors, before.radius_everywhere(), before.width_px, band), weights
-            )
-            image = mix(bgr, weights)
-            response = noise_response(image, sectors, before.fit, dark_response(image))
-            trace = trace_ring(image, sectors, response, before)
+        if bgr is None:
+            yield frame, None
+            continue
+        if trace is None:
+            weights = _first_weights(bgr, sectors, probe)
+        image = mix(bgr, weights)
+        trace = trace_ring(image, sectors, Clipping(), trace)
         yield frame, trace
+        if trace is not None:
+            weights = discriminant_weights(bgr, sectors, trace, weights)
+            trace = replace(trace, response=noise_response(image, sectors, trace.fit, trace.response))
 
 
-def _or(first, second):
-    return second if first is None else first
+def _first_weights(bgr: NDArray[np.uint8], sectors: Sectors, probe: Probe) -> Float:
+    """Return weights learned from an image in which the ring is found by the laser's colour alone."""
+    weights = excess_weights(probe.laser.wavelength_nm)
+    trace = trace_ring(mix(bgr, weights), sectors, Clipping())
+    return weights if trace is None else discriminant_weights(bgr, sectors, trace, weights)
 
 
-def _learn_response(recording: Recording, frames: Int, sectors: Sectors) -> Response:
-    """Learn noise and clipping level from the first frames that show a ring."""
-    few = frames[:_LEARNING_FRAMES]
-    response = Response(0.0, 1.0, 0.0, np.inf, 0.0)
-    pairs = zip(_copies(recording, few, "grey"), _copies(recording, few, "bgr"), strict=True)
-    for grey, bgr in pairs:
-        if grey is None or bgr is None:
-            continue
-        response = dark_response(grey)
-        trace = trace_ring(grey, sectors, response)
-        if _covered(trace, 0.5) is None:
-            continue
-        assert trace is not None
-        line = np.zeros(grey.shape, bool)
-        near = (
-            np.abs(sectors.radius_px - np.repeat(trace.radius_everywhere(), np.diff(sectors.start)))
-            < trace.width_px
-        )
-        line.ravel()[sectors.pixel[near]] = True
-        knee, beyond = clipping_knee(grey, bgr, line)
-        response = response._replace(knee=knee, beyond=beyond)
-        response = noise_response(grey, sectors, trace.fit, response)
-        return response
-    return response
+def _learn_clipping(recording: Recording, frames: Int, sectors: Sectors) -> Clipping:
+    """Learn at which grey level the line clips from the first of ``frames`` that shows a ring."""
+    for grey, bgr in zip(_copies(recording, frames, "grey"), _copies(recording, frames, "bgr"), strict=True):
+        trace = None if grey is None or bgr is None else trace_ring(grey, sectors, Clipping())
+        if trace is not None and grey is not None and bgr is not None:
+            return clipping_of(grey, bgr, sectors.pixels_near(trace.radius_everywhere(), 0, trace.width_px))
+    return Clipping()
 
 
-def _copies(recording: Recording, frames: Int, planes):
+def _copies(recording: Recording, frames: Int, planes: Planes) -> list[NDArray[np.uint8] | None]:
     return [None if image is None else image.copy() for _, image in recording.read(frames, planes)]
 
 
-def _covered(trace: RingTrace | None, least: float) -> RingTrace | None:
-    return trace if trace is not None and trace.valid.mean() >= least else None
-
-
-def _samples(frames: Int, sectors: Sectors, traces: dict[int, RingTrace | None]) -> RingSamples:
+def _samples(frames: Int, sectors: Sectors, traces: dict[int, RingTrace]) -> RingSamples:
     shape = (len(frames), len(sectors.azimuth_rad))
     values = {
         k: np.full(shape, np.nan, np.float32) for k in ("radius_px", "sigma_px", "width_px", "amplitude")

@@ -5,24 +5,25 @@ from __future__ import annotations
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from pipeline.artefacts import Float
-from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response, first_at_least
+from stages.rings.profile import WINDOW_WIDTHS, Clipping, ProfileFit, Response, first_at_least
 from stages.rings.search import Image
 from stages.rings.sectors import Sectors
 
 QUANTISATION_VARIANCE = 1 / 12
 _BINS, _BIN_LEVELS = 32, 8.0
 _ABSOLUTE_TO_SIGMA = np.sqrt(np.pi / 2)
+_LEAST_RESIDUALS = 50
 _CLIPS_TOGETHER = 0.97
 
 
-def dark_response(image: Image) -> Response:
-    """Return a first guess from the image alone: median level, robust noise of neighbouring pixels, no knee."""
-    level = float(np.median(image))
+def dark_response(image: Image, clipping: Clipping) -> Response:
+    """Return a first guess from the image alone: median level and robust noise of neighbouring pixels."""
     step = np.diff(image.astype(np.float32), axis=1)
     variance = (1.4826 * float(np.median(np.abs(step)))) ** 2 / 2
-    return Response(level, variance + QUANTISATION_VARIANCE, 0.0, np.inf, 0.0)
+    return Response(float(np.median(image)), variance + QUANTISATION_VARIANCE, 0.0, clipping)
 
 
 def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Response) -> Response:
@@ -33,18 +34,18 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
     total, count = np.zeros(_BINS), np.zeros(_BINS)
     _residuals_by_level(
         image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, fit.radius_px, fit.width_px,
-        fit.amplitude, fit.background, guess.black, guess.knee, total, count,
+        fit.amplitude, fit.background, guess.black, guess.clipping.knee, total, count,
     )  # fmt: skip
-    used = count > 50
-    if used.sum() < 2:
+    used = count > _LEAST_RESIDUALS
+    if not used.any():
         return guess
     level = (np.arange(_BINS) + 0.5)[used] * _BIN_LEVELS
     variance = (_ABSOLUTE_TO_SIGMA * total[used] / count[used]) ** 2
     weight = np.sqrt(count[used]) / variance
-    design = np.stack([np.ones_like(level), level], 1) * weight[:, None]
-    dark, per_level = np.linalg.lstsq(design, variance * weight, rcond=None)[0]
+    design = np.stack([np.ones_like(level), level], 1)
+    dark, per_level = nnls(design * weight[:, None], variance * weight)[0]
     return guess._replace(
-        variance=max(float(dark), QUANTISATION_VARIANCE), variance_per_level=max(float(per_level), 0.0)
+        variance=max(float(dark), QUANTISATION_VARIANCE), variance_per_level=float(per_level)
     )
 
 
@@ -67,23 +68,21 @@ def _residuals_by_level(  # type: ignore[no-untyped-def]
             k += 1
 
 
-def clipping_knee(
-    grey: NDArray[np.uint8], bgr: NDArray[np.uint8], line: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """Return the grey level at which the line's strongest channel clips, and the slope beyond it.
+def clipping_of(grey: NDArray[np.uint8], bgr: NDArray[np.uint8], line: NDArray[np.int32]) -> Clipping:
+    """Return where grey levels of the line bend because its strongest channel clips.
 
     Grey is a fixed linear mixture of the channels, and a laser line keeps its colour: both are read off the
-    pixels of the ``line`` (H, W).
+    pixels of the ``line`` (flat indices).
     """
-    colour, level = bgr[line].astype(float), grey[line].astype(float)
+    colour, level = bgr.reshape(-1, 3)[line].astype(float), grey.ravel()[line].astype(float)
     white = float(np.iinfo(bgr.dtype).max)
     strongest = int(np.argmax(colour.mean(0)))
     open_ = (colour < 0.95 * white).all(1)
     bright = open_ & (colour[:, strongest] > np.median(colour[:, strongest]))
     if bright.sum() < 50:
-        return white, 0.0
+        return Clipping(white)
     *weights, black = np.linalg.lstsq(np.c_[colour[open_], np.ones(open_.sum())], level[open_], rcond=None)[0]
     ratio = np.median(colour[bright] / colour[bright, strongest, None], axis=0)
     share: Float = np.maximum(np.array(weights) * ratio, 0)
     beyond = share[ratio < _CLIPS_TOGETHER].sum() / share.sum()
-    return float(black + white * share.sum()), float(beyond)
+    return Clipping(float(black + white * share.sum()), float(beyond))

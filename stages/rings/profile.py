@@ -28,18 +28,28 @@ _LOG_WIDTH_PRIOR = 0.3
 _SETTLED_PX, _SETTLED_LOG_WIDTH = 0.004, 0.01
 
 
+class Clipping(NamedTuple):
+    """Grey level ``knee`` at which the line's strongest channel clips, and slope ``beyond`` it (< 1)."""
+
+    knee: float = np.inf
+    beyond: float = 0.0
+
+
 class Response(NamedTuple):
     """How grey levels follow light, and their noise.
 
-    ``black``: level without light; ``variance`` there and ``variance_per_level`` above it (shot noise); beyond
-    ``knee`` a channel clips and the level rises only by ``beyond`` (< 1) per level of the unclipped line.
+    ``black``: level without light; ``variance`` there and ``variance_per_level`` above it (shot noise).
     """
 
     black: float
     variance: float
     variance_per_level: float
-    knee: float
-    beyond: float
+    clipping: Clipping
+
+    @property
+    def dark_noise(self) -> float:
+        """1 σ, grey levels, where there is no line."""
+        return float(np.sqrt(self.variance))
 
 
 class ProfileFit(NamedTuple):
@@ -167,7 +177,8 @@ def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, res
     """Fill ``n`` (5, 5) and ``v`` (5,) at parameters p = (r, ln w, A, b0, b1); return χ²."""
     r, height, b0, b1 = p[0], p[2], p[3], p[4]
     iw = np.exp(-p[1])
-    black, variance, per_level, knee, beyond = response
+    black, variance, per_level, clipping = response
+    knee, beyond = clipping
     n00 = n10 = n11 = n20 = n21 = n22 = n30 = n31 = n32 = n33 = n40 = n41 = n42 = n43 = n44 = 0.0
     v0 = v1 = v2 = v3 = v4 = chi2 = 0.0
     for k in range(low, high):
@@ -266,5 +277,5 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
         out[4, a] = np.sqrt(_inverse_diagonal(n, 0, v))
         out[5, a] = np.sqrt(_inverse_diagonal(n, 2, v))
         out[6, a] = chi2 / (high - low - v.size)
-        clipped, inner, outer = _flank_counts(radius, offset, low, high, r0, p, slope[a], response[3])
+        clipped, inner, outer = _flank_counts(radius, offset, low, high, r0, p, slope[a], response[3][0])
         out[7, a], out[8, a], out[9, a] = clipped, inner, outer

@@ -124,7 +124,8 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
     polar = _polar_image(image, sectors)
     best_total, best = -np.inf, (np.full(len(sectors.azimuth_rad), np.nan), _TRIAL_WIDTHS_PX[0])
     for width in _TRIAL_WIDTHS_PX:
-        score = cv2.filter2D(polar, cv2.CV_32F, matched_template(width)[None].astype(np.float32)) / noise
+        response = cv2.filter2D(polar, cv2.CV_32F, matched_template(width)[None].astype(np.float32))
+        score = response / np.maximum(_texture_noise(response, width), noise)
         score[np.isnan(score)] = 0
         credit = np.clip(score, 0, _CREDIT)
         path = _closed_path(credit.astype(np.float32), _JUMP)
@@ -135,6 +136,18 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
             radius = np.where(found, path + float(_SMALLEST_RADIUS_PX), np.nan)
             best_total, best = total, (radius, width)
     return best
+
+
+def _texture_noise(response: NDArray[np.float32], width_px: float) -> NDArray[np.float32]:
+    """Robust spread (R,) of a filter's response (A, R) over all azimuths in a belt about each radius.
+
+    The belt is wide against the line, so that a well centred ring does not pass for noise.
+    """
+    belt = int(np.ceil(BAND_WIDTHS * width_px))
+    size = np.nan_to_num(np.abs(response)).T
+    spread = [np.median(size[max(0, r - belt) : r + belt + 1]) for r in range(0, len(size), belt)]
+    every = np.interp(np.arange(len(size)), np.arange(0, len(size), belt), spread)
+    return (1.4826 * every).astype(np.float32)
 
 
 def _polar_image(image: Image, sectors: Sectors) -> NDArray[np.float32]:

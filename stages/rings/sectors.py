@@ -41,6 +41,11 @@ class Sectors:
     radius_px: NDArray[np.float32]
     offset_rad: NDArray[np.float32]
 
+    def pixels_near(self, radius_px: Float, least_px: float, most_px: float) -> NDArray[np.int32]:
+        """Return flat indices of the pixels whose distance to the ring (A,) is in [least, most), px."""
+        away = np.abs(self.radius_px - np.repeat(radius_px, np.diff(self.start)).astype(np.float32))
+        return self.pixel[(away >= least_px) & (away < most_px)]
+
 
 def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) -> Sectors:
     """Assign every pixel of an image (width, height) to the nearest of ``azimuths`` directions."""
