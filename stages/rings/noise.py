@@ -41,9 +41,8 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
         return guess
     level = (np.arange(_BINS) + 0.5)[used] * _BIN_LEVELS
     variance = (_ABSOLUTE_TO_SIGMA * total[used] / count[used]) ** 2
-    weight = np.sqrt(count[used]) / variance
-    design = np.stack([np.ones_like(level), level], 1)
-    dark, per_level = nnls(design * weight[:, None], variance * weight)[0]
+    design = np.stack([np.ones_like(level), level], 1) / variance[:, None]
+    dark, per_level = nnls(design, np.ones_like(level))[0]
     return guess._replace(
         variance=max(float(dark), QUANTISATION_VARIANCE), variance_per_level=float(per_level)
     )

@@ -23,7 +23,7 @@ from stages.rings.sectors import Sectors
 FAST = {"reassoc", "contract", "arcp", "nsz"}
 WINDOW_WIDTHS = 5.5
 _FLANK = 0.6
-_STEPS = 10
+_STEPS, _FULL_STEPS = 12, 4
 _LOG_WIDTH_PRIOR = 0.3
 _SETTLED_PX, _SETTLED_LOG_WIDTH = 0.004, 0.01
 
@@ -258,13 +258,15 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
             continue
         p[0], p[1], p[2], p[3], p[4] = r0, np.log(width), height, b0, b1
         chi2, settled = 0.0, False
-        for _ in range(_STEPS):
+        for step in range(_STEPS):
             chi2 = _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope[a], response, n, v)
             n[1, 1] += prior
             v[1] += prior * (np.log(width) - p[1])
             if not _factor(n):
                 break
             _solve(n, v)
+            if step >= _FULL_STEPS:
+                v *= 0.5
             settled = abs(v[0]) < _SETTLED_PX and abs(v[1]) < _SETTLED_LOG_WIDTH
             v[0] = min(max(v[0], -width), width)
             v[1] = min(max(v[1], -0.3), 0.3)

@@ -128,12 +128,12 @@ def _judge(fit: ProfileFit, peaks: Peaks) -> Byte:
     out[faint] = v.LOW_CONTRAST
     out[thin & (fit.clipped > 0)] = v.SATURATED
     out[thin & ~(fit.clipped > 0)] = v.OUT_OF_VIEW
-    out[np.isnan(peaks.radius_px)] = v.NO_LINE
+    out[np.isnan(fit.radius_px)] = v.NO_LINE
     return out
 
 
 def _odd_width(fit: ProfileFit) -> NDArray[np.bool_]:
-    """(A,) where the line width lies far outside of the ring's own spread of widths."""
+    """Tell (A,) where the line width lies far outside of the ring's own spread of widths."""
     log_width = np.log(fit.width_px)
     middle = np.nanmedian(log_width)
     spread = 1.4826 * np.nanmedian(np.abs(log_width - middle))
