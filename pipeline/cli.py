@@ -123,8 +123,6 @@ def config(
 
 def main() -> None:
     """Run the command line; a refusal is told as text, with its own exit code."""
-    for command in _ATTACHED:
-        _attach(command)
     try:
         app()
     except BoresightError as error:
@@ -176,11 +174,14 @@ def _print_outcome(outcome: RunOutcome, folder: Path) -> None:
         typer.echo(f"{number.name:<48} {number.value} {number.unit}".rstrip())
     for stage in outcome.stages:
         for number in stage.numbers:
-            if number.name.startswith("rejected") and number.value:
+            if "rejected" in number.name and number.value:
                 typer.echo(f"{stage.name + ': ' + number.name:<48} {number.value} {number.unit}".rstrip())
     report = folder / "report.html"
     typer.echo(f"Report: {report.resolve()}" if report.is_file() else f"Run folder: {folder.resolve()}")
 
+
+for _command in _ATTACHED:
+    _attach(_command)
 
 if __name__ == "__main__":
     main()

@@ -21,6 +21,8 @@ from pipeline.run_folder import RunFolder
 from pipeline.stage import Context
 from pipeline.store import Provenance, Stored
 
+_LONGEST_PROBLEM = 300
+
 
 class FailedError(BoresightError):
     """A bug: something broke that no input should break. The log holds the traceback."""
@@ -121,9 +123,10 @@ class Runner:
             raise
         except Exception as error:
             self._logger.exception("%s failed", self._at)
-            self._end(State.FAILED, f"{type(error).__name__}: {error}")
+            problem = f"{type(error).__name__}: {str(error)[:_LONGEST_PROBLEM]}"
+            self._end(State.FAILED, problem)
             raise FailedError(
-                f"{self._at} failed: {type(error).__name__}: {error}\n"
+                f"{self._at} failed: {problem}\n"
                 f"This is a fault of the program. The log with the details: {self._folder.log}"
             ) from error
 

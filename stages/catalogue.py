@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.stage import Stage
-from stages.sections import SECTIONS
+from stages.rings import RINGS
 from stages.triangulate import TRIANGULATE
 
-PIPELINE: tuple[Stage, ...] = (TRIANGULATE, SECTIONS)
+PIPELINE: tuple[Stage, ...] = (RINGS, TRIANGULATE)

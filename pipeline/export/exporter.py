@@ -68,9 +68,8 @@ def publish(exporter: Exporter, artefacts: Mapping[type, object], key: str, run:
             temporary.mkdir(parents=True)
             exporter.write(**arguments, folder=temporary)
             _put_in_place(exporter, temporary, key, run)
-        except OSError:
+        finally:
             remove(temporary)
-            raise
 
 
 def is_published(exporter: Exporter, key: str, run: RunFolder) -> bool:
@@ -101,7 +100,6 @@ def _put_in_place(exporter: Exporter, temporary: Path, key: str, run: RunFolder)
         if path.is_dir():
             remove(run.path / path.name)
         path.replace(run.path / path.name)
-    temporary.rmdir()
     sync_folder(run.path)
     _receipt(exporter, run).parent.mkdir(exist_ok=True)
     replace_json(_receipt(exporter, run), {"key": key, "files": files})  # type: ignore[dict-item]

@@ -1,0 +1,109 @@
+"""The command line tells refusals as text with their own exit codes, and helps without loading the world."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from pipeline.cli import _ATTACHED, _exit_code, main
+from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
+from pipeline.runner import FailedError
+from stages.catalogue import PIPELINE
+from tests.shared_data import PROJECT_ROOT
+
+SAMPLE = PROJECT_ROOT / "data" / "sample"
+
+
+@dataclass(frozen=True)
+class Told:
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def boresight(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., Told]:
+    """Return a function that runs the command line in this process."""
+
+    def call(*arguments: str | Path) -> Told:
+        monkeypatch.chdir(PROJECT_ROOT)
+        monkeypatch.setattr(sys, "argv", ["boresight", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ending:
+            main()
+        told = capsys.readouterr()
+        return Told(int(ending.value.code or 0), told.out, told.err)
+
+    return call
+
+
+def test_help_names_every_command_and_loads_no_heavy_library() -> None:
+    code = (
+        "import sys; sys.argv = ['boresight', '--help']\n"
+        "from pipeline.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'cv2', 'av', 'numba', 'zarr', 'open3d', 'matplotlib'}\n"
+        "print('loaded', sorted(heavy & set(sys.modules)))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], cwd=PROJECT_ROOT, capture_output=True, text=True)
+    assert "loaded []" in told.stdout
+    for name in ("run", "stages", "config", *(a.name for a in _ATTACHED)):
+        assert f" {name} " in told.stdout
+
+
+@pytest.mark.parametrize("name", [a.name for a in _ATTACHED])
+def test_attached_commands_are_there(boresight: Callable[..., Told], name: str) -> None:
+    told = boresight(name, "--help")
+    assert told.code == 0, told.err
+    assert f"boresight {name}" in told.out
+
+
+def test_stages_are_listed_in_order(boresight: Callable[..., Told]) -> None:
+    lines = [line for line in boresight("stages").out.splitlines() if not line.startswith(" ")]
+    assert [line.split()[0] for line in lines] == [s.name for s in PIPELINE]
+
+
+def test_the_default_configuration_is_printed(boresight: Callable[..., Told]) -> None:
+    text = (PROJECT_ROOT / "configs" / "default.yaml").read_text("utf-8")
+    assert boresight("config", "--default").out == text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "nowhere", "-o", "out"], "nowhere: does not exist"),
+        (["run", SAMPLE, "-o", SAMPLE], "not those of a boresight run"),
+        (["run", SAMPLE, "-o", "out", "--set", "rings.nonsense=1"], "unknown key"),
+        (["run", SAMPLE, "-o", "out", "--only", "nonsense"], "no stage nonsense"),
+        (["run", SAMPLE, "-o", "out", "--probe", "no.yaml"], r"no.yaml"),
+        (["run", SAMPLE, "-o", "/proc/out"], "cannot be written"),
+        (["config", "--set", "nonsense"], "is no assignment"),
+    ],
+)
+def test_refusals_are_text_and_exit_code_2(
+    boresight: Callable[..., Told], arguments: list[str | Path], message: str
+) -> None:
+    told = boresight(*arguments)
+    assert told.code == 2
+    assert message in told.err
+    assert "Traceback" not in told.err
+    assert not (PROJECT_ROOT / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (FailedError("x"), 1),
+        (InputError("f", "x"), 2),
+        (BoresightError("x"), 2),
+        (UnusableError("s", "x"), 3),
+        (Cancelled("x"), 130),
+    ],
+)
+def test_exit_codes(error: BoresightError, code: int) -> None:
+    assert _exit_code(error) == code
