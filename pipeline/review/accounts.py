@@ -60,7 +60,9 @@ def _samples(rings: RingSamples | None) -> Table | None:
     total = rings.validity.size
     rows = [(_REASONS[v], f"{counts[v]:,}", f"{100 * counts[v] / total:.2f} %") for v in RingValidity]
     rows = [r for r in rows if r[1] != "0"]
-    return Table("Ring samples", ("what became of it", "samples", "share"), (*rows, ("all", f"{total:,}", "")))
+    return Table(
+        "Ring samples", ("what became of it", "samples", "share"), (*rows, ("all", f"{total:,}", ""))
+    )
 
 
 def _rejections(summary: RunSummary) -> Table | None:

@@ -11,7 +11,8 @@ from pipeline.findings import Defect
 from pipeline.review.page import Card
 from pipeline.review.summary import RunSummary
 
-_PLURAL = {"corrosion": "areas of corrosion"}
+_ONE = {"corrosion": "area of corrosion"}
+_MANY = {"corrosion": "areas of corrosion"}
 
 
 def verdict(summary: RunSummary) -> str:
@@ -121,7 +122,7 @@ def _mean_diameter(wall: Wall) -> str:
 
 def _counted(found: tuple[Defect, ...]) -> str:
     counts = Counter(d.kind for d in found)
-    words = [f"{n} {k if n == 1 else _PLURAL.get(k, k + 's')}" for k, n in counts.most_common()]
+    words = [f"{n} {_ONE.get(k, k) if n == 1 else _MANY.get(k, k + 's')}" for k, n in counts.most_common()]
     return ", ".join(words)
 
 

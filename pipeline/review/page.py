@@ -67,12 +67,14 @@ class Finding:
     kind: str
     distance: str
     clock: str
-    size: str
+    length: str
+    width: str
     depth: str
+    way: str
     wall_loss: str
     confidence: str
     codes: tuple[str, ...]
-    frames: str
+    frames: tuple[str, ...]
     statement: str
     photo: str
     deviation: str

@@ -176,8 +176,11 @@ def _runs(mask: Mask) -> list[slice]:
 
 def _all_round(height: Float, peak: float) -> bool:
     """Tell whether a bead (rows, A) reaches a third of its peak in nine of ten sectors that were seen."""
+    seen = np.isfinite(height)
     sectors = [
-        np.nanmax(p.mean(1)) for p in np.array_split(height, 24, axis=1) if np.isfinite(p).mean() > 0.5
+        (np.where(s, h, 0.0).sum(1) / np.maximum(s.sum(1), 1)).max()
+        for h, s in zip(np.array_split(height, 24, axis=1), np.array_split(seen, 24, axis=1), strict=True)
+        if s.mean() > 0.5
     ]
     return len(sectors) >= 12 and float(np.mean(np.array(sectors) > peak / 3)) >= 0.9
 
