@@ -73,7 +73,7 @@ def segment(relief: Relief, detection: Detection, parameters: DefectParameters) 
 
 def footprint(relief: Relief, regions: tuple[Region, ...]) -> Mask:
     """Return the cells (S, A) of all local defects with a margin for their feet."""
-    mask = np.zeros(relief.local_mm.shape, bool)
+    mask = np.zeros_like(relief.seen)
     for region in regions:
         if not region.all_round:
             i, j = np.nonzero(region.mask)
