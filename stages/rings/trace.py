@@ -14,7 +14,8 @@ from stages.rings.search import BAND_WIDTHS, Image, Peaks, detection_limit, find
 from stages.rings.sectors import Sectors
 
 _LEAST_FLANK_PIXELS = 2
-_WIDTH_SIGMAS = 6.0
+_ODD, _TYPICAL = 6.0, 3.0
+_LEAST_SPREAD = 0.02
 _MOST = 0.5
 
 
@@ -118,23 +119,28 @@ def _search_rays(
 
 
 def _judge(fit: ProfileFit, peaks: Peaks) -> Byte:
-    """Return `RingValidity` (A,) as far as a single sector's own profile tells; the gravest reason wins."""
+    """Return `RingValidity` (A,) as far as a single image tells; of several reasons the last named here wins.
+
+    Limits come from the ring itself: a sample is odd when it leaves the spread of the ring's own samples.
+    """
     v = RingValidity
+    brightness, width, misfit = np.log(fit.amplitude), np.log(fit.width_px), np.log(fit.chi2)
+    rival = np.log(fit.amplitude * np.maximum(peaks.rival_score, 1e-9) / peaks.score)
     thin = ~(np.minimum(fit.unclipped_below, fit.unclipped_above) >= _LEAST_FLANK_PIXELS)
-    faint = ~(fit.amplitude > detection_limit(len(thin)) * fit.amplitude_sigma)
     out = np.full(len(thin), v.VALID, np.uint8)
-    out[_odd_width(fit)] = v.WIDTH
-    out[peaks.rival_score > peaks.score] = v.GHOST
-    out[faint] = v.LOW_CONTRAST
+    out[np.abs(_oddness(width, width)) > _ODD] = v.WIDTH
+    out[_oddness(brightness, brightness) > _ODD] = v.GLINT
+    out[_oddness(misfit, misfit) > _ODD] = v.GHOST
+    out[_oddness(rival, brightness) > -_TYPICAL] = v.GHOST
+    out[~(fit.amplitude > detection_limit(len(thin)) * fit.amplitude_sigma)] = v.LOW_CONTRAST
     out[thin & (fit.clipped > 0)] = v.SATURATED
     out[thin & ~(fit.clipped > 0)] = v.OUT_OF_VIEW
     out[np.isnan(fit.radius_px)] = v.NO_LINE
     return out
 
 
-def _odd_width(fit: ProfileFit) -> NDArray[np.bool_]:
-    """Tell (A,) where the line width lies far outside of the ring's own spread of widths."""
-    log_width = np.log(fit.width_px)
-    middle = np.nanmedian(log_width)
-    spread = 1.4826 * np.nanmedian(np.abs(log_width - middle))
-    return np.asarray(np.abs(log_width - middle) > _WIDTH_SIGMAS * max(float(spread), 1e-3))
+def _oddness(value: Float, ring: Float) -> Float:
+    """Return how many robust σ of the ``ring``'s own values each ``value`` (A,) is above their median."""
+    middle = np.nanmedian(ring)
+    spread = 1.4826 * np.nanmedian(np.abs(ring - middle))
+    return np.asarray((value - middle) / max(float(spread), _LEAST_SPREAD))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
 
-from pipeline.artefacts import Byte, Float32, RingValidity
+from pipeline.artefacts import Byte, Float, Float32, RingValidity
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0
+_MAJORITY = 0.5
 _LAG = 4
 
 
@@ -16,7 +18,8 @@ def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte
     """Return ``validity`` (F, A) with samples marked that leave the run of their neighbours.
 
     The running median over nine sectors follows a step and any dent or pit at least five sectors wide; what
-    is narrower is kept when the ring before or after shows it at the same place.
+    is narrower is kept when the ring before or after shows it at the same place. Where most neighbours are
+    rejected, the rest is not trusted either.
     """
     valid = validity == RingValidity.VALID
     filled = _bridged(radius_px, valid)
@@ -28,7 +31,9 @@ def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte
     confirmed[1:] |= (off[1:] == off[:-1]) & valid[:-1]
     confirmed[:-1] |= (off[:-1] == off[1:]) & valid[1:]
     out = validity.copy()
-    out[valid & (off != 0) & ~confirmed] = RingValidity.OUTLIER
+    kept = valid & ((off == 0) | confirmed)
+    alone = _running_share(kept, _NEIGHBOURS) < _MAJORITY
+    out[valid & (~kept | alone)] = RingValidity.OUTLIER
     return out
 
 
@@ -49,6 +54,11 @@ def wander_px(radius_px: Float32, sigma_px: Float32, validity: Byte) -> float:
     return float(np.sqrt(max(total - np.median(expected), 0.0) / 6))
 
 
+def _running_share(where: NDArray[np.bool_], sectors: int) -> Float:
+    """Share of true among ``sectors`` neighbours (odd) around the circle, of (F, A)."""
+    return np.asarray(uniform_filter1d(where.astype(float), sectors, axis=1, mode="wrap"))
+
+
 def _running_median(values: Float32, sectors: int) -> Float32:
     """Median over ``sectors`` neighbours (odd) around the circle, of values (F, A)."""
     half = sectors // 2
@@ -56,7 +66,7 @@ def _running_median(values: Float32, sectors: int) -> Float32:
     return np.asarray(median_filter(wide, size=(1, sectors))[:, half:-half])
 
 
-def _bridged(radius_px: Float32, valid: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Float32:
+def _bridged(radius_px: Float32, valid: NDArray[np.bool_]) -> Float32:
     out = radius_px.copy()
     sectors = np.arange(radius_px.shape[1])
     for row, good in zip(out, valid, strict=True):
