@@ -14,7 +14,7 @@ import yaml
 
 from pipeline.errors import InputError
 
-LARGEST_BYTES = 4_000_000
+LARGEST_BYTES = 1_000_000
 
 
 def read_yaml(file: Path) -> Section:
@@ -68,7 +68,7 @@ class _StrictLoader(yaml.SafeLoader):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[str] = set()
         for key, _ in node.value:
-            if key.value in seen if isinstance(key.value, str) else True:
+            if key.tag != "tag:yaml.org,2002:str" or key.value in seen:
                 problem = f"key {key.value!r} occurs twice or is not a plain word"
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=key.start_mark)
             seen.add(key.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from pipeline.errors import InputError
 from pipeline.recording.base import Image, Int, Planes
 from pipeline.recording.pixels import pixels
 from pipeline.recording.selection import ascending, complete
+from pipeline.recording.video_index import VideoIndex, list_frames
 
 # Fixed, so that which frames of a damaged file are given up does not depend on the machine.
 _THREADS = 4
@@ -20,25 +22,6 @@ _THREADS = 4
 _RESTART_FRAMES = 8
 # A decoder holds back at most this many frames: 16 for reordering and one a thread.
 _HELD_BACK = 16 + _THREADS
-
-
-@dataclass(frozen=True)
-class VideoIndex:
-    """What a file lists without being decoded.
-
-    Attributes
-    ----------
-    pts : (N,) int
-        Presentation times of all frames, ascending, in the stream's unit.
-    keyframes : (K,) int
-        Numbers of the frames at which decoding can begin.
-    timed : bool
-        Whether packets carry presentation times; if not, frames are numbered as they come, from the first.
-    """
-
-    pts: Int
-    keyframes: Int
-    timed: bool
 
 
 @dataclass(frozen=True)
@@ -64,34 +47,52 @@ class VideoSource:
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`; frames beyond the end of the file yield None."""
         wanted = ascending(frames)
-        for stretch in _stretches(wanted[wanted < self.count], self.index.keyframes):
+        for stretch in _stretches(wanted[wanted < self.count], self.index):
             for number, frame in complete(stretch, self._decode(stretch)):
                 yield number, None if frame is None else pixels(frame, planes)
         yield from ((int(number), None) for number in wanted[wanted >= self.count])
 
     def _decode(self, wanted: Int) -> Iterator[tuple[int, av.VideoFrame]]:
-        """Yield trusted frames from the keyframe before the first wanted one on.
+        """Yield the frames that can be trusted, from the keyframe before the first wanted one on.
 
-        After damage nothing is trusted before the next keyframe, since later frames are predicted from it.
+        A frame is held back until the frames that may be coded before it, but are shown later, are known to
+        be sound.
         """
-        index = self.index
-        start = int(index.keyframes[np.searchsorted(index.keyframes, wanted[0], "right") - 1])
-        only = index.pts[wanted] if index.timed and index.keyframes.size == index.pts.size else None
-        expected, damaged = start, False
+        damaged: set[int] = set()
+        held: deque[tuple[int, av.VideoFrame]] = deque()
+        for number, frame in self._numbered(wanted, damaged):
+            held.append((number, frame))
+            while held and held[0][0] < number - self.index.reordered:
+                yield from self._trusted(*held.popleft(), damaged)
+        for number, frame in held:
+            yield from self._trusted(number, frame, damaged)
+
+    def _trusted(
+        self, number: int, frame: av.VideoFrame, damaged: set[int]
+    ) -> Iterator[tuple[int, av.VideoFrame]]:
+        if (frame.width, frame.height) == self.image_size and not self.index.reached(number, damaged):
+            yield number, frame
+
+    def _numbered(self, wanted: Int, damaged: set[int]) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Yield decoded frames in order with their numbers; ``damaged`` grows by those that are not sound."""
+        start = int(self.index.key_of[wanted[0]])
+        only = self.index.pts[wanted] if self.index.intra else None
+        expected = start
         with av.open(str(self.path)) as container:
             stream = _prepare(container)
             if start > 0:
-                container.seek(int(index.pts[start]), stream=stream)
+                container.seek(int(self.index.pts[start]), stream=stream)
             for frame in _decoded(container, stream, only):
                 number = self._number(frame, expected)
-                if number is None or frame is None or number < start:
-                    damaged = True
+                if number is None or number < start:
                     continue
-                gap = number > expected and only is None
-                damaged = frame.is_corrupt or ((damaged or gap) and number not in index.keyframes)
-                expected = number + 1
-                if not damaged and _size(frame) == self.image_size:
+                damaged.update(range(expected, number))
+                if frame is None or frame.is_corrupt:
+                    damaged.add(number)
+                if frame is not None:
                     yield number, frame
+                expected = number + 1
+            damaged.update(range(expected, self.count))
 
     def _number(self, frame: av.VideoFrame | None, expected: int) -> int | None:
         """Return a frame's number; None where it is not known."""
@@ -114,7 +115,7 @@ def open_video(path: Path) -> VideoSource:
         with av.open(str(path)) as container:
             stream = _prepare(container)
             size = (stream.codec_context.width, stream.codec_context.height)
-            index = _list_frames(container, stream)
+            index = list_frames(container, stream)
     except (av.FFmpegError, OSError, ValueError) as error:
         raise InputError(
             path, f"cannot be opened as a video ({error.strerror if isinstance(error, OSError) else error})",
@@ -126,10 +127,6 @@ def open_video(path: Path) -> VideoSource:
     return VideoSource(path, index, size)
 
 
-def _size(frame: av.VideoFrame) -> tuple[int, int]:
-    return frame.width, frame.height
-
-
 def _prepare(container: av.container.InputContainer) -> av.VideoStream:
     """Return the first video stream, set to decode on several threads and to report damage."""
     if not container.streams.video:
@@ -139,26 +136,6 @@ def _prepare(container: av.container.InputContainer) -> av.VideoStream:
     stream.codec_context.thread_count = _THREADS
     stream.codec_context.options = {"err_detect": "crccheck+explode"}
     return stream
-
-
-def _list_frames(container: av.container.InputContainer, stream: av.VideoStream) -> VideoIndex:
-    pts: list[int | None] = []
-    key: list[bool] = []
-    try:
-        for packet in container.demux(stream):
-            if packet.size:
-                pts.append(packet.pts)
-                key.append(packet.is_keyframe)
-    except av.FFmpegError:
-        pass  # a damaged tail: what was listed so far stands, the table of frames tells what is missing
-    known = [p for p in pts if p is not None]
-    # AVI keeps no presentation times: with frames out of order, what it gives are times of decoding.
-    reordered_avi = container.format.name == "avi" and stream.codec_context.has_b_frames
-    if len(known) < len(pts) or reordered_avi:
-        return VideoIndex(np.arange(len(pts)), np.zeros(1, np.int64), timed=False)
-    order = np.argsort(np.array(known, np.int64), kind="stable")
-    keyframes = np.flatnonzero(np.array(key, bool)[order])
-    return VideoIndex(np.array(known, np.int64)[order], np.union1d(keyframes, [0]), timed=True)
 
 
 def _decoded(
@@ -195,9 +172,8 @@ def _decode_packet(
         return [None]
 
 
-def _stretches(wanted: Int, keyframes: Int) -> list[Int]:
+def _stretches(wanted: Int, index: VideoIndex) -> list[Int]:
     """Split ascending frame numbers where seeking to a keyframe is quicker than decoding on."""
     if wanted.size == 0:
         return []
-    key = keyframes[np.searchsorted(keyframes, wanted[1:], "right") - 1]
-    return np.split(wanted, np.flatnonzero(key - wanted[:-1] > _RESTART_FRAMES) + 1)
+    return np.split(wanted, np.flatnonzero(index.key_of[wanted[1:]] - wanted[:-1] > _RESTART_FRAMES) + 1)
