@@ -57,15 +57,61 @@ def _store(sample, inverse_brightness, weight, view, values, weights):  # type: 
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
-def _weighted_median(value, weight, count):  # type: ignore[no-untyped-def]
-    order = np.argsort(value[:count])
-    half = 0.5 * weight[:count].sum()
-    total = 0.0
-    for k in order:
-        total += weight[k]
-        if total >= half:
-            return value[k]
-    return value[order[-1]]
+def _sort_in(values, weights, grey, weight, where):  # type: ignore[no-untyped-def]
+    """Put the brightness of one pixel's samples into ``grey`` in ascending order; return how many."""
+    n = 0
+    for k in range(len(weights)):
+        if weights[k] > 0:
+            g = 0.25 * values[k, 0] + 0.5 * values[k, 1] + 0.25 * values[k, 2]
+            m = n
+            while m > 0 and grey[m - 1] > g:
+                grey[m], weight[m], where[m] = grey[m - 1], weight[m - 1], where[m - 1]
+                m -= 1
+            grey[m], weight[m], where[m] = g, weights[k], k
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def _middle_and_spread(grey, weight, n):  # type: ignore[no-untyped-def]
+    """Return weighted median and weighted median absolute deviation of n sorted values."""
+    half = 0.0
+    for m in range(n):
+        half += 0.5 * weight[m]
+    low, below = 0, weight[0]
+    while below < half and low < n - 1:
+        low += 1
+        below += weight[low]
+    middle, within, spread = grey[low], weight[low], 0.0
+    high = low + 1
+    low -= 1
+    while within < half and (low >= 0 or high < n):
+        if high >= n or (low >= 0 and middle - grey[low] <= grey[high] - middle):
+            spread = middle - grey[low]
+            within += weight[low]
+            low -= 1
+        else:
+            spread = grey[high] - middle
+            within += weight[high]
+            high += 1
+    return middle, spread
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc]
+def _biweight_mean(values, grey, weight, where, n, out):  # type: ignore[no-untyped-def]
+    """Write the robust mean colour of one pixel's n samples to ``out`` (3,)."""
+    middle, spread = _middle_and_spread(grey, weight, n)
+    limit = 4.685 * max(1.4826 * spread, 0.03 * middle + 1.0)
+    total, blue, green, red = 0.0, 0.0, 0.0, 0.0
+    for m in range(n):
+        x = (grey[m] - middle) / limit
+        if x * x < 1:
+            w = weight[m] * (1 - x * x) ** 2
+            total += w
+            blue += w * values[where[m], 0]
+            green += w * values[where[m], 1]
+            red += w * values[where[m], 2]
+    out[0], out[1], out[2] = int(blue / total + 0.5), int(green / total + 0.5), int(red / total + 0.5)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc]
@@ -84,36 +130,12 @@ def blend_samples(values, weights):  # type: ignore[no-untyped-def]
     rows, columns, views = weights.shape
     out = np.zeros((rows, columns, 3), np.uint16)
     counts = np.zeros((rows, columns), np.uint8)
+    grey, weight = np.empty(views, np.float32), np.empty(views, np.float32)
+    where = np.empty(views, np.int64)
     for i in range(rows):
-        grey, weight, apart = np.empty(views), np.empty(views), np.empty(views)
-        where = np.empty(views, np.int64)
         for j in range(columns):
-            n = 0
-            for k in range(views):
-                if weights[i, j, k] > 0:
-                    v = values[i, j, k]
-                    grey[n] = 0.25 * v[0] + 0.5 * v[1] + 0.25 * v[2]
-                    weight[n] = weights[i, j, k]
-                    where[n] = k
-                    n += 1
+            n = _sort_in(values[i, j], weights[i, j], grey, weight, where)
             counts[i, j] = n
-            if n == 0:
-                continue
-            middle = _weighted_median(grey, weight, n)
-            for m in range(n):
-                apart[m] = abs(grey[m] - middle)
-            limit = 4.685 * max(1.4826 * _weighted_median(apart, weight, n), 0.03 * middle + 1.0)
-            total, b, g, r = 0.0, 0.0, 0.0, 0.0
-            for m in range(n):
-                if apart[m] < limit:
-                    x = apart[m] / limit
-                    w = weight[m] * (1 - x * x) ** 2
-                    v = values[i, j, where[m]]
-                    total += w
-                    b += w * v[0]
-                    g += w * v[1]
-                    r += w * v[2]
-            out[i, j, 0] = np.uint16(b / total + 0.5)
-            out[i, j, 1] = np.uint16(g / total + 0.5)
-            out[i, j, 2] = np.uint16(r / total + 0.5)
+            if n > 0:
+                _biweight_mean(values[i, j], grey, weight, where, n, out[i, j])
     return out, counts

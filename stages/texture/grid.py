@@ -76,21 +76,21 @@ class FlatGrid:
 
 
 def flat_grid(surface: WallSurface, probe: Probe, oversampling: float, tile_mm: float) -> FlatGrid:
-    """Return a grid whose square pixels are as fine as the camera's pixels at the laser ring.
+    """Return a grid whose square pixels cover as much wall as the camera's pixels at the laser ring.
 
     Parameters
     ----------
     surface
         The wall; the grid covers the rows that the ring saw.
     probe
-        Its camera and laser sheet give the finest footprint of a pixel on the wall.
+        Its camera and laser sheet give the footprint of a pixel on the wall.
     oversampling
         Grid pixels per camera pixel.
     tile_mm
         Wished length of a tile.
     """
     radius = surface.mean_radius_mm
-    spacing = finest_footprint_mm(probe, radius) / oversampling
+    spacing = footprint_mm(probe, radius) / oversampling
     columns = NODE_PX * int(np.ceil(2 * np.pi * radius / spacing / NODE_PX))
     spacing = 2 * np.pi * radius / columns
     first, last = surface.seen_mm
@@ -98,12 +98,13 @@ def flat_grid(surface: WallSurface, probe: Probe, oversampling: float, tile_mm: 
     return FlatGrid(first, spacing, 1 + int((last - first) / spacing), columns, tile_rows)
 
 
-def finest_footprint_mm(probe: Probe, radius_mm: float) -> float:
-    """Return the smaller side of a camera pixel on the wall at the laser ring, mean around the ring."""
+def footprint_mm(probe: Probe, radius_mm: float) -> float:
+    """Return the root of the wall area that a camera pixel covers at the laser ring, mean around the ring."""
     psi = np.linspace(-np.pi, np.pi, 36, endpoint=False)
     c, s, zero = np.cos(psi), np.sin(psi), 0 * psi
     height = probe.laser.height(psi) + radius_mm * probe.laser.slope(psi)
     by_point = probe.camera.project_jacobian(np.stack([radius_mm * c, radius_mm * s, height], -1)).by_point
-    around = np.linalg.norm(np.einsum("nij,nj->ni", by_point, np.stack([-s, c, zero], -1)), axis=-1)
-    along = np.linalg.norm(by_point[..., 2], axis=-1)
-    return float(1 / np.maximum(around.mean(), along.mean()))
+    around = np.einsum("nij,nj->ni", by_point, np.stack([-s, c, zero], -1))
+    along = by_point[..., 2]
+    density = np.abs(around[:, 0] * along[:, 1] - around[:, 1] * along[:, 0])
+    return float(1 / np.sqrt(density.mean()))

@@ -21,7 +21,8 @@ from stages.texture.sampling import LightSamples
 _THETA_KNOTS = 9
 _AZIMUTH_KNOTS = 12
 # Prior 1 σ of log brightness: by angle alone, around the image, of g's steps, of a frame's gain, of one sample.
-_SIGMA_THETA, _SIGMA_AROUND, _SIGMA_STEP, _SIGMA_GAIN, _SIGMA_SAMPLE = 1.0, 0.2, 0.1, 0.3, 0.05
+_SIGMA_THETA, _SIGMA_AROUND, _SIGMA_STEP, _SIGMA_GAIN, _SIGMA_SAMPLE = 1.0, 0.05, 0.05, 0.05, 0.05
+_SIGMA_TREND = 1e-4
 _ITERATIONS = 4
 _FEWEST = 20
 
@@ -67,7 +68,7 @@ def solve_light(samples: LightSamples, views: int, probe: Probe, reference: floa
     design = _design(samples, views, theta_from, theta_step)
     _, cell = np.unique(samples.cell, return_inverse=True)
     level = float(np.median(samples.log_ratio))
-    solution, residual = _solve_robust(design, cell, samples.log_ratio - level, _prior(views))
+    solution, residual = _solve_robust(design, cell, samples.log_ratio - level, _prior(_along(samples, views)))
     f = solution[:_THETA_KNOTS]
     g = solution[_THETA_KNOTS:-views].reshape(_THETA_KNOTS, _AZIMUTH_KNOTS)
     field = LightField(probe.lighting, theta_from, theta_step, f[:, None] + g, reference)
@@ -91,8 +92,20 @@ def _design(samples: LightSamples, views: int, theta_from: float, theta_step: fl
     return sparse.csr_array((np.concatenate(value), (rows, np.concatenate(index))), shape=shape)
 
 
-def _prior(views: int) -> sparse.csc_array:
-    """Return the prior's information matrix."""
+def _along(samples: LightSamples, views: int) -> Float:
+    """Return (V,) how far along the wall each view looked, zero mean, 0 where it took no sample."""
+    count = np.bincount(samples.view, minlength=views)
+    mean = np.bincount(samples.view, samples.cell, minlength=views) / np.maximum(count, 1)
+    centred = np.where(count > 0, mean - mean[count > 0].mean(), 0.0)
+    return np.asarray(centred / max(float(np.linalg.norm(centred)), 1e-12))
+
+
+def _prior(along: Float) -> sparse.csc_array:
+    """Return the prior's information matrix.
+
+    A wall that grows brighter along the pipe, a light that falls off less and an exposure that sinks from
+    frame to frame explain the same pictures. Exposure is taken to have no trend ``along`` (V,).
+    """
     around = np.arange(_THETA_KNOTS * _AZIMUTH_KNOTS).reshape(_THETA_KNOTS, _AZIMUTH_KNOTS)
     pairs = np.concatenate(
         [
@@ -104,7 +117,7 @@ def _prior(views: int) -> sparse.csc_array:
     steps[np.arange(len(pairs)), pairs[:, 0]], steps[np.arange(len(pairs)), pairs[:, 1]] = -1, 1
     smooth = steps.T @ steps / _SIGMA_STEP**2 + np.eye(around.size) / _SIGMA_AROUND**2
     theta = np.eye(_THETA_KNOTS) / _SIGMA_THETA**2
-    gain = sparse.eye_array(views) / _SIGMA_GAIN**2
+    gain = np.eye(len(along)) / _SIGMA_GAIN**2 + np.outer(along, along) / _SIGMA_TREND**2
     return sparse.block_diag([theta, smooth, gain], format="csc")
 
 

@@ -69,10 +69,10 @@ class LightSampler:
         T_cp = self._views.T_cp[view]
         xyz_c = transform(T_cp, self._patch.xyz_p[rows])
         normal_c = self._patch.normal_p[rows] @ T_cp[:3, :3].T
-        small = cv2.resize(
-            image.mean(2, dtype=np.float32), None, fx=1 / _SHRINK, fy=1 / _SHRINK, interpolation=cv2.INTER_AREA
-        )
-        uv = ((self._probe.camera.project(xyz_c).uv + 0.5) / _SHRINK - 0.5).astype(np.float32)
+        size = (image.shape[1] // _SHRINK, image.shape[0] // _SHRINK)
+        small = cv2.resize(image, size, interpolation=cv2.INTER_AREA).mean(2, dtype=np.float32)
+        scale = np.array(size) / np.array([image.shape[1], image.shape[0]])
+        uv = ((self._probe.camera.project(xyz_c).uv + 0.5) * scale - 0.5).astype(np.float32)
         grey = cv2.remap(small, uv[..., 0], uv[..., 1], cv2.INTER_LINEAR)
         light = irradiance(self._probe.lighting, xyz_c, normal_c) / self._reference
         use = self._usable(view, xyz_c) & (grey > _DARK) & (grey < _BRIGHT) & (light > 0.01)
