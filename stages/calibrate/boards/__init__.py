@@ -1,0 +1,1 @@
+"""Camera calibration from images of chessboard and ChArUco boards."""

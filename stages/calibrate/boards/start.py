@@ -1,0 +1,115 @@
+"""Starting values: an equidistant camera whose focal length explains the views, and the boards' poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.rigid import from_parts
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.calibration import BoardView
+from pipeline.instrument.camera.equidistant import Equidistant
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.pinhole import Pinhole
+from pipeline.instrument.camera.scaramuzza import Scaramuzza
+from pipeline.instrument.camera.unified import Unified
+from stages.calibrate.boards.bundle import Corners, Estimate, cost, solve
+
+Float = NDArray[np.float64]
+_HALF_FIELDS_RAD = np.geomspace(0.15, 2.6, 14)
+_SAMPLE_CORNERS = 24
+_START_HUBER_PX = 5.0
+_NEAR_FORWARD = 0.3
+_NO_PARAMETERS = np.zeros(0, np.int64)
+
+
+def start(views: Sequence[BoardView], image_size: tuple[int, int]) -> Estimate:
+    """Return the best equidistant camera, centred in the image at first, with all poses.
+
+    Half fields of view from 9° to 149° are tried on a few corners of every view; the best is refined.
+    """
+    sample = [_thinned(view) for view in views]
+    corners = Corners.of(sample)
+    tried = [_posed(sample, corners, _equidistant(image_size, half)) for half in _HALF_FIELDS_RAD]
+    best = min(tried, key=lambda e: cost(e.residuals(corners), _START_HUBER_PX))
+    best = solve(best, corners, np.arange(2), _START_HUBER_PX)
+    return solve(best, Corners.of(views), np.arange(4), _START_HUBER_PX)
+
+
+def pose(view: BoardView, camera: Camera) -> Float:
+    """Return a first ``T_cb`` (4, 4) of a view: SQPnP in a virtual camera that faces the board.
+
+    Turning the rays so that their mean looks forward lets a method for pinhole images serve beyond 90°.
+    """
+    rays = camera.unproject(view.uv)
+    ray = rays.ray[rays.valid]
+    if len(ray) < 4:
+        return from_parts(np.eye(3), np.array([0.0, 0.0, float(np.ptp(view.xyz_b)) or 1.0]))
+    turn = _rotation_to_forward(ray.mean(0))
+    turned = ray @ turn.T
+    ahead = turned[:, 2] > _NEAR_FORWARD
+    if np.count_nonzero(ahead) < 4:
+        ahead = turned[:, 2] > np.sort(turned[:, 2])[-5]
+        turned = np.maximum(turned, [-np.inf, -np.inf, 1e-2])
+    plane = turned[ahead, :2] / turned[ahead, 2:]
+    xyz_b = view.xyz_b[rays.valid][ahead]
+    found, w, t = cv2.solvePnP(xyz_b, plane, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_SQPNP)
+    if not found:
+        return from_parts(turn.T, turn.T @ np.array([0.0, 0.0, float(np.ptp(view.xyz_b))]))
+    return from_parts(turn.T @ cv2.Rodrigues(w)[0], turn.T @ t[:, 0])
+
+
+def model_start(model: str, estimate: Estimate, theta_max: float) -> Camera:
+    """Return a camera of ``model`` that projects nearly as the equidistant ``estimate`` up to ``theta_max``."""
+    seed = estimate.camera
+    size, (fx, fy, cx, cy) = seed.image_size, (float(p) for p in seed.parameters)
+    match model:
+        case "kannala_brandt":
+            return KannalaBrandt(size, (fx, fy), (cx, cy))
+        case "scaramuzza":
+            return Scaramuzza(size, (cx, cy), _equidistant_polynomial((fx + fy) / 2, theta_max))
+        case "unified":
+            return Unified(size, 1.0, (2 * fx, 2 * fy), (cx, cy))
+        case "pinhole":
+            return Pinhole(size, (fx, fy), (cx, cy))
+        case "equidistant":
+            return Equidistant(size, (fx, fy), (cx, cy))
+        case _:
+            raise ValueError(f"no camera model {model!r}")
+
+
+def _equidistant(image_size: tuple[int, int], half_field_rad: float) -> Equidistant:
+    width, height = image_size
+    focal = np.hypot(width, height) / 2 / half_field_rad
+    return Equidistant(image_size, (focal, focal), ((width - 1) / 2, (height - 1) / 2))
+
+
+def _equidistant_polynomial(focal: float, theta_max: float) -> tuple[float, ...]:
+    """Fit z(ρ) = ρ / tan(ρ/f) by a0 + a2 ρ² + a3 ρ³ + a4 ρ⁴, in OCamCalib's sign."""
+    theta = np.linspace(1e-3, min(theta_max, 2.8), 200)
+    rho = focal * theta
+    basis = np.stack([np.ones_like(theta), theta**2, theta**3, theta**4], -1)
+    a0, a2, a3, a4 = np.linalg.lstsq(basis, -rho / np.tan(theta), rcond=None)[0]
+    return float(a0), 0.0, float(a2 / focal**2), float(a3 / focal**3), float(a4 / focal**4)
+
+
+def _posed(sample: list[BoardView], corners: Corners, camera: Camera) -> Estimate:
+    T_cb = np.stack([pose(view, camera) for view in sample])
+    return solve(Estimate(camera, T_cb), corners, _NO_PARAMETERS, _START_HUBER_PX)
+
+
+def _thinned(view: BoardView) -> BoardView:
+    pick = np.unique(np.linspace(0, len(view.uv) - 1, _SAMPLE_CORNERS).astype(int))
+    return BoardView(view.name, view.xyz_b[pick], view.uv[pick])
+
+
+def _rotation_to_forward(direction: Float) -> Float:
+    """Return a rotation that takes ``direction`` to +z."""
+    z = direction / np.linalg.norm(direction)
+    helper = np.eye(3)[np.argmin(np.abs(z))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
