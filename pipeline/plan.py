@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pipeline.codec import Json, canonical
 from pipeline.config import Configuration
 from pipeline.errors import BoresightError
+from pipeline.source_code import source_digest
 from pipeline.stage import Parameters, Stage
 
 
@@ -37,13 +38,27 @@ class Source:
 
 @dataclass(frozen=True)
 class Step:
-    """A stage with its parameters, the classes of its arguments by name, and the key of its result."""
+    """A stage placed in a plan.
+
+    Attributes
+    ----------
+    stage, parameters
+    inputs
+        Argument names with their classes.
+    output
+        Class of what it makes.
+    key
+        Hash of all that the result depends on.
+    seed
+        For its random numbers: as the key, but the same whatever the program text.
+    """
 
     stage: Stage
     parameters: Parameters
     inputs: tuple[tuple[str, type], ...]
     output: type
     key: str
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -78,7 +93,7 @@ class Plan:
 def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Sequence[Source]) -> Plan:
     """Wire the stages and derive their keys.
 
-    The key of a result is a hash of stage name, version, parameters and the keys of its inputs.
+    The key of a result is a hash of stage name, version, program text, parameters and keys of the inputs.
 
     Raises
     ------
@@ -91,7 +106,8 @@ def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Se
         _check_wiring(stage, keys, stages)
         parameters = configuration.of(stage.name)
         key = _key(stage, parameters, keys)
-        steps.append(Step(stage, parameters, tuple(stage.inputs().items()), stage.output(), key))
+        seed = _seed(stage, parameters, sources)
+        steps.append(Step(stage, parameters, tuple(stage.inputs().items()), stage.output(), key, seed))
         keys[stage.output()] = key
     return Plan(tuple(sources), tuple(steps))
 
@@ -113,7 +129,13 @@ def _key(stage: Stage, parameters: Parameters, keys: Mapping[type, str]) -> str:
     content: Json = {
         "stage": stage.name,
         "version": stage.version,
+        "source": source_digest(stage.function),
         "parameters": parameters.model_dump(mode="json"),
         "inputs": inputs,
     }
     return hashlib.sha256(canonical(content)).hexdigest()
+
+
+def _seed(stage: Stage, parameters: Parameters, sources: Sequence[Source]) -> int:
+    content: Json = [stage.name, parameters.model_dump(mode="json"), [s.key for s in sources]]
+    return int(hashlib.sha256(canonical(content)).hexdigest(), 16)

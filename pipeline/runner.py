@@ -178,7 +178,7 @@ class Runner:
             self._logger.info("%s: %s = %s %s", step.stage.name, name, value, unit)
             numbers.append(Number(name, value, unit))
 
-        random = np.random.default_rng(int(step.key, 16))
+        random = np.random.default_rng(step.seed)
         return Context(self._logger, progress, report, random, self._workers)
 
     def _stop_if_wished(self) -> None:

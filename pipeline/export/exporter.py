@@ -20,6 +20,7 @@ from pipeline.disk import (
     sync_tree,
 )
 from pipeline.run_folder import RunFolder
+from pipeline.source_code import source_digest
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,10 @@ class Exporter:
     write
         ``write(artefact, ..., folder)``: writes finished files into ``folder``. Arguments other than
         ``folder`` are artefacts or sources, wired by type as those of stages are.
-    version
-        To be raised whenever the files for the same artefacts change.
     """
 
     name: str
     write: Callable[..., None] = field(repr=False)
-    version: str = "1"
 
     def inputs(self) -> dict[str, type]:
         """Return argument name to class, in the order of the function's signature."""
@@ -47,9 +45,9 @@ class Exporter:
         return {k: v for k, v in hints.items() if k not in ("folder", "return")}
 
     def key(self, keys: Mapping[type, str]) -> str:
-        """Return the hash of what its files are made from."""
+        """Return the hash of what its files are made from, and of the program text that writes them."""
         inputs = {name: keys[kind] for name, kind in self.inputs().items()}
-        return hashlib.sha256(canonical([self.name, self.version, dict(inputs)])).hexdigest()
+        return hashlib.sha256(canonical([self.name, source_digest(self.write), dict(inputs)])).hexdigest()
 
 
 def publish(exporter: Exporter, artefacts: Mapping[type, object], key: str, run: RunFolder) -> None:

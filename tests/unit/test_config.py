@@ -11,7 +11,7 @@ from pipeline.config import default_text, resolve, resolved_text
 from pipeline.errors import InputError
 from stages.catalogue import PIPELINE
 from tests.shared_data import PROJECT_ROOT
-from tests.toys import TOYS, DrawParameters, Mood, SmoothParameters, TotalParameters
+from tests.toy_stages import TOYS, DrawParameters, Mood, SmoothParameters, TotalParameters
 
 
 def test_defaults_then_file_then_assignments(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from pipeline.config import resolve
 from pipeline.plan import PipelineError, Plan, Source, make_plan
 from pipeline.recording.base import Recording
 from pipeline.stage import Stage
-from tests.toys import DRAW, SMOOTH, TOTAL, TOYS, toy_recording
+from tests.toy_stages import DRAW, SMOOTH, TOTAL, TOYS
+from tests.toys import toy_recording
 
 
 def plan_of(*stages: Stage, key: str = "0" * 64, assignments: tuple[str, ...] = ()) -> Plan:

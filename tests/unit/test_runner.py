@@ -23,7 +23,8 @@ from pipeline.plan import PipelineError
 from pipeline.runner import FailedError, Selection
 from pipeline.stage import Context
 from tests.shared_data import PROJECT_ROOT
-from tests.toys import DRAW, SMOOTH, Drawn, DrawParameters, run_toys, toy_job
+from tests.toy_stages import DRAW, SMOOTH, Drawn, DrawParameters
+from tests.toys import run_toys, toy_job
 
 
 def states(outcome: RunOutcome) -> list[str]:

@@ -21,7 +21,7 @@ from pipeline.codec import digest, encode
 from pipeline.errors import InputError
 from pipeline.outcome import Number
 from pipeline.store import Provenance, Store
-from tests.toys import Mood
+from tests.toy_stages import Mood
 
 
 @dataclass(frozen=True)
