@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pipeline.export.exporter import Exporter
 from pipeline.export.radius_map import write_radius_map
+from pipeline.export.report import write_report_page
 from pipeline.export.rings import write_rings
 from pipeline.export.trajectory import write_trajectory
 
@@ -11,4 +12,5 @@ EXPORTERS = (
     Exporter("rings.zarr", write_rings),
     Exporter("trajectory.csv", write_trajectory),
     Exporter("radius_map.npz", write_radius_map),
+    Exporter("report.html", write_report_page),
 )
