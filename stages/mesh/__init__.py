@@ -1,0 +1,173 @@
+"""Wall, photo and error colours -> textured mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from pipeline.artefacts import Wall, WallTexture
+from pipeline.errors import UnusableError
+from pipeline.isolated import CrashError, TimeLimitError, call_isolated
+from pipeline.model import MeshTile, Overlays, TexturedMesh
+from pipeline.stage import Context, Parameters, Stage
+from stages.mesh.bake import bake_tile
+from stages.mesh.charts import cut_charts, pack, tile_length, unroll
+from stages.mesh.decimate import Decimated, decimate
+from stages.mesh.poisson import folded_cells, poisson_surface
+from stages.mesh.surface import Surface, grid_surface, row_pieces, vertex_normals, weld
+
+
+class MeshParameters(Parameters):
+    """How the surface is made, thinned out and textured."""
+
+    surface: Literal["auto", "grid", "poisson"] = Field(
+        "auto", description="grid: one vertex a cell; poisson: walls that fold over; auto: as the cloud asks"
+    )
+    folded_cell_mm: float = Field(2.0, ge=0.5, le=20, description="mm; cells in which auto looks for folds")
+    fold: float = Field(
+        0.35, ge=0.05, le=5, description="spread of radii in a cell, per median radius, that is a fold"
+    )
+    least_folded_cells: int = Field(20, ge=1, description="cells with a fold from which auto takes poisson")
+    poisson_cell_mm: float = Field(0.5, ge=0.05, le=10, description="mm; finest cell of the Poisson solver")
+    poisson_reach_mm: float = Field(
+        3.0, ge=0.1, le=50, description="mm; surface further from every point is left out as not seen"
+    )
+    error_mm: float = Field(
+        0.02,
+        gt=0,
+        le=5,
+        description="mm; bound of decimation: how far it may move the wall beyond its own noise",
+    )
+    noise_factor: float = Field(
+        4.0,
+        ge=0,
+        le=6,
+        description="random 1 σ of a cell that decimation may smooth on top; 0: bound is strict",
+    )
+    triangles_per_mm2: float = Field(2.0, gt=0, le=200, description="1/mm²; decimation stops at this density")
+    texel_mm: float = Field(0.1, ge=0.02, le=5, description="mm; size of a photo texel on the wall")
+    tile_mm: float = Field(100.0, ge=10, le=1000, description="mm; length of the pieces the model is made of")
+    atlas_px: int = Field(4096, ge=512, le=16384, description="px; largest side of a texture")
+    time_limit_s: float = Field(
+        600.0, ge=1, description="s; after this a reconstruction of one piece is given up"
+    )
+
+
+def make_mesh(
+    wall: Wall, texture: WallTexture, overlays: Overlays, parameters: MeshParameters, context: Context
+) -> TexturedMesh:
+    """Return the wall as a textured mesh.
+
+    Raises
+    ------
+    UnusableError
+        When the wall has too few measured cells, or a library gave up or took longer than its limit.
+    """
+    kind = _choose_surface(wall, parameters, context)
+    make_pieces = {"grid": _grid_pieces, "poisson": _poisson_pieces}[kind]
+    pieces = make_pieces(wall, parameters, context)
+    surface = weld([p.surface for p in pieces])
+    if len(surface.face) == 0:
+        raise UnusableError("mesh", "no triangle could be made: too few measured cells lie side by side")
+    normal = vertex_normals(surface)
+    unrolled = unroll(surface, wall.axis)
+    tile_mm = tile_length(parameters.tile_mm, unrolled.reference_mm, parameters.texel_mm, parameters.atlas_px)
+    charts = cut_charts(unrolled, surface, tile_mm, parameters.texel_mm)
+    atlases = [pack(c, parameters.texel_mm) for c in charts]
+    tiles = [bake_tile(a, surface, normal, unrolled, texture, overlays, parameters.texel_mm) for a in atlases]
+    mesh = _assemble(tiles, kind, pieces, parameters)
+    _report(mesh, context)
+    return mesh
+
+
+def _choose_surface(wall: Wall, parameters: MeshParameters, context: Context) -> str:
+    folded = folded_cells(wall.cloud, parameters.folded_cell_mm, parameters.fold)
+    context.report("mesh: cells in which the wall folds over", folded)
+    if parameters.surface != "auto":
+        return parameters.surface
+    return "poisson" if folded >= parameters.least_folded_cells else "grid"
+
+
+def _grid_pieces(wall: Wall, parameters: MeshParameters, context: Context) -> list[Decimated]:
+    """Return the radius map's surface in decimated pieces, made side by side so that memory stays bounded."""
+    radius_map = wall.radius_map
+    spacing = float(radius_map.distance_mm[1] - radius_map.distance_mm[0])
+    rows = row_pieces(len(radius_map.distance_mm), max(1, round(parameters.tile_mm / spacing)))
+    noise = np.nan_to_num(radius_map.sigma_random_mm.astype(float))
+    allowance = parameters.error_mm + parameters.noise_factor * noise
+    done: list[Decimated] = []
+    with ThreadPoolExecutor(context.workers) as pool:
+        for piece in pool.map(lambda r: _thin_out(grid_surface(wall, r, allowance), parameters), rows):
+            done.append(piece)
+            context.progress(len(done), len(rows))
+    return done
+
+
+def _poisson_pieces(wall: Wall, parameters: MeshParameters, context: Context) -> list[Decimated]:
+    """Return the cloud's Poisson surface, decimated."""
+    cloud = wall.cloud
+    allowance = parameters.error_mm + parameters.noise_factor * float(np.median(cloud.sigma_mm))
+    xyz, normal = cloud.xyz_p.astype(float), cloud.normal_p.astype(float)
+    with _native_failures("screened Poisson"):
+        surface = call_isolated(
+            parameters.time_limit_s,
+            poisson_surface,
+            xyz,
+            normal,
+            parameters.poisson_cell_mm,
+            parameters.poisson_reach_mm,
+            allowance,
+        )
+    context.progress(1, 2)
+    piece = _thin_out(surface, parameters)
+    context.progress(2, 2)
+    return [piece]
+
+
+def _thin_out(surface: Surface, parameters: MeshParameters) -> Decimated:
+    """Return the surface decimated in a process of its own, as pymeshlab bears no threads."""
+    a, b, c = np.moveaxis(surface.vertex_p[surface.face], 1, 0)
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    target = max(1, round(parameters.triangles_per_mm2 * area))
+    with _native_failures("decimation"):
+        return call_isolated(parameters.time_limit_s, decimate, surface, target)
+
+
+@contextmanager
+def _native_failures(what: str) -> Iterator[None]:
+    """Turn a library's crash or endless run into an error for people."""
+    try:
+        yield
+    except (TimeLimitError, CrashError) as error:
+        hint = "set mesh.time_limit_s higher, or mesh.surface=grid, or mesh.poisson_cell_mm larger"
+        raise UnusableError("mesh", f"{what}: {error}", hint=hint) from error
+
+
+def _assemble(
+    tiles: Sequence[MeshTile], kind: str, pieces: Sequence[Decimated], parameters: MeshParameters
+) -> TexturedMesh:
+    vertices = sum(p.original_vertices for p in pieces)
+    return TexturedMesh(
+        tuple(tiles),
+        kind,
+        parameters.texel_mm,
+        sum(p.original_faces for p in pieces),
+        max(p.largest_error_mm for p in pieces),
+        float(np.sqrt(sum(p.mean_square_mm2 * p.original_vertices for p in pieces) / max(vertices, 1))),
+    )
+
+
+def _report(mesh: TexturedMesh, context: Context) -> None:
+    context.report("mesh: surface", mesh.surface)
+    context.report("mesh: triangles before decimation", mesh.wall_triangles)
+    context.report("mesh: triangles", mesh.triangles)
+    context.report("mesh: largest decimation error", mesh.decimation_error_mm, "mm")
+    context.report("mesh: RMS decimation error", mesh.decimation_rms_mm, "mm")
+
+
+MESH = Stage("mesh", "1", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")

@@ -1,0 +1,143 @@
+"""Bakes the wall's photo and error colours into the texture atlas of a mesh tile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import WallTexture
+from pipeline.model import VARIANTS, ErrorTexture, MeshTile, Overlays
+from pipeline.native import open3d
+from stages.mesh.charts import PADDING_PX, Atlas, Chart, Unrolled
+from stages.mesh.surface import Float, Surface
+
+Byte = NDArray[np.uint8]
+
+_ERROR_COARSER = 3
+_UNTEXTURED = 55  # linear grey, 128 as sRGB
+
+
+@dataclass(frozen=True)
+class TexelPlaces:
+    """Pipe coordinates of texels (H, W): distance, mm, and azimuth, rad; NaN where there is no wall."""
+
+    distance_mm: NDArray[np.float32]
+    azimuth_rad: NDArray[np.float32]
+
+
+def bake_tile(
+    atlas: Atlas,
+    surface: Surface,
+    normal_p: Float,
+    unrolled: Unrolled,
+    texture: WallTexture,
+    overlays: Overlays,
+    texel_mm: float,
+) -> MeshTile:
+    """Return the tile of an atlas' charts with its textures."""
+    vertex = np.concatenate([c.vertex for c in atlas.charts])
+    starts = np.cumsum([0, *(len(c.vertex) for c in atlas.charts)])
+    face = np.concatenate([c.corner + s for c, s in zip(atlas.charts, starts, strict=False)])
+    uv = np.concatenate(atlas.corner_px) / np.array(atlas.size_px)
+    fine = texel_places(atlas, unrolled, texel_mm, 1)
+    coarse = texel_places(atlas, unrolled, texel_mm, _ERROR_COARSER)
+    return MeshTile(
+        surface.vertex_p[vertex].astype(np.float32),
+        normal_p[vertex].astype(np.float32),
+        uv.astype(np.float32),
+        face.astype(np.int32),
+        _photo(texture, fine),
+        tuple(_error(v, overlays, coarse) for v in VARIANTS[1:]),
+    )
+
+
+def texel_places(atlas: Atlas, unrolled: Unrolled, texel_mm: float, coarser: int) -> TexelPlaces:
+    """Return where on the wall each texel of the atlas lies, ``coarser`` times larger texels than packed."""
+    size = [max(1, round(n / coarser)) for n in atlas.size_px]
+    step = np.array(atlas.size_px) / size
+    distance = np.full((size[1], size[0]), np.nan, np.float32)
+    azimuth = distance.copy()
+    for chart, px in zip(atlas.charts, atlas.corner_px, strict=True):
+        low = np.maximum(np.floor((px.min(axis=0) - PADDING_PX / 2) / step), 0).astype(int)
+        high = np.minimum(np.ceil((px.max(axis=0) + PADDING_PX / 2) / step), size).astype(int)
+        box = (slice(low[1], high[1]), slice(low[0], high[0]))
+        x, y = ((np.arange(low[i], high[i]) + 0.5) * step[i] for i in (0, 1))
+        azimuth[box], distance[box] = _chart_places(chart, px, x, y, unrolled, texel_mm)
+    return TexelPlaces(distance, azimuth)
+
+
+def _chart_places(
+    chart: Chart, px: Float, x: Float, y: Float, unrolled: Unrolled, texel_mm: float
+) -> tuple[Float, Float]:
+    """Return azimuth and distance at texture columns ``x`` (W,) and rows ``y`` (H,), px, broadcasting."""
+    if chart.origin is None:
+        return _nearest_places(chart, px, x, y, unrolled)
+    flat = chart.xy_mm[0] - px[0] * texel_mm
+    azimuth = chart.origin[0] + (x * texel_mm + flat[0]) / unrolled.reference_mm
+    distance = chart.origin[1] + y * texel_mm + flat[1]
+    return np.broadcast_to(azimuth, (len(y), len(x))), np.broadcast_to(distance[:, None], (len(y), len(x)))
+
+
+def _nearest_places(chart: Chart, px: Float, x: Float, y: Float, unrolled: Unrolled) -> tuple[Float, Float]:
+    """Return azimuth and distance of the points of a flattened chart next to each texel (by open3d)."""
+    corner = np.dstack([px[chart.corner], np.zeros(chart.corner.shape)]).reshape(-1, 3).astype(np.float32)
+    scene = open3d().t.geometry.RaycastingScene()
+    scene.add_triangles(corner, np.arange(len(corner), dtype=np.uint32).reshape(-1, 3))
+    texel = np.dstack([*np.meshgrid(x, y), np.zeros((len(y), len(x)))]).astype(np.float32)
+    found = scene.compute_closest_points(texel)
+    face = chart.face[found["primitive_ids"].numpy().astype(np.int64)]
+    uv = found["primitive_uvs"].numpy().astype(float)
+    weight = np.dstack([1 - uv.sum(-1), uv])
+    return (
+        np.einsum("hwk,hwk->hw", weight, unrolled.azimuth_rad[face]),
+        np.einsum("hwk,hwk->hw", weight, unrolled.distance_mm[face]),
+    )
+
+
+def _photo(texture: WallTexture, places: TexelPlaces) -> Byte:
+    """Return the sRGB photo (H, W, 3) at texels."""
+    rows = len(texture.bgra)
+    row = (places.distance_mm - texture.distance_from_mm) / texture.mm_per_px
+    first = int(np.clip(np.nanmin(row) - 1, 0, rows - 1))
+    last = int(np.clip(np.nanmax(row) + 2, first + 1, rows))
+    picture = texture.bgra[first:last]
+    picture = np.where(picture[..., 3:] > 0, picture, 0).astype(np.uint8)
+    columns = picture.shape[1]
+    column = ((places.azimuth_rad - texture.azimuth_from_rad) / texture.rad_per_px) % columns
+    beyond = np.isnan(row) | (row < -0.5) | (row > rows - 0.5)
+    sampled = cv2.remap(
+        np.concatenate([picture, picture[:, :1]], axis=1),
+        np.nan_to_num(column),
+        np.clip(np.nan_to_num(row - first), 0, last - first - 1),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    sampled[beyond] = 0
+    grey = ((255 - sampled[..., 3:].astype(np.uint16)) * _UNTEXTURED // 255).astype(np.uint8)
+    return np.asarray(_SRGB[cv2.add(sampled[..., :3], np.repeat(grey, 3, axis=-1))])
+
+
+def _error(variant: str, overlays: Overlays, places: TexelPlaces) -> ErrorTexture:
+    """Return the levels of an overlay at texels; 0 off the wall and where nothing was measured."""
+    overlay = overlays.of_variant(variant)
+    rows, columns = overlay.level.shape
+    spacing = (overlays.distance_mm[-1] - overlays.distance_mm[0]) / max(rows - 1, 1)
+    row = np.rint((places.distance_mm - overlays.distance_mm[0]) / spacing)
+    column = np.rint((places.azimuth_rad - overlays.azimuth_rad[0]) * columns / (2 * np.pi)) % columns
+    outside = np.isnan(row)
+    row = np.clip(np.nan_to_num(row), 0, rows - 1).astype(np.int64)
+    level = overlay.level[row, np.nan_to_num(column).astype(np.int64)]
+    return ErrorTexture(variant, overlay.palette_bgr, np.where(outside, 0, level).astype(np.uint8))
+
+
+def _srgb_table() -> Byte:
+    """Return the sRGB value of each linear one (IEC 61966-2-1)."""
+    linear = np.arange(256) / 255
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.asarray(np.rint(255 * curve).astype(np.uint8))
+
+
+_SRGB = _srgb_table()

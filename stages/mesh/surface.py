@@ -1,0 +1,101 @@
+"""Triangle surfaces, and the structured one of a radius map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Wall
+from pipeline.geometry.axis import from_pipe
+from pipeline.native import open3d
+
+Float = NDArray[np.float64]
+Face = NDArray[np.int32]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangles in P.
+
+    Attributes
+    ----------
+    vertex_p : (V, 3)
+        mm.
+    face : (T, 3) int32
+        Counter-clockwise seen from inside the pipe.
+    allowance_mm : (V,)
+        How far decimation may leave each vertex.
+    locked : (V,) bool
+        Vertices that decimation must keep, because the neighbouring piece has them too.
+    """
+
+    vertex_p: Float
+    face: Face
+    allowance_mm: Float
+    locked: NDArray[np.bool_]
+
+
+def row_pieces(rows: int, rows_per_piece: int) -> list[slice]:
+    """Return slices that cut ``rows`` grid rows in pieces sharing their border rows."""
+    count = max(1, round((rows - 1) / rows_per_piece))
+    cut = np.rint(np.linspace(0, rows - 1, count + 1)).astype(int)
+    return [slice(int(a), int(b) + 1) for a, b in pairwise(cut)]
+
+
+def grid_surface(wall: Wall, rows: slice, allowance_mm: Float) -> Surface:
+    """Return the structured surface of some rows of the radius map: a vertex for each measured cell.
+
+    The first azimuth follows the last, so the tube is closed; cells that were not measured stay holes.
+    """
+    radius_map = wall.radius_map
+    radius = radius_map.radius_mm[rows].astype(float)
+    measured = np.isfinite(radius)
+    xyz = from_pipe(wall.axis, radius_map.distance_mm[rows, None], radius_map.azimuth_rad, radius)
+    number = np.cumsum(measured).reshape(measured.shape) - 1
+    corner = np.where(measured, number, -1)
+    border = np.zeros(measured.shape, bool)
+    border[0] = rows.start > 0
+    border[-1] |= rows.stop < len(radius_map.distance_mm)
+    return Surface(xyz[measured], _grid_faces(corner), allowance_mm[rows][measured], border[measured])
+
+
+def _grid_faces(corner: Index) -> Face:
+    """Return the triangles between vertices (S, A) numbered by cell, −1 where there is none."""
+    around = np.roll(corner, -1, axis=1)
+    a, b, c, d = corner[:-1], around[:-1], corner[1:], around[1:]
+    whole = np.stack([np.stack([a, c, b], -1), np.stack([b, c, d], -1)], 2)
+    lacks_b = (b < 0)[..., None]
+    lacks_c = (c < 0)[..., None]
+    three = np.where(lacks_b, np.stack([a, c, d], -1), np.stack([a, d, b], -1))
+    first = np.where(lacks_b | lacks_c, three, whole[:, :, 0])
+    face = np.stack([first, np.where(lacks_b | lacks_c, -1, whole[:, :, 1])], 2).reshape(-1, 3)
+    return face[(face >= 0).all(1)].astype(np.int32)
+
+
+def weld(pieces: Sequence[Surface]) -> Surface:
+    """Return the pieces as one surface, the border vertices they share merged, unused vertices dropped."""
+    starts = np.cumsum([0, *(len(p.vertex_p) for p in pieces)])
+    vertex = np.concatenate([p.vertex_p for p in pieces])
+    face = np.concatenate([p.face + s for p, s in zip(pieces, starts, strict=False)])
+    allowance = np.concatenate([p.allowance_mm for p in pieces])
+    border = np.flatnonzero(np.concatenate([p.locked for p in pieces]))
+    _, first, same = np.unique(vertex[border], axis=0, return_index=True, return_inverse=True)
+    target = np.arange(len(vertex))
+    target[border] = border[first[same.ravel()]]
+    used, compact = np.unique(target[face], return_inverse=True)
+    face = compact.reshape(-1, 3).astype(np.int32)
+    return Surface(vertex[used], face, allowance[used], np.zeros(len(used), bool))
+
+
+def vertex_normals(surface: Surface) -> Float:
+    """Return unit normals (V, 3) of the vertices, toward the inside of the pipe (by open3d)."""
+    o3d = open3d()
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(surface.vertex_p), o3d.utility.Vector3iVector(surface.face)
+    )
+    return np.asarray(mesh.compute_vertex_normals().vertex_normals)

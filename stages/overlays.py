@@ -1,0 +1,164 @@
+"""Wall -> error-colour overlays: deviation, 1 σ uncertainty, misalignment error.
+
+Colour maps are safe for colour-blind readers and even in lightness: a blue-white-red map of ColorBrewer for
+signed values, `cividis` (Nuñez, Anderton, Renslow 2018) for values that only grow.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from matplotlib import colormaps
+from numpy.typing import NDArray
+from pydantic import Field
+
+from pipeline.artefacts import RadiusMap, Wall
+from pipeline.errors import UnusableError
+from pipeline.model import Overlay, Overlays
+from pipeline.recording.base import Recording
+from pipeline.stage import Context, Parameters, Stage
+
+Float = NDArray[np.float64]
+Byte = NDArray[np.uint8]
+
+_NOT_MEASURED_BGR = (128, 128, 128)
+_HARMONICS = (1, 2)
+_HUBER = 1.345
+
+
+class OverlayParameters(Parameters):
+    """How error colours are chosen."""
+
+    shown_quantile: float = Field(
+        0.995, ge=0.5, le=1, description="share of the measured wall that the colour range holds"
+    )
+    smallest_range_mm: float = Field(
+        0.02, gt=0, le=10, description="mm; smaller ranges are widened to this, so that noise is not blown up"
+    )
+    signed_colours: Literal["RdBu_r", "PuOr_r", "BrBG"] = Field(
+        "RdBu_r", description="colour map of signed values; zero is white"
+    )
+    growing_colours: Literal["cividis", "viridis"] = Field(
+        "cividis", description="colour map of values that start at zero"
+    )
+
+
+def draw_overlays(
+    recording: Recording, wall: Wall, parameters: OverlayParameters, context: Context
+) -> Overlays:
+    """Return the error colours of ``wall``.
+
+    Raises
+    ------
+    UnusableError
+        When the radius map holds no measured cell.
+    """
+    radius_map = wall.radius_map
+    if not np.isfinite(radius_map.radius_mm).any():
+        raise UnusableError("overlays", "no cell of the wall was measured", hint="see the stages before")
+    fitted = fitted_pipe(radius_map)
+    nominal = recording.pipe.nominal_diameter_mm / 2
+    signed, growing = parameters.signed_colours, parameters.growing_colours
+    overlays = Overlays(
+        radius_map.distance_mm,
+        radius_map.azimuth_rad,
+        fitted,
+        nominal,
+        _signed(
+            "deviation", "Deviation from the fitted pipe", radius_map.radius_mm - fitted, signed, parameters
+        ),
+        _signed(
+            "deviation_nominal",
+            "Deviation from the nominal pipe",
+            radius_map.radius_mm - nominal,
+            signed,
+            parameters,
+        ),
+        _growing("uncertainty", "Uncertainty of the radius (1 σ)", radius_map.sigma_mm, growing, parameters),
+        _signed(
+            "misalignment",
+            "Radius error if misalignment were ignored",
+            radius_map.misalignment_mm,
+            signed,
+            parameters,
+        ),
+    )
+    for overlay in overlays.pictures:
+        context.report(f"overlay {overlay.name}: range", overlay.high_mm, "mm")
+        context.report(f"overlay {overlay.name}: beyond the range", 100 * overlay.beyond, "%")
+    return overlays
+
+
+def fitted_pipe(radius_map: RadiusMap) -> Float:
+    """Return the radius (A,), mm, of the best off-centre oval over the whole run.
+
+    The median along the pipe at each azimuth, smoothed to its mean, first (centre) and second (oval)
+    harmonics with Huber weights: neither defects nor gaps move it.
+    """
+    seen = np.isfinite(radius_map.radius_mm).any(axis=0)
+    profile = np.nanmedian(radius_map.radius_mm[:, seen].astype(float), axis=0)
+    basis = _harmonic_basis(radius_map.azimuth_rad)
+    weight = np.ones(len(profile))
+    for _ in range(20):
+        root = np.sqrt(weight)
+        coefficients = np.linalg.lstsq(basis[seen] * root[:, None], profile * root, rcond=None)[0]
+        size = np.abs(profile - basis[seen] @ coefficients)
+        scale = max(float(1.4826 * np.median(size)), 1e-9)
+        weight = np.minimum(1, _HUBER * scale / np.maximum(size, 1e-12))
+    return np.asarray(basis @ coefficients)
+
+
+def _harmonic_basis(azimuth_rad: Float) -> Float:
+    waves = [f(m * azimuth_rad) for m in _HARMONICS for f in (np.cos, np.sin)]
+    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
+
+
+def _signed(
+    name: str, title: str, value_mm: NDArray[np.floating], colours: str, parameters: OverlayParameters
+) -> Overlay:
+    """Return the overlay of a signed quantity, its range symmetric about zero."""
+    high = _range(np.abs(value_mm), parameters)
+    return _overlay(name, title, value_mm, -high, high, colours)
+
+
+def _growing(
+    name: str, title: str, value_mm: NDArray[np.floating], colours: str, parameters: OverlayParameters
+) -> Overlay:
+    """Return the overlay of a quantity that starts at zero."""
+    return _overlay(name, title, value_mm, 0.0, _range(value_mm, parameters), colours)
+
+
+def _range(size_mm: NDArray[np.floating], parameters: OverlayParameters) -> float:
+    """Return the round upper end (two digits) below which the wished share of the wall lies."""
+    measured = size_mm[np.isfinite(size_mm)]
+    size = float(np.quantile(measured, parameters.shown_quantile)) if len(measured) else 0.0
+    size = max(size, parameters.smallest_range_mm)
+    unit = 10.0 ** (np.floor(np.log10(size)) - 1)
+    return float(np.ceil(size / unit - 1e-9) * unit)
+
+
+def _overlay(
+    name: str, title: str, value_mm: NDArray[np.floating], low: float, high: float, colours: str
+) -> Overlay:
+    measured = np.isfinite(value_mm)
+    scaled = np.where(measured, (value_mm - low) / (high - low), 0.0)
+    level = np.where(measured, 1 + np.rint(np.clip(scaled, 0, 1) * 254), 0).astype(np.uint8)
+    outside = int(np.count_nonzero(measured & ((scaled < 0) | (scaled > 1))))
+    beyond = outside / max(1, int(np.count_nonzero(measured)))
+    return Overlay(name, title, colours, low, high, beyond, _palette(colours), level)
+
+
+def _palette(colours: str) -> Byte:
+    rgb = colormaps[colours](np.linspace(0, 1, 255))[:, :3]
+    bgr = np.rint(255 * rgb[:, ::-1]).astype(np.uint8)
+    return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), bgr])
+
+
+OVERLAYS = Stage(
+    "overlays",
+    "1",
+    OverlayParameters,
+    draw_overlays,
+    "wall -> deviation, uncertainty, misalignment as colours",
+)
