@@ -6,7 +6,7 @@ import fcntl
 import logging
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,7 +61,7 @@ def claimed(path: Path) -> Iterator[RunFolder]:
 def logged(folder: RunFolder) -> Iterator[logging.Logger]:
     """Yield a logger that appends to the run folder's log."""
     with disk_errors_named(folder.path):
-        handler = logging.FileHandler(folder.log, encoding="utf-8")
+        handler = _LogFile(folder.log, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     logger = logging.getLogger("boresight.run")
     logger.setLevel(logging.INFO)
@@ -70,7 +70,15 @@ def logged(folder: RunFolder) -> Iterator[logging.Logger]:
         yield logger
     finally:
         logger.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()
+
+
+class _LogFile(logging.FileHandler):
+    """A log that goes quiet on a full disk, so as not to hide the error that tells of it."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  the name is logging's
+        """Ignore."""
 
 
 def _refuse_foreign(folder: RunFolder) -> None:
@@ -90,13 +98,13 @@ def _locked(folder: RunFolder) -> Iterator[None]:
     """Hold the folder's lock, which the system takes from a dead process, however it died."""
     path = folder.internal / "lock"
     with disk_errors_named(folder.path):
-        stream = path.open("a+", encoding="ascii")
+        stream = path.open("a+b", buffering=0)
     with stream:
         try:
             fcntl.lockf(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             stream.seek(0)
-            holder = stream.read().strip() or "unknown"
+            holder = stream.read().decode("ascii", "replace").strip() or "unknown"
             raise InputError(
                 folder.path,
                 f"process {holder} is at work in this run folder",
@@ -104,6 +112,5 @@ def _locked(folder: RunFolder) -> Iterator[None]:
             ) from error
         with disk_errors_named(folder.path):
             stream.truncate(0)
-            stream.write(str(os.getpid()))
-            stream.flush()
+            stream.write(str(os.getpid()).encode())
         yield

@@ -208,7 +208,9 @@ class Runner:
             if all(k in self._artefacts for k in kinds):
                 key = exporter.key(self._keys)
                 if not is_published(exporter, key, self._folder):
+                    start = time.monotonic()
                     publish(exporter, self._artefacts, key, self._folder)
+                    self._logger.info("wrote %s, %.1f s", exporter.name, time.monotonic() - start)
 
     def _withdraw_stale(self) -> None:
         for exporter in self._exporters:

@@ -54,10 +54,17 @@ def write_run_record(
         "stages": [_stage(s) for s in outcome.stages],
         "metrics": _numbers(outcome.metrics),
         "reader_warnings": list(recording.warnings),
-        "peak_memory_mib": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+        "peak_memory_mib": {
+            "program": _peak_mib(resource.RUSAGE_SELF),
+            "largest_helper": _peak_mib(resource.RUSAGE_CHILDREN),
+        },
     }
     with disk_errors_named(folder):
         replace_json(folder / "run.json", tree)
+
+
+def _peak_mib(whose: int) -> float:
+    return round(resource.getrusage(whose).ru_maxrss / 1024, 1)
 
 
 def _stage(outcome: StageOutcome) -> Json:

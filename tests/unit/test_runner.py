@@ -22,6 +22,7 @@ from pipeline.outcome import RunOutcome, State
 from pipeline.plan import PipelineError
 from pipeline.runner import FailedError, Selection
 from pipeline.stage import Context
+from tests.disk_limit import file_size_limit
 from tests.shared_data import PROJECT_ROOT
 from tests.toy_stages import DRAW, SMOOTH, Drawn, DrawParameters
 from tests.toys import run_toys, toy_job
@@ -192,6 +193,15 @@ def test_a_foreign_folder_is_refused_untouched(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_written_is_told() -> None:
     with pytest.raises(InputError, match="cannot be written"):
         run_toys(Path("/proc/boresight-run"))
+
+
+@pytest.mark.parametrize("limit", [0, 500, 3000, 6000])
+def test_a_full_disk_is_told_and_the_run_continues_later(tmp_path: Path, limit: int) -> None:
+    run_toys(tmp_path / "whole")
+    with file_size_limit(limit), pytest.raises(InputError, match=r"cannot be written(?s:.*)the same command"):
+        run_toys(tmp_path / "run")
+    assert run_toys(tmp_path / "run").state == State.COMPLETED
+    assert (tmp_path / "run" / "report.html").read_text() == (tmp_path / "whole" / "report.html").read_text()
 
 
 def test_two_processes_do_not_share_a_folder(tmp_path: Path) -> None:

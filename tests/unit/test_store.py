@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import resource
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,7 @@ from pipeline.codec import digest, encode
 from pipeline.errors import InputError
 from pipeline.outcome import Number
 from pipeline.store import Provenance, Store
+from tests.disk_limit import file_size_limit
 from tests.toy_stages import Mood
 
 
@@ -151,16 +150,6 @@ def test_the_result_of_another_key_or_class_is_discarded(tmp_path: Path) -> None
     assert store.read("grow", KEY[:-1] + "c", Tree) is None
     store.write(tree(), PROVENANCE)
     assert store.read("grow", KEY, Leaf) is None
-
-
-@contextmanager
-def file_size_limit(limit: int) -> Iterator[None]:
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 @pytest.mark.parametrize("limit", [0, 100, 5000])
