@@ -41,8 +41,8 @@ def open_folder(path: Path) -> Recording:
     frames_file = required_file(section, "frames")
     encoder_file, no_encoder = optional_file(section, "encoder")
     encoder = read_encoder(encoder_file) if encoder_file else None
-    source, image_files = _open_source(section)
     table = read_frame_table(frames_file)
+    source, image_files = _open_source(section, table)
     gaps = _check_numbers(source, table)
     frames, cut = common_frames(table, source.count)
     files = [section.file, frames_file, *([encoder_file] if encoder_file else []), *image_files]
@@ -61,22 +61,20 @@ def open_folder(path: Path) -> Recording:
     )
 
 
-def _open_source(section: Section) -> tuple[VideoSource | ImageSequence, list[Path]]:
+def _open_source(section: Section, table: FrameTable) -> tuple[VideoSource | ImageSequence, list[Path]]:
     """Return the source of images and the files it reads."""
     if is_pattern(section.text("video")):
         inside(section, "video")
         images = open_images(section.file.parent, section.text("video"))
         return images, images.files
     file = required_file(section, "video")
-    return open_video(file), [file]
+    return open_video(file).numbered_by(table), [file]
 
 
 def _check_numbers(source: VideoSource | ImageSequence, table: FrameTable) -> tuple[str, ...]:
     """Refuse images numbered from another start than the table; return a warning for gaps."""
-    if isinstance(source, VideoSource):
-        return ()
     first, listed = int(source.numbers[0]), int(table.frame[0])
-    if first != listed:
+    if isinstance(source, ImageSequence) and first != listed:
         raise InputError(
             source.file(first), f"is the first image, but the table of frames starts at {listed}",
             hint="number both alike: a shift would give every frame the light of its neighbour",

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import av
 import numpy as np
 
 from pipeline.errors import InputError
-from pipeline.recording.base import Image, Int, Planes
+from pipeline.recording.base import FrameTable, Image, Int, Planes
 from pipeline.recording.pixels import pixels
 from pipeline.recording.selection import ascending, complete
 from pipeline.recording.video_index import VideoIndex, list_frames
@@ -22,35 +22,58 @@ _THREADS = 4
 _RESTART_FRAMES = 8
 # A decoder holds back at most this many frames: 16 for reordering and one a thread.
 _HELD_BACK = 16 + _THREADS
+# Times of a frame in video and table are the same when they differ by less than this part of a period.
+_SAME_TIME = 0.25
 
 
 @dataclass(frozen=True)
 class VideoSource:
-    """Frames of a video file; frame n is the n-th in order of presentation.
+    """Frames of a video file, which its index numbers in order of presentation.
 
     Attributes
     ----------
     path, index
     image_size : (int, int)
         Width and height, px.
+    numbers : (N,) int
+        Under which number each frame of the file is asked for, ascending; see `numbered_by`.
     """
 
     path: Path
     index: VideoIndex
     image_size: tuple[int, int]
+    numbers: Int
 
     @property
     def count(self) -> int:
-        """How many frames the file holds, decodable or not."""
-        return self.index.pts.size
+        """One more than the highest number."""
+        return int(self.numbers[-1]) + 1
+
+    def numbered_by(self, table: FrameTable) -> VideoSource:
+        """Return the source with numbers taken from a table of frames by their times.
+
+        A file that lost frames on its way to the disk has fewer than the table lists: counting them would
+        give those behind the gap the light of others. Where times do not agree, frames stay counted.
+        """
+        if not self.index.timed or self.numbers.size >= table.frame.size or table.frame.size < 2:
+            return self
+        shown_s = (self.index.pts - self.index.pts[0]) * self.index.unit_s
+        listed_s = table.time_s - table.time_s[0]
+        nearest = np.searchsorted((listed_s[1:] + listed_s[:-1]) / 2, shown_s)
+        off_s = np.abs(shown_s - listed_s[nearest])
+        agrees = off_s.max() < _SAME_TIME * float(np.median(np.diff(listed_s)))
+        return replace(self, numbers=table.frame[nearest]) if agrees and _ascends(nearest) else self
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
-        """See `FrameSource.read`; frames beyond the end of the file yield None."""
+        """See `FrameSource.read`; frames that the file does not hold yield None."""
         wanted = ascending(frames)
-        for stretch in _stretches(wanted[wanted < self.count], self.index):
-            for number, frame in complete(stretch, self._decode(stretch)):
-                yield number, None if frame is None else pixels(frame, planes)
-        yield from ((int(number), None) for number in wanted[wanted >= self.count])
+        return complete(wanted, self._read(np.flatnonzero(np.isin(self.numbers, wanted)), planes))
+
+    def _read(self, places: Int, planes: Planes) -> Iterator[tuple[int, Image]]:
+        for stretch in _stretches(places, self.index):
+            for place, frame in complete(stretch, self._decode(stretch)):
+                if frame is not None:
+                    yield int(self.numbers[place]), pixels(frame, planes)
 
     def _decode(self, wanted: Int) -> Iterator[tuple[int, av.VideoFrame]]:
         """Yield the frames that can be trusted, from the keyframe before the first wanted one on.
@@ -58,7 +81,7 @@ class VideoSource:
         A frame is held back until the frames that may be coded before it, but are shown later, are known to
         be sound.
         """
-        damaged: set[int] = set()
+        damaged = set(self.index.broken.tolist())
         held: deque[tuple[int, av.VideoFrame]] = deque()
         for number, frame in self._numbered(wanted, damaged):
             held.append((number, frame))
@@ -76,7 +99,7 @@ class VideoSource:
     def _numbered(self, wanted: Int, damaged: set[int]) -> Iterator[tuple[int, av.VideoFrame]]:
         """Yield decoded frames in order with their numbers; ``damaged`` grows by those that are not sound."""
         start = int(self.index.key_of[wanted[0]])
-        only = self.index.pts[wanted] if self.index.intra else None
+        only = set(self.index.pts[wanted].tolist()) if self.index.intra else None
         expected = start
         with av.open(str(self.path)) as container:
             stream = _prepare(container)
@@ -92,7 +115,7 @@ class VideoSource:
                 if frame is not None:
                     yield number, frame
                 expected = number + 1
-            damaged.update(range(expected, self.count))
+            damaged.update(range(expected, self.index.pts.size))
 
     def _number(self, frame: av.VideoFrame | None, expected: int) -> int | None:
         """Return a frame's number; None where it is not known."""
@@ -124,7 +147,7 @@ def open_video(path: Path) -> VideoSource:
         )  from error  # fmt: skip
     if index.pts.size == 0 or min(size) <= 0:
         raise InputError(path, "holds no video frames", hint="the recording may have been stopped at once")
-    return VideoSource(path, index, size)
+    return VideoSource(path, index, size, np.arange(index.pts.size))
 
 
 def _prepare(container: av.container.InputContainer) -> av.VideoStream:
@@ -139,7 +162,7 @@ def _prepare(container: av.container.InputContainer) -> av.VideoStream:
 
 
 def _decoded(
-    container: av.container.InputContainer, stream: av.VideoStream, only: Int | None
+    container: av.container.InputContainer, stream: av.VideoStream, only: set[int] | None
 ) -> Iterator[av.VideoFrame | None]:
     """Yield decoded frames in order of presentation; None where the decoder met damage.
 
@@ -170,6 +193,10 @@ def _decode_packet(
         return []
     except av.FFmpegError:
         return [None]
+
+
+def _ascends(values: Int) -> bool:
+    return bool(np.all(np.diff(values) > 0))
 
 
 def _stretches(wanted: Int, index: VideoIndex) -> list[Int]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import av
 import numpy as np
 
 from pipeline.recording.base import Int
+from pipeline.recording.ffv1 import checksums_hold
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,8 @@ class VideoIndex:
     ----------
     pts : (N,) int
         Times of presentation, ascending, in the stream's unit.
+    unit_s : float
+        That unit, s.
     coded : (N,) int
         Each frame's place in the order in which frames are coded.
     keyframes : (K,) int
@@ -28,13 +32,17 @@ class VideoIndex:
         Over how many frames the order of presentation can differ from the order of coding.
     timed : bool
         Whether packets carry times of presentation; if not, frames are numbered as they come.
+    broken : (B,) int
+        Numbers of the frames whose checksum is wrong, where the coding has checksums.
     """
 
     pts: Int
+    unit_s: float
     coded: Int
     keyframes: Int
     reordered: int
     timed: bool
+    broken: Int
 
     @property
     def intra(self) -> bool:
@@ -57,19 +65,36 @@ class VideoIndex:
 
 def list_frames(container: av.container.InputContainer, stream: av.VideoStream) -> VideoIndex:
     """List a stream's packets; what lies behind damage of the container is left out."""
-    packets: list[tuple[int | None, bool]] = []
+    packets: list[_Packet] = []
+    checked = stream.codec_context.name == "ffv1"
     try:
         for packet in container.demux(stream):
             if packet.size:
-                packets.append((packet.pts, packet.is_keyframe))
+                sound = checked and checksums_hold(bytes(packet))
+                packets.append(_Packet(packet.pts, packet.is_keyframe, sound))
     except av.FFmpegError:
         pass  # the table of frames tells what is missing behind this place
     reordered = int(stream.codec_context.has_b_frames)
     # AVI keeps no times of presentation: with frames out of order, what it gives are times of decoding.
-    if any(pts is None for pts, _ in packets) or (container.format.name == "avi" and reordered):
-        count = np.arange(len(packets))
-        return VideoIndex(count, count, np.zeros(1, np.int64), reordered, timed=False)
-    pts = np.array([pts for pts, _ in packets], np.int64)
+    timed = not (container.format.name == "avi" and reordered) and all(p.pts is not None for p in packets)
+    pts = np.array([p.pts for p in packets] if timed else range(len(packets)), np.int64)
     order = np.argsort(pts, kind="stable")
-    keyframes = np.flatnonzero(np.array([key for _, key in packets], bool)[order])
-    return VideoIndex(pts[order], order, np.union1d(keyframes, [0]), reordered, timed=True)
+    key = np.array([timed and p.key for p in packets], bool)[order]
+    intact = np.array([p.sound for p in packets], bool)[order]
+    return VideoIndex(
+        pts=pts[order],
+        unit_s=float(stream.time_base or 0),
+        coded=order,
+        keyframes=np.union1d(np.flatnonzero(key), [0]),
+        reordered=reordered,
+        timed=timed,
+        broken=np.flatnonzero(~intact & intact.any()),
+    )
+
+
+class _Packet(NamedTuple):
+    """A coded frame: time of presentation, whether decoding can begin there, whether its checksum holds."""
+
+    pts: int | None
+    key: bool
+    sound: bool

@@ -110,7 +110,7 @@ def test_numbers_must_ascend_and_those_past_the_end_are_none(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("packet", [5, 7, 9])
-@pytest.mark.parametrize("name", ["H.264 4:4:4 MKV", "H.264 4:2:0 MP4", "HEVC MKV", "MJPEG AVI"])
+@pytest.mark.parametrize("name", ["H.264 4:4:4 MKV", "H.264 4:2:0 MP4", "HEVC MKV", "MJPEG AVI", "FFV1 MKV"])
 def test_damage_costs_frames_and_falsifies_none(tmp_path: Path, name: str, packet: int) -> None:
     source = _made(tmp_path, name)
     whole = {n: image.copy() for n, image in source.read(range(COUNT), "grey")}
@@ -124,7 +124,8 @@ def test_damage_costs_frames_and_falsifies_none(tmp_path: Path, name: str, packe
     images = dict(open_video(source.path).read(range(COUNT), "grey"))
     lost = [n for n, image in images.items() if image is None]
     assert number in lost
-    assert max(lost) < next(k for k in keys[1:].tolist() if source.index.coded[k] > packet)
+    later_keys = [k for k in keys.tolist() if source.index.coded[k] > packet]
+    assert max(lost) < later_keys[0]
     assert all(np.array_equal(images[n], whole[n]) for n in images if n not in lost)
 
 
@@ -139,6 +140,26 @@ def test_truncated_video_gives_what_it_holds(tmp_path: Path) -> None:
     assert any(f"there are {held} images, the table of frames lists 16" in w for w in recording.warnings)
     readable = [n for n, image in recording.read(recording.frames.frame, "grey") if image is not None]
     assert readable
+
+
+@pytest.mark.parametrize("codec", ["mjpeg", "libx264"])
+def test_frames_lost_on_the_way_to_the_disk_do_not_shift_the_others(tmp_path: Path, codec: str) -> None:
+    folder = write_folder(tmp_path / "r", codec=codec, pix_fmt="yuvj444p", options=GOP4)
+    video = folder / "frames.mkv"
+    whole = {n: image.copy() for n, image in open_recording(folder).read(range(COUNT), "grey")}
+    lost, gap = (5, 9) if codec == "mjpeg" else (4, 8)
+    with av.open(str(video)) as full, av.open(str(tmp_path / "gap.mkv"), "w") as cut:
+        stream = cut.add_stream_from_template(full.streams.video[0])
+        for place, packet in enumerate(p for p in full.demux(video=0) if p.size):
+            if not lost <= place < gap:
+                packet.stream = stream
+                cut.mux(packet)
+    (tmp_path / "gap.mkv").rename(video)
+    recording = open_recording(folder)
+    images = dict(recording.read(recording.frames.frame, "grey"))
+    assert [n for n, image in images.items() if image is None] == list(range(lost, gap))
+    assert all(np.array_equal(images[n], whole[n]) for n in images if images[n] is not None)
+    assert recording.warnings == ("4 images are missing between the first and the last",)
 
 
 @pytest.mark.parametrize("content", [b"", b"not a video at all", b"\x1aE\xdf\xa3" + bytes(500)])
