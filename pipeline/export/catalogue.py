@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from pipeline.export.exporter import Exporter
+from pipeline.export.findings import write_defects, write_sections
 from pipeline.export.radius_map import write_radius_map
 from pipeline.export.report import write_report_page
 from pipeline.export.rings import write_rings
 from pipeline.export.trajectory import write_trajectory
+from pipeline.export.unrolled import write_unrolled
 
 EXPORTERS = (
     Exporter("rings.zarr", write_rings),
     Exporter("trajectory.csv", write_trajectory),
     Exporter("radius_map.npz", write_radius_map),
+    Exporter("unrolled.png", write_unrolled),
+    Exporter("sections.csv", write_sections),
+    Exporter("defects.json", write_defects),
     Exporter("report.html", write_report_page),
 )
