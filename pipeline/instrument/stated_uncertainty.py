@@ -1,8 +1,8 @@
 """The section ``standard_uncertainty`` of probe.yaml and the covariance it stands for.
 
 ``focal_px`` is common to fx and fy; ``centre_px``, ``tilt_deg`` and ``decentre_mm`` hold for each axis on its
-own; ``opening_angle_deg`` is twice the cone's; ``waviness_rad`` holds for each of its coefficients. What is
-not stated is 0.
+own; ``distortion`` lists the camera's other parameters in their order; ``opening_angle_deg`` is twice the
+cone's; ``waviness_rad`` holds for each of its coefficients. What is not stated is 0.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def covariance_from_stated(stated: Section, names: Sequence[str]) -> Float:
 def stated_from_covariance(probe: Probe) -> dict[str, object]:
     """Return the section to write: the root mean square of the σ of each key's parameters."""
     variance = dict(zip(probe.parameter_names, np.diag(probe.covariance).tolist(), strict=True))
-    stated: dict[str, object] = {"focal_px": _rms(variance, _FOCAL)}
+    stated: dict[str, object] = {"focal_px": _rms(variance, _FOCAL)} if _FOCAL[0] in variance else {}
     stated |= {key: _rms(variance, members) / factor for key, members, factor in _SINGLE}
     distortion = _distortion_names(probe.camera.parameter_names)
     stated["distortion"] = [math.sqrt(variance[name]) for name in distortion]
@@ -58,6 +58,8 @@ def stated_from_covariance(probe: Probe) -> dict[str, object]:
 def _terms(stated: Section, names: Sequence[str]) -> Iterator[tuple[tuple[str, ...], float]]:
     """Yield independent terms: the parameters that move together by one σ, and that σ."""
     if stated.has("focal_px"):
+        if _FOCAL[0] not in names:
+            raise stated.fail("focal_px", "has no meaning for this camera model", "σ in distortion instead")
         yield _FOCAL, stated.number("focal_px", least=0)
     for key, members, factor in _SINGLE:
         if stated.has(key):
@@ -75,6 +77,5 @@ def _distortion_names(camera_names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _rms(variance: dict[str, float], members: Sequence[str]) -> float:
-    """Return the root mean square σ of those parameters that there are."""
-    there = [variance[m] for m in members if m in variance]
-    return math.sqrt(sum(there) / len(there)) if there else 0.0
+    """Return the root mean square σ of parameters."""
+    return math.sqrt(sum(variance[m] for m in members) / len(members))

@@ -61,7 +61,7 @@ class RosBag:
         """See `Bag.files`."""
         if self.path.is_file():
             return [self.path]
-        return sorted(f for f in self.path.iterdir() if f.suffix in (".db3", ".mcap", ".zstd"))
+        return sorted(f for f in self.path.iterdir() if f.suffix in (".yaml", ".db3", ".mcap", ".zstd"))
 
     def topics(self) -> dict[str, str]:
         """See `Bag.topics`."""

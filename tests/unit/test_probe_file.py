@@ -9,6 +9,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from tests.made_recording import PROBE
+from tests.unit.camera_samples import CAMERAS, SCARAMUZZA
 
 
 @pytest.fixture
@@ -80,6 +81,27 @@ def test_written_uncertainty_alone_gives_the_same_sigmas(file: Path, tmp_path: P
     text = out.read_text()
     out.write_text(text[: text.index("covariance:")])
     np.testing.assert_allclose(read_probe(out).covariance, stated.covariance, rtol=1e-12, atol=1e-20)
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_every_camera_model_round_trips_with_its_uncertainty(file: Path, tmp_path: Path, name: str) -> None:
+    camera, laser = CAMERAS[name], read_probe(file).laser
+    size = camera.parameters.size + laser.parameters.size
+    probe = Probe(camera, laser, np.diag(np.linspace(0, 1e-2, size) ** 2))
+    write_probe(probe, tmp_path / "out.yaml")
+    back = read_probe(tmp_path / "out.yaml")
+    assert back.camera == camera
+    np.testing.assert_array_equal(back.covariance, probe.covariance)
+
+
+def test_focal_uncertainty_of_a_camera_without_focal_length_is_refused(file: Path, tmp_path: Path) -> None:
+    probe = replace(read_probe(file), camera=SCARAMUZZA, covariance=np.eye(SCARAMUZZA.parameters.size + 12))
+    out = tmp_path / "out.yaml"
+    write_probe(probe, out)
+    text = out.read_text()
+    out.write_text(text[: text.index("covariance:")].replace("centre_px: 1.0", "focal_px: 0.1"))
+    with pytest.raises(InputError, match="focal_px: has no meaning"):
+        read_probe(out)
 
 
 def test_covariance_is_placed_by_name(file: Path) -> None:
