@@ -14,7 +14,9 @@ import typer
 from jinja2 import Environment, StrictUndefined
 from rich.console import Console
 
+from pipeline.disk import disk_errors_named
 from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.misalignment import (
     MisalignedScan,
     allowed_tilt_deg,
@@ -31,6 +33,9 @@ def error_model(
     probe: Annotated[
         Path | None,
         typer.Argument(help="probe.yaml: its camera is put into the page, its baseline is the default"),
+    ] = None,
+    camera_file: Annotated[
+        Path | None, typer.Option("--camera", help="camera file of any known format, in place of the probe's")
     ] = None,
     diameter_mm: Annotated[float, typer.Option(help="inner diameter of the pipe, mm")] = 101.6,
     tilt_deg: Annotated[float, typer.Option(help="tilt of the laser sheet, deg")] = 0.6,
@@ -60,11 +65,12 @@ def error_model(
         diameter_mm, default_baseline if baseline_mm is None else baseline_mm, tilt_deg,
         tilt_direction_deg, opening_angle_deg, offset_x_mm, offset_y_mm,
     )  # fmt: skip
-    camera = None if stated is None else stated.camera
+    seen_with = camera_file if camera_file is not None else probe
+    camera = read_camera(camera_file) if camera_file is not None else stated.camera if stated else None
     numbers = error_numbers(scan, camera, accuracy_mm)
     if output is not None or not as_json:
         folder = Path("error-model") if output is None else output
-        name = "" if probe is None else probe.name
+        name = "" if seen_with is None else seen_with.name
         write_error_model(scan, camera, name, 0.1 if accuracy_mm is None else accuracy_mm, folder)
     if as_json:
         typer.echo(json.dumps(numbers, indent=2))
@@ -90,11 +96,12 @@ def write_error_model(
     # matplotlib takes a second to load, which --json alone need not wait for
     from pipeline.commands.error_model_figures import ring_figure, save_figure, tilt_figure
 
-    folder.mkdir(parents=True, exist_ok=True)
-    save_figure(ring_figure(scan), folder, "fig4-ring")
-    save_figure(tilt_figure(scan, accuracy_mm), folder, "fig5-tilt")
-    page = error_model_page(scan, camera, camera_name, accuracy_mm)
-    (folder / "error-model.html").write_text(page, "utf-8")
+    with disk_errors_named(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        save_figure(ring_figure(scan), folder, "fig4-ring")
+        save_figure(tilt_figure(scan, accuracy_mm), folder, "fig5-tilt")
+        page = error_model_page(scan, camera, camera_name, accuracy_mm)
+        (folder / "error-model.html").write_text(page, "utf-8")
 
 
 def error_model_page(

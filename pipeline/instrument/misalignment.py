@@ -169,10 +169,16 @@ def misread_ring(
     """
     azimuth = scan.azimuths() if azimuth_rad is None else azimuth_rad
     xyz = scan.wall_points(azimuth)
-    ray = xyz if camera is None else camera.unproject(camera.project(xyz).uv).ray
+    ray = xyz if camera is None else camera.unproject(in_image(camera, camera.project(xyz).uv)).ray
     assumed = LaserSheet(scan.baseline_mm).intersect(ray)
     radial = np.linalg.norm(assumed[:, :2] + scan.offset_mm, axis=-1) - scan.radius_mm
     return MisreadRing(azimuth, xyz, assumed, radial, np.linalg.norm(assumed - xyz, axis=-1))
+
+
+def in_image(camera: Camera, uv: Float) -> Float:
+    """Return pixels (..., 2) with NaN in place of those outside the camera's image."""
+    inside = ((uv >= -0.5) & (uv < np.array(camera.image_size) - 0.5)).all(-1, keepdims=True)
+    return np.where(inside, uv, np.nan)
 
 
 def fit_circle(xy: Float) -> tuple[Float, float]:

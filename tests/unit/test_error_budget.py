@@ -22,6 +22,7 @@ from pipeline.instrument.budget.scan import (
 )
 from pipeline.instrument.budget.sources import Kind
 from pipeline.instrument.budget.typical import typical_probe
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 
 PROBE = typical_probe()
 INCH = 25.4
@@ -239,6 +240,12 @@ def test_best_baseline_lies_inside_the_study_for_2_inch_and_grows_with_diameter(
 def test_scans_that_cannot_be_are_refused_by_name(scan, named):
     with pytest.raises(InputError, match=named):
         RingScan(PROBE, **scan)
+
+
+def test_a_ring_partly_outside_the_image_is_refused():
+    low = KannalaBrandt((1600, 700), (360.0, 360.0), (799.5, 349.5))
+    with pytest.raises(InputError, match="camera sees"):
+        RingScan(replace(PROBE, camera=low), 101.6)
 
 
 def test_unknown_sources_and_bad_sigmas_are_refused_by_name():

@@ -140,9 +140,10 @@ const boresight = (() => {
     let seen = 0, shift = 0;
     const uv = ring.map((q, i) => {
       const real = project(p.camera, q.x, q.y, q.z), expected = project(p.camera, plane[i].x, plane[i].y, plane[i].z);
-      if (real && inside(real)) seen += 1;
+      const visible = Boolean(real && inside(real));
+      if (visible) seen += 1;
       if (real && expected) shift = Math.max(shift, Math.hypot(real[0] - expected[0], real[1] - expected[1]));
-      return { real, expected };
+      return { real, expected, visible };
     });
     return { uv, visible_share: seen / ring.length, max_image_shift_px: shift };
   }
@@ -167,8 +168,13 @@ const boresight = (() => {
     };
     const problem = problemOf(p);
     if (problem) return { problem };
-    const ring = readRing(p), circle = fitCircle(ring), r = p.diameter_mm / 2;
-    const image = p.camera ? ringImage(p, ring) : null;
+    const whole = readRing(p), r = p.diameter_mm / 2;
+    const image = p.camera ? ringImage(p, whole) : null;
+    if (image && image.visible_share < 0.25) {
+      return { problem: `The camera sees ${(100 * image.visible_share).toFixed(0)} % of the ring: take a longer baseline or a wider camera.` };
+    }
+    const ring = image ? whole.filter((_, i) => image.uv[i].visible) : whole, circle = fitCircle(ring);
+    if (image) image.uv = image.uv.filter((q) => q.visible);
     return {
       problem: null,
       paper_equation_mm: paperError(r, p.baseline_mm, rad(p.tilt_deg)),

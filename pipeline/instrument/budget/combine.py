@@ -178,7 +178,8 @@ def _stated_covariance(probe: Probe, given: Mapping[str, float]) -> Float:
 def _shown(source: Source, block: Float) -> float:
     """Return the σ to show: of the first parameter for distortion, else the root mean square."""
     variance = np.diag(block)
-    size = variance[0] if source.name == "radial_distortion" else variance.mean()
+    first = source.name == "radial_distortion" and variance[0] > 0
+    size = variance[0] if first else variance.mean()
     return float(np.sqrt(size)) / source.factor
 
 

@@ -14,7 +14,7 @@ from pipeline.errors import InputError
 from pipeline.instrument.budget.disturbance import Disturbance, observe, observe_jacobian
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
-from pipeline.instrument.misalignment import fit_circle, sheet_on_wall
+from pipeline.instrument.misalignment import fit_circle, in_image, sheet_on_wall
 from pipeline.instrument.probe import Probe
 
 Float = NDArray[np.float64]
@@ -63,7 +63,7 @@ class RingScan:
                 "error budget", "the probe is outside the pipe",
                 place="offset_mm", expected="an offset below the pipe's radius",
             )  # fmt: skip
-        seen = np.isfinite(self.pixels).all(-1)
+        seen = np.isfinite(in_image(self.probe.camera, self.pixels)).all(-1)
         if not seen.all():
             raise InputError(
                 "error budget", f"the camera sees {seen.mean():.0%} of the ring", place="diameter_mm",

@@ -63,7 +63,7 @@ def stated_sources(probe: Probe) -> tuple[Source, ...]:
     focal = tuple(n for n in names if n.startswith("f"))
     centre = tuple(n for n in names if n in ("cx", "cy"))
     rest = tuple(n for n in names if n not in (*focal, *centre))
-    first = {"kannala_brandt": "k1"}.get(probe.camera.model, "first coefficient")
+    first = rest[0] if rest else ""
     both = (
         Source("focal_scale", "Focal length", Kind.SYSTEMATIC, "px", 0.36, focal, 1.0, "focal length"),
         Source("principal_point", "Principal point, per axis", Kind.SYSTEMATIC, "px", 0.5, centre, 1.0,
