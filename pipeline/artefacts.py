@@ -155,6 +155,11 @@ class Trajectory:
     scale_sigma : float
         Relative 1 σ of the distance scale from calibration (it does not average away).
     events : tuple of MotionEvent
+    instrument : (P,) or None
+        The probe's parameters as this run bears them out (stated values, moved within their uncertainty);
+        None where they are as stated. `Probe.as_found_in` applies them.
+    instrument_covariance : (P, P) or None
+        Their covariance.
     """
 
     frame: Int
@@ -167,6 +172,8 @@ class Trajectory:
     encoder_scale_sigma: float
     scale_sigma: float
     events: tuple[MotionEvent, ...]
+    instrument: Float | None = None
+    instrument_covariance: Float | None = None
 
 
 @dataclass(frozen=True)

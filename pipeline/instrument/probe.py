@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts import Trajectory
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
 
@@ -59,6 +60,35 @@ class Probe:
     def parameter_names(self) -> tuple[str, ...]:
         """Names of all P parameters: camera, then laser."""
         return (*self.camera.parameter_names, *LaserSheet.PARAMETER_NAMES)
+
+    @property
+    def parameters(self) -> Float:
+        """(P,) values of `parameter_names`."""
+        return np.concatenate([self.camera.parameters, self.laser.parameters])
+
+    def with_parameters(self, parameters: Float, covariance: Float) -> Probe:
+        """Return the probe with other parameters (P,) and their covariance (P, P)."""
+        split = len(self.camera.parameter_names)
+        camera = self.camera.with_parameters(parameters[:split])
+        laser = self.laser.with_parameters(parameters[split:])
+        return replace(self, camera=camera, laser=laser, covariance=covariance)
+
+    def as_found_in(self, trajectory: Trajectory) -> Probe:
+        """Return the probe as the motion estimate of a run bears it out."""
+        if trajectory.instrument is None or trajectory.instrument_covariance is None:
+            return self
+        return self.with_parameters(trajectory.instrument, trajectory.instrument_covariance)
+
+    def principal_uncertainties(self) -> Float:
+        """Return (P, Q) the independent directions of the covariance, each 1 σ long, largest first.
+
+        Scaled to correlations first, so that a direction is not lost for its unit.
+        """
+        sigma = np.sqrt(np.diagonal(self.covariance))
+        scale = np.where(sigma > 0, sigma, 1.0)
+        value, vector = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        keep = value > 1e-9
+        return np.asarray(scale[:, None] * vector[:, keep] * np.sqrt(value[keep]))[:, ::-1]
 
     def triangulate(self, uv: Float) -> Float:
         """Return the wall points (..., 3), mm in C, of laser-line pixels (..., 2); NaN where impossible."""

@@ -1,0 +1,252 @@
+"""Normal equations of frames, landmarks and a few global numbers: banded, bordered, landmarks eliminated.
+
+The unknowns are ``BLOCK`` numbers for each frame (banded, because no landmark is followed for long), a border
+of global numbers, and three for each landmark, which leave by the Schur complement. B. Triggs et al.,
+"Bundle adjustment: a modern synthesis", 2000, § 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from stages.motion.tridiagonal import BlockTridiagonal
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+BLOCK = 7
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Scalar, weighted residual equations that touch some frames and the border, but no landmark.
+
+    Attributes
+    ----------
+    frame : (M, F) int
+        The F frames of each equation.
+    by_frame : (M, F, 7)
+    by_border : (M, B)
+    residual, weight : (M,)
+    """
+
+    frame: Int
+    by_frame: Float
+    by_border: Float
+    residual: Float
+    weight: Float
+
+
+@dataclass(frozen=True)
+class LandmarkRows:
+    """Texture observations and the landmarks' surface equations.
+
+    Attributes
+    ----------
+    start : (L + 1,) int
+        Observations of landmark l are ``start[l]:start[l + 1]``.
+    frame : (M,) int
+    by_pose : (M, 2, 6)
+    by_point : (M, 2, 3)
+    by_instrument : (M, 2, Q)
+        By the last Q numbers of the border.
+    residual : (M, 2)
+    weight : (M,)
+    surface_by_point : (L, 3)
+    surface_by_border : (L, B)
+    surface_residual, surface_weight : (L,)
+    """
+
+    start: Int
+    frame: Int
+    by_pose: Float
+    by_point: Float
+    by_instrument: Float
+    residual: Float
+    weight: Float
+    surface_by_point: Float
+    surface_by_border: Float
+    surface_residual: Float
+    surface_weight: Float
+
+
+class BorderedSystem:
+    """Accumulates equations, solves them, and gives covariances.
+
+    Parameters
+    ----------
+    frames, border, bandwidth
+        Number of frames and of global numbers, and the largest distance of two frames in one equation.
+    """
+
+    def __init__(self, frames: int, border: int, bandwidth: int) -> None:
+        size = BLOCK * frames
+        self._band = np.zeros((BLOCK * (min(bandwidth, frames - 1) + 1), size))
+        self._border = np.zeros((size, border))
+        self._corner = np.zeros((border, border))
+        self._right = np.zeros(size)
+        self._right_border = np.zeros(border)
+
+    def add(self, rows: Rows) -> None:
+        """Add equations without landmarks."""
+        _add_rows(
+            rows.frame, rows.by_frame, rows.by_border, rows.residual, rows.weight,
+            self._band, self._border, self._corner, self._right, self._right_border,
+        )  # fmt: skip
+
+    def add_landmarks(self, rows: LandmarkRows) -> tuple[Float, Float]:
+        """Add texture and eliminate its landmarks; return their inverse information and right sides."""
+        count = len(rows.start) - 1
+        inverse, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
+        _add_landmarks(
+            rows.start, rows.frame, rows.by_pose, rows.by_point, rows.by_instrument, rows.residual, rows.weight,
+            rows.surface_by_point, rows.surface_by_border, rows.surface_residual, rows.surface_weight,
+            self._band, self._border, self._corner, self._right, self._right_border, inverse, right,
+        )  # fmt: skip
+        return inverse, right
+
+    def factor(self) -> Factor:
+        """Return the factorised system.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When some unknown is not determined.
+        """
+        band = BlockTridiagonal.of_band(self._band)
+        solved = band.solve(self._border)
+        corner = cho_factor(self._corner - self._border.T @ solved)
+        return Factor(band, self._border, solved, corner, self._right, self._right_border)
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A factorised `BorderedSystem`."""
+
+    band: BlockTridiagonal
+    border: Float
+    solved_border: Float
+    corner: tuple[Float, bool]
+    right: Float
+    right_border: Float
+
+    def step(self) -> tuple[Float, Float]:
+        """Return the step of the frames (N, 7) and of the border (B,)."""
+        direct = self.band.solve(self.right[:, None])[:, 0]
+        border = cho_solve(self.corner, self.right_border - self.border.T @ direct)
+        return (direct - self.solved_border @ border).reshape(-1, BLOCK), border
+
+    def border_covariance(self) -> Float:
+        """Return (B, B)."""
+        return np.asarray(cho_solve(self.corner, np.eye(self.border.shape[1])))
+
+    def frame_covariance(self, frames: Int) -> Float:
+        """Return (len(frames), 7, 7) marginal covariances."""
+        border = self.border_covariance()
+        out = np.empty((len(frames), BLOCK, BLOCK))
+        for k, frame in enumerate(frames):
+            at = slice(BLOCK * frame, BLOCK * frame + BLOCK)
+            unit = np.zeros((len(self.right), BLOCK))
+            unit[at] = np.eye(BLOCK)
+            out[k] = self.band.solve(unit)[at] + self.solved_border[at] @ border @ self.solved_border[at].T
+        return out
+
+
+def landmark_steps(
+    rows: LandmarkRows, inverse: Float, right: Float, frame_step: Float, border_step: Float
+) -> Float:
+    """Return the steps (L, 3) of the eliminated landmarks."""
+    instrument = border_step[len(border_step) - rows.by_instrument.shape[2] :]
+    moved = np.einsum("mij,mj->mi", rows.by_pose, frame_step[rows.frame, :6]) + rows.by_instrument @ instrument
+    pull = np.einsum("mij,mi,m->mj", rows.by_point, moved, rows.weight)
+    total = np.add.reduceat(pull, rows.start[:-1], axis=0) if len(pull) else np.zeros((0, 3))
+    surface = rows.surface_weight * (rows.surface_by_border @ border_step)
+    return np.einsum("lij,lj->li", inverse, right - total - surface[:, None] * rows.surface_by_point)
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _add_rows(frame, by_frame, by_border, residual, weight, band, border, corner, right, right_border):  # type: ignore[no-untyped-def]  # pragma: no cover
+    block = by_frame.shape[2]
+    size = by_border.shape[1]
+    for m in range(frame.shape[0]):
+        w = weight[m]
+        for p in range(frame.shape[1]):
+            for a in range(block):
+                ja = by_frame[m, p, a]
+                if ja == 0.0:
+                    continue
+                row = frame[m, p] * block + a
+                right[row] -= w * ja * residual[m]
+                for q in range(frame.shape[1]):
+                    for b in range(block):
+                        column = frame[m, q] * block + b
+                        if column <= row and by_frame[m, q, b] != 0.0:
+                            band[row - column, column] += w * ja * by_frame[m, q, b]
+                for b in range(size):
+                    border[row, b] += w * ja * by_border[m, b]
+        for a in range(size):
+            ja = by_border[m, a]
+            if ja == 0.0:
+                continue
+            right_border[a] -= w * ja * residual[m]
+            for b in range(size):
+                corner[a, b] += w * ja * by_border[m, b]
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _add_landmarks(  # type: ignore[no-untyped-def]  # pragma: no cover
+    start, frame, by_pose, by_point, by_instrument, residual, weight,
+    s_point, s_border, s_residual, s_weight,
+    band, border, corner, right, right_border, inverse, right_point,
+):  # fmt: skip
+    size = s_border.shape[1]
+    first = size - by_instrument.shape[2]
+    most = 0
+    for k in range(len(start) - 1):
+        most = max(most, start[k + 1] - start[k])
+    cross = np.empty((most, 6, 3))
+    solved = np.empty((most, 6, 3))
+    for k in range(len(start) - 1):
+        ws = s_weight[k]
+        h = ws * np.outer(s_point[k], s_point[k])
+        g = -ws * s_residual[k] * s_point[k]
+        side = ws * np.outer(s_border[k], s_point[k])
+        right_border -= ws * s_residual[k] * s_border[k]
+        corner += ws * np.outer(s_border[k], s_border[k])
+        for m in range(start[k], start[k + 1]):
+            w, f = weight[m], frame[m] * 7
+            jx, jp, jc, r = by_point[m], by_pose[m], by_instrument[m], residual[m]
+            h += w * (jx.T @ jx)
+            g -= w * (jx.T @ r)
+            cross[m - start[k]] = w * (jp.T @ jx)
+            right[f : f + 6] -= w * (jp.T @ r)
+            border[f : f + 6, first:] += w * (jp.T @ jc)
+            side[first:] += w * (jc.T @ jx)
+            corner[first:, first:] += w * (jc.T @ jc)
+            right_border[first:] -= w * (jc.T @ r)
+            for a in range(6):
+                for b in range(a + 1):
+                    band[a - b, f + b] += w * (jp[0, a] * jp[0, b] + jp[1, a] * jp[1, b])
+        hi = np.linalg.inv(h)
+        inverse[k], right_point[k] = hi, g
+        solved_side = side @ hi
+        right_border -= solved_side @ g
+        corner -= solved_side @ side.T
+        for i in range(start[k + 1] - start[k]):
+            f = frame[start[k] + i] * 7
+            solved[i] = cross[i] @ hi
+            right[f : f + 6] -= solved[i] @ g
+            border[f : f + 6] -= solved[i] @ side.T
+            for j in range(i + 1):
+                e = frame[start[k] + j] * 7
+                for a in range(6):
+                    for b in range(6):
+                        if f + a >= e + b:
+                            total = 0.0
+                            for c in range(3):
+                                total += solved[i, a, c] * cross[j, b, c]
+                            band[f + a - e - b, e + b] -= total

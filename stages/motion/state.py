@@ -1,0 +1,111 @@
+"""The unknowns of the joint adjustment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from pipeline.artefacts import PipeAxis
+from pipeline.geometry.axis import axis_through, frames_at, from_pipe
+from stages.motion.tracking import moved
+
+Float = NDArray[np.float64]
+GLOBALS = 4
+_DEGREE = 3
+_AXIS_STEP_MM = 2.0
+
+
+@dataclass(frozen=True)
+class State:
+    """Poses, encoder slip, landmarks, and the pipe.
+
+    Attributes
+    ----------
+    T_pc : (N, 4, 4)
+    slip : (N,)
+        Encoder's accumulated slip, mm.
+    xyz_p : (L, 3)
+        Landmarks.
+    globals : (4,)
+        Radius, second-harmonic cosine and sine of the radius (ovality), mm, and encoder scale.
+    axis : PipeAxis
+        Where the axis is now; the adjustment's axis unknowns are deflections from it.
+    curve : (2, knots)
+        Sum of the deflections so far, as spline coefficients along x and y of the sections.
+    knot_mm, nominal_radius_mm : float
+    instrument : (Q,)
+        Corrections of the instrument along its principal uncertainties, in σ.
+    """
+
+    T_pc: Float
+    slip: Float
+    xyz_p: Float
+    globals: Float
+    axis: PipeAxis
+    curve: Float
+    knot_mm: float
+    nominal_radius_mm: float
+    instrument: Float
+
+    @property
+    def knots(self) -> int:
+        """Number of spline coefficients along each direction."""
+        return self.curve.shape[1]
+
+    @property
+    def border_size(self) -> int:
+        """Number of global unknowns."""
+        return GLOBALS + 2 * self.knots + len(self.instrument)
+
+    def axis_basis(self, distance_mm: Float) -> Float:
+        """Return the spline basis (M, knots) at distances (M,), clamped to the axis."""
+        knots = self._knot_vector()
+        s = np.clip(distance_mm, knots[_DEGREE], knots[-_DEGREE - 1] - 1e-9)
+        return np.asarray(BSpline.design_matrix(s, knots, _DEGREE).toarray())
+
+    def section_frames(self, distance_mm: Float) -> Float:
+        """Return the axis' frames (M, 3, 3) in P at distances (M,)."""
+        return frames_at(self.axis, distance_mm)[1]
+
+    def step(self, frames: Float, border: Float, landmarks: Float) -> State:
+        """Return the state after a step of the frames (N, 7), the border (B,) and the landmarks (L, 3)."""
+        deflection = border[GLOBALS : GLOBALS + 2 * self.knots].reshape(2, -1)
+        return replace(
+            self,
+            T_pc=moved(self.T_pc, frames[:, :6]),
+            slip=self.slip + frames[:, 6],
+            xyz_p=self.xyz_p + landmarks,
+            globals=self.globals + border[:GLOBALS],
+            axis=self._deflected(deflection),
+            curve=self.curve + deflection,
+            instrument=self.instrument + border[GLOBALS + 2 * self.knots :],
+        )
+
+    def _deflected(self, deflection: Float) -> PipeAxis:
+        x, y = (self.axis_basis(self.axis.distance_mm) @ deflection.T).T
+        origin = from_pipe(self.axis, self.axis.distance_mm, np.arctan2(y, x), np.hypot(x, y))
+        return axis_through(origin, self.axis.R_pa[0, :, 0], float(self.axis.distance_mm[0]))
+
+    def _knot_vector(self) -> Float:
+        first = self.axis.distance_mm[0] - _DEGREE * self.knot_mm
+        return first + self.knot_mm * np.arange(self.knots + _DEGREE + 1)
+
+
+def straight_start(
+    T_pc: Float, xyz_p: Float, from_mm: float, to_mm: float, radius_mm: float, knot_mm: float, unsure: int
+) -> State:
+    """Return the state of a straight pipe from first guesses of poses and landmarks.
+
+    ``unsure`` is the number of the instrument's principal uncertainties.
+    """
+    steps = max(int(np.ceil((to_mm - from_mm) / _AXIS_STEP_MM)), 2)
+    z = np.linspace(from_mm, to_mm, steps + 1)
+    axis = axis_through(np.stack([0 * z, 0 * z, z], -1), np.array([1.0, 0, 0]), from_mm)
+    knots = int(np.ceil((to_mm - from_mm) / knot_mm)) + _DEGREE
+    return State(
+        T_pc, np.zeros(len(T_pc)), xyz_p, np.array([radius_mm, 0.0, 0.0, 1.0]), axis,
+        np.zeros((2, knots)), knot_mm, radius_mm, np.zeros(unsure),
+    )  # fmt: skip

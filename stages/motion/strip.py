@@ -1,0 +1,185 @@
+"""The wall in front of a camera, unrolled about the local pipe axis and freed of its illumination.
+
+A strip has rows of constant distance (``row`` 0 is distance 0 of the straightened pipe, spacing
+``grid.step_mm``) and columns of constant azimuth (column 0 is −π). Where the texture lies in a strip hardly
+depends on the camera's pose, so patches can be compared over many frames without warping.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from pipeline.geometry.rigid import inverse, transform
+from pipeline.instrument.camera.base import Camera
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Mask = NDArray[np.bool_]
+_COARSE = 4
+_BLUR_PX = 1.2  # keeps noise finer than a strip sample from folding into it
+_SMOOTH_PX = 1.0
+_MEAN_PX = 41
+_COURSE_PX = 3.0
+_DARKEST, _BRIGHTEST = 5.0, 250.0
+
+
+@dataclass(frozen=True)
+class StripGrid:
+    """Sampling of the straightened pipe wall.
+
+    Attributes
+    ----------
+    radius_mm : float
+        Of the cylinder on which the strip lies.
+    columns : int
+        Samples around.
+    near_mm, far_mm : float
+        Wall ahead of the camera that is sampled.
+    """
+
+    radius_mm: float
+    columns: int
+    near_mm: float
+    far_mm: float
+
+    @property
+    def step_mm(self) -> float:
+        """Row spacing, equal to the column spacing along the wall."""
+        return 2 * np.pi * self.radius_mm / self.columns
+
+    @property
+    def rows(self) -> int:
+        """Number of rows, a multiple of the coarse grid's step."""
+        return int((self.far_mm - self.near_mm) / self.step_mm) // _COARSE * _COARSE
+
+    def wall(self, row: Float, column: Float) -> Float:
+        """Return points (..., 3) of strip positions (...) on the cylinder about the z-axis."""
+        psi = column * (2 * np.pi / self.columns) - np.pi
+        r = self.radius_mm
+        return np.stack([r * np.cos(psi), r * np.sin(psi), row * self.step_mm + 0 * psi], -1)
+
+    def position(self, xyz: Float) -> tuple[Float, Float]:
+        """Return strip row and column (...) of points (..., 3)."""
+        psi = np.arctan2(xyz[..., 1], xyz[..., 0])
+        return xyz[..., 2] / self.step_mm, (psi + np.pi) * (self.columns / (2 * np.pi))
+
+
+@dataclass(frozen=True)
+class Strip:
+    """One frame's view of the wall.
+
+    Attributes
+    ----------
+    first_row : int
+        Row of the pipe that is row 0 of the arrays.
+    contrast : (H, W) float32
+        Grey value over its neighbourhood's mean, minus 1; 0 where unusable.
+    usable : (H, W) bool
+    coarse_uv : (H/4 + 1, W/4 + 1, 2) float32
+        Pixels of every fourth row and column.
+    noise : float
+        1 σ of ``contrast`` from one sample to the next.
+    """
+
+    first_row: int
+    contrast: Float32
+    usable: Mask
+    coarse_uv: Float32
+    noise: float
+
+    def pixel(self, row: Float, column: Float) -> Float:
+        """Return (..., 2) pixels of strip positions: exactly where `unroll` sampled the image."""
+        i, j = (row - self.first_row) / _COARSE, np.mod(column / _COARSE, self.coarse_uv.shape[1] - 1)
+        m = np.clip(np.floor(i).astype(int), 0, self.coarse_uv.shape[0] - 2)
+        n = np.clip(np.floor(j).astype(int), 0, self.coarse_uv.shape[1] - 2)
+        a, b = (i - m)[..., None], (j - n)[..., None]
+        g = self.coarse_uv.astype(np.float64)
+        top = g[m, n] * (1 - b) + g[m, n + 1] * b
+        low = g[m + 1, n] * (1 - b) + g[m + 1, n + 1] * b
+        return np.asarray(top * (1 - a) + low * a)
+
+
+def unroll(
+    image: NDArray[np.uint8], camera: Camera, T_pc: Float, grid: StripGrid, blocked_mm: tuple[float, float]
+) -> Strip:
+    """Unroll a grey image (H, W) as seen from pose ``T_pc`` (4, 4) in the straightened pipe.
+
+    ``blocked_mm`` is the range of wall ahead of the camera hidden under the laser line; empty if equal.
+    """
+    first_row = int(np.ceil((T_pc[2, 3] + grid.near_mm) / grid.step_mm))
+    coarse_uv = _coarse_pixels(camera, T_pc, grid, first_row)
+    grey, seen = _sample(cv2.GaussianBlur(image, (0, 0), _BLUR_PX), coarse_uv, _COARSE)
+    ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
+    seen[(ahead > blocked_mm[0]) & (ahead < blocked_mm[1])] = False
+    usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST)
+    contrast = _without_light(grey, usable)
+    return Strip(first_row, contrast, usable, coarse_uv, _noise_of(contrast, usable))
+
+
+def _without_light(grey: Float32, usable: Mask) -> Float32:
+    """Return grey over the light that fell there, minus 1; 0 where unusable.
+
+    A slope of the light within a patch shifts its match by half the slope times the squared length of the
+    texture, always the same way. So the light's course along the pipe, the same all round, is divided out
+    before the local mean, which leaves slopes near borders.
+    """
+    count = usable.sum(1)
+    course = np.where(usable, grey, 0).sum(1) / np.maximum(count, 1)
+    row = np.arange(len(course))
+    known = count > 0.1 * grey.shape[1]
+    if not known.any():
+        return np.zeros_like(grey)
+    course = gaussian_filter1d(np.interp(row, row[known], course[known]), _COURSE_PX)[:, None]
+    flat = np.where(usable, grey / np.maximum(course, 1.0), 0).astype(np.float32)
+    size = (_MEAN_PX, _MEAN_PX)
+    share = cv2.blur(usable.astype(np.float32), size)
+    mean = cv2.blur(flat, size) / np.maximum(share, 1e-3)
+    contrast = np.where(usable, flat / np.maximum(mean, 0.05) - 1, 0).astype(np.float32)
+    return cv2.GaussianBlur(contrast, (0, 0), _SMOOTH_PX)
+
+
+def _coarse_pixels(camera: Camera, T_pc: Float, grid: StripGrid, first_row: int) -> Float32:
+    rows = first_row + _COARSE * np.arange(grid.rows // _COARSE + 1.0)
+    columns = _COARSE * np.arange(grid.columns // _COARSE + 1.0)
+    xyz = grid.wall(*np.meshgrid(rows, columns, indexing="ij"))
+    return camera.project(transform(inverse(T_pc), xyz)).uv.astype(np.float32)
+
+
+def _noise_of(contrast: Float32, usable: Mask) -> float:
+    """Return the noise's 1 σ from second differences around, which smooth texture hardly reaches."""
+    d = contrast[::3, 2:] - 2 * contrast[::3, 1:-1] + contrast[::3, :-2]
+    ok = usable[::3, 2:] & usable[::3, 1:-1] & usable[::3, :-2]
+    return float(1.4826 * np.median(np.abs(d[ok])) / np.sqrt(6)) if ok.any() else float("inf")
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _sample(image, coarse, step):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Bilinear look-up of the image on the coarse pixel grid refined ``step`` times."""
+    rows, columns = (coarse.shape[0] - 1) * step, (coarse.shape[1] - 1) * step
+    grey = np.zeros((rows, columns), np.float32)
+    seen = np.zeros((rows, columns), np.bool_)
+    height, width = image.shape
+    for i in range(rows):
+        m, a = i // step, np.float32((i % step) / step)
+        for j in range(columns):
+            n, b = j // step, np.float32((j % step) / step)
+            w00, w01, w10, w11 = (1 - a) * (1 - b), (1 - a) * b, a * (1 - b), a * b
+            u = w00 * coarse[m, n, 0] + w01 * coarse[m, n + 1, 0]
+            u += w10 * coarse[m + 1, n, 0] + w11 * coarse[m + 1, n + 1, 0]
+            v = w00 * coarse[m, n, 1] + w01 * coarse[m, n + 1, 1]
+            v += w10 * coarse[m + 1, n, 1] + w11 * coarse[m + 1, n + 1, 1]
+            if not (0 <= u < width - 1 and 0 <= v < height - 1):
+                continue
+            x, y = int(u), int(v)
+            p, q = np.float32(u - x), np.float32(v - y)
+            top = image[y, x] * (1 - p) + image[y, x + 1] * p
+            low = image[y + 1, x] * (1 - p) + image[y + 1, x + 1] * p
+            grey[i, j] = top * (1 - q) + low * q
+            seen[i, j] = True
+    return grey, seen

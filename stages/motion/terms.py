@@ -1,0 +1,159 @@
+"""The equations of the joint adjustment that need no landmark: rings, smooth motion, encoder, axis, origin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.axis import to_pipe
+from pipeline.geometry.rigid import skew, transform, vector_from_rotation
+from stages.motion.bordered import BLOCK, Rows
+from stages.motion.state import GLOBALS, State
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class RingBins:
+    """Rings condensed to azimuth bins.
+
+    Attributes
+    ----------
+    frame : (M,) int
+    xyz_c : (M, 3)
+        Mean point with the instrument as stated.
+    by_instrument : (M, 3, Q)
+        Its change with the instrument's principal uncertainties, mm per σ.
+    sigma_mm : (M,)
+        1 σ of its radius: noise and relief of the wall.
+    """
+
+    frame: Int
+    xyz_c: Float
+    by_instrument: Float
+    sigma_mm: Float
+
+
+def cauchy(residual_over_sigma: Float, scale: float = 2.5) -> Float:
+    """Return the Cauchy weight of residuals in σ."""
+    return np.asarray(1 / (1 + (residual_over_sigma / scale) ** 2))
+
+
+def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
+    """Return residual (M,), gradient by point (M, 3) and by border (M, B) of points against the smooth pipe."""
+    s, psi, rho = to_pipe(state.axis, xyz_p)
+    basis = state.axis_basis(s)
+    a2, b2 = state.globals[1:3]
+    residual = rho - state.globals[0] - a2 * np.cos(2 * psi) - b2 * np.sin(2 * psi)
+    frame = state.section_frames(s)
+    normal = frame[:, :, 0] * np.cos(psi)[:, None] + frame[:, :, 1] * np.sin(psi)[:, None]
+    shape = np.stack([-np.ones_like(psi), -np.cos(2 * psi), -np.sin(2 * psi), np.zeros_like(psi)], -1)
+    deflect = [-basis * np.cos(psi)[:, None], -basis * np.sin(psi)[:, None]]
+    instrument = np.zeros((len(psi), len(state.instrument)))
+    return residual, normal, np.concatenate([shape, *deflect, instrument], 1)
+
+
+def ring_rows(state: State, rings: RingBins) -> Rows:
+    """Every ring bin lies on the pipe's smooth surface."""
+    T = state.T_pc[rings.frame]
+    xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument
+    residual, normal, by_border = surface(state, transform(T, xyz_c))
+    normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
+    turn = -np.einsum("mj,mjk->mk", normal_c, skew(xyz_c))
+    by_border[:, by_border.shape[1] - len(state.instrument) :] = np.einsum("mj,mjq->mq", normal_c, rings.by_instrument)
+    by_frame = np.zeros((len(residual), 1, BLOCK))
+    by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
+    weight = cauchy(residual / rings.sigma_mm) / rings.sigma_mm**2
+    return Rows(rings.frame[:, None], by_frame, by_border, residual, weight)
+
+
+def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
+    """Third differences of the pose over time are small: ``sigma`` (6,) for evenly spaced frames."""
+    n = len(time_s)
+    first = np.arange(n - 3)
+    frame = first[:, None] + np.arange(4)
+    coefficient = _third_difference(time_s[frame])
+    turn = vector_from_rotation(np.swapaxes(state.T_pc[first + 1, :3, :3], 1, 2)[:, None] @ state.T_pc[frame][..., :3, :3])
+    pose = np.concatenate([state.T_pc[frame][..., :3, 3], turn], -1)
+    residual = np.einsum("mk,mki->mi", coefficient, pose)
+    by_frame = np.zeros((n - 3, 6, 4, BLOCK))
+    for i in range(6):
+        by_frame[:, i, :, i] = coefficient
+    weight = cauchy(residual / sigma, 5.0) / sigma**2
+    return Rows(
+        np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK),
+        np.zeros((6 * (n - 3), state.border_size)), residual.reshape(-1), weight.reshape(-1),
+    )  # fmt: skip
+
+
+def encoder_rows(state: State, encoder_mm: Float, sigma_mm: float, slip_sigma_mm: float) -> tuple[Rows, Rows]:
+    """Distance = scale × encoder + slip, and slip hardly changes from frame to frame."""
+    n = len(encoder_mm)
+    origin = state.T_pc[:, :3, 3]
+    s = to_pipe(state.axis, origin)[0]
+    scale = state.globals[3]
+    by_frame = np.zeros((n, 1, BLOCK))
+    by_frame[:, 0, :3], by_frame[:, 0, 6] = state.section_frames(s)[:, :, 2], -1
+    by_border = np.zeros((n, state.border_size))
+    by_border[:, 3] = -encoder_mm
+    residual = s - scale * encoder_mm - state.slip
+    reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, np.full(n, sigma_mm**-2.0))
+    pair = np.stack([np.arange(n - 1), np.arange(1, n)], -1)
+    by_pair = np.zeros((n - 1, 2, BLOCK))
+    by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
+    change = np.diff(state.slip)
+    weight = cauchy(change / slip_sigma_mm) / slip_sigma_mm**2
+    return reading, Rows(pair, by_pair, np.zeros((n - 1, state.border_size)), change, weight)
+
+
+def no_slip_rows(state: State) -> Rows:
+    """Without an encoder the slip is zero."""
+    n = len(state.slip)
+    by_frame = np.zeros((n, 1, BLOCK))
+    by_frame[:, 0, 6] = 1
+    return Rows(np.arange(n)[:, None], by_frame, np.zeros((n, state.border_size)), state.slip, np.ones(n))
+
+
+def origin_rows(state: State) -> Rows:
+    """Hold the first frame where it is: it defines the frame of the estimate."""
+    by_frame = np.zeros((6, 1, BLOCK))
+    by_frame[np.arange(6), 0, np.arange(6)] = 1
+    weight = np.array([1e-4] * 3 + [1e-6] * 3) ** -2.0
+    return Rows(np.zeros((6, 1), np.int64), by_frame, np.zeros((6, state.border_size)), np.zeros(6), weight)
+
+
+def border_rows(state: State, bend_sigma: float, encoder_sigma: float, radius_sigma_mm: float) -> Rows:
+    """Priors of the global numbers: an axis that bends as little as it may, encoder scale, the instrument."""
+    size, knots = state.border_size, state.knots
+    third = np.diff(np.eye(knots), 3, axis=0)
+    second = np.diff(np.eye(knots), 2, axis=0)
+    h2 = state.knot_mm**2
+    blocks, residual, sigma = [], [], []
+    for part in range(2):
+        at = GLOBALS + part * knots
+        for rows, bend in ((third, bend_sigma), (second, 100 * bend_sigma)):
+            block = np.zeros((len(rows), size))
+            block[:, at : at + knots] = rows
+            blocks.append(block)
+            residual.append(rows @ state.curve[part])
+            sigma.append(np.full(len(rows), bend * h2))
+    unsure = len(state.instrument)
+    own = np.r_[0:GLOBALS, size - unsure : size]
+    blocks.append(np.eye(size)[own])
+    start = state.globals - np.array([state.nominal_radius_mm, 0.0, 0.0, 1.0])
+    residual.append(np.concatenate([start, state.instrument]))
+    sigma.append(np.array([radius_sigma_mm] * 3 + [encoder_sigma] + [1.0] * unsure))
+    r, s = np.concatenate(residual), np.concatenate(sigma)
+    soft = np.where(np.arange(len(r)) < len(r) - len(own), cauchy(r / s), 1.0)
+    none = np.zeros((len(r), 0), np.int64)
+    return Rows(none, np.zeros((len(r), 0, BLOCK)), np.concatenate(blocks), r, soft / s**2)
+
+
+def _third_difference(time_s: Float) -> Float:
+    """Return coefficients (M, 4) of the third divided difference, those of even spacing being −1, 3, −3, 1."""
+    t = (time_s - time_s[:, :1]) / np.maximum(time_s[:, 3:] - time_s[:, :1], 1e-12) * 3
+    gap = t[:, :, None] - t[:, None, :] + np.eye(4)
+    return 6 / np.prod(gap, -1)

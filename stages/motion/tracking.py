@@ -1,0 +1,329 @@
+"""Texture tracks: landmarks on the wall followed from frame to frame in unrolled strips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.rigid import from_parts, rotation_from_vector, vector_from_rotation
+from pipeline.instrument.camera.base import Camera
+from stages.motion.matching import Patches, cut, match
+from stages.motion.parameters import MotionParameters
+from stages.motion.strip import Strip, StripGrid, unroll
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Image = NDArray[np.uint8]
+_FEWEST = 12
+_FEWEST_FOUND = 0.3
+_MOST_MISSES = 8
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Observations of landmarks, sorted by landmark, then frame.
+
+    Attributes
+    ----------
+    landmark, frame : (M,) int
+        Index into ``xyz`` and index into the list of all frames.
+    uv : (M, 2)
+        Observed pixels.
+    sigma_px : (M,)
+        1 σ, px, of each coordinate.
+    xyz : (L, 3)
+        First guess of the landmarks in the straightened pipe.
+    frames : (K,) int
+        Frames that were tracked.
+    T_pc : (K, 4, 4)
+        First guess of their poses in the straightened pipe.
+    lost : (K,) bool
+        Frames in which too little texture was found to move the pose.
+    """
+
+    landmark: Int
+    frame: Int
+    uv: Float
+    sigma_px: Float
+    xyz: Float
+    frames: Int
+    T_pc: Float
+    lost: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Landmarks (N,) looked for; which were found (N,), at what strip position, offset (N, 2) and σ (N,)."""
+
+    landmark: Int
+    good: NDArray[np.bool_]
+    at: Float
+    offset: Float
+    sigma: Float
+
+    @property
+    def share(self) -> float:
+        """Return the share of landmarks found."""
+        return float(self.good.mean()) if self.good.size else 0.0
+
+
+@dataclass
+class _Map:
+    """Landmarks alive: strip positions, patches, first frame; grown while tracking."""
+
+    half: int
+    row: Float = field(default_factory=lambda: np.zeros(0))
+    column: Float = field(default_factory=lambda: np.zeros(0))
+    offset: Float = field(default_factory=lambda: np.zeros((0, 2)))
+    born: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    retired: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+    misses: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    patches: list[Patches] = field(default_factory=list)
+
+    def gather(self, index: Int) -> Patches:
+        """Return the patches of landmarks (N,) as one batch."""
+        starts = np.cumsum([0] + [len(p.value) for p in self.patches])
+        batch = np.searchsorted(starts, index, side="right") - 1
+        if not index.size:
+            return Patches.none(2 * self.half + 1)
+        parts = [(self.patches[b], index[batch == b] - starts[b]) for b in np.unique(batch)]
+        return Patches.joined([p.of(i) for p, i in parts])
+
+    def add(self, at: Float, born: int, patches: Patches) -> None:
+        """Add landmarks at strip positions (N, 2)."""
+        n = len(at)
+        self.row, self.column = np.append(self.row, at[:, 0]), np.append(self.column, at[:, 1])
+        self.offset = np.concatenate([self.offset, np.zeros((n, 2))])
+        self.born = np.append(self.born, np.full(n, born))
+        self.retired = np.append(self.retired, np.zeros(n, bool))
+        self.misses = np.append(self.misses, np.zeros(n, np.int64))
+        self.patches.append(patches)
+
+
+class TextureTracker:
+    """Follows the wall's texture; distance and roll follow from it, the rest of the pose from the rings.
+
+    Each landmark keeps its own offset from where the cylinder puts it, so that a wrong pitch, yaw or radius
+    bends the strips but never feeds back into the pose: those are left to the joint adjustment.
+    """
+
+    def __init__(
+        self, camera: Camera, grid: StripGrid, parameters: MotionParameters, blocked_mm: tuple[float, float]
+    ) -> None:
+        self._camera, self._grid, self._parameters, self._blocked = camera, grid, parameters, blocked_mm
+        self._map = _Map(parameters.patch_half_px)
+        self._rows: list[tuple[Int, Int, Float, Float]] = []
+        self._poses: list[tuple[int, Float, bool]] = []
+        self._last: Strip | None = None
+
+    def follow(self, frame: int, image: Image, T_pc: Float) -> Float:
+        """Track one frame from its predicted pose and return the better one (4, 4)."""
+        strip = unroll(image, self._camera, T_pc, self._grid, self._blocked)
+        found = self._search(strip, frame)
+        if found.share < _FEWEST_FOUND and self._last is not None:
+            T_pc = self._shifted(T_pc, _displacement(self._last, strip))
+            strip = unroll(image, self._camera, T_pc, self._grid, self._blocked)
+            found = self._search(strip, frame)
+        drift, lost = self._note(found, strip, frame)
+        T_better = self._shifted(T_pc, drift)
+        self._grow(strip, frame, drift)
+        self._poses.append((frame, T_better, lost))
+        self._last = strip
+        return T_better
+
+    def tracks(self) -> Tracks:
+        """Return all observations of landmarks seen at least three times."""
+        none = np.zeros(0, np.int64)
+        self._rows.append((none, none, np.zeros((0, 2)), np.zeros(0)))
+        landmark, frame, uv, sigma = (np.concatenate(c) for c in zip(*self._rows, strict=True))
+        keep = np.bincount(landmark, minlength=len(self._map.row)) >= 3
+        use = keep[landmark]
+        renumber = np.cumsum(keep) - 1
+        order = np.lexsort((frame[use], landmark[use]))
+        xyz = self._grid.wall(self._map.row, self._map.column)[keep]
+        return Tracks(
+            renumber[landmark[use]][order], frame[use][order], uv[use][order], sigma[use][order], xyz,
+            np.array([p[0] for p in self._poses]), np.array([p[1] for p in self._poses]).reshape(-1, 4, 4),
+            np.array([p[2] for p in self._poses], bool),
+        )  # fmt: skip
+
+    def _search(self, strip: Strip, frame: int) -> _Found:
+        """Match every landmark that should be in the strip."""
+        m, half = self._map, self._map.half
+        guess = np.stack([m.row - strip.first_row, m.column], -1) + m.offset
+        young = frame - m.born < self._parameters.max_track_frames
+        inside = (guess[:, 0] > half + 1) & (guess[:, 0] < strip.contrast.shape[0] - half - 2)
+        near = np.flatnonzero(inside & young & ~m.retired)
+        found = match(strip.contrast, strip.usable, m.gather(near), guess[near, 0], guess[near, 1])
+        at = guess[near] + found.offset + np.array([strip.first_row, 0])
+        good = (found.correlation > self._parameters.min_correlation) & np.isfinite(at).all(1)
+        good &= found.sigma < 3 * self._parameters.landmark_sigma_px
+        return _Found(near, good, at, found.offset, found.sigma)
+
+    def _note(self, found: _Found, strip: Strip, frame: int) -> tuple[Float, bool]:
+        """Keep the pixels of matched landmarks; return the strip's common displacement (2,) and if lost."""
+        m, good = self._map, found.good
+        index = found.landmark[good]
+        m.misses[found.landmark] = np.where(good, 0, m.misses[found.landmark] + 1)
+        m.retired[found.landmark] |= m.misses[found.landmark] > _MOST_MISSES
+        at = found.at[good]
+        sigma = np.maximum(found.sigma[good], 0.02) * self._px_per_strip(strip, at)
+        self._rows.append((index, np.full(len(index), frame), strip.pixel(at[:, 0], at[:, 1]), sigma))
+        if len(index) < _FEWEST:
+            return np.zeros(2), True
+        drift = np.median(found.offset[good], 0)
+        m.offset[index] += found.offset[good] - drift
+        return drift, False
+
+    def _px_per_strip(self, strip: Strip, at: Float) -> Float:
+        du = strip.pixel(at[:, 0] + 1, at[:, 1]) - strip.pixel(at[:, 0], at[:, 1])
+        dv = strip.pixel(at[:, 0], at[:, 1] + 1) - strip.pixel(at[:, 0], at[:, 1])
+        return np.sqrt((np.sum(du * du, 1) + np.sum(dv * dv, 1)) / 2)
+
+    def _grow(self, strip: Strip, frame: int, drift: Float) -> None:
+        """Start a landmark at the most distinct spot of every free cell."""
+        row, column = self._free_spots(strip)
+        patches = cut(strip.contrast, row, column, self._map.half)
+        variance = np.trace(np.linalg.inv(patches.information + 1e-9 * np.eye(2)), axis1=1, axis2=2) / 2
+        good = strip.noise * np.sqrt(variance) < self._parameters.landmark_sigma_px
+        at = np.stack([row[good] + strip.first_row, column[good]], -1).astype(float)
+        first = len(self._map.row)
+        self._map.add(at - drift, frame, patches.of(good))
+        sigma = np.maximum(strip.noise * np.sqrt(variance[good]), 0.02) * self._px_per_strip(strip, at)
+        index = first + np.arange(len(at))
+        self._rows.append((index, np.full(len(at), frame), strip.pixel(at[:, 0], at[:, 1]), sigma))
+
+    def _free_spots(self, strip: Strip) -> tuple[Int, Int]:
+        """Return rows and columns (in the strip) of the best corner of each unoccupied cell."""
+        cell, half = self._parameters.cell_px, self._map.half
+        corner = cv2.cornerMinEigenVal(strip.contrast, 2 * half + 1)
+        corner[cv2.erode(strip.usable.astype(np.uint8), np.ones((2 * half + 3,) * 2)) == 0] = 0
+        corner[: half + 2], corner[-half - 3 :] = 0, 0
+        first_cell, last_cell = strip.first_row // cell, (strip.first_row + corner.shape[0]) // cell
+        columns = corner.shape[1] // cell
+        taken = np.zeros((last_cell - first_cell + 1, columns), bool)
+        alive = ~self._map.retired
+        i = (self._map.row[alive] // cell).astype(int) - first_cell
+        j = np.minimum((self._map.column[alive] // cell).astype(int), columns - 1)
+        ok = (i >= 0) & (i < len(taken))
+        taken[i[ok], j[ok]] = True
+        offset = first_cell * cell - strip.first_row
+        return _best_of_cells(corner, taken, offset, cell)
+
+    def _shifted(self, T_pc: Float, drift: Float) -> Float:
+        """Move a pose so that the strip moves by ``drift`` (rows, columns)."""
+        turn = drift[1] * 2 * np.pi / self._grid.columns
+        step = from_parts(rotation_from_vector(np.array([0, 0, -turn])), np.zeros(3))
+        out = step @ T_pc
+        out[2, 3] = T_pc[2, 3] - drift[0] * self._grid.step_mm
+        return np.asarray(out)
+
+
+def moved(T_pc: Float, step: Float) -> Float:
+    """Return T = [R exp(w), t + d] for a step (6,) = (d, w); also batched."""
+    return from_parts(T_pc[..., :3, :3] @ rotation_from_vector(step[..., 3:]), T_pc[..., :3, 3] + step[..., :3])
+
+
+def _displacement(before: Strip, now: Strip) -> Float:
+    """Return by how many rows and columns the wall in ``now`` lies off where ``before`` had it."""
+    lag = now.first_row - before.first_row
+    rows = before.contrast.shape[0] - abs(lag)
+    if rows < 32:
+        return np.zeros(2)
+    a = before.contrast[max(lag, 0) : max(lag, 0) + rows]
+    b = now.contrast[max(-lag, 0) : max(-lag, 0) + rows]
+    halves = [cv2.resize(np.clip(x, -1, 1), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for x in (a, b)]
+    window = np.broadcast_to(np.hanning(halves[0].shape[0])[:, None], halves[0].shape)
+    (dx, dy), response = cv2.phaseCorrelate(*(np.asarray(h * window, np.float32) for h in halves))
+    return np.array([2 * dy, 2 * dx]) if response > 0.05 else np.zeros(2)
+
+
+def _best_of_cells(corner: Float, taken: NDArray[np.bool_], offset: int, cell: int) -> tuple[Int, Int]:
+    rows, columns = [], []
+    for i, j in zip(*np.nonzero(~taken), strict=True):
+        r0 = max(i * cell + offset, 0)
+        block = corner[r0 : max((i + 1) * cell + offset, 0), j * cell : (j + 1) * cell]
+        if block.size and block.max() > 0:
+            r, c = np.unravel_index(np.argmax(block), block.shape)
+            rows.append(r0 + r)
+            columns.append(j * cell + c)
+    return np.array(rows, np.int64), np.array(columns, np.int64)
+
+
+def track_texture(
+    images: Iterable[tuple[int, Image | None]],
+    predict: Predictor,
+    tracker: TextureTracker,
+    progress: Callable[[int], None],
+) -> Tracks:
+    """Follow the wall through all lit frames; undecodable ones are passed over.
+
+    ``progress`` is told the number of frames done.
+    """
+    for done, (frame, image) in enumerate(images):
+        if image is not None:
+            predict.learn(frame, tracker.follow(frame, image, predict(frame)))
+        progress(done + 1)
+    return tracker.tracks()
+
+
+class Predictor:
+    """Predicts the next pose in the straightened pipe.
+
+    Distance and roll go on as before (distance by the encoder's advance where there is one); the rings say
+    where the pipe's axis passes; pitch and yaw are taken as zero.
+
+    Parameters
+    ----------
+    time_s : (N,)
+        Of all frames.
+    encoder_mm : (N,) or None
+        Encoder distance at the frames' times.
+    centre_c : (N, 2)
+        Where the pipe's axis passes the laser's plane, mm in C.
+    """
+
+    def __init__(self, time_s: Float, encoder_mm: Float | None, centre_c: Float) -> None:
+        self._time, self._encoder, self._centre = time_s, encoder_mm, centre_c
+        self._known: list[tuple[int, float, float]] = []
+
+    def learn(self, frame: int, T_pc: Float) -> None:
+        """Take note of a frame's pose."""
+        roll = float(np.arctan2(T_pc[1, 0], T_pc[0, 0]))
+        self._known = [*self._known[-1:], (frame, float(T_pc[2, 3]), roll)]
+
+    def __call__(self, frame: int) -> Float:
+        """Return the predicted pose (4, 4) of a frame."""
+        z, roll = self._ahead(frame)
+        rotation = rotation_from_vector(np.array([0, 0, roll]))
+        offset = rotation @ np.append(-self._centre[frame], 0.0)
+        return from_parts(rotation, offset + np.array([0, 0, z]))
+
+    def _ahead(self, frame: int) -> tuple[float, float]:
+        if not self._known:
+            return 0.0, 0.0
+        last, z, roll = self._known[-1]
+        before, z_before, roll_before = self._known[0]
+        ratio = (self._time[frame] - self._time[last]) / max(self._time[last] - self._time[before], 1e-9)
+        turn = (roll - roll_before + np.pi) % (2 * np.pi) - np.pi
+        if self._encoder is not None:
+            return z + float(self._encoder[frame] - self._encoder[last]), roll + turn * ratio
+        return z + (z - z_before) * ratio, roll + turn * ratio
+
+    def between(self, frames: Int, T_pc: Float, count: int) -> Float:
+        """Return first guesses (count, 4, 4) of all poses from those of the tracked ``frames``."""
+        z = self._encoder if self._encoder is not None else np.zeros(count)
+        roll = np.zeros(count)
+        if len(frames):
+            near = np.arange(count)
+            z = np.interp(near, frames, T_pc[:, 2, 3])
+            roll = np.interp(near, frames, np.unwrap(np.arctan2(T_pc[:, 1, 0], T_pc[:, 0, 0])))
+        turn = rotation_from_vector(np.stack([0 * roll, 0 * roll, roll], -1))
+        centre = np.concatenate([-self._centre, np.zeros((count, 1))], 1)
+        origin = np.einsum("nij,nj->ni", turn, centre)
+        origin[:, 2] = z
+        return from_parts(turn, origin)
