@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.codec import digest
 from pipeline.export.run_record import program_version
 from pipeline.findings import Defects, Sections
 from pipeline.instrument.probe import Probe
+from pipeline.model import Overlays
 from pipeline.outcome import Results, StageOutcome
 from pipeline.recording.base import Recording
 from pipeline.review.report import write_report
@@ -27,17 +30,18 @@ def _summary(results: Results, recording: Recording, probe: Probe) -> RunSummary
     return RunSummary(
         recording=recording,
         probe=probe,
-        created="",
+        created=datetime.now(UTC).isoformat(timespec="minutes"),
         rings=results.of(RingSamples),
         trajectory=results.of(Trajectory),
         wall=results.of(Wall),
         texture=results.of(WallTexture),
+        overlays=results.of(Overlays),
         sections=results.of(Sections),
         defects=results.of(Defects),
         numbers=tuple(ReportedNumber(s.name, n.name, n.value, n.unit) for s in stages for n in s.numbers),
         stages=tuple(_record(s) for s in stages),
         versions=(("boresight", program_version()), *((p, version(p)) for p in _STANDS_ON)),
-        inputs=(("recording", recording.content_key),),
+        inputs=(("recording", recording.content_key), ("probe", digest(probe))),
     )
 
 

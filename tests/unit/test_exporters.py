@@ -1,0 +1,115 @@
+"""The files of a run folder hold what the artefacts held, under the agreed names."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+from pipeline.artefacts import PipeAxis, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
+from pipeline.export.radius_map import write_radius_map
+from pipeline.export.rings import write_rings
+from pipeline.export.trajectory import write_trajectory
+from pipeline.geometry.rigid import from_parts, rotation_from_quaternion, rotation_from_vector
+
+
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(1)
+
+
+def axis() -> PipeAxis:
+    return PipeAxis(np.arange(2.0), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)))
+
+
+def rings_of(random: np.random.Generator, frames: int) -> RingSamples:
+    shape = (frames, 90)
+    validity = random.integers(0, 3, shape).astype(np.uint8)
+    radius = np.where(validity == 0, random.normal(400, 1, shape), np.nan).astype(np.float32)
+    sigma, width, amplitude = (random.random(shape, dtype=np.float32) for _ in range(3))
+    azimuth = -np.pi + np.arange(90) * 2 * np.pi / 90
+    frame = np.arange(frames, dtype=np.int64) * 2
+    return RingSamples(frame, azimuth, np.array([1.5, 2.5]), radius, sigma, width, amplitude, validity)
+
+
+@pytest.mark.parametrize("frames", [0, 1, 150])
+def test_rings(tmp_path: Path, random: np.random.Generator, frames: int) -> None:
+    rings = rings_of(random, frames)
+    write_rings(rings, tmp_path)
+    group = zarr.open_group(tmp_path / "rings.zarr", mode="r")
+    expected = {
+        "radius_px": rings.radius_px,
+        "sigma_px": rings.sigma_px,
+        "line_width_px": rings.width_px,
+        "amplitude": rings.amplitude,
+        "valid": rings.valid,
+        "frame": rings.frame,
+        "azimuth_rad": rings.azimuth_rad,
+    }
+    for name, values in expected.items():
+        read = np.asarray(group[name])
+        assert read.dtype == values.dtype
+        np.testing.assert_array_equal(read, values, err_msg=name)
+    assert group.attrs["centre_px"] == [1.5, 2.5]
+    assert group.attrs["validity_codes"]["valid"] == 0
+
+
+def test_rings_are_the_same_bytes_again(tmp_path: Path, random: np.random.Generator) -> None:
+    rings = rings_of(random, 70)
+    files = []
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        write_rings(rings, tmp_path / name)
+        files.append(
+            {
+                p.relative_to(tmp_path / name): p.read_bytes()
+                for p in (tmp_path / name).rglob("*")
+                if p.is_file()
+            }
+        )
+    assert files[0] == files[1]
+
+
+def test_trajectory(tmp_path: Path, random: np.random.Generator) -> None:
+    count = 20
+    rotation = rotation_from_vector(random.normal(0, 0.5, (count, 3)))
+    T_pc = from_parts(rotation, random.normal(0, 100, (count, 3)))
+    half = random.normal(size=(count, 6, 6))
+    covariance = half @ np.swapaxes(half, 1, 2)
+    time = np.arange(count) / 30
+    trajectory = Trajectory(np.arange(count) + 5, time, T_pc, covariance, axis(), 50.0, 1.0, 0.001, 0.001, ())
+    write_trajectory(trajectory, tmp_path)
+    with (tmp_path / "trajectory.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    table = {name: np.array([float(r[name]) for r in rows]) for name in rows[0]}
+    assert list(table)[:9] == ["frame", "time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
+    np.testing.assert_array_equal(table["frame"], trajectory.frame)
+    np.testing.assert_allclose(table["time_s"], time, rtol=1e-8)
+    for k, name in enumerate(("x_mm", "y_mm", "z_mm")):
+        np.testing.assert_allclose(table[name], T_pc[:, k, 3], rtol=1e-8)
+    quaternion = np.stack([table[n] for n in ("qw", "qx", "qy", "qz")], -1)
+    np.testing.assert_allclose(rotation_from_quaternion(quaternion), rotation, atol=1e-8)
+    names = [f"sigma_{n}" for n in ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")]
+    for k, name in enumerate(names):
+        np.testing.assert_allclose(table[name] ** 2, covariance[:, k, k], rtol=1e-7)
+
+
+def test_radius_map(tmp_path: Path, random: np.random.Generator) -> None:
+    shape = (7, 12)
+    radius, sigma, part, misalignment = (random.random(shape, dtype=np.float32) for _ in range(4))
+    radius[2, 3] = np.nan
+    count = random.integers(0, 9, shape)
+    azimuth = -np.pi + np.arange(12) * np.pi / 6
+    radius_map = RadiusMap(np.arange(7.0), azimuth, radius, sigma, part, count, misalignment)
+    one = np.zeros(1, np.float32)
+    cloud = PointCloud(
+        np.zeros((1, 3), np.float32), np.zeros((1, 3), np.float32), one, one, one, one, np.zeros(1, np.int64)
+    )
+    write_radius_map(Wall(cloud, radius_map, axis()), tmp_path)
+    with np.load(tmp_path / "radius_map.npz") as read:
+        for name in ("distance_mm", "azimuth_rad", "radius_mm", "sigma_mm", "count", "misalignment_mm"):
+            np.testing.assert_array_equal(read[name], getattr(radius_map, name), err_msg=name)
+        np.testing.assert_array_equal(read["sigma_random_mm"], part)
