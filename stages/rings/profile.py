@@ -21,11 +21,12 @@ from stages.rings.sectors import Sectors
 
 # Sums may be reordered; NaN keeps its meaning.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
-WINDOW_WIDTHS = 5.5
+WINDOW_WIDTHS = 5.0
 _FLANK = 0.6
 _STEPS, _FULL_STEPS = 12, 4
 _LOG_WIDTH_PRIOR = 0.3
-_SETTLED_PX, _SETTLED_LOG_WIDTH = 0.004, 0.01
+# Steps converge quadratically: one this small leaves less than a hundredth of it to go.
+_SETTLED_WIDTHS, _SETTLED_LOG_WIDTH = 0.03, 0.06
 
 
 class Clipping(NamedTuple):
@@ -226,17 +227,20 @@ def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, res
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _flank_counts(radius, offset, low, high, r0, p, slope, knee):  # type: ignore[no-untyped-def]
-    """Clipped pixels, and unclipped ones on the inner and the outer flank."""
+def _flank_counts(radius, low, high, r0, p, knee):  # type: ignore[no-untyped-def]
+    """Clipped pixels, and unclipped ones on the inner and the outer flank (0.5 to 2.5 widths)."""
     clipped, inner, outer = 0, 0, 0
-    w = np.exp(p[1])
+    iw = np.exp(-p[1])
+    may_clip = p[2] + p[3] + abs(p[4]) / iw > knee
     for k in range(low, high):
-        x = (radius[k] - p[0] - slope * offset[k]) / w
-        if p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * (radius[k] - r0) > knee:
+        x = (radius[k] - p[0]) * iw
+        if abs(x) > 2.5:
+            continue
+        if may_clip and p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * (radius[k] - r0) > knee:
             clipped += 1
-        elif -2.5 < x < -0.5:
+        elif x < -0.5:
             inner += 1
-        elif 0.5 < x < 2.5:
+        elif x > 0.5:
             outer += 1
     return clipped, inner, outer
 
@@ -267,7 +271,7 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
             _solve(n, v)
             if step >= _FULL_STEPS:
                 v *= 0.5
-            settled = abs(v[0]) < _SETTLED_PX and abs(v[1]) < _SETTLED_LOG_WIDTH
+            settled = abs(v[0]) < _SETTLED_WIDTHS * width and abs(v[1]) < _SETTLED_LOG_WIDTH
             v[0] = min(max(v[0], -width), width)
             v[1] = min(max(v[1], -0.3), 0.3)
             p += v
@@ -279,5 +283,5 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
         out[4, a] = np.sqrt(_inverse_diagonal(n, 0, v))
         out[5, a] = np.sqrt(_inverse_diagonal(n, 2, v))
         out[6, a] = chi2 / (high - low - v.size)
-        clipped, inner, outer = _flank_counts(radius, offset, low, high, r0, p, slope[a], response[3][0])
+        clipped, inner, outer = _flank_counts(radius, low, high, r0, p, response[3][0])
         out[7, a], out[8, a], out[9, a] = clipped, inner, outer

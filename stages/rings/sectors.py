@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,20 +51,42 @@ class Sectors:
 def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) -> Sectors:
     """Assign every pixel of an image (width, height) to the nearest of ``azimuths`` directions."""
     width, height = image_size
-    v, u = np.mgrid[:height, :width]
-    du, dv = (u - centre_px[0]).ravel(), (v - centre_px[1]).ravel()
-    radius, turn = np.hypot(du, dv), np.arctan2(dv, du)
+    centre = np.asarray(centre_px, float)
+    du, dv = np.arange(width) - centre[0], (np.arange(height) - centre[1])[:, None]
+    radius, turn = np.hypot(du, dv).ravel(), np.arctan2(dv, du).ravel()
     step = 2 * np.pi / azimuths
-    nearest = np.rint((turn + np.pi) / step).astype(np.int64)
-    sector = nearest % azimuths
-    order = np.argsort(sector * (4.0 * (width + height)) + radius, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(sector, minlength=azimuths))])
+    nearest = np.rint((turn + np.pi) / step)
+    start, order = _grouped(nearest.astype(np.int64) % azimuths, radius, azimuths)
     return Sectors(
-        -np.pi + step * np.arange(azimuths),
-        np.asarray(centre_px, float),
-        image_size,
-        start,
-        order.astype(np.int32),
-        radius[order].astype(np.float32),
-        (turn + np.pi - nearest * step)[order].astype(np.float32),
-    )
+        -np.pi + step * np.arange(azimuths), centre, image_size, start, order,
+        radius[order].astype(np.float32), (turn + np.pi - nearest * step)[order].astype(np.float32),
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, nogil=True)
+def _grouped(group, value, groups):  # type: ignore[no-untyped-def]
+    """Start (groups + 1,) of each group and the order (N,) by group, then by ``value``: a sort by counting.
+
+    Sorting all pixels by rounded value first, then stably by group, leaves only neighbours to be swapped.
+    """
+    rings = np.zeros(int(value.max()) + 2, np.int64)
+    start = np.zeros(groups + 1, np.int64)
+    for k in range(group.size):
+        rings[int(value[k]) + 1] += 1
+        start[group[k] + 1] += 1
+    rings, start = np.cumsum(rings), np.cumsum(start)
+    by_value = np.empty(group.size, np.int32)
+    for k in range(group.size):
+        ring = int(value[k])
+        by_value[rings[ring]] = k
+        rings[ring] += 1
+    order = np.empty(group.size, np.int32)
+    end = start[:-1].copy()
+    for k in by_value:
+        at = end[group[k]]
+        while at > start[group[k]] and value[order[at - 1]] > value[k]:
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = k
+        end[group[k]] += 1
+    return start, order
