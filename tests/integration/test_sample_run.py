@@ -1,0 +1,90 @@
+"""One command turns the sample recording into a whole run folder; the same command again does nothing."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stages.catalogue import PIPELINE
+from tests.shared_data import PROJECT_ROOT
+
+FILES = (
+    "run.json",
+    "rings.zarr",
+    "trajectory.csv",
+    "cloud.ply",
+    "radius_map.npz",
+    "model.glb",
+    "unrolled.png",
+    "unrolled.json",
+    "sections.csv",
+    "defects.csv",
+    "defects.json",
+    "report.html",
+)
+
+
+def run_sample(folder: Path) -> str:
+    command = [sys.executable, "-m", "pipeline.cli", "run", "data/sample", "-o", str(folder)]
+    told = subprocess.run(command, cwd=PROJECT_ROOT, capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    return told.stdout
+
+
+def record(folder: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((folder / "run.json").read_text("utf-8"))
+    return content
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sample") / "run"
+    run_sample(folder)
+    return folder
+
+
+def test_every_file_is_there(sample: Path) -> None:
+    assert [name for name in FILES if not (sample / name).exists()] == []
+
+
+def test_every_stage_completed_within_the_memory_allowed(sample: Path) -> None:
+    told = record(sample)
+    assert told["state"] == "completed"
+    assert [(s["name"], s["state"]) for s in told["stages"]] == [(s.name, "completed") for s in PIPELINE]
+    assert max(told["peak_memory_mib"].values()) < 2048
+
+
+def test_headline_numbers_are_those_of_the_recording(sample: Path) -> None:
+    metrics = {m["name"]: m["value"] for m in record(sample)["metrics"]}
+    with (PROJECT_ROOT / "data" / "sample" / "frames.csv").open() as stream:
+        lit = [row["illumination"] for row in csv.DictReader(stream)]
+    assert metrics["laser frames"] == sum(light != "led" for light in lit)
+    assert metrics["wall seen"] > 98
+
+
+def test_tables_fit_together(sample: Path) -> None:
+    with np.load(sample / "radius_map.npz") as wall:
+        shape = (len(wall["distance_mm"]), len(wall["azimuth_rad"]))
+        assert all(wall[n].shape == shape for n in ("radius_mm", "sigma_mm", "count", "misalignment_mm"))
+        seen = np.isfinite(wall["radius_mm"])
+        assert np.array_equal(seen, wall["count"] > 0)
+        assert np.all(wall["sigma_mm"][seen] >= wall["sigma_random_mm"][seen])
+
+
+def test_the_same_command_again_does_nothing(sample: Path) -> None:
+    def files() -> dict[str, tuple[int, int]]:
+        told = ("run.json", "run.log", "lock")
+        paths = (p for p in sample.rglob("*") if p.is_file() and p.name not in told)
+        return {str(p.relative_to(sample)): (p.stat().st_ino, p.stat().st_mtime_ns) for p in paths}
+
+    before = files()
+    assert str(sample / "report.html") in run_sample(sample)
+    assert files() == before
+    assert {s["state"] for s in record(sample)["stages"]} == {"reused"}
