@@ -37,10 +37,11 @@ class TileStack:
 
     def blend(self) -> tuple[Short, Byte]:
         """Return the blended colours (rows, columns, 3) and how many samples stand behind each."""
-        return blend_samples(self._values, self._weights)
+        colour, count = blend_samples(self._values, self._weights)
+        return colour, count
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@njit(cache=True, nogil=True)
 def _store(sample, inverse_brightness, weight, view, values, weights):  # type: ignore[no-untyped-def]
     rows, columns = weight.shape
     for i in range(rows):
@@ -56,7 +57,7 @@ def _store(sample, inverse_brightness, weight, view, values, weights):  # type: 
                 values[i, j, view, c] = min(65535, int(sample[i, j, c] * gain + 0.5))
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@njit(cache=True, nogil=True)
 def _sort_in(values, weights, grey, weight, where):  # type: ignore[no-untyped-def]
     """Put the brightness of one pixel's samples into ``grey`` in ascending order; return how many."""
     n = 0
@@ -72,7 +73,7 @@ def _sort_in(values, weights, grey, weight, where):  # type: ignore[no-untyped-d
     return n
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@njit(cache=True, nogil=True)
 def _middle_and_spread(grey, weight, n):  # type: ignore[no-untyped-def]
     """Return weighted median and weighted median absolute deviation of n sorted values."""
     half = 0.0
@@ -97,7 +98,7 @@ def _middle_and_spread(grey, weight, n):  # type: ignore[no-untyped-def]
     return middle, spread
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@njit(cache=True, nogil=True)
 def _biweight_mean(values, grey, weight, where, n, out):  # type: ignore[no-untyped-def]
     """Write the robust mean colour of one pixel's n samples to ``out`` (3,)."""
     middle, spread = _middle_and_spread(grey, weight, n)
@@ -114,7 +115,7 @@ def _biweight_mean(values, grey, weight, where, n, out):  # type: ignore[no-unty
     out[0], out[1], out[2] = int(blue / total + 0.5), int(green / total + 0.5), int(red / total + 0.5)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[misc]
+@njit(cache=True, nogil=True)
 def blend_samples(values, weights):  # type: ignore[no-untyped-def]
     """Return robust weighted means (rows, columns, 3) and counts (rows, columns).
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -54,8 +53,8 @@ class FlatGrid:
 
     def tiles(self) -> list[Tile]:
         """Return the tiles in the order of distance."""
-        edges = np.arange(0, self.rows + self.tile_rows, self.tile_rows)
-        return [Tile(int(a), int(min(b, self.rows))) for a, b in pairwise(edges)]
+        first = range(0, self.rows, self.tile_rows)
+        return [Tile(row, min(row + self.tile_rows, self.rows)) for row in first]
 
     def centre_mm(self, tile: Tile) -> float:
         """Return the distance of a tile's middle."""

@@ -12,7 +12,7 @@ from pipeline.instrument.probe import Lighting
 
 
 def irradiance(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
-    """Return the irradiance (...), 1/mm², of wall points (..., 3) with unit normals, from LEDs of intensity 1.
+    """Return the irradiance (...), 1/mm², of wall points (..., 3) with unit normals, lit by unit LEDs.
 
     Each LED is a Lambert source facing forward: cos(at LED) cos(at wall) / distance²; mean over the LEDs.
     The wall is Lambertian, so this is also what the camera sees up to a factor.
@@ -49,7 +49,7 @@ class LightField:
     reference: float
 
     def brightness(self, xyz_c: Float, normal_c: Float) -> Float:
-        """Return the relative brightness (...) of white wall at points (..., 3) with normals (..., 3) in C."""
+        """Return the relative brightness (...) of white wall, points and normals (..., 3) in C."""
         row, column = self.indices(xyz_c)
         log = map_coordinates(self.log_correction, [row, column], order=1, mode="grid-wrap")
         return np.asarray(irradiance(self.lighting, xyz_c, normal_c) / self.reference * np.exp(log))

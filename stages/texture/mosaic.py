@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures import Executor
 
@@ -43,17 +44,20 @@ class Mosaic:
         self._grid, self._surface, self._probe = grid, surface, probe
         self._views, self._plan, self._light, self._band = views, plan, light, laser_band_mm
         self._tiles = grid.tiles()
+        self._tiles_of: dict[int, list[int]] = defaultdict(list)
+        for tile, chosen in enumerate(plan):
+            for view in chosen.views:
+                self._tiles_of[int(view)].append(tile)
         self._open: dict[int, tuple[SurfacePatch, TileStack]] = {}
         self.colour: NDArray[np.uint16] = np.zeros((grid.rows, grid.columns, 3), np.uint16)
         self.count: Byte = np.zeros((grid.rows, grid.columns), np.uint8)
 
     def add(self, view: int, image: Image | None, pool: Executor) -> None:
         """Sample one view, in order, into every tile that wants it; None when there is no such image."""
-        tiles = [t for t, chosen in enumerate(self._plan) if view in chosen.views]
-        usable = image is not None and np.isfinite(self._light.gain[view])
+        tiles = self._tiles_of[view]
         for tile in tiles:
             self._ensure_open(tile)
-        if usable:
+        if image is not None and np.isfinite(self._light.gain[view]):
             list(pool.map(lambda tile: self._sample(tile, view, image), tiles))
         done = [tile for tile in tiles if self._plan[tile].views[-1] == view]
         list(pool.map(self._close, done))

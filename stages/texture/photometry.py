@@ -20,11 +20,11 @@ from stages.texture.sampling import LightSamples
 
 _THETA_KNOTS = 9
 _AZIMUTH_KNOTS = 12
-# Prior 1 σ of log brightness: by angle alone, around the image, of g's steps, of a frame's gain, of one sample.
+# 1 σ of log brightness: prior of f, of g, of g's steps and of gains; of one sample.
 _SIGMA_THETA, _SIGMA_AROUND, _SIGMA_STEP, _SIGMA_GAIN, _SIGMA_SAMPLE = 1.0, 0.05, 0.05, 0.05, 0.05
-_SIGMA_TREND = 1e-4
 _ITERATIONS = 4
 _FEWEST = 20
+_STANDSTILL_CELLS = 1e-3
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,8 @@ def solve_light(samples: LightSamples, views: int, probe: Probe, reference: floa
     design = _design(samples, views, theta_from, theta_step)
     _, cell = np.unique(samples.cell, return_inverse=True)
     level = float(np.median(samples.log_ratio))
-    solution, residual = _solve_robust(design, cell, samples.log_ratio - level, _prior(_along(samples, views)))
+    along = _along(samples, views)
+    solution, residual = _solve_robust(design, cell, samples.log_ratio - level, _prior(views), along)
     f = solution[:_THETA_KNOTS]
     g = solution[_THETA_KNOTS:-views].reshape(_THETA_KNOTS, _AZIMUTH_KNOTS)
     field = LightField(probe.lighting, theta_from, theta_step, f[:, None] + g, reference)
@@ -82,8 +83,8 @@ def _design(samples: LightSamples, views: int, theta_from: float, theta_step: fl
     i, j = row.astype(int), column.astype(int) % _AZIMUTH_KNOTS
     u, v = row - i, column - np.floor(column)
     j1 = (j + 1) % _AZIMUTH_KNOTS
-    at = lambda a, b: _THETA_KNOTS + a * _AZIMUTH_KNOTS + b  # noqa: E731
-    index = [i, i + 1, at(i, j), at(i, j1), at(i + 1, j), at(i + 1, j1)]
+    first = _THETA_KNOTS + i * _AZIMUTH_KNOTS
+    index = [i, i + 1, first + j, first + j1, first + _AZIMUTH_KNOTS + j, first + _AZIMUTH_KNOTS + j1]
     value = [1 - u, u, (1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v]
     index.append(_THETA_KNOTS * (1 + _AZIMUTH_KNOTS) + samples.view)
     value.append(np.ones_like(u))
@@ -93,19 +94,21 @@ def _design(samples: LightSamples, views: int, theta_from: float, theta_step: fl
 
 
 def _along(samples: LightSamples, views: int) -> Float:
-    """Return (V,) how far along the wall each view looked, zero mean, 0 where it took no sample."""
+    """Return (V,) how far along the wall each view looked, zero mean; all alike when nothing moved.
+
+    A wall that grows brighter along the pipe, a light that falls off less and an exposure that sinks from
+    frame to frame explain the same pictures: exposure is taken to have no trend along this.
+    """
     count = np.bincount(samples.view, minlength=views)
     mean = np.bincount(samples.view, samples.cell, minlength=views) / np.maximum(count, 1)
     centred = np.where(count > 0, mean - mean[count > 0].mean(), 0.0)
-    return np.asarray(centred / max(float(np.linalg.norm(centred)), 1e-12))
+    if float(np.linalg.norm(centred)) < _STANDSTILL_CELLS:
+        centred = np.ones(views)
+    return np.asarray(centred / np.linalg.norm(centred))
 
 
-def _prior(along: Float) -> sparse.csc_array:
-    """Return the prior's information matrix.
-
-    A wall that grows brighter along the pipe, a light that falls off less and an exposure that sinks from
-    frame to frame explain the same pictures. Exposure is taken to have no trend ``along`` (V,).
-    """
+def _prior(views: int) -> sparse.csc_array:
+    """Return the prior's information matrix."""
     around = np.arange(_THETA_KNOTS * _AZIMUTH_KNOTS).reshape(_THETA_KNOTS, _AZIMUTH_KNOTS)
     pairs = np.concatenate(
         [
@@ -117,24 +120,29 @@ def _prior(along: Float) -> sparse.csc_array:
     steps[np.arange(len(pairs)), pairs[:, 0]], steps[np.arange(len(pairs)), pairs[:, 1]] = -1, 1
     smooth = steps.T @ steps / _SIGMA_STEP**2 + np.eye(around.size) / _SIGMA_AROUND**2
     theta = np.eye(_THETA_KNOTS) / _SIGMA_THETA**2
-    gain = np.eye(len(along)) / _SIGMA_GAIN**2 + np.outer(along, along) / _SIGMA_TREND**2
-    return sparse.block_diag([theta, smooth, gain], format="csc")
+    gain = sparse.eye_array(views) / _SIGMA_GAIN**2
+    return sparse.csc_array(sparse.block_diag([theta, smooth, gain]))
 
 
-def _solve_robust(design: sparse.csr_array, cell: Int, value: Float, prior: sparse.csc_array) -> tuple[Float, float]:
-    """Return the solution of the reduced normal equations with Huber weights, and the robust residual."""
+def _solve_robust(
+    design: sparse.csr_array, cell: Int, value: Float, prior: sparse.csc_array, along: Float
+) -> tuple[Float, float]:
+    """Return the solution of the reduced normal equations with Huber weights, and the robust residual.
+
+    The gains, the last unknowns, are held square to ``along`` by a Lagrange multiplier.
+    """
+    border = sparse.csc_array(np.concatenate([np.zeros(design.shape[1] - len(along)), along])[:, None])
     weight = np.ones(len(value))
     cells = sparse.csr_array((np.ones(len(cell)), (np.arange(len(cell)), cell)))
     for _ in range(_ITERATIONS):
         weighted = cells.T * weight
-        total = weighted.sum(1)
+        total = np.bincount(cell, weight)
         crossed = weighted @ design
         shrunk = crossed.T * (1 / total)
         mean = weighted @ value
         matrix = (design.T * weight) @ design - shrunk @ crossed + prior * _SIGMA_SAMPLE**2
-        solution = spsolve(
-            sparse.csc_array(matrix), design.T @ (weight * value) - shrunk @ mean
-        )
+        bordered = sparse.block_array([[matrix, border], [border.T, None]], format="csc")
+        solution = spsolve(bordered, np.append(design.T @ (weight * value) - shrunk @ mean, 0.0))[:-1]
         rest = value - design @ solution
         rest -= ((weighted @ rest) / total)[cell]
         residual = 1.4826 * float(np.median(np.abs(rest)))

@@ -28,7 +28,13 @@ class TileProjection:
 
 
 def project_tile(
-    patch: SurfacePatch, T_cp: Float, probe: Probe, light: LightField, gain: float, reach_mm: float, gap_mm: float
+    patch: SurfacePatch,
+    T_cp: Float,
+    probe: Probe,
+    light: LightField,
+    gain: float,
+    reach_mm: float,
+    gap_mm: float,
 ) -> TileProjection:
     """Project the nodes of a tile exactly and the pixels between them by linear interpolation.
 
@@ -68,7 +74,5 @@ def _quality(uv: Float, brightness: Float) -> Float:
 
 def _enlarge(nodes: Float) -> Float32:
     """Return node values (n, m) or (n, m, 2) at all pixels, linearly; the outer ring of nodes is cut off."""
-    big = cv2.resize(
-        nodes.astype(np.float32), None, fx=NODE_PX, fy=NODE_PX, interpolation=cv2.INTER_LINEAR
-    )
+    big = cv2.resize(nodes.astype(np.float32), None, fx=NODE_PX, fy=NODE_PX, interpolation=cv2.INTER_LINEAR)
     return np.asarray(big[NODE_PX:-NODE_PX, NODE_PX:-NODE_PX], np.float32)

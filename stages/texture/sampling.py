@@ -16,8 +16,8 @@ from stages.texture.light import irradiance
 from stages.texture.surface import WallSurface
 from stages.texture.views import LitViews, sheet_distance_mm
 
-_CELL_COLUMNS = 48
-_CELL_RADII = 0.04
+_CELL_COLUMNS = 30
+_CELL_RADII = 0.05
 _SHRINK = 8
 _DARK, _BRIGHT = 3.0, 245.0
 
@@ -56,7 +56,7 @@ class LightSampler:
         self._cell_mm = _CELL_RADII * radius
         self._radius = radius
         self._distance = np.arange(first, last, self._cell_mm)
-        azimuth = -np.pi + 2 * np.pi / _CELL_COLUMNS * np.arange(_CELL_COLUMNS)
+        azimuth = np.linspace(-np.pi, np.pi, _CELL_COLUMNS, endpoint=False)
         self._patch = surface.patch(self._distance, azimuth)
         self._reference = float(self._at_sheet(radius))
         self._parts: list[LightSamples] = []
@@ -111,4 +111,3 @@ class LightSampler:
     def _at_sheet(self, radius: float) -> Float:
         point = np.array([radius, 0.0, self._probe.laser.baseline_mm])
         return irradiance(self._probe.lighting, point, np.array([-1.0, 0.0, 0.0]))
-

@@ -121,16 +121,19 @@ def smoothed(radius_mm: NDArray[np.float32], sigma_px: tuple[float, ...]) -> NDA
     Normalised convolution (H. Knutsson, C.-F. Westin, CVPR 1993), wrapped around the pipe.
     """
     known = np.isfinite(radius_mm)
-    mode = ("nearest", "wrap")
     out = np.full(radius_mm.shape, np.nan)
     value, weight = np.where(known, radius_mm, 0.0), known.astype(float)
     sigma = np.maximum(sigma_px, 0.3)
     while np.isnan(out).any():
-        total = gaussian_filter(weight, sigma, mode=mode)
-        mean = gaussian_filter(value, sigma, mode=mode) / np.maximum(total, 1e-12)
+        total = _gaussian(weight, sigma)
+        mean = _gaussian(value, sigma) / np.maximum(total, 1e-12)
         out = np.where(np.isnan(out) & (total > 1e-3), mean, out)
         sigma = 2 * sigma
     return out.astype(np.float32)
+
+
+def _gaussian(values: Float, sigma_px: Float) -> Float:
+    return np.asarray(gaussian_filter(values, sigma_px, mode=("nearest", "wrap")))
 
 
 def _steps(radius_map: RadiusMap) -> tuple[float, float]:

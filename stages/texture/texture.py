@@ -26,17 +26,20 @@ class TextureParameters(Parameters):
     """Parameters of the stage texture."""
 
     oversampling: float = Field(
-        1.0, ge=0.25, le=4.0, description="pixels of the flat picture per camera pixel on the wall at the ring"
+        1.0,
+        ge=0.25,
+        le=4.0,
+        description="pixels of the flat picture per camera pixel on the wall at the ring",
     )
     reach_radii: float = Field(
-        0.2, ge=0.02, le=1.0, description="wall used on either side of the laser sheet, in pipe radii"
+        0.5, ge=0.02, le=1.0, description="wall used on either side of the laser sheet, in pipe radii"
     )
-    most_views: int = Field(24, ge=3, le=64, description="most frames blended into one place")
+    most_views: int = Field(48, ge=3, le=64, description="most frames blended into one place")
     tile_mm: float = Field(10.0, ge=1.0, le=200.0, description="length of the tiles worked on, mm")
-    smoothing_mm: float = Field(0.4, ge=0.0, le=10.0, description="1 σ of the radius map's smoothing, mm")
-    shading_mm: float = Field(0.8, ge=0.1, le=20.0, description="1 σ of the wall slopes' smoothing, mm")
+    smoothing_mm: float = Field(0.2, ge=0.0, le=10.0, description="1 σ of the radius map's smoothing, mm")
+    shading_mm: float = Field(0.4, ge=0.1, le=20.0, description="1 σ of the wall slopes' smoothing, mm")
     laser_band_mm: float = Field(
-        1.5, ge=0.0, le=20.0, description="half width left out about the laser line when it is on, mm"
+        1.0, ge=0.0, le=20.0, description="half width left out about the laser line when it is on, mm"
     )
     white_quantile: float = Field(
         0.9995, ge=0.5, le=1.0, description="quantile of the brightest colour that becomes 250 of 255"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.artefacts import Float, Int, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
@@ -32,7 +33,7 @@ class LitViews:
     """
 
     frame: Int
-    laser_on: Int
+    laser_on: NDArray[np.bool_]
     T_cp: Float
     distance_mm: Float
     lean: Float
@@ -40,7 +41,7 @@ class LitViews:
 
 @dataclass(frozen=True)
 class TileViews:
-    """Views (indices into `LitViews`) to blend into one tile, seen up to ``reach_mm`` from the laser sheet."""
+    """Views (indices into `LitViews`) to blend into one tile, seen up to ``reach_mm`` from the sheet."""
 
     views: Int
     reach_mm: float
