@@ -62,7 +62,11 @@ class VideoSource:
         nearest = np.searchsorted((listed_s[1:] + listed_s[:-1]) / 2, shown_s)
         off_s = np.abs(shown_s - listed_s[nearest])
         agrees = off_s.max() < _SAME_TIME * float(np.median(np.diff(listed_s)))
-        return replace(self, numbers=table.frame[nearest]) if agrees and _ascends(nearest) else self
+        if not (agrees and np.all(np.diff(nearest) > 0)):
+            return self
+        numbers = table.frame[nearest]
+        gaps = np.flatnonzero(np.diff(nearest) > 1) + 1
+        return replace(self, numbers=numbers, index=self.index.with_gaps(gaps))
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`; frames that the file does not hold yield None."""
@@ -85,7 +89,7 @@ class VideoSource:
         held: deque[tuple[int, av.VideoFrame]] = deque()
         for number, frame in self._numbered(wanted, damaged):
             held.append((number, frame))
-            while held and held[0][0] < number - self.index.reordered:
+            while held and (self.index.settled[held[0][0]] <= number or len(held) > _HELD_BACK):
                 yield from self._trusted(*held.popleft(), damaged)
         for number, frame in held:
             yield from self._trusted(number, frame, damaged)
@@ -193,10 +197,6 @@ def _decode_packet(
         return []
     except av.FFmpegError:
         return [None]
-
-
-def _ascends(values: Int) -> bool:
-    return bool(np.all(np.diff(values) > 0))
 
 
 def _stretches(wanted: Int, index: VideoIndex) -> list[Int]:

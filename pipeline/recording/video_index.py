@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -28,19 +28,17 @@ class VideoIndex:
         Each frame's place in the order in which frames are coded.
     keyframes : (K,) int
         Numbers of the frames at which decoding can begin.
-    reordered : int
-        Over how many frames the order of presentation can differ from the order of coding.
     timed : bool
         Whether packets carry times of presentation; if not, frames are numbered as they come.
     broken : (B,) int
-        Numbers of the frames whose checksum is wrong, where the coding has checksums.
+        Numbers of frames that cannot be trusted: by their checksum, or since what they are predicted from
+        is not in the file.
     """
 
     pts: Int
     unit_s: float
     coded: Int
     keyframes: Int
-    reordered: int
     timed: bool
     broken: Int
 
@@ -50,17 +48,38 @@ class VideoIndex:
         return self.timed and self.keyframes.size == self.pts.size
 
     @cached_property
+    def settled(self) -> Int:
+        """(N,) Number of the last shown among each frame and those coded before it."""
+        return np.asarray(np.maximum.accumulate(np.argsort(self.coded))[self.coded])
+
+    @cached_property
     def key_of(self) -> Int:
         """(N,) Number of the keyframe from which each frame can be decoded."""
         return self.keyframes[np.searchsorted(self.keyframes, np.arange(self.pts.size), "right") - 1]
 
-    def reached(self, number: int, damaged: Iterable[int]) -> bool:
+    def reached(self, number: int, damaged: Collection[int]) -> bool:
         """Tell whether one of the damaged frames may be part of the prediction of a frame.
 
-        Prediction refers to frames coded before, back to the keyframe at or before the frame.
+        Prediction refers to frames coded before, and to none shown before the frame's keyframe.
         """
-        key, place = self.coded[self.key_of[number]], self.coded[number]
-        return any(key <= self.coded[d] <= place for d in damaged)
+        if self.intra:
+            return number in damaged
+        key, place = self.key_of[number], self.coded[number]
+        return any(key <= d and self.coded[d] <= place for d in damaged)
+
+    def with_gaps(self, gaps: Int) -> VideoIndex:
+        """Return the index, knowing that frames are missing from the file right before frames ``gaps``.
+
+        The missing ones may be part of the prediction of those shown after them, and of those shown before
+        them by no more than the reordering, up to the next keyframe.
+        """
+        if self.intra:
+            return self
+        place = np.arange(self.pts.size)
+        reordered = int((self.settled - place).max())
+        hit = [np.flatnonzero((self.key_of == self.key_of[g - 1]) & (place >= g - reordered)) for g in gaps]
+        spoiled = np.concatenate([self.broken, *hit]).astype(np.int64)
+        return replace(self, broken=np.setdiff1d(spoiled, self.keyframes))
 
 
 def list_frames(container: av.container.InputContainer, stream: av.VideoStream) -> VideoIndex:
@@ -74,7 +93,7 @@ def list_frames(container: av.container.InputContainer, stream: av.VideoStream) 
                 packets.append(_Packet(packet.pts, packet.is_keyframe, sound))
     except av.FFmpegError:
         pass  # the table of frames tells what is missing behind this place
-    reordered = int(stream.codec_context.has_b_frames)
+    reordered = stream.codec_context.has_b_frames
     # AVI keeps no times of presentation: with frames out of order, what it gives are times of decoding.
     timed = not (container.format.name == "avi" and reordered) and all(p.pts is not None for p in packets)
     pts = np.array([p.pts for p in packets] if timed else range(len(packets)), np.int64)
@@ -86,7 +105,6 @@ def list_frames(container: av.container.InputContainer, stream: av.VideoStream) 
         unit_s=float(stream.time_base or 0),
         coded=order,
         keyframes=np.union1d(np.flatnonzero(key), [0]),
-        reordered=reordered,
         timed=timed,
         broken=np.flatnonzero(~intact & intact.any()),
     )

@@ -142,24 +142,37 @@ def test_truncated_video_gives_what_it_holds(tmp_path: Path) -> None:
     assert readable
 
 
-@pytest.mark.parametrize("codec", ["mjpeg", "libx264"])
-def test_frames_lost_on_the_way_to_the_disk_do_not_shift_the_others(tmp_path: Path, codec: str) -> None:
-    folder = write_folder(tmp_path / "r", codec=codec, pix_fmt="yuvj444p", options=GOP4)
-    video = folder / "frames.mkv"
-    whole = {n: image.copy() for n, image in open_recording(folder).read(range(COUNT), "grey")}
-    lost, gap = (5, 9) if codec == "mjpeg" else (4, 8)
-    with av.open(str(video)) as full, av.open(str(tmp_path / "gap.mkv"), "w") as cut:
+GOP8_NO_B = {"g": "8", "sc_threshold": "0", "bf": "0"}
+
+
+@pytest.mark.parametrize(("lost", "end"), [(1, 2), (4, 8), (5, 6), (6, 7), (9, 11)])
+@pytest.mark.parametrize(
+    ("codec", "options"),
+    [("mjpeg", {}), ("libx264", GOP4), ("libx264", GOP8_NO_B), ("libx265", HEVC4), ("ffv1", {})],
+)
+def test_packets_lost_on_the_way_to_the_disk_neither_shift_nor_falsify_others(
+    tmp_path: Path, codec: str, options: dict[str, str], lost: int, end: int
+) -> None:
+    pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
+    folder = write_folder(tmp_path / "r", codec=codec, pix_fmt=pix_fmt, options=options)
+    source = open_recording(folder).source
+    whole = {n: image.copy() for n, image in source.read(range(COUNT), "grey")}
+    with av.open(str(source.path)) as full, av.open(str(tmp_path / "gap.mkv"), "w") as cut:
         stream = cut.add_stream_from_template(full.streams.video[0])
         for place, packet in enumerate(p for p in full.demux(video=0) if p.size):
-            if not lost <= place < gap:
+            if not lost <= place < end:
                 packet.stream = stream
                 cut.mux(packet)
-    (tmp_path / "gap.mkv").rename(video)
+    (tmp_path / "gap.mkv").rename(source.path)
     recording = open_recording(folder)
-    images = dict(recording.read(recording.frames.frame, "grey"))
-    assert [n for n, image in images.items() if image is None] == list(range(lost, gap))
-    assert all(np.array_equal(images[n], whole[n]) for n in images if images[n] is not None)
-    assert recording.warnings == ("4 images are missing between the first and the last",)
+    images = dict(recording.read(range(COUNT), "grey"))
+    gone = {n for n in range(COUNT) if lost <= source.index.coded[n] < end}
+    given_up = {n for n, image in images.items() if image is None}
+    assert gone <= given_up
+    groups = {source.index.key_of[n] for n in gone} | {source.index.key_of[max(min(gone) - 1, 0)]}
+    assert {source.index.key_of[n] for n in given_up} <= groups
+    assert all(np.array_equal(images[n], whole[n]) for n in images if n not in given_up)
+    assert recording.warnings == (f"{end - lost} images are missing between the first and the last",)
 
 
 @pytest.mark.parametrize("content", [b"", b"not a video at all", b"\x1aE\xdf\xa3" + bytes(500)])
