@@ -35,7 +35,7 @@ class MeshParameters(Parameters):
     least_folded_cells: int = Field(20, ge=1, description="cells with a fold from which auto takes poisson")
     poisson_cell_mm: float = Field(0.5, ge=0.05, le=10, description="mm; finest cell of the Poisson solver")
     poisson_reach_mm: float = Field(
-        3.0, ge=0.1, le=50, description="mm; surface further from every point is left out as not seen"
+        2.0, ge=0.1, le=50, description="mm; surface further from every point is left out as not seen"
     )
     error_mm: float = Field(
         0.02,

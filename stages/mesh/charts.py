@@ -123,17 +123,23 @@ def cut_charts(unrolled: Unrolled, surface: Surface, tile_mm: float, texel_mm: f
 def pack(charts: list[Chart], texel_mm: float) -> Atlas:
     """Return the charts packed by xatlas, which is given their bounding boxes: they never overlap."""
     low = [c.xy_mm.min(axis=0) for c in charts]
+    # xatlas takes two meshes at one address for the same mesh, so all arrays live until the packing is done.
+    boxes = [_box(np.maximum(c.xy_mm.max(axis=0) - o, texel_mm)) for c, o in zip(charts, low, strict=True)]
     packer = xatlas.Atlas()
-    for chart, corner in zip(charts, low, strict=True):
-        w, h = np.maximum(chart.xy_mm.max(axis=0) - corner, texel_mm)
-        box = np.array([[0, 0], [w, 0], [w, h], [0, h]], np.float32)
-        packer.add_uv_mesh(box, np.array([[0, 1, 2], [0, 2, 3]], np.uint32))
+    for corner, face in boxes:
+        packer.add_uv_mesh(corner, face)
     packer.generate(xatlas.ChartOptions(), _pack_options(texel_mm))
     size = np.array([packer.width, packer.height])
     place = [(packer.get_mesh(i)[2] * size).min(axis=0) for i in range(len(charts))]
     px = tuple(p + (c.xy_mm - o) / texel_mm for p, c, o in zip(place, charts, low, strict=True))
     width, height = np.maximum(size, np.ceil(np.max([p.max(axis=0) for p in px], axis=0))).astype(int)
     return Atlas(tuple(charts), px, (int(width), int(height)))
+
+
+def _box(size: Float) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Return corners and triangles of a rectangle."""
+    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
+    return corner.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
 
 
 def _tile_numbers(along: Float, tile_mm: float) -> tuple[Index, int]:
