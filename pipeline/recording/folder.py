@@ -39,12 +39,11 @@ def open_folder(path: Path) -> Recording:
     described = describe(section)
     frame_rate = section.number("frame_rate", above=0)
     frames_file = required_file(section, "frames")
+    table = read_frame_table(frames_file)
     encoder_file, no_encoder = optional_file(section, "encoder")
     encoder = read_encoder(encoder_file) if encoder_file else None
-    table = read_frame_table(frames_file)
     source, image_files = _open_source(section, table)
-    gaps = _check_numbers(source, table)
-    frames, cut = common_frames(table, source.count)
+    frames, mended = _match(frames_file, table, source)
     files = [section.file, frames_file, *([encoder_file] if encoder_file else []), *image_files]
     return Recording(
         name=described.name,
@@ -57,8 +56,22 @@ def open_folder(path: Path) -> Recording:
         source=source,
         probe_file=described.probe_file,
         content_key=content_key(files),
-        warnings=(*described.warnings, *no_encoder, *gaps, *cut, *encoder_warnings(encoder, frames)),
+        warnings=(*described.warnings, *no_encoder, *mended, *encoder_warnings(encoder, frames)),
     )
+
+
+def _match(
+    file: Path, table: FrameTable, source: VideoSource | ImageSequence
+) -> tuple[FrameTable, tuple[str, ...]]:
+    """Return the frames that table and images share, and what was mended."""
+    gaps = _check_numbers(source, table)
+    frames, cut = common_frames(table, source.count)
+    if frames.frame.size == 0:
+        raise InputError(
+            file, f"starts at frame {table.frame[0]}, but there are only {source.count} images",
+            hint="frames are numbered from 0 in the video",
+        )  # fmt: skip
+    return frames, (*gaps, *cut)
 
 
 def _open_source(section: Section, table: FrameTable) -> tuple[VideoSource | ImageSequence, list[Path]]:

@@ -170,6 +170,7 @@ SPOILED = {
     "no columns": ("frames.csv", "frame,time_s,illumination\n", "", r"line 1: has no column frame"),
     "mistyped column": ("frames.csv", "illumination", "ilumination", r"is ilumination meant"),
     "table empty": ("frames.csv", None, "", r"has no column frame"),
+    "frames past the end": ("frames.csv", None, "frame,time_s,illumination\n16,0.1,led\n", r"only 16 images"),
     "no frames": ("frames.csv", None, "frame,time_s,illumination\n", r"lists no frames"),
     "unknown light": ("frames.csv", "3,0.100000,led", "3,0.100000,ledd", r"line 5: .*'ledd'(.|\n)*mean led"),
     "time NaN": ("frames.csv", "0.100000", "nan", r"line 5: time_s is 'nan'"),
