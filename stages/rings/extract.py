@@ -65,8 +65,9 @@ def extract_rings(
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
     samples = _samples(frames, sectors, traces)
-    _report(context, samples)
-    return samples
+    wander = wander_px(samples)
+    _report(context, samples, wander)
+    return replace(samples, sigma_px=np.hypot(samples.sigma_px, np.float32(wander)))
 
 
 def _traces(recording: Recording, probe: Probe, sectors: Sectors) -> Iterator[tuple[int, RingTrace | None]]:
@@ -137,12 +138,11 @@ def _samples(frames: Int, sectors: Sectors, traces: dict[int, RingTrace]) -> Rin
         for name, array in values.items():
             array[row] = getattr(trace.fit, name)
     validity = mark_outliers(values["radius_px"], values["sigma_px"], validity)
-    wander = wander_px(values["radius_px"], values["sigma_px"], validity)
-    values["sigma_px"] = np.hypot(values["sigma_px"], np.float32(wander))
     return RingSamples(frames, sectors.azimuth_rad, sectors.centre_px, **values, validity=validity)
 
 
-def _report(context: Context, samples: RingSamples) -> None:
+def _report(context: Context, samples: RingSamples, wander: float) -> None:
+    context.report("line wander beyond noise", wander, "px")
     for reason in RingValidity:
         name = (
             "ring samples valid"

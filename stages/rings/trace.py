@@ -12,6 +12,7 @@ from stages.rings.noise import dark_response, noise_response
 from stages.rings.profile import Clipping, ProfileFit, Response, fit_line
 from stages.rings.search import BAND_WIDTHS, Image, Peaks, detection_limit, find_ring, search_band
 from stages.rings.sectors import Sectors
+from stages.rings.validity import middle_and_spread
 
 _LEAST_FLANK_PIXELS = 2
 _ODD, _TYPICAL = 6.0, 3.0
@@ -141,6 +142,5 @@ def _judge(fit: ProfileFit, peaks: Peaks) -> Byte:
 
 def _oddness(value: Float, ring: Float) -> Float:
     """Return how many robust σ of the ``ring``'s own values each ``value`` (A,) is above their median."""
-    middle = np.nanmedian(ring)
-    spread = 1.4826 * np.nanmedian(np.abs(ring - middle))
-    return np.asarray((value - middle) / max(float(spread), _LEAST_SPREAD))
+    middle, spread = middle_and_spread(ring)
+    return np.asarray((value - middle) / max(spread, _LEAST_SPREAD))

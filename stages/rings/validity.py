@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 
-from pipeline.artefacts import Byte, Float, Float32, RingValidity
+from pipeline.artefacts import Byte, Float32, RingSamples, RingValidity
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0
 _MAJORITY = 0.5
-_LAG = 4
+_LAG_WIDTHS = 6.0
 
 
 def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte:
@@ -24,49 +25,80 @@ def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte
     valid = validity == RingValidity.VALID
     filled = _bridged(radius_px, valid)
     away = filled - _running_median(filled, _NEIGHBOURS)
-    local = 1.4826 * _running_median(np.abs(away), 8 * _NEIGHBOURS + 1)
-    limit = _OUTLIER_SIGMAS * np.hypot(local, np.where(valid, sigma_px, 0))
+    limit = _OUTLIER_SIGMAS * np.hypot(_local_spread(away), np.where(valid, sigma_px, 0))
     off = np.where(np.abs(away) > limit, np.sign(away), 0.0)
     confirmed = np.zeros_like(valid)
     confirmed[1:] |= (off[1:] == off[:-1]) & valid[:-1]
     confirmed[:-1] |= (off[:-1] == off[1:]) & valid[1:]
-    out = validity.copy()
     kept = valid & ((off == 0) | confirmed)
-    alone = _running_share(kept, _NEIGHBOURS) < _MAJORITY
+    alone = uniform_filter1d(kept.astype(float), _NEIGHBOURS, axis=1, mode="wrap") < _MAJORITY
+    out = validity.copy()
     out[valid & (~kept | alone)] = RingValidity.OUTLIER
     return out
 
 
-def wander_px(radius_px: Float32, sigma_px: Float32, validity: Byte) -> float:
-    """Return the 1 σ, px, by which the line wanders beyond ``sigma_px``: speckle, texture, compression.
+def wander_px(samples: RingSamples) -> float:
+    """Return the 1 σ, px, by which the line wanders beyond its noise: speckle, texture, compression.
 
-    From second differences over ``_LAG`` sectors, far enough apart to share neither pixels nor speckle and
-    near enough for the wall to be straight; medians keep true edges out of it.
+    From second differences along the ring between sectors far enough apart to share neither pixels nor speckle
+    (blurred together over the line's width), near enough for the wall to be straight; medians keep true edges
+    out of it.
     """
-    radius = np.where(validity == RingValidity.VALID, radius_px, np.nan).astype(float)
-    bend = np.roll(radius, _LAG, 1) - 2 * radius + np.roll(radius, -_LAG, 1)
+    valid = samples.valid
+    arc = np.median(samples.radius_px[valid]) * (samples.azimuth_rad[1] - samples.azimuth_rad[0])
+    lag = int(np.ceil(_LAG_WIDTHS * np.median(samples.width_px[valid]) / arc))
+    radius = np.where(valid, samples.radius_px, np.nan).astype(float)
+    bend = np.roll(radius, lag, 1) - 2 * radius + np.roll(radius, -lag, 1)
     known = np.isfinite(bend)
     if not known.any():
         return 0.0
-    variance = np.where(known, sigma_px, 0.0).astype(float) ** 2
-    expected = (np.roll(variance, _LAG, 1) + 4 * variance + np.roll(variance, -_LAG, 1))[known]
+    variance = np.where(known, samples.sigma_px, 0.0).astype(float) ** 2
+    expected = (np.roll(variance, lag, 1) + 4 * variance + np.roll(variance, -lag, 1))[known]
     total = (1.4826 * np.median(np.abs(bend[known]))) ** 2
     return float(np.sqrt(max(total - np.median(expected), 0.0) / 6))
 
 
-def _running_share(where: NDArray[np.bool_], sectors: int) -> Float:
-    """Share of true among ``sectors`` neighbours (odd) around the circle, of (F, A)."""
-    return np.asarray(uniform_filter1d(where.astype(float), sectors, axis=1, mode="wrap"))
+@numba.njit(cache=True, nogil=True)
+def middle_and_spread(values):  # type: ignore[no-untyped-def]
+    """Median and 1.4826 × median absolute deviation of the finite ``values`` (N,); 0, 0 without any."""
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        return 0.0, 0.0
+    middle = np.median(finite)
+    return middle, 1.4826 * np.median(np.abs(finite - middle))
 
 
-def _running_median(values: Float32, sectors: int) -> Float32:
+def _local_spread(away: Float32) -> Float32:
+    """Robust 1 σ (F, A) of ``away`` in the neighbourhood, values limited to three of the whole frame's."""
+    frame = 1.4826 * np.median(np.abs(away), axis=1, keepdims=True)
+    limited = np.minimum(np.abs(away), 3 * frame)
+    return np.asarray(
+        np.sqrt(np.pi / 2) * uniform_filter1d(limited, 8 * _NEIGHBOURS + 1, axis=1, mode="wrap")
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def _running_median(values, sectors):  # type: ignore[no-untyped-def]
     """Median over ``sectors`` neighbours (odd) around the circle, of values (F, A)."""
+    rows, columns = values.shape
     half = sectors // 2
-    wide = np.pad(values, ((0, 0), (half, half)), mode="wrap")
-    return np.asarray(median_filter(wide, size=(1, sectors))[:, half:-half])
+    out = np.empty_like(values)
+    window = np.empty(sectors, values.dtype)
+    for row in range(rows):
+        for column in range(columns):
+            for k in range(sectors):
+                v = values[row, (column + k - half) % columns]
+                at = k
+                while at > 0 and window[at - 1] > v:
+                    window[at] = window[at - 1]
+                    at -= 1
+                window[at] = v
+            out[row, column] = window[half]
+    return out
 
 
 def _bridged(radius_px: Float32, valid: NDArray[np.bool_]) -> Float32:
+    """Return ``radius_px`` (F, A) with gaps bridged around the circle; 0 in frames without a sample."""
     out = radius_px.copy()
     sectors = np.arange(radius_px.shape[1])
     for row, good in zip(out, valid, strict=True):
