@@ -74,7 +74,8 @@ def test_tables_fit_together(sample: Path) -> None:
         shape = (len(wall["distance_mm"]), len(wall["azimuth_rad"]))
         assert all(wall[n].shape == shape for n in ("radius_mm", "sigma_mm", "count", "misalignment_mm"))
         seen = np.isfinite(wall["radius_mm"])
-        assert np.array_equal(seen, wall["count"] > 0)
+        assert np.all(seen[wall["count"] > 0])
+        assert np.mean(wall["count"][seen] > 0) > 0.99, "hardly anything may be bridged"
         assert np.all(wall["sigma_mm"][seen] >= wall["sigma_random_mm"][seen])
 
 
