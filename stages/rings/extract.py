@@ -15,8 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Planes, Recording
 from pipeline.stage import Context, Parameters
 from stages.rings.colour import discriminant_weights, excess_weights, mix
-from stages.rings.noise import clipping_of, noise_response
-from stages.rings.profile import Clipping
+from stages.rings.noise import clip_level_of, noise_response
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
 from stages.rings.validity import mark_outliers, wander_px
@@ -79,9 +78,9 @@ def _laser_traces(
     recording: Recording, frames: Int, sectors: Sectors
 ) -> Iterator[tuple[int, RingTrace | None]]:
     """Trace frames lit by the laser alone, in the luma plane."""
-    clipping, trace = _learn_clipping(recording, frames[:_LEARNING_FRAMES], sectors), None
+    clip_level, trace = _learn_clip_level(recording, frames[:_LEARNING_FRAMES], sectors), None
     for frame, image in recording.read(frames, "grey"):
-        trace = None if image is None else trace_ring(image, sectors, clipping, trace)
+        trace = None if image is None else trace_ring(image, sectors, clip_level, trace)
         yield frame, trace
 
 
@@ -97,7 +96,7 @@ def _lit_traces(
         if trace is None:
             weights = _first_weights(bgr, sectors, probe)
         image = mix(bgr, weights)
-        trace = trace_ring(image, sectors, Clipping(), trace)
+        trace = trace_ring(image, sectors, np.inf, trace)
         yield frame, trace
         if trace is not None:
             weights = discriminant_weights(bgr, sectors, trace, weights)
@@ -107,17 +106,17 @@ def _lit_traces(
 def _first_weights(bgr: NDArray[np.uint8], sectors: Sectors, probe: Probe) -> Float:
     """Return weights learned from an image in which the ring is found by the laser's colour alone."""
     weights = excess_weights(probe.laser.wavelength_nm)
-    trace = trace_ring(mix(bgr, weights), sectors, Clipping())
+    trace = trace_ring(mix(bgr, weights), sectors, np.inf)
     return weights if trace is None else discriminant_weights(bgr, sectors, trace, weights)
 
 
-def _learn_clipping(recording: Recording, frames: Int, sectors: Sectors) -> Clipping:
+def _learn_clip_level(recording: Recording, frames: Int, sectors: Sectors) -> float:
     """Learn at which grey level the line clips from the first of ``frames`` that shows a ring."""
     for grey, bgr in zip(_copies(recording, frames, "grey"), _copies(recording, frames, "bgr"), strict=True):
-        trace = None if grey is None or bgr is None else trace_ring(grey, sectors, Clipping())
+        trace = None if grey is None or bgr is None else trace_ring(grey, sectors, np.inf)
         if trace is not None and grey is not None and bgr is not None:
-            return clipping_of(grey, bgr, sectors.pixels_near(trace.radius_everywhere(), 0, trace.width_px))
-    return Clipping()
+            return clip_level_of(grey, bgr, sectors.pixels_near(trace.radius_everywhere(), 0, trace.width_px))
+    return np.inf
 
 
 def _copies(recording: Recording, frames: Int, planes: Planes) -> list[NDArray[np.uint8] | None]:

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pipeline.artefacts import Float
-from stages.rings.profile import WINDOW_WIDTHS, Clipping, ProfileFit, Response, first_at_least
+from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response, first_at_least
 from stages.rings.search import Image
 from stages.rings.sectors import Sectors
 
@@ -16,14 +15,14 @@ QUANTISATION_VARIANCE = 1 / 12
 _BINS, _BIN_LEVELS = 32, 8.0
 _ABSOLUTE_TO_SIGMA = np.sqrt(np.pi / 2)
 _LEAST_RESIDUALS = 50
-_CLIPS_TOGETHER = 0.97
+_SURELY_UNCLIPPED = 0.95
 
 
-def dark_response(image: Image, clipping: Clipping) -> Response:
+def dark_response(image: Image, clip_level: float) -> Response:
     """Return a first guess from the image alone: median level and robust noise of neighbouring pixels."""
     step = np.diff(image.astype(np.float32), axis=1)
     variance = (1.4826 * float(np.median(np.abs(step)))) ** 2 / 2
-    return Response(float(np.median(image)), variance + QUANTISATION_VARIANCE, 0.0, clipping)
+    return Response(float(np.median(image)), variance + QUANTISATION_VARIANCE, 0.0, clip_level)
 
 
 def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Response) -> Response:
@@ -34,7 +33,7 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
     total, count = np.zeros(_BINS), np.zeros(_BINS)
     _residuals_by_level(
         image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, fit.radius_px, fit.width_px,
-        fit.amplitude, fit.background, guess.black, guess.clipping.knee, total, count,
+        fit.amplitude, fit.background, guess.black, guess.clip_level, total, count,
     )  # fmt: skip
     used = count > _LEAST_RESIDUALS
     if not used.any():
@@ -50,7 +49,7 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
 
 @numba.njit(cache=True, nogil=True)
 def _residuals_by_level(  # type: ignore[no-untyped-def]
-    image, start, pixel, radius, r, width, amplitude, background, black, knee, total, count
+    image, start, pixel, radius, r, width, amplitude, background, black, clip_level, total, count
 ):
     for a in range(r.size):
         if not np.isfinite(r[a]):
@@ -61,14 +60,14 @@ def _residuals_by_level(  # type: ignore[no-untyped-def]
             x = (radius[k] - r[a]) / width[a]
             m = background[a] + amplitude[a] * np.exp(-0.5 * x * x)
             level = int((m - black) / _BIN_LEVELS)
-            if 0 <= level < total.size and m < knee:
+            if 0 <= level < total.size and m < clip_level:
                 total[level] += abs(image[pixel[k]] - m)
                 count[level] += 1.0
             k += 1
 
 
-def clipping_of(grey: NDArray[np.uint8], bgr: NDArray[np.uint8], line: NDArray[np.int32]) -> Clipping:
-    """Return where grey levels of the line bend because its strongest channel clips.
+def clip_level_of(grey: NDArray[np.uint8], bgr: NDArray[np.uint8], line: NDArray[np.int32]) -> float:
+    """Return the grey level at which the line's strongest channel clips.
 
     Grey is a fixed linear mixture of the channels, and a laser line keeps its colour: both are read off the
     pixels of the ``line`` (flat indices).
@@ -76,12 +75,11 @@ def clipping_of(grey: NDArray[np.uint8], bgr: NDArray[np.uint8], line: NDArray[n
     colour, level = bgr.reshape(-1, 3)[line].astype(float), grey.ravel()[line].astype(float)
     white = float(np.iinfo(bgr.dtype).max)
     strongest = int(np.argmax(colour.mean(0)))
-    open_ = (colour < 0.95 * white).all(1)
-    bright = open_ & (colour[:, strongest] > np.median(colour[:, strongest]))
-    if bright.sum() < 50:
-        return Clipping(white)
-    *weights, black = np.linalg.lstsq(np.c_[colour[open_], np.ones(open_.sum())], level[open_], rcond=None)[0]
+    unclipped = (colour < _SURELY_UNCLIPPED * white).all(1)
+    bright = unclipped & (colour[:, strongest] > np.median(colour[:, strongest]))
+    if bright.sum() < _LEAST_RESIDUALS:
+        return white
+    design = np.column_stack([colour[unclipped], np.ones(int(unclipped.sum()))])
+    *mixture, black = np.linalg.lstsq(design, level[unclipped], rcond=None)[0]
     ratio = np.median(colour[bright] / colour[bright, strongest, None], axis=0)
-    share: Float = np.maximum(np.array(weights) * ratio, 0)
-    beyond = share[ratio < _CLIPS_TOGETHER].sum() / share.sum()
-    return Clipping(float(black + white * share.sum()), float(beyond))
+    return float(black + white * (ratio @ np.array(mixture)))

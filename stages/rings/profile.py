@@ -4,7 +4,7 @@ The pixels of a sector near the ring are modelled as a Gaussian across the line 
 
     m(ρ, δ) = A exp(−x² / 2w²) + b₀ + b₁ (ρ − r₀),  x = ρ − r − r′(ψ) δ,
 
-seen through a response that bends at the clipping level, and fitted by weighted Gauss–Newton steps. With
+fitted by weighted Gauss–Newton steps; pixels that the model puts near the clipping level are left out. With
 weights 1 / variance the inverse normal matrix is the inverse Fisher information, hence the Cramér–Rao bound.
 """
 
@@ -25,32 +25,36 @@ WINDOW_WIDTHS = 5.0
 _FLANK = 0.6
 _STEPS, _FULL_STEPS = 12, 4
 _LOG_WIDTH_PRIOR = 0.3
+_SLOPE_SECTORS = 6
+_CLIP_SIGMAS = 2.0
 # Steps converge quadratically: one this small leaves less than a hundredth of it to go.
 _SETTLED_WIDTHS, _SETTLED_LOG_WIDTH = 0.03, 0.06
-
-
-class Clipping(NamedTuple):
-    """Grey level ``knee`` at which the line's strongest channel clips, and slope ``beyond`` it (< 1)."""
-
-    knee: float = np.inf
-    beyond: float = 0.0
 
 
 class Response(NamedTuple):
     """How grey levels follow light, and their noise.
 
-    ``black``: level without light; ``variance`` there and ``variance_per_level`` above it (shot noise).
+    ``black``: level without light; ``variance`` there and ``variance_per_level`` above it (shot noise);
+    ``clip_level``: level at which the line's strongest channel clips.
     """
 
     black: float
     variance: float
     variance_per_level: float
-    clipping: Clipping
+    clip_level: float
 
     @property
     def dark_noise(self) -> float:
         """1 σ, grey levels, where there is no line."""
         return float(np.sqrt(self.variance))
+
+    @property
+    def trusted_level(self) -> float:
+        """Level below which noise hardly ever reaches the clipping level."""
+        if not np.isfinite(self.clip_level):
+            return self.clip_level
+        noise = np.sqrt(self.variance + self.variance_per_level * max(self.clip_level - self.black, 0.0))
+        return float(self.clip_level - _CLIP_SIGMAS * noise)
 
 
 class ProfileFit(NamedTuple):
@@ -83,13 +87,12 @@ def fit_line(
     """Fit the line near ``seed_px`` (A,) in every sector of ``image`` (H, W); NaN seeds are left out."""
     known = np.isfinite(seed_px)
     filled = np.where(known, seed_px, np.nanmean(seed_px)) if known.any() else seed_px
-    slope = (np.roll(filled, -1) - np.roll(filled, 1)) / (
-        2 * (sectors.azimuth_rad[1] - sectors.azimuth_rad[0])
-    )
+    step = sectors.azimuth_rad[1] - sectors.azimuth_rad[0]
+    slope = (np.roll(filled, -_SLOPE_SECTORS) - np.roll(filled, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
     out = np.empty((len(ProfileFit._fields), len(seed_px)))
     _fit_sectors(
         image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad,
-        seed_px, slope, width_px, response, out,
+        seed_px, slope, width_px, response, response.trusted_level, out,
     )  # fmt: skip
     return ProfileFit(*out)
 
@@ -174,12 +177,11 @@ def _inverse_diagonal(n, index, v):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, response, n, v):  # type: ignore[no-untyped-def]
+def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, response, trusted, n, v):  # type: ignore[no-untyped-def]
     """Fill ``n`` (5, 5) and ``v`` (5,) at parameters p = (r, ln w, A, b0, b1); return χ²."""
     r, height, b0, b1 = p[0], p[2], p[3], p[4]
     iw = np.exp(-p[1])
-    black, variance, per_level, clipping = response
-    knee, beyond = clipping
+    black, variance, per_level, _ = response
     n00 = n10 = n11 = n20 = n21 = n22 = n30 = n31 = n32 = n33 = n40 = n41 = n42 = n43 = n44 = 0.0
     v0 = v1 = v2 = v3 = v4 = chi2 = 0.0
     for k in range(low, high):
@@ -187,17 +189,13 @@ def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, res
         x = (radius[k] - r - slope * offset[k]) * iw
         e = np.exp(-0.5 * x * x)
         m = height * e + b0 + b1 * t
-        gain = 1.0
-        if m > knee:
-            m = knee + beyond * (m - knee)
-            gain = beyond
+        if m > trusted:
+            continue
         weight = 1.0 / (variance + per_level * max(m - black, 0.0))
         residual = image[pixel[k]] - m
-        e *= gain
         d0 = height * e * x * iw
         d1 = height * e * x * x
-        d4 = gain * t
-        w0, w1, w2, w3, w4 = weight * d0, weight * d1, weight * e, weight * gain, weight * d4
+        w0, w1, w2, w3, w4 = weight * d0, weight * d1, weight * e, weight, weight * t
         chi2 += weight * residual * residual
         v0 += w0 * residual
         v1 += w1 * residual
@@ -213,12 +211,12 @@ def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, res
         n30 += w3 * d0
         n31 += w3 * d1
         n32 += w3 * e
-        n33 += w3 * gain
+        n33 += w3
         n40 += w4 * d0
         n41 += w4 * d1
         n42 += w4 * e
-        n43 += w4 * gain
-        n44 += w4 * d4
+        n43 += w4
+        n44 += w4 * t
     n[0, 0], n[1, 0], n[1, 1], n[2, 0], n[2, 1], n[2, 2] = n00, n10, n11, n20, n21, n22
     n[3, 0], n[3, 1], n[3, 2], n[3, 3] = n30, n31, n32, n33
     n[4, 0], n[4, 1], n[4, 2], n[4, 3], n[4, 4] = n40, n41, n42, n43, n44
@@ -227,16 +225,16 @@ def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, res
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _flank_counts(radius, low, high, r0, p, knee):  # type: ignore[no-untyped-def]
+def _flank_counts(radius, low, high, r0, p, trusted):  # type: ignore[no-untyped-def]
     """Clipped pixels, and unclipped ones on the inner and the outer flank (0.5 to 2.5 widths)."""
     clipped, inner, outer = 0, 0, 0
     iw = np.exp(-p[1])
-    may_clip = p[2] + p[3] + abs(p[4]) / iw > knee
+    may_clip = p[2] + p[3] + abs(p[4]) / iw > trusted
     for k in range(low, high):
         x = (radius[k] - p[0]) * iw
         if abs(x) > 2.5:
             continue
-        if may_clip and p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * (radius[k] - r0) > knee:
+        if may_clip and p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * (radius[k] - r0) > trusted:
             clipped += 1
         elif x < -0.5:
             inner += 1
@@ -246,7 +244,7 @@ def _flank_counts(radius, low, high, r0, p, knee):  # type: ignore[no-untyped-de
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, response, out):  # type: ignore[no-untyped-def]
+def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, response, trusted, out):  # type: ignore[no-untyped-def]
     n, v, p = np.empty((5, 5)), np.empty(5), np.empty(5)
     half = WINDOW_WIDTHS * width
     prior = 1.0 / _LOG_WIDTH_PRIOR**2
@@ -263,7 +261,9 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
         p[0], p[1], p[2], p[3], p[4] = r0, np.log(width), height, b0, b1
         chi2, settled = 0.0, False
         for step in range(_STEPS):
-            chi2 = _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope[a], response, n, v)
+            chi2 = _normal_equations(
+                image, pixel, radius, offset, low, high, r0, p, slope[a], response, trusted, n, v
+            )
             n[1, 1] += prior
             v[1] += prior * (np.log(width) - p[1])
             if not _factor(n):
@@ -283,5 +283,5 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
         out[4, a] = np.sqrt(_inverse_diagonal(n, 0, v))
         out[5, a] = np.sqrt(_inverse_diagonal(n, 2, v))
         out[6, a] = chi2 / (high - low - v.size)
-        clipped, inner, outer = _flank_counts(radius, low, high, r0, p, response[3][0])
+        clipped, inner, outer = _flank_counts(radius, low, high, r0, p, trusted)
         out[7, a], out[8, a], out[9, a] = clipped, inner, outer

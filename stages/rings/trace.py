@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts import Byte, Float, RingValidity
 from stages.rings.noise import dark_response, noise_response
-from stages.rings.profile import Clipping, ProfileFit, Response, fit_line
+from stages.rings.profile import ProfileFit, Response, fit_line
 from stages.rings.search import BAND_WIDTHS, Image, Peaks, detection_limit, find_ring, search_band
 from stages.rings.sectors import Sectors
 from stages.rings.validity import middle_and_spread
@@ -54,15 +54,15 @@ class RingTrace:
 
 
 def trace_ring(
-    image: Image, sectors: Sectors, clipping: Clipping, before: RingTrace | None = None
+    image: Image, sectors: Sectors, clip_level: float, before: RingTrace | None = None
 ) -> RingTrace | None:
     """Find and fit the laser ring in ``image`` (H, W), grey levels; None when there is none.
 
     With the ring of the image ``before``, a band about it is searched first; when most of the ring is not in
-    there, or without it, the whole image is.
+    there, or without it, the whole image is. ``clip_level``: grey level at which the line clips.
     """
     trace = None if before is None else follow_ring(image, sectors, before)
-    return discover_ring(image, sectors, clipping) if trace is None else trace
+    return discover_ring(image, sectors, clip_level) if trace is None else trace
 
 
 def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace | None:
@@ -85,9 +85,9 @@ def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace 
     return RingTrace(fit, _judge(fit, peaks), float(np.nanmedian(fit.width_px)), before.response)
 
 
-def discover_ring(image: Image, sectors: Sectors, clipping: Clipping) -> RingTrace | None:
+def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrace | None:
     """Find the ring anywhere, and learn its line width and the image's noise from it; None without ring."""
-    response = dark_response(image, clipping)
+    response = dark_response(image, clip_level)
     radius, width = find_ring(image, sectors, response.dark_noise)
     found = np.isfinite(radius)
     if not found.any():
