@@ -1,0 +1,49 @@
+"""The texture of short cuts of the open recordings, on true motion and wall, against the true reflectance."""
+
+import importlib.util
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.export.unrolled import write_unrolled
+from pipeline.recording.base import FrameTable
+from pipeline.stage import quiet_context
+from stages.texture.texture import TextureParameters, photograph_wall
+from tests.shared_data import shared
+from tests.truth_run import true_radius_map, truth_run
+
+
+def texture_score(*arguments):
+    spec = importlib.util.spec_from_file_location("score_run", shared("score_run.py"))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.texture_score(*arguments)
+
+
+# The scorer leaves its files to the garbage collector.
+@pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+@pytest.mark.parametrize(
+    ("name", "frames", "to_mm"), [("open-1-field", 90, 70.0), ("open-3-field", 60, 48.0)]
+)
+def test_cut_meets_the_figures(name, frames, to_mm, tmp_path):
+    run = truth_run(name)
+    table = run.recording.frames
+    cut = replace(
+        run.recording,
+        frames=FrameTable(table.frame[:frames], table.time_s[:frames], table.illumination[:frames]),
+    )
+    wall = replace(run.wall, radius_map=true_radius_map(name, 26.0, to_mm))
+    told = {}
+    context = replace(quiet_context(), report=lambda key, value, unit="": told.__setitem__(key, value))
+    texture = photograph_wall(cut, run.probe, run.trajectory, wall, TextureParameters(), context)
+    write_unrolled(texture, tmp_path)
+    known = {"axial_scale_error": 0.0, "axial_shift_mm": 0.0, "roll_shift_deg": 0.0}
+    score = texture_score(
+        str(tmp_path), str(shared("recordings", name)), known | {"radius": run.trajectory.radius_mm}
+    )
+    assert score["psnr_db"] >= 30
+    assert score["registration_p95_mm"] <= 0.15
+    assert score["textured"] >= 0.99
+    assert told["rejected: lit frames too dark, clipped or unreadable"] == 0
+    assert np.isfinite(told["photometric residual"])

@@ -1,0 +1,219 @@
+"""Parts of the texture stage: blending, light, photometry, grid, surface, choice of views."""
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts import Trajectory
+from pipeline.geometry.axis import straight_axis
+from pipeline.instrument.probe import Lighting
+from stages.texture.blend import blend_samples
+from stages.texture.grid import NODE_PX, FlatGrid, flat_grid, footprint_mm
+from stages.texture.light import irradiance
+from stages.texture.photometry import solve_light
+from stages.texture.project import _enlarge
+from stages.texture.sampling import LightSamples
+from stages.texture.surface import smoothed, wall_surface
+from stages.texture.views import LitViews, lit_views, plan_tiles, sheet_distance_mm
+from tests.synthetic_wall import wall_of
+from tests.unit.drawn_pipe import BASELINE, RADIUS, poses, recording_of, small_probe, trajectory_of
+
+
+def plain_blend(values, weights):
+    """The same robust mean in plain numpy, one pixel."""
+    seen = weights > 0
+    colour, w = values[seen].astype(float), weights[seen].astype(float)
+    grey = colour @ [0.25, 0.5, 0.25]
+
+    def median(x):
+        order = np.argsort(x, kind="stable")
+        return x[order][np.searchsorted(np.cumsum(w[order]), 0.5 * w.sum())]
+
+    middle = median(grey)
+    limit = 4.685 * max(1.4826 * median(np.abs(grey - middle)), 0.03 * middle + 1)
+    w = w * np.clip(1 - ((grey - middle) / limit) ** 2, 0, None) ** 2
+    return (colour * w[:, None]).sum(0) / w.sum()
+
+
+def test_blend_agrees_with_plain_numpy():
+    random = np.random.default_rng(1)
+    values = random.integers(3000, 4000, (6, 7, 15, 3)).astype(np.uint16)
+    values[:, :, 4] = 20000
+    weights = random.integers(0, 255, (6, 7, 15)).astype(np.uint8)
+    weights[:, :, 3] = 0
+    colour, count = blend_samples(values, weights)
+    expected = [[plain_blend(values[i, j], weights[i, j]) for j in range(7)] for i in range(6)]
+    assert np.abs(colour - np.array(expected)).max() <= 0.51
+    assert np.array_equal(count, (weights > 0).sum(-1))
+
+
+def test_blend_leaves_pixels_without_samples_empty():
+    colour, count = blend_samples(np.ones((2, 2, 3, 3), np.uint16), np.zeros((2, 2, 3), np.uint8))
+    assert colour.max() == 0
+    assert count.max() == 0
+
+
+def test_one_led_on_the_axis_follows_lambert_and_inverse_square():
+    lamp = Lighting(leds=1, radius_mm=0.0, z_mm=0.0)
+    z = np.array([5.0, 20.0, 60.0])
+    point = np.stack([np.full(3, RADIUS), 0 * z, z], -1)
+    d = np.hypot(RADIUS, z)
+    light = irradiance(lamp, point, np.array([-1.0, 0.0, 0.0]))
+    assert np.allclose(light, (z / d) * (RADIUS / d) / d**2)
+    assert irradiance(lamp, point, np.array([1.0, 0.0, 0.0])).max() == 0
+
+
+def drawn_samples(wall_slope, gain, views=40, wall_rows=80):
+    """Samples of a wall of random cells under a light that falls with θ; view v sees rows v to v + 30."""
+    random = np.random.default_rng(5)
+    wall = random.normal(0, 0.2, (wall_rows, 12)) + wall_slope * np.arange(wall_rows)[:, None]
+    view, row, column = (
+        g.ravel() for g in np.meshgrid(np.arange(views), np.arange(30), np.arange(12), indexing="ij")
+    )
+    theta = 1.3 - 0.02 * row
+    value = wall[view + row, column] - 2.0 * (theta - 1.0) ** 2 + gain[view]
+    value += random.normal(0, 0.02, value.shape)
+    azimuth = -np.pi + 2 * np.pi * column / 12
+    return LightSamples(value, theta, azimuth, (view + row) * 12 + column, view)
+
+
+def test_photometry_separates_light_from_wall():
+    gain = np.random.default_rng(2).normal(0, 0.1, 40)
+    gain -= np.polyval(np.polyfit(np.arange(40), gain, 1), np.arange(40))
+    light = solve_light(drawn_samples(0.0, gain), 40, small_probe(), 1.0)
+    assert np.std(np.log(light.gain) - gain) < 0.005
+    theta = light.field.theta_from + light.field.theta_step * np.arange(9)
+    expected = -2.0 * (theta - 1.0) ** 2
+    found = light.field.log_correction.mean(1)
+    assert np.abs((found - found.mean()) - (expected - expected.mean())).max() < 0.02
+    assert light.residual == pytest.approx(0.02, rel=0.15)
+
+
+def test_a_wall_that_grows_brighter_is_not_taken_for_exposure():
+    light = solve_light(drawn_samples(0.01, np.zeros(40)), 40, small_probe(), 1.0)
+    assert np.ptp(np.log(light.gain)) < 0.02
+
+
+def test_views_without_samples_have_no_gain():
+    light = solve_light(drawn_samples(0.0, np.zeros(40)), 42, small_probe(), 1.0)
+    assert np.isnan(light.gain[40:]).all()
+    assert np.isfinite(light.gain[:40]).all()
+
+
+def test_enlarged_nodes_lie_on_the_pixels():
+    grid = FlatGrid(10.0, 0.1, 40, 32, 16)
+    down, right = np.meshgrid(grid._nodes(16), grid._nodes(32), indexing="ij")
+    assert np.allclose(_enlarge(down)[:, 5], np.arange(16), atol=1e-4)
+    assert np.allclose(_enlarge(right)[3], np.arange(32), atol=1e-4)
+
+
+def test_tiles_cover_every_row_once():
+    tiles = FlatGrid(0.0, 0.1, 41, 32, 16).tiles()
+    assert [(t.first_row, t.last_row) for t in tiles] == [(0, 16), (16, 32), (32, 41)]
+
+
+def test_footprint_is_that_of_the_equidistant_lens():
+    # Around: r / (f θ); along: (r² + l²) / (r f), both per pixel.
+    probe = small_probe()
+    focal, theta = probe.camera.focal_px[0], np.arctan2(RADIUS, BASELINE)
+    expected = np.sqrt(RADIUS / (focal * theta) * (RADIUS**2 + BASELINE**2) / (RADIUS * focal))
+    assert footprint_mm(probe, RADIUS) == pytest.approx(expected, rel=1e-6)
+
+
+def straight_wall(radius_at=lambda s, psi: RADIUS + 0 * s, gap=None):
+    distance, azimuth = np.arange(0.0, 60.0, 0.5), np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    radius = radius_at(*np.meshgrid(distance, azimuth, indexing="ij")).astype(float)
+    if gap is not None:
+        radius[gap] = np.nan
+    return wall_of(distance, azimuth, radius)
+
+
+def test_grid_pixels_are_square_and_close_the_circle():
+    surface = wall_surface(straight_wall(), 0.0, 0.5)
+    grid = flat_grid(surface, small_probe(), 1.0, 10.0)
+    assert grid.columns % NODE_PX == 0
+    assert grid.columns * grid.mm_per_px == pytest.approx(2 * np.pi * RADIUS, rel=1e-6)
+    assert grid.distance_from_mm + (grid.rows - 1) * grid.mm_per_px <= surface.seen_mm[1]
+
+
+def test_surface_normals_of_a_cone_lean_along_it():
+    surface = wall_surface(straight_wall(lambda s, psi: RADIUS + 0.2 * s), 0.0, 0.5)
+    patch = surface.patch(np.array([20.0, 30.0]), np.array([0.3, 2.0]))
+    radial = np.array([[np.cos(a), np.sin(a), 0.0] for a in (0.3, 2.0)])
+    expected = (0.2 * np.array([0, 0, 1.0]) - radial) / np.hypot(1, 0.2)
+    assert np.allclose(patch.normal_p[0], expected, atol=1e-3)
+    assert np.allclose(patch.xyz_p[1, :, :2], (RADIUS + 6.0) * radial[:, :2], atol=1e-3)
+
+
+def test_surface_normals_of_an_ellipse_lean_around():
+    surface = wall_surface(straight_wall(lambda s, psi: RADIUS + np.cos(2 * psi)), 0.0, 0.5)
+    patch = surface.patch(np.array([20.0, 30.0]), np.array([0.4, 0.4001]))
+    along_wall = patch.xyz_p[0, 1] - patch.xyz_p[0, 0]
+    assert abs(patch.normal_p[0, 0] @ along_wall) / np.linalg.norm(along_wall) < 1e-3
+
+
+def test_gaps_are_filled_from_their_neighbours_also_across_the_seam():
+    random = np.random.default_rng(0)
+    radius = RADIUS + 0.01 * random.normal(size=(60, 90))
+    radius[20:40, :8], radius[20:40, -8:] = np.nan, np.nan
+    filled = smoothed(radius.astype(np.float32), (1.0, 1.0))
+    assert np.abs(filled - RADIUS).max() < 0.05
+
+
+def views_at(distance):
+    count = len(distance)
+    T = np.tile(np.eye(4), (count, 1, 1))
+    return LitViews(np.arange(count), np.zeros(count, bool), T, np.asarray(distance, float), np.zeros(count))
+
+
+def plan_of(distance, reach_mm=10.0, most=40):
+    surface = wall_surface(straight_wall(), 0.0, 0.5)
+    grid = FlatGrid(0.0, 0.5, 120, 640, 24)
+    return grid, plan_tiles(grid, surface, views_at(distance), small_probe().laser, reach_mm, most)
+
+
+def test_views_near_the_sheet_are_chosen():
+    distance = np.arange(-30.0, 60.0, 2.0)
+    grid, plan = plan_of(distance)
+    for tile, chosen in zip(grid.tiles(), plan, strict=True):
+        assert np.abs(grid.centre_mm(tile) - distance[chosen.views] - BASELINE).max() < 10 + 6
+        assert len(chosen.views) >= 10
+
+
+def test_rare_views_widen_the_reach():
+    _, plan = plan_of([-20.0, 10.0, 40.0])
+    assert all(len(chosen.views) == 3 and chosen.reach_mm > 30 for chosen in plan)
+
+
+def test_at_most_so_many_views_spread_over_the_reach():
+    _, plan = plan_of(np.linspace(-30, 60, 2000), most=20)
+    assert max(len(chosen.views) for chosen in plan) == 20
+
+
+def test_of_two_passes_one_is_taken():
+    there = np.arange(-40.0, 60.0, 2.0)
+    _, plan = plan_of(np.concatenate([there, there[::-1]]))
+    middle = plan[2].views
+    assert np.all(np.diff(middle) == 1)
+    assert middle.max() < len(there) or middle.min() >= len(there)
+
+
+def test_sheet_distance_is_zero_on_the_tilted_sheet():
+    laser = small_probe().laser.with_parameters(np.array([22.0, 0.01, 0.02, 0.003, 0.1, 0.2, *[0.001] * 6]))
+    ray = np.array([[1.0, 0.3, 0.5], [-0.4, 1.0, 0.4]])
+    assert np.allclose(sheet_distance_mm(laser, laser.intersect(ray)), 0, atol=1e-9)
+    assert np.allclose(sheet_distance_mm(laser, laser.intersect(ray) + np.array([0, 0, 2.0])), 2.0)
+
+
+def test_only_lit_frames_with_a_pose_become_views():
+    T = poses(5)
+    images = [np.zeros((300, 400, 3), np.uint8)] * 6
+    full = trajectory_of(T)
+    keep = np.array([0, 2, 3])
+    some = Trajectory(
+        full.frame[keep], full.time_s[keep], full.T_pc[keep], full.covariance[keep],
+        straight_axis(-50, 100), RADIUS, 1.0, 0.0, 0.0, (),
+    )  # fmt: skip
+    views = lit_views(recording_of(images, "both"), some)
+    assert views.frame.tolist() == [0, 2, 3]
+    assert views.laser_on.all()
+    assert np.allclose(views.T_cp[1] @ T[2], np.eye(4))
