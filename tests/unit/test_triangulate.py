@@ -1,0 +1,104 @@
+"""Triangulation: exact, its noise and calibration covariance true, uncorrected points as the seed paper's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from pipeline.stage import quiet_context
+from stages.triangulate import TRIANGULATE, TriangulateParameters, triangulate_rings
+
+CAMERA = KannalaBrandt((1600, 1200), (366.1, 365.8), (796.9, 591.8), (-0.0118, 0.0008, -0.0008, 0.0))
+SHEET = LaserSheet(23.4, 0.008, -0.006, 0.002, 0.05, -0.03, (1e-4, -2e-4, 0.0, 1e-4, 0.0, 0.0))
+SIGMA = np.r_[0.06, 0.06, 0.06, 0.06, 2e-4, 2e-4, 1e-4, 0, 0.008, 1e-4, 1e-4, 2e-4, 0.01, 0.01, np.zeros(6)]
+PROBE = Probe(CAMERA, SHEET, np.diag(SIGMA**2))
+AZIMUTH = np.linspace(-np.pi, np.pi, 72, endpoint=False)
+
+
+def samples(radius, sigma=0.1):
+    shape = radius.shape
+    return RingSamples(
+        np.arange(shape[0]), AZIMUTH, CAMERA.centre_px, radius.astype(np.float32),
+        np.full(shape, sigma, np.float32), np.ones(shape, np.float32), np.full(shape, 80, np.float32),
+        np.zeros(shape, np.uint8),
+    )  # fmt: skip
+
+
+def rings(frames=20):
+    random = np.random.default_rng(0)
+    return samples(random.uniform(280, 430, (frames, AZIMUTH.size)))
+
+
+def triangulated(ring, probe=PROBE):
+    return triangulate_rings(ring, probe, TriangulateParameters(), quiet_context())
+
+
+def test_points_lie_on_the_sheet_and_project_back_to_their_samples():
+    ring = rings()
+    points = triangulated(ring)
+    xyz = points.xyz_c.astype(float)
+    rho, psi = np.hypot(xyz[..., 0], xyz[..., 1]), np.arctan2(xyz[..., 1], xyz[..., 0])
+    assert np.allclose(xyz[..., 2], SHEET.height(psi) + rho * SHEET.slope(psi), atol=2e-5)
+    assert np.allclose(CAMERA.project(xyz).uv, ring.pixels(), atol=1e-3)
+
+
+def test_uncorrected_points_take_the_sheet_for_a_plane_parallel_to_the_image():
+    points = triangulated(rings())
+    ray = CAMERA.unproject(rings().pixels()).ray
+    assert np.allclose(points.xyz_uncorrected_c, ray * (SHEET.baseline_mm / ray[..., 2:]), atol=1e-4)
+    assert np.abs(points.xyz_uncorrected_c - points.xyz_c).max() > 0.1
+
+
+def test_noise_direction_is_one_sigma_of_radius():
+    ring = rings()
+    points = triangulated(ring)
+    moved = [triangulated(replace(ring, radius_px=ring.radius_px + np.float32(s))).xyz_c for s in (-0.5, 0.5)]
+    slope = (moved[1].astype(float) - moved[0]) / 1.0
+    assert np.allclose(points.noise_direction, 0.1 * slope, rtol=0.01, atol=1e-4)
+
+
+def test_calibration_covariance_is_that_of_drawn_probes():
+    ring = samples(np.full((1, AZIMUTH.size), 400.0))
+    points, random = triangulated(ring), np.random.default_rng(1)
+    drawn = []
+    for _ in range(3000):
+        p = random.normal(size=SIGMA.size) * SIGMA
+        probe = replace(
+            PROBE, camera=CAMERA.with_parameters(CAMERA.parameters + p[:8]),
+            laser=SHEET.with_parameters(SHEET.parameters + p[8:]),
+        )  # fmt: skip
+        drawn.append(probe.triangulate(ring.pixels()[0]))
+    spread = np.std(drawn, axis=0)
+    stated = np.sqrt(points.calibration_covariance[0][:, [0, 3, 5]])
+    assert np.allclose(stated, spread, rtol=0.08, atol=2e-4)
+    offset = np.array(drawn) - np.mean(drawn, axis=0)
+    mixed = np.mean(offset[..., 0] * offset[..., 1], axis=0)
+    assert np.allclose(points.calibration_covariance[0][:, 1], mixed, atol=0.05 * stated.max() ** 2)
+
+
+def test_invalid_samples_and_rays_that_miss_the_sheet_are_nan():
+    ring = rings()
+    validity = ring.validity.copy()
+    validity[3, 5] = RingValidity.GHOST
+    radius = ring.radius_px.copy()
+    radius[4, 6] = 620.0
+    points = triangulated(replace(ring, validity=validity, radius_px=radius))
+    gone = np.isnan(points.xyz_c).all(-1)
+    assert sorted(zip(*np.nonzero(gone), strict=True)) == [(3, 5), (4, 6)]
+    assert np.isnan(points.calibration_covariance[3, 5]).all()
+
+
+def test_counts_are_reported():
+    told = {}
+    context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
+    triangulate_rings(rings(3), PROBE, TriangulateParameters(), context)
+    assert told["points triangulated"] == 3 * AZIMUTH.size
+    assert told["median point noise"] == pytest.approx(0.03, rel=0.5)
+
+
+def test_the_stage_is_wired_by_type():
+    assert list(TRIANGULATE.inputs()) == ["rings", "probe"]
