@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from pipeline.stage import Context, Stage
-from stages.motion.adjustment import Estimate, Measurements, adjust, third_difference_sigma
+from stages.motion.adjustment import MATCH_BIASES, Estimate, Measurements, adjust, third_difference_sigma
 from stages.motion.events import find_events
 from stages.motion.output import in_pipe_frame
 from stages.motion.parameters import MotionParameters
@@ -26,6 +27,8 @@ __all__ = ["MOTION", "MotionParameters", "estimate_motion"]
 Float = NDArray[np.float64]
 _LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
 _MARGIN_MM = 20.0
+_BLUE, _RED = 0, 2
+_YELLOW_NM = 575.0
 
 
 def estimate_motion(
@@ -58,7 +61,7 @@ def estimate_motion(
     bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
     bins = replace(bins, frame=_index_of(recording, bins.frame))
     measured = Measurements(tracks, bins, recording.frames.time_s, encoder_mm, probe, unsure, _LOOSE)
-    start = _first_guess(tracks, predictor, grid, len(recording.frames.frame), unsure.shape[1], parameters)
+    start = _first_guess(tracks, predictor, grid, len(recording.frames.frame), unsure.shape[1] + MATCH_BIASES, parameters)
     estimate = _adjusted(start, measured, parameters)
     trajectory = in_pipe_frame(estimate, recording.frames, measured)
     events = find_events(recording.frames, trajectory, tracks, estimate.state.slip, encoder_mm is not None)
@@ -112,8 +115,20 @@ def _tracked(
     half = 12 * probe.laser.line_sigma_mm if both else 0.0
     blocked = (probe.laser.baseline_mm - half, probe.laser.baseline_mm + half)
     tracker = TextureTracker(probe.camera, grid, parameters, blocked)
-    images = zip(_index_of(recording, lit), (image for _, image in recording.read(lit, "grey")), strict=False)
+    images = zip(_index_of(recording, lit), _wall_images(recording, lit, both, probe), strict=False)
     return track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
+
+
+def _wall_images(
+    recording: Recording, lit: NDArray[np.int64], both: bool, probe: Probe
+) -> Iterator[NDArray[np.uint8] | None]:
+    """Yield the lit frames' grey pictures; with the laser on, the colour that its light reaches least."""
+    if not both:
+        yield from (image for _, image in recording.read(lit, "grey"))
+        return
+    channel = _RED if probe.laser.wavelength_nm < _YELLOW_NM else _BLUE
+    for _, image in recording.read(lit, "bgr"):
+        yield None if image is None else np.ascontiguousarray(image[..., channel])
 
 
 def _require_distance(tracks: Tracks, encoder_mm: Float | None) -> None:

@@ -19,6 +19,7 @@ from stages.motion.tracking import Tracks
 
 Float = NDArray[np.float64]
 _CONVERGED_MM = 1e-3
+MATCH_BIASES = 2
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Measurements:
 
     def camera_at(self, state: State) -> Camera:
         """Return the camera with the corrections found so far."""
-        parameters = self.probe.parameters + self.unsure @ state.instrument
+        parameters = self.probe.parameters + self.unsure @ state.instrument[: self.unsure.shape[1]]
         return self.probe.camera.with_parameters(parameters[: len(self.probe.camera.parameter_names)])
 
 
@@ -116,9 +117,11 @@ def landmark_rows(
     tracks, camera = measured.tracks, measured.camera_at(state)
     T = state.T_pc[tracks.frame]
     xyz_c = transform(inverse(T), state.xyz_p[tracks.landmark])
-    residual = camera.project(xyz_c).uv - tracks.uv
+    bias = _match_bias(xyz_c, tracks.uv - camera.centre_px) * parameters.match_bias_px
+    residual = camera.project(xyz_c).uv + bias @ state.instrument[-MATCH_BIASES:] - tracks.uv
     by_c, by_parameters = camera.project_jacobian(xyz_c)
-    by_instrument = by_parameters @ measured.unsure[: by_parameters.shape[2]]
+    by_camera = by_parameters @ measured.unsure[: by_parameters.shape[2]]
+    by_instrument = np.concatenate([by_camera, bias], -1)
     by_point = by_c @ np.swapaxes(T[:, :3, :3], 1, 2)
     by_pose = np.concatenate([-by_point, by_c @ skew(xyz_c)], -1)
     size = np.linalg.norm(residual, axis=1)
@@ -136,6 +139,17 @@ def landmark_rows(
     )  # fmt: skip
     new_excess = float(np.median(size / tracks.sigma_px)) / np.sqrt(2 * np.log(2)) if len(size) else 1.0
     return rows, float(np.median(size)) if len(size) else 0.0, max(new_excess, 0.3) * np.sqrt(parameters.alike)
+
+
+def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
+    """Return (M, 2, 2) what matching may get wrong alike all round: radial, constant and linear in θ.
+
+    Light that falls off across a patch and blur that grows with distance shift matches along the radius; that
+    must not be taken for the lens.
+    """
+    theta = np.arctan2(np.hypot(xyz_c[:, 0], xyz_c[:, 1]), xyz_c[:, 2])
+    radial = from_centre_px / np.maximum(np.linalg.norm(from_centre_px, axis=1), 1.0)[:, None]
+    return radial[:, :, None] * np.stack([np.ones_like(theta), theta - 1.0], -1)[:, None, :]
 
 
 def third_difference_sigma(state: State, lit: NDArray[np.int64]) -> Float:

@@ -30,8 +30,9 @@ def in_pipe_frame(estimate: Estimate, frames: FrameTable, measured: Measurements
     T_pc = T_po @ state.T_pc
     covariance = _covariances(estimate, T_po[:3, :3])
     border = estimate.factor.border_covariance()
-    unsure = len(state.instrument)
-    instrument = border[len(border) - unsure :, len(border) - unsure :]
+    unsure = measured.unsure.shape[1]
+    own = slice(len(border) - len(state.instrument), len(border) - len(state.instrument) + unsure)
+    instrument = border[own, own]
     has_encoder = measured.encoder_mm is not None
     return Trajectory(
         frame=frames.frame,
@@ -44,7 +45,7 @@ def in_pipe_frame(estimate: Estimate, frames: FrameTable, measured: Measurements
         encoder_scale_sigma=float(np.sqrt(border[GLOBALS - 1, GLOBALS - 1])) if has_encoder else float("nan"),
         scale_sigma=float(np.sqrt(border[0, 0]) / state.globals[0]),
         events=(),
-        instrument=measured.probe.parameters + measured.unsure @ state.instrument,
+        instrument=measured.probe.parameters + measured.unsure @ state.instrument[:unsure],
         instrument_covariance=measured.unsure @ instrument @ measured.unsure.T,
     )
 

@@ -42,7 +42,10 @@ class MotionParameters(Parameters):
         0.01, gt=0, le=1, description="1 σ, mm, of the encoder's slip from one frame to the next"
     )
     alike: float = Field(
-        100.0, ge=1, le=10000, description="number of neighbouring observations of a landmark that err alike"
+        30.0, ge=1, le=10000, description="number of neighbouring observations of a landmark that err alike"
+    )
+    match_bias_px: float = Field(
+        0.05, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
     )
     iterations: int = Field(6, ge=2, le=50, description="Gauss-Newton steps of the joint adjustment")
     max_track_frames: int = Field(

@@ -37,7 +37,7 @@ class State:
         Sum of the deflections so far, as spline coefficients along x and y of the sections.
     knot_mm, nominal_radius_mm : float
     instrument : (Q,)
-        Corrections of the instrument along its principal uncertainties, in σ.
+        Corrections of the instrument along its principal uncertainties, then of texture matching, in σ.
     """
 
     T_pc: Float
@@ -99,7 +99,7 @@ def straight_start(
 ) -> State:
     """Return the state of a straight pipe from first guesses of poses and landmarks.
 
-    ``unsure`` is the number of the instrument's principal uncertainties.
+    ``unsure`` is the number of corrections of the instrument and of texture matching.
     """
     steps = max(int(np.ceil((to_mm - from_mm) / _AXIS_STEP_MM)), 2)
     z = np.linspace(from_mm, to_mm, steps + 1)

@@ -83,15 +83,15 @@ class Strip:
     usable : (H, W) bool
     coarse_uv : (H/4 + 1, W/4 + 1, 2) float32
         Pixels of every fourth row and column.
-    noise : float
-        1 σ of ``contrast`` from one sample to the next.
+    noise : (H,) float32
+        1 σ of ``contrast`` from one sample to the next, in each row.
     """
 
     first_row: int
     contrast: Float32
     usable: Mask
     coarse_uv: Float32
-    noise: float
+    noise: Float32
 
     def pixel(self, row: Float, column: Float) -> Float:
         """Return (..., 2) pixels of strip positions: exactly where `unroll` sampled the image."""
@@ -151,11 +151,13 @@ def _coarse_pixels(camera: Camera, T_pc: Float, grid: StripGrid, first_row: int)
     return camera.project(transform(inverse(T_pc), xyz)).uv.astype(np.float32)
 
 
-def _noise_of(contrast: Float32, usable: Mask) -> float:
-    """Return the noise's 1 σ from second differences around, which smooth texture hardly reaches."""
-    d = contrast[::3, 2:] - 2 * contrast[::3, 1:-1] + contrast[::3, :-2]
-    ok = usable[::3, 2:] & usable[::3, 1:-1] & usable[::3, :-2]
-    return float(1.4826 * np.median(np.abs(d[ok])) / np.sqrt(6)) if ok.any() else float("inf")
+def _noise_of(contrast: Float32, usable: Mask) -> Float32:
+    """Return each row's noise (H,), 1 σ, from second differences around, which texture hardly reaches."""
+    d = contrast[:, 4:] - 2 * contrast[:, 2:-2] + contrast[:, :-4]
+    ok = usable[:, 4:] & usable[:, 2:-2] & usable[:, :-4]
+    power = np.where(ok, d * d, 0).sum(1) / np.maximum(ok.sum(1), 1) / 6
+    power = gaussian_filter1d(power, 2 * _COURSE_PX) / np.maximum(gaussian_filter1d(ok.mean(1), 2 * _COURSE_PX), 1e-3)
+    return np.sqrt(power).astype(np.float32)
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]

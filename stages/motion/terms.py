@@ -59,11 +59,13 @@ def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
 def ring_rows(state: State, rings: RingBins) -> Rows:
     """Every ring bin lies on the pipe's smooth surface."""
     T = state.T_pc[rings.frame]
-    xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument
+    unsure = rings.by_instrument.shape[2]
+    xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument[:unsure]
     residual, normal, by_border = surface(state, transform(T, xyz_c))
     normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
     turn = -np.einsum("mj,mjk->mk", normal_c, skew(xyz_c))
-    by_border[:, by_border.shape[1] - len(state.instrument) :] = np.einsum("mj,mjq->mq", normal_c, rings.by_instrument)
+    first = state.border_size - len(state.instrument)
+    by_border[:, first : first + unsure] = np.einsum("mj,mjq->mq", normal_c, rings.by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
     by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
     weight = cauchy(residual / rings.sigma_mm) / rings.sigma_mm**2

@@ -189,11 +189,12 @@ class TextureTracker:
         row, column = self._free_spots(strip)
         patches = cut(strip.contrast, row, column, self._map.half)
         variance = np.trace(np.linalg.inv(patches.information + 1e-9 * np.eye(2)), axis1=1, axis2=2) / 2
-        good = strip.noise * np.sqrt(variance) < self._parameters.landmark_sigma_px
+        sigma_strip = strip.noise[row] * np.sqrt(variance)
+        good = sigma_strip < self._parameters.landmark_sigma_px
         at = np.stack([row[good] + strip.first_row, column[good]], -1).astype(float)
         first = len(self._map.row)
         self._map.add(at - drift, frame, patches.of(good))
-        sigma = np.maximum(strip.noise * np.sqrt(variance[good]), 0.02) * self._px_per_strip(strip, at)
+        sigma = np.maximum(sigma_strip[good], 0.02) * self._px_per_strip(strip, at)
         index = first + np.arange(len(at))
         self._rows.append((index, np.full(len(at), frame), strip.pixel(at[:, 0], at[:, 1]), sigma))
 

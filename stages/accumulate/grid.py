@@ -1,0 +1,178 @@
+"""From scattered rings to the regular radius map: binned in azimuth, local linear regression in distance.
+
+J. Fan, I. Gijbels, "Local polynomial modelling and its applications", 1996: a local line has no bias from the
+rings' uneven spacing, and its variance follows from its weights.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.stage import Progress
+from stages.accumulate.samples import WallSamples
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+_BLOCK = 64
+
+
+@dataclass(frozen=True)
+class MapGrid:
+    """Rows ``distance_mm`` (S,) and columns ``azimuth_rad`` (A,) of the radius map."""
+
+    distance_mm: Float
+    azimuth_rad: Float
+
+
+@dataclass(frozen=True)
+class RingColumns:
+    """Rings averaged in the map's azimuth columns, sorted by distance within each column.
+
+    Attributes
+    ----------
+    distance_mm, radius_mm, variance, misalignment_mm : (A, F)
+        Of each ring in each column; distance is NaN where the ring was not seen there.
+    count : (A, F) int
+        Samples averaged.
+    """
+
+    distance_mm: Float
+    radius_mm: Float
+    variance: Float
+    misalignment_mm: Float
+    count: NDArray[np.int64]
+
+
+def map_grid(samples: WallSamples, step_mm: float, azimuths: int) -> MapGrid:
+    """Return the grid that covers the distances at which at least half of a ring was seen."""
+    s = np.where(samples.valid, samples.distance_mm, np.nan)
+    some = samples.valid.mean(1) > 0.1
+    if not some.any():
+        some = samples.valid.any(1)
+    middle = np.nanmedian(s[some], axis=1)
+    first, last = np.ceil(middle.min() / step_mm), np.floor(middle.max() / step_mm)
+    distance = step_mm * np.arange(first, max(last, first + 1) + 1)
+    return MapGrid(distance, -np.pi + 2 * np.pi / azimuths * np.arange(azimuths))
+
+
+def rings_on_columns(samples: WallSamples, grid: MapGrid) -> RingColumns:
+    """Average each ring's samples in every column's bin, with weights from their noise."""
+    columns = len(grid.azimuth_rad)
+    frames = samples.valid.shape[0]
+    bin_of = np.rint(np.nan_to_num(samples.azimuth_rad + np.pi) / (2 * np.pi / columns)).astype(np.int64) % columns
+    sums = np.zeros((4, columns, frames))
+    count = np.zeros((columns, frames), np.int64)
+    _bin(
+        samples.valid, bin_of, samples.distance_mm, samples.radius_mm, samples.misalignment_mm,
+        samples.sigma_mm, sums, count,
+    )  # fmt: skip
+    weight = np.where(count > 0, sums[0], np.nan)
+    distance, radius, misalignment = (part / weight for part in sums[1:])
+    order = np.argsort(distance, axis=1, kind="stable")
+    pick = [np.take_along_axis(x, order, 1) for x in (distance, radius, 1 / weight, misalignment)]
+    return RingColumns(*pick, np.take_along_axis(count, order, 1))
+
+
+def gridded(
+    columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float, progress: Progress
+) -> tuple[Float32, Float32, NDArray[np.int64], Float32]:
+    """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen."""
+    shape = (len(grid.distance_mm), len(grid.azimuth_rad))
+    radius, sigma, misalignment = (np.full(shape, np.nan, np.float32) for _ in range(3))
+    count = np.zeros(shape, np.int64)
+    width = max(smoothing_mm, 0.6 * _usual_spacing(columns))
+    for a in range(0, shape[1], _BLOCK):
+        part = slice(a, min(a + _BLOCK, shape[1]))
+        _regress(
+            columns.distance_mm[part], columns.radius_mm[part], columns.variance[part],
+            columns.misalignment_mm[part], columns.count[part], grid.distance_mm, width, largest_gap_mm,
+            radius[:, part], sigma[:, part], count[:, part], misalignment[:, part],
+        )  # fmt: skip
+        progress(part.stop, shape[1])
+    return radius, sigma, count, misalignment
+
+
+def _usual_spacing(columns: RingColumns) -> float:
+    """Return the median distance between neighbouring rings, mm."""
+    step = np.diff(columns.distance_mm[:: max(len(columns.distance_mm) // 16, 1)], axis=1)
+    step = step[np.isfinite(step)]
+    return float(np.median(step)) if step.size else 0.0
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _bin(valid, bin_of, distance, radius, misalignment, sigma, sums, count):  # type: ignore[no-untyped-def]  # pragma: no cover
+    for f in range(valid.shape[0]):
+        for a in range(valid.shape[1]):
+            if valid[f, a]:
+                j = bin_of[f, a]
+                w = 1.0 / (sigma[f, a] * sigma[f, a] + 1e-12)
+                sums[0, j, f] += w
+                sums[1, j, f] += w * distance[f, a]
+                sums[2, j, f] += w * radius[f, a]
+                sums[3, j, f] += w * misalignment[f, a]
+                count[j, f] += 1
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _regress(  # type: ignore[no-untyped-def]  # pragma: no cover
+    distance, radius, variance, misalignment, count, rows, width, gap,
+    out_radius, out_sigma, out_count, out_misalignment,
+):  # fmt: skip
+    reach = 3.0 * width
+    for a in range(distance.shape[0]):
+        n = 0
+        while n < distance.shape[1] and np.isfinite(distance[a, n]):
+            n += 1
+        first = 0
+        for i in range(len(rows)):
+            s = rows[i]
+            while first < n and distance[a, first] < s - max(reach, gap):
+                first += 1
+            before, after = np.inf, np.inf
+            m0 = m1 = m2 = b0 = b1 = c0 = total = 0.0
+            k = first
+            while k < n and distance[a, k] <= s + max(reach, gap):
+                d = distance[a, k] - s
+                if d <= 0:
+                    before = -d
+                elif after == np.inf:
+                    after = d
+                w = np.exp(-0.5 * (d / width) ** 2) / variance[a, k]
+                m0 += w
+                m1 += w * d
+                m2 += w * d * d
+                b0 += w * radius[a, k]
+                b1 += w * d * radius[a, k]
+                c0 += w * misalignment[a, k]
+                if abs(d) <= width:
+                    total += count[a, k]
+                k += 1
+            if before + after > gap and min(before, after) > 0.5 * width:
+                continue
+            if m0 <= 0:
+                continue
+            determinant = m0 * m2 - m1 * m1
+            line = determinant > 1e-6 * m0 * m0 * width * width
+            value = (m2 * b0 - m1 * b1) / determinant if line else b0 / m0
+            slope = (m0 * b1 - m1 * b0) / determinant if line else 0.0
+            variance_sum, misfit, weight_sum, spread = 0.0, 0.0, 0.0, 0.0
+            for j in range(first, k):
+                d = distance[a, j] - s
+                w = np.exp(-0.5 * (d / width) ** 2) / variance[a, j]
+                c = w * (m2 - m1 * d) / determinant if line else w / m0
+                variance_sum += c * c * variance[a, j]
+                e = radius[a, j] - value - slope * d
+                u = np.exp(-0.5 * (d / width) ** 2)
+                misfit += u * e * e / variance[a, j]
+                weight_sum += u
+                spread += u * u
+            freedom = weight_sum - 2.0 * spread / max(weight_sum, 1e-12)
+            excess = misfit / freedom if freedom > 0.2 else 1.0
+            out_radius[i, a] = value
+            out_sigma[i, a] = np.sqrt(variance_sum * max(1.0, excess))
+            out_count[i, a] = int(total)
+            out_misalignment[i, a] = c0 / m0

@@ -1,0 +1,70 @@
+"""Ring samples in pipe coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import RingPoints, RingSamples, Trajectory
+from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WallSamples:
+    """Every ring sample on the wall; rows are laser frames, columns image azimuths.
+
+    Attributes
+    ----------
+    frame : (F,) int
+    valid : (F, A) bool
+    xyz_p : (F, A, 3)
+    distance_mm, azimuth_rad, radius_mm : (F, A)
+        Pipe coordinates.
+    sigma_mm : (F, A)
+        1 σ of the radius from image noise.
+    misalignment_mm : (F, A)
+        Radius with the sheet taken as square to the camera, minus ``radius_mm``.
+    section : (F, A, 3, 3)
+        The pipe's section frame at each sample.
+    """
+
+    frame: NDArray[np.int64]
+    valid: NDArray[np.bool_]
+    xyz_p: Float
+    distance_mm: Float
+    azimuth_rad: Float
+    radius_mm: Float
+    sigma_mm: Float
+    misalignment_mm: Float
+    section: Float
+
+
+def wall_samples(
+    probe: Probe, rings: RingSamples, points: RingPoints, trajectory: Trajectory
+) -> WallSamples:
+    """Triangulate with the probe as found in the run and place the points on the wall."""
+    index = np.searchsorted(trajectory.frame, rings.frame)
+    T_pc = trajectory.T_pc[np.minimum(index, len(trajectory.frame) - 1)]
+    ray = probe.camera.unproject(rings.pixels()).ray
+    xyz_p = _placed(T_pc, probe.laser.intersect(ray))
+    s, psi, radius = to_pipe(trajectory.axis, xyz_p)
+    square = replace(LaserSheet(probe.laser.baseline_mm), line_sigma_mm=probe.laser.line_sigma_mm)
+    uncorrected = to_pipe(trajectory.axis, _placed(T_pc, square.intersect(ray)))[2]
+    section = frames_at(trajectory.axis, np.where(np.isfinite(s), s, 0.0))[1]
+    outward = section[..., :, 0] * np.cos(psi)[..., None] + section[..., :, 1] * np.sin(psi)[..., None]
+    noise_p = np.einsum("fij,faj->fai", T_pc[:, :3, :3], points.noise_direction.astype(float))
+    sigma = np.abs(np.sum(outward * noise_p, -1))
+    known = trajectory.frame[np.minimum(index, len(trajectory.frame) - 1)] == rings.frame
+    valid = rings.valid & known[:, None] & np.isfinite(radius) & np.isfinite(sigma)
+    return WallSamples(rings.frame, valid, xyz_p, s, psi, radius, sigma, uncorrected - radius, section)
+
+
+def _placed(T_pc: Float, xyz_c: Float) -> Float:
+    """Return ring points (F, A, 3) of C in P."""
+    return np.einsum("fij,faj->fai", T_pc[:, :3, :3], xyz_c) + T_pc[:, None, :3, 3]
