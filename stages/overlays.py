@@ -54,40 +54,30 @@ def draw_overlays(
     UnusableError
         When the radius map holds no measured cell.
     """
-    radius_map = wall.radius_map
-    if not np.isfinite(radius_map.radius_mm).any():
+    if not np.isfinite(wall.radius_map.radius_mm).any():
         raise UnusableError("overlays", "no cell of the wall was measured", hint="see the stages before")
-    fitted = fitted_pipe(radius_map)
-    nominal = recording.pipe.nominal_diameter_mm / 2
-    signed, growing = parameters.signed_colours, parameters.growing_colours
-    overlays = Overlays(
-        radius_map.distance_mm,
-        radius_map.azimuth_rad,
-        fitted,
-        nominal,
-        _signed(
-            "deviation", "Deviation from the fitted pipe", radius_map.radius_mm - fitted, signed, parameters
-        ),
-        _signed(
-            "deviation_nominal",
-            "Deviation from the nominal pipe",
-            radius_map.radius_mm - nominal,
-            signed,
-            parameters,
-        ),
-        _growing("uncertainty", "Uncertainty of the radius (1 σ)", radius_map.sigma_mm, growing, parameters),
-        _signed(
-            "misalignment",
-            "Radius error if misalignment were ignored",
-            radius_map.misalignment_mm,
-            signed,
-            parameters,
-        ),
-    )
+    overlays = overlays_of(wall.radius_map, recording.pipe.nominal_diameter_mm, parameters)
     for overlay in overlays.pictures:
         context.report(f"overlay {overlay.name}: range", overlay.high_mm, "mm")
         context.report(f"overlay {overlay.name}: beyond the range", 100 * overlay.beyond, "%")
     return overlays
+
+
+def overlays_of(radius_map: RadiusMap, nominal_diameter_mm: float, parameters: OverlayParameters) -> Overlays:
+    """Return the error colours of a radius map that holds measured cells."""
+    radius, fitted, nominal = radius_map.radius_mm, fitted_pipe(radius_map), nominal_diameter_mm / 2
+    signed, growing = parameters.signed_colours, parameters.growing_colours
+    misaligned = radius_map.misalignment_mm
+    return Overlays(
+        radius_map.distance_mm,
+        radius_map.azimuth_rad,
+        fitted,
+        nominal,
+        _signed("deviation", "Deviation from the fitted pipe", radius - fitted, signed, parameters),
+        _signed("deviation_nominal", "Deviation from the nominal pipe", radius - nominal, signed, parameters),
+        _growing("uncertainty", "Uncertainty of the radius (1 σ)", radius_map.sigma_mm, growing, parameters),
+        _signed("misalignment", "Radius error if misalignment were ignored", misaligned, signed, parameters),
+    )
 
 
 def fitted_pipe(radius_map: RadiusMap) -> Float:

@@ -16,7 +16,7 @@ from pipeline.isolated import CrashError, TimeLimitError, call_isolated
 from pipeline.model import MeshTile, Overlays, TexturedMesh
 from pipeline.stage import Context, Parameters, Stage
 from stages.mesh.bake import bake_tile
-from stages.mesh.charts import cut_charts, pack, tile_length, unroll
+from stages.mesh.charts import cut_charts, pack, tile_count, tile_length, unroll
 from stages.mesh.decimate import Decimated, decimate
 from stages.mesh.poisson import folded_cells, poisson_surface
 from stages.mesh.surface import Surface, grid_surface, row_pieces, vertex_normals, weld
@@ -69,14 +69,16 @@ def make_mesh(
         When the wall has too few measured cells, or a library gave up or took longer than its limit.
     """
     kind = _choose_surface(wall, parameters, context)
-    make_pieces = {"grid": _grid_pieces, "poisson": _poisson_pieces}[kind]
-    pieces = make_pieces(wall, parameters, context)
+    tile_mm = _tile_length(wall, parameters)
+    if kind == "grid":
+        pieces = _grid_pieces(wall, tile_mm, parameters, context)
+    else:
+        pieces = _poisson_pieces(wall, parameters, context)
     surface = weld([p.surface for p in pieces])
     if len(surface.face) == 0:
         raise UnusableError("mesh", "no triangle could be made: too few measured cells lie side by side")
     normal = vertex_normals(surface)
     unrolled = unroll(surface, wall.axis)
-    tile_mm = tile_length(parameters.tile_mm, unrolled.reference_mm, parameters.texel_mm, parameters.atlas_px)
     charts = cut_charts(unrolled, surface, tile_mm, parameters.texel_mm)
     atlases = [pack(c, parameters.texel_mm) for c in charts]
     tiles = [bake_tile(a, surface, normal, unrolled, texture, overlays, parameters.texel_mm) for a in atlases]
@@ -93,11 +95,21 @@ def _choose_surface(wall: Wall, parameters: MeshParameters, context: Context) ->
     return "poisson" if folded >= parameters.least_folded_cells else "grid"
 
 
-def _grid_pieces(wall: Wall, parameters: MeshParameters, context: Context) -> list[Decimated]:
+def _tile_length(wall: Wall, parameters: MeshParameters) -> float:
+    radius = wall.radius_map.radius_mm
+    measured = radius[np.isfinite(radius)]
+    if len(measured) == 0:
+        raise UnusableError("mesh", "no cell of the wall was measured", hint="see the stages before")
+    return tile_length(
+        parameters.tile_mm, float(np.median(measured)), parameters.texel_mm, parameters.atlas_px
+    )
+
+
+def _grid_pieces(wall: Wall, tile_mm: float, parameters: MeshParameters, context: Context) -> list[Decimated]:
     """Return the radius map's surface in decimated pieces, made side by side so that memory stays bounded."""
     radius_map = wall.radius_map
-    spacing = float(radius_map.distance_mm[1] - radius_map.distance_mm[0])
-    rows = row_pieces(len(radius_map.distance_mm), max(1, round(parameters.tile_mm / spacing)))
+    length = float(np.ptp(radius_map.distance_mm))
+    rows = row_pieces(len(radius_map.distance_mm), tile_count(length, tile_mm))
     noise = np.nan_to_num(radius_map.sigma_random_mm.astype(float))
     allowance = parameters.error_mm + parameters.noise_factor * noise
     done: list[Decimated] = []

@@ -98,7 +98,12 @@ def tile_length(wished_mm: float, radius_mm: float, texel_mm: float, atlas_px: i
 
     The charts are near square, so half of the atlas is a safe share to fill.
     """
-    return min(wished_mm, 0.5 * (atlas_px * texel_mm) ** 2 / (2 * np.pi * radius_mm))
+    return float(min(wished_mm, 0.5 * (atlas_px * texel_mm) ** 2 / (2 * np.pi * radius_mm)))
+
+
+def tile_count(length_mm: float, tile_mm: float) -> int:
+    """Return in how many tiles of one length a pipe is cut."""
+    return max(1, round(length_mm / tile_mm))
 
 
 def cut_charts(unrolled: Unrolled, surface: Surface, tile_mm: float, texel_mm: float) -> list[list[Chart]]:
@@ -107,7 +112,7 @@ def cut_charts(unrolled: Unrolled, surface: Surface, tile_mm: float, texel_mm: f
     Triangles that face the axis at about the reference radius are unrolled, in sectors as wide as a tile is
     long; what folds over (a branch, say) is flattened by xatlas.
     """
-    tile, tiles = _tile_numbers(unrolled.distance_mm.mean(axis=1), tile_mm)
+    tile, tiles = _tile_numbers(unrolled.distance_mm, tile_mm)
     sectors = max(_LEAST_SECTORS, int(np.ceil(2 * np.pi * unrolled.reference_mm / tile_mm)))
     around = unrolled.azimuth_rad.mean(axis=1) / (2 * np.pi) + 0.5
     sector = np.where(unrolled.folded, sectors, np.floor(around * sectors).astype(int) % sectors)
@@ -142,11 +147,11 @@ def _box(size: Float) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     return corner.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
 
 
-def _tile_numbers(along: Float, tile_mm: float) -> tuple[Index, int]:
-    """Return the tile of each triangle and how many tiles there are, all of one length."""
-    low, high = float(along.min()), float(along.max())
-    tiles = max(1, round((high - low) / tile_mm))
-    tile = (tiles * (along - low) / max(high - low, 1e-9)).astype(np.int64)
+def _tile_numbers(distance_mm: Float, tile_mm: float) -> tuple[Index, int]:
+    """Return the tile of each triangle and how many tiles of one length there are."""
+    low, high = float(distance_mm.min()), float(distance_mm.max())
+    tiles = tile_count(high - low, tile_mm)
+    tile = (tiles * (distance_mm.mean(axis=1) - low) / max(high - low, 1e-9)).astype(np.int64)
     return np.minimum(tile, tiles - 1), tiles
 
 

@@ -28,7 +28,8 @@ class Decimated:
 def decimate(original: Surface, target_faces: int) -> Decimated:
     """Return ``original`` with about ``target_faces`` triangles, or more where its allowance asks for it.
 
-    The distance of every original vertex from the new surface is measured (one-sided Hausdorff distance).
+    The distance of every original vertex from the new surface is measured (one-sided Hausdorff distance), and
+    that of the new vertices from the original, since a collapse on a flat wall may throw a vertex far along it.
     Where one is larger than its vertex' allowance, the original is decimated again, half as much; if nothing
     is left to take away, the original itself is returned.
     """
@@ -36,7 +37,8 @@ def decimate(original: Surface, target_faces: int) -> Decimated:
     while goal < _WORTHWHILE * len(original.face):
         found = _collapse(original, goal)
         distance = distance_to_surface(original.vertex_p, found)
-        if np.all(distance <= original.allowance_mm):
+        back = distance_to_surface(found.vertex_p, original)
+        if np.all(distance <= original.allowance_mm) and np.all(back <= original.allowance_mm.max()):
             return _decimated(original, found, distance)
         goal *= 2
     return _decimated(original, original, np.zeros(len(original.vertex_p)))
@@ -79,7 +81,7 @@ def _collapse(surface: Surface, goal: int) -> Surface:
         preservenormal=True,
         preservetopology=True,
         optimalplacement=True,
-        planarquadric=False,
+        planarquadric=True,
         planarweight=0.001,
         qualityweight=False,
         autoclean=False,

@@ -40,10 +40,9 @@ class Surface:
     locked: NDArray[np.bool_]
 
 
-def row_pieces(rows: int, rows_per_piece: int) -> list[slice]:
+def row_pieces(rows: int, pieces: int) -> list[slice]:
     """Return slices that cut ``rows`` grid rows in pieces sharing their border rows."""
-    count = max(1, round((rows - 1) / rows_per_piece))
-    cut = np.rint(np.linspace(0, rows - 1, count + 1)).astype(int)
+    cut = np.unique(np.rint(np.linspace(0, rows - 1, pieces + 1)).astype(int))
     return [slice(int(a), int(b) + 1) for a, b in pairwise(cut)]
 
 

@@ -1,0 +1,300 @@
+"""The wall as a mesh: geometry, holes, decimation, charts and baked textures."""
+
+import dataclasses
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts import PipeAxis, PointCloud, Wall
+from pipeline.codec import digest
+from pipeline.errors import UnusableError
+from pipeline.geometry.axis import from_pipe, straight_axis, to_pipe
+from pipeline.model import MeshTile, Overlays, TexturedMesh
+from pipeline.native import open3d
+from pipeline.stage import quiet_context
+from stages.mesh import MeshParameters, make_mesh
+from stages.mesh.decimate import decimate
+from stages.mesh.poisson import folded_cells
+from stages.mesh.surface import grid_surface, row_pieces, weld
+from stages.overlays import OverlayParameters, overlays_of
+from tests.unit.small_wall import PIT, RADIUS, bent_axis, drawn_radius, small_wall, smooth_photo
+
+HOLE = (slice(60, 72), slice(100, 130))
+SRGB_LINEAR = np.where(
+    np.arange(256) / 255 <= 0.04045,
+    np.arange(256) / 255 / 12.92,
+    ((np.arange(256) / 255 + 0.055) / 1.055) ** 2.4,
+)
+
+
+def error_colours(wall: Wall) -> Overlays:
+    return overlays_of(wall.radius_map, 2 * RADIUS, OverlayParameters())
+
+
+def meshed(wall: Wall, **parameters: object) -> TexturedMesh:
+    chosen = MeshParameters.model_validate(parameters)
+    return make_mesh(wall, smooth_photo(), error_colours(wall), chosen, quiet_context())
+
+
+@pytest.fixture(scope="module")
+def plain() -> TexturedMesh:
+    """Two tiles, decimated with a strict bound."""
+    return meshed(small_wall(), tile_mm=25.0, noise_factor=0.0, error_mm=0.01)
+
+
+def boundary_edges(face: np.ndarray) -> np.ndarray:
+    """Edges (N, 2) that belong to one triangle only; fails where one belongs to more than two."""
+    edge = np.sort(face[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    found, count = np.unique(edge, axis=0, return_counts=True)
+    assert count.max() <= 2
+    return found[count == 1]
+
+
+def joined(mesh: TexturedMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of all tiles, equal positions merged."""
+    vertex = np.concatenate([t.vertex_p for t in mesh.tiles])
+    starts = np.cumsum([0, *(len(t.vertex_p) for t in mesh.tiles)])
+    face = np.concatenate([t.face + s for t, s in zip(mesh.tiles, starts, strict=False)])
+    unique, same = np.unique(vertex, axis=0, return_inverse=True)
+    return unique, same.ravel()[face]
+
+
+def radius_seen(mesh: TexturedMesh, wall: Wall, s: np.ndarray, psi: np.ndarray) -> np.ndarray:
+    """Radius of the mesh by rays from the axis; NaN where they leave through a hole.
+
+    The rays pass 0.1 µm beside their aim, since one that meets an edge exactly may slip through.
+    """
+    s, psi = s + 1e-4, psi + 4e-6
+    scene = open3d().t.geometry.RaycastingScene()
+    for tile in mesh.tiles:
+        scene.add_triangles(tile.vertex_p, tile.face.astype(np.uint32))
+    start = from_pipe(wall.axis, s, psi, np.zeros_like(s))
+    away = from_pipe(wall.axis, s, psi, np.ones_like(s)) - start
+    hit = scene.cast_rays(np.concatenate([start, away], -1).astype(np.float32))["t_hit"].numpy()
+    return np.where(np.isfinite(hit), hit, np.nan)
+
+
+@pytest.mark.parametrize("axis", [straight_axis(-40.0, 120.0), bent_axis(2e-3)])
+def test_grid_reproduces_the_radius_map(axis: PipeAxis) -> None:
+    wall = small_wall(axis=axis)
+    radius = wall.radius_map.radius_mm
+    surface = grid_surface(wall, slice(0, len(radius)), np.zeros(radius.shape))
+    s, psi, r = to_pipe(axis, surface.vertex_p)
+    np.testing.assert_allclose(r.reshape(radius.shape), radius, atol=1e-3)
+    np.testing.assert_allclose(
+        s.reshape(radius.shape),
+        np.broadcast_to(wall.radius_map.distance_mm[:, None], radius.shape),
+        atol=1e-3,
+    )
+    far = np.abs((psi.reshape(radius.shape) - wall.radius_map.azimuth_rad + np.pi) % (2 * np.pi) - np.pi)
+    assert far.max() * RADIUS < 1e-3
+
+
+def test_grid_is_closed_around_and_faces_inward() -> None:
+    wall = small_wall()
+    rows, columns = wall.radius_map.radius_mm.shape
+    surface = grid_surface(wall, slice(0, rows), np.zeros((rows, columns)))
+    open_edges = boundary_edges(surface.face)
+    assert len(open_edges) == 2 * columns
+    assert set(np.unique(surface.vertex_p[open_edges][..., 2])) == {0.0, 50.0}
+    a, b, c = np.moveaxis(surface.vertex_p[surface.face], 1, 0)
+    assert np.all(np.sum(np.cross(b - a, c - a)[:, :2] * a[:, :2], axis=1) < 0)
+
+
+def test_holes_stay_and_single_missing_cells_leave_triangles() -> None:
+    wall = small_wall(hole=(slice(10, 11), slice(20, 21)))
+    rows, columns = wall.radius_map.radius_mm.shape
+    surface = grid_surface(wall, slice(0, rows), np.zeros((rows, columns)))
+    assert len(surface.face) == 2 * (rows - 1) * columns - 4
+    assert len(boundary_edges(surface.face)) == 2 * columns + 4
+
+
+def test_pieces_share_their_border_rows() -> None:
+    pieces = row_pieces(101, 3)
+    assert pieces[0].start == 0
+    assert pieces[-1].stop == 101
+    assert all(a.stop - 1 == b.start for a, b in pairwise(pieces))
+    wall = small_wall()
+    none = np.zeros(wall.radius_map.radius_mm.shape)
+    surface = weld([grid_surface(wall, p, none) for p in pieces])
+    assert len(boundary_edges(surface.face)) == 2 * 360
+    assert len(surface.vertex_p) == none.size
+
+
+def test_decimated_tiles_close_around_the_seam_and_to_each_other(plain: TexturedMesh) -> None:
+    assert len(plain.tiles) == 2
+    vertex, face = joined(plain)
+    ends = vertex[boundary_edges(face)][..., 2]
+    assert np.all((ends < 0.01) | (ends > 49.99))
+
+
+def test_decimation_keeps_its_bound(plain: TexturedMesh) -> None:
+    assert plain.triangles < 0.5 * plain.wall_triangles
+    assert 0 < plain.decimation_error_mm <= 0.01
+    wall = small_wall()
+    s, psi = np.meshgrid(wall.radius_map.distance_mm[1:-1], wall.radius_map.azimuth_rad, indexing="ij")
+    error = radius_seen(plain, wall, s, psi) - wall.radius_map.radius_mm[1:-1]
+    # Along the radius, not to the nearest point: the pit's flanks slope by up to 20 degrees.
+    assert np.abs(error).max() < 0.01 / np.cos(np.radians(25))
+    assert np.abs(error).max() > 0.2 * plain.decimation_error_mm
+
+
+def test_no_vertex_leaves_the_wall(plain: TexturedMesh) -> None:
+    """On a wall without curvature along the pipe, a collapse can throw a vertex anywhere along it."""
+    vertex = np.concatenate([t.vertex_p for t in plain.tiles])
+    assert vertex[:, 2].min() > -0.01
+    assert vertex[:, 2].max() < 50.01
+    radius = np.hypot(vertex[:, 0], vertex[:, 1])
+    far = np.abs(radius - drawn_radius(vertex[:, 2], np.arctan2(vertex[:, 1], vertex[:, 0])))
+    assert far.max() < 0.03
+    for tile in plain.tiles:
+        assert np.ptp(tile.vertex_p[tile.face][..., 2], axis=1).max() < 12
+
+
+def test_a_bound_that_cannot_be_kept_leaves_the_grid_alone() -> None:
+    wall = small_wall(noise_mm=0.05, length_mm=10.0)
+    surface = grid_surface(wall, slice(0, 21), np.full((21, 360), 1e-5))
+    kept = decimate(surface, 500)
+    assert len(kept.surface.face) == len(surface.face)
+    assert kept.largest_error_mm < 1e-5
+
+
+def test_pit_depth_survives_noise_and_decimation() -> None:
+    wall = small_wall(noise_mm=0.02)
+    mesh = meshed(wall)
+    assert mesh.triangles < 0.5 * mesh.wall_triangles
+    at, around, depth, _ = PIT
+    s, psi = np.meshgrid(at + np.linspace(-0.5, 0.5, 9), around + np.linspace(-0.5, 0.5, 9) / RADIUS)
+    seen = radius_seen(mesh, wall, s, psi).mean()
+    # Nine grid cells of noise 0.02 leave 0.007 mm of the map's own.
+    true = drawn_radius(s, psi).mean()
+    assert depth > 1
+    assert abs(seen - true) < 0.015
+
+
+def test_what_was_not_seen_stays_a_hole() -> None:
+    wall = small_wall(hole=HOLE)
+    mesh = meshed(wall)
+    psi = wall.radius_map.azimuth_rad
+    s_in, psi_in = np.meshgrid(np.arange(30.5, 35.3, 0.5), psi[102:128])
+    assert np.isnan(radius_seen(mesh, wall, s_in, psi_in)).all()
+    s_out, psi_out = np.meshgrid(np.arange(27.0, 29.0, 0.5), psi)
+    assert np.isfinite(radius_seen(mesh, wall, s_out, psi_out)).all()
+
+
+@pytest.mark.parametrize("surface", ["grid", "poisson"])
+def test_charts_lie_in_the_atlas_and_never_overlap(surface: str) -> None:
+    cloud, axis = tee()
+    wall = small_wall(axis=axis) if surface == "grid" else Wall(cloud, small_wall().radius_map, axis)
+    for tile in meshed(wall, surface=surface).tiles:
+        assert tile.uv.min() >= 0
+        assert tile.uv.max() <= 1
+        assert overlap(tile) < 1e-4
+
+
+def overlap(tile: MeshTile) -> float:
+    """Share of points of the atlas that lie in more than one triangle."""
+    flat = np.column_stack([tile.uv, np.zeros(len(tile.uv))]).astype(np.float32)
+    scene = open3d().t.geometry.RaycastingScene()
+    scene.add_triangles(flat, tile.face.astype(np.uint32))
+    point = np.random.default_rng(0).uniform(size=(200_000, 2))
+    up = np.tile([-1.0, 0.0, 0.0, 1.0], (len(point), 1))
+    count = scene.count_intersections(np.column_stack([point, up]).astype(np.float32)).numpy()
+    assert np.mean(count == 1) > 0.4
+    return float(np.mean(count > 1))
+
+
+def test_photo_and_error_colours_lie_where_they_belong(plain: TexturedMesh) -> None:
+    wall, photo = small_wall(), smooth_photo()
+    overlays = error_colours(wall)
+    for tile in plain.tiles:
+        s, psi, _ = to_pipe(wall.axis, tile.vertex_p.astype(float))
+        px = tile.uv * np.array(tile.photo_bgr.shape[1::-1]) - 0.5
+        column, row = np.clip(np.rint(px).astype(int), 0, np.array(tile.photo_bgr.shape[1::-1]) - 1).T
+        linear = 255 * SRGB_LINEAR[tile.photo_bgr[row, column]]
+        want = np.stack(
+            [60 + 2 * (s - photo.distance_from_mm), 128 + 90 * np.cos(psi), 128 + 90 * np.sin(psi)], -1
+        )
+        assert np.abs(linear - want).max() < 3
+        error = next(e for e in tile.errors if e.variant == "misalignment")
+        h, w = error.level.shape
+        level = error.level[
+            np.minimum((tile.uv[:, 1] * h).astype(int), h - 1),
+            np.minimum((tile.uv[:, 0] * w).astype(int), w - 1),
+        ]
+        value = overlays.misalignment.low_mm + (level - 1.0) / 254 * (2 * overlays.misalignment.high_mm)
+        assert np.abs(value - 0.2 * np.cos(psi)).max() < 0.01
+
+
+def test_atlases_respect_their_limit() -> None:
+    mesh = meshed(small_wall(length_mm=40.0), texel_mm=0.05, atlas_px=1024)
+    assert len(mesh.tiles) > 1
+    assert max(max(t.photo_bgr.shape[:2]) for t in mesh.tiles) <= 1024
+
+
+def test_same_wall_same_bytes() -> None:
+    wall = small_wall(noise_mm=0.01, length_mm=20.0)
+    assert digest(meshed(wall, tile_mm=10.0)) == digest(meshed(wall, tile_mm=10.0))
+
+
+def test_a_wall_of_nothing_is_refused() -> None:
+    wall = small_wall(length_mm=10.0)
+    colours = error_colours(wall)
+    none = dataclasses.replace(wall.radius_map, radius_mm=np.full_like(wall.radius_map.radius_mm, np.nan))
+    with pytest.raises(UnusableError, match="no cell of the wall"):
+        make_mesh(
+            dataclasses.replace(wall, radius_map=none),
+            smooth_photo(),
+            colours,
+            MeshParameters(),
+            quiet_context(),
+        )
+
+
+def tee(points: int = 24000) -> tuple[PointCloud, PipeAxis]:
+    """Cloud of a pipe of radius 25 mm with a branch of radius 12 mm toward +x at distance 25 mm."""
+    random = np.random.default_rng(0)
+    psi, z = random.uniform(-np.pi, np.pi, points), random.uniform(0, 50, points)
+    run = np.stack([25 * np.cos(psi), 25 * np.sin(psi), z], -1)
+    mouth = (np.hypot(run[:, 1], z - 25) < 12) & (run[:, 0] > 0)
+    t, x = random.uniform(-np.pi, np.pi, points // 4), random.uniform(20, 42, points // 4)
+    branch = np.stack([x, 12 * np.sin(t), 25 + 12 * np.cos(t)], -1)
+    beyond = np.hypot(branch[:, 0], branch[:, 1]) >= 25
+    xyz = np.concatenate([run[~mouth], branch[beyond]])
+    inward = [-run[~mouth] / 25 * [1, 1, 0], (np.stack([0 * t, -np.sin(t), -np.cos(t)], -1))[beyond]]
+    axis = straight_axis(-40.0, 120.0)
+    s, azimuth, r = to_pipe(axis, xyz)
+    sigma, frame = np.full(len(s), 0.02), np.zeros(len(s), np.int64)
+    columns = (xyz, np.concatenate(inward), sigma, r, s, azimuth)
+    return PointCloud(*(c.astype(np.float32) for c in columns), frame), axis
+
+
+def test_a_branch_is_reconstructed_by_poisson_within_its_limit() -> None:
+    cloud, axis = tee()
+    wall = Wall(cloud, small_wall().radius_map, axis)
+    mesh = meshed(wall, time_limit_s=120.0)
+    assert mesh.surface == "poisson"
+    scene = open3d().t.geometry.RaycastingScene()
+    for tile in mesh.tiles:
+        scene.add_triangles(tile.vertex_p, tile.face.astype(np.uint32))
+    far = scene.compute_distance(cloud.xyz_p).numpy()
+    assert np.quantile(far, 0.99) < 0.2
+    vertex = np.concatenate([t.vertex_p for t in mesh.tiles])
+    assert vertex[:, 0].max() > 40
+
+
+def test_poisson_is_given_up_at_its_time_limit() -> None:
+    cloud, axis = tee()
+    with pytest.raises(UnusableError, match="longer than"):
+        meshed(
+            Wall(cloud, small_wall().radius_map, axis),
+            surface="poisson",
+            time_limit_s=1.0,
+            poisson_cell_mm=0.05,
+        )
+
+
+def test_only_a_wall_that_folds_over_counts_as_folded() -> None:
+    assert folded_cells(tee()[0], 2.0, 0.35) >= 20
+    assert folded_cells(small_wall(noise_mm=0.05).cloud, 2.0, 0.35) == 0
