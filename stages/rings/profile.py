@@ -26,6 +26,7 @@ _FLANK = 0.6
 _STEPS, _FULL_STEPS = 12, 4
 _LOG_WIDTH_PRIOR = 0.3
 _SLOPE_SECTORS = 6
+_LEAST_ARC_PX = 1.2
 _CLIP_SIGMAS = 2.0
 # Steps converge quadratically: one this small leaves less than a hundredth of it to go.
 _SETTLED_WIDTHS, _SETTLED_LOG_WIDTH = 0.03, 0.06
@@ -62,7 +63,7 @@ class ProfileFit(NamedTuple):
 
     ``radius_px``, ``width_px`` (1 σ), ``amplitude`` and ``background`` in grey levels, ``sigma_px`` and
     ``amplitude_sigma`` from the Fisher information, ``chi2`` per degree of freedom, ``unclipped_below`` and
-    ``unclipped_above``: pixels of the line's inner and outer flank (0.5 to 2.5 widths) that did not clip.
+    ``unclipped_above``: pixels of the line's inner and outer flank (0.5 to 3 widths) that did not clip.
     """
 
     radius_px: Float
@@ -109,28 +110,48 @@ def first_at_least(values, low, high, limit):  # type: ignore[no-untyped-def]
     return low
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _guess(image, pixel, radius, low, high, r0, width):  # type: ignore[no-untyped-def]
-    """Background at r0, its slope, line height, and whether both flanks were seen."""
+@numba.njit(cache=True, nogil=True)
+def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  # type: ignore[no-untyped-def]
+    """Copy grey levels and distances to the seed of sector ``a``'s pixels near it; return their number.
+
+    Where sectors are narrower than a pixel, whole neighbours are joined in until there is enough to fit.
+    """
+    sectors = start.size - 1
+    step = 2 * np.pi / sectors
+    aside = int(np.ceil(0.5 * (_LEAST_ARC_PX / (step * seed) - 1))) if step * seed < _LEAST_ARC_PX else 0
+    count = 0
+    for turn in range(-aside, aside + 1):
+        b = (a + turn) % sectors
+        k = first_at_least(radius, start[b], start[b + 1], seed - half)
+        while k < start[b + 1] and radius[k] <= seed + half and count < y.size:
+            y[count] = image[pixel[k]]
+            t[count] = radius[k] - seed - slope * (offset[k] + turn * step)
+            count += 1
+            k += 1
+    return count
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _guess(y, t, count, width, p):  # type: ignore[no-untyped-def]
+    """Start ``p`` = (r − seed, ln w, A, b0, b1) from flanks and peak; False when a flank is not seen."""
     edge = _FLANK * WINDOW_WIDTHS * width
     top, inner, inners, outer, outers = 0.0, 0.0, 0, 0.0, 0
-    for k in range(low, high):
-        y = float(image[pixel[k]])
-        x = radius[k] - r0
-        if x < -edge:
-            inner += y
+    for k in range(count):
+        if t[k] < -edge:
+            inner += y[k]
             inners += 1
-        elif x > edge:
-            outer += y
+        elif t[k] > edge:
+            outer += y[k]
             outers += 1
-        elif abs(x) < width and y > top:
-            top = y
+        elif abs(t[k]) < width and y[k] > top:
+            top = y[k]
     if inners == 0 or outers == 0:
-        return 0.0, 0.0, 0.0, False
+        return False
     inner /= inners
     outer /= outers
-    b0 = 0.5 * (inner + outer)
-    return b0, (outer - inner) / ((1 + _FLANK) * WINDOW_WIDTHS * width), max(top - b0, 1.0), True
+    p[0], p[1], p[3] = 0.0, np.log(width), 0.5 * (inner + outer)
+    p[2], p[4] = max(top - p[3], 1.0), (outer - inner) / ((1 + _FLANK) * WINDOW_WIDTHS * width)
+    return True
 
 
 @numba.njit(cache=True, nogil=True)
@@ -177,25 +198,24 @@ def _inverse_diagonal(n, index, v):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, response, trusted, n, v):  # type: ignore[no-untyped-def]
-    """Fill ``n`` (5, 5) and ``v`` (5,) at parameters p = (r, ln w, A, b0, b1); return χ²."""
+def _normal_equations(y, t, count, p, response, trusted, n, v):  # type: ignore[no-untyped-def]
+    """Fill ``n`` (5, 5) and ``v`` (5,) at parameters p = (r − seed, ln w, A, b0, b1); return χ²."""
     r, height, b0, b1 = p[0], p[2], p[3], p[4]
     iw = np.exp(-p[1])
     black, variance, per_level, _ = response
     n00 = n10 = n11 = n20 = n21 = n22 = n30 = n31 = n32 = n33 = n40 = n41 = n42 = n43 = n44 = 0.0
     v0 = v1 = v2 = v3 = v4 = chi2 = 0.0
-    for k in range(low, high):
-        t = radius[k] - r0
-        x = (radius[k] - r - slope * offset[k]) * iw
+    for k in range(count):
+        x = (t[k] - r) * iw
         e = np.exp(-0.5 * x * x)
-        m = height * e + b0 + b1 * t
+        m = height * e + b0 + b1 * t[k]
         if m > trusted:
             continue
         weight = 1.0 / (variance + per_level * max(m - black, 0.0))
-        residual = image[pixel[k]] - m
+        residual = y[k] - m
         d0 = height * e * x * iw
         d1 = height * e * x * x
-        w0, w1, w2, w3, w4 = weight * d0, weight * d1, weight * e, weight, weight * t
+        w0, w1, w2, w3, w4 = weight * d0, weight * d1, weight * e, weight, weight * t[k]
         chi2 += weight * residual * residual
         v0 += w0 * residual
         v1 += w1 * residual
@@ -216,7 +236,7 @@ def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, res
         n41 += w4 * d1
         n42 += w4 * e
         n43 += w4
-        n44 += w4 * t
+        n44 += w4 * t[k]
     n[0, 0], n[1, 0], n[1, 1], n[2, 0], n[2, 1], n[2, 2] = n00, n10, n11, n20, n21, n22
     n[3, 0], n[3, 1], n[3, 2], n[3, 3] = n30, n31, n32, n33
     n[4, 0], n[4, 1], n[4, 2], n[4, 3], n[4, 4] = n40, n41, n42, n43, n44
@@ -225,63 +245,66 @@ def _normal_equations(image, pixel, radius, offset, low, high, r0, p, slope, res
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _flank_counts(radius, low, high, r0, p, trusted):  # type: ignore[no-untyped-def]
-    """Clipped pixels, and unclipped ones on the inner and the outer flank (0.5 to 2.5 widths)."""
+def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
+    """Clipped pixels, and unclipped ones on the inner and the outer flank (0.5 to 3 widths)."""
     clipped, inner, outer = 0, 0, 0
     iw = np.exp(-p[1])
     may_clip = p[2] + p[3] + abs(p[4]) / iw > trusted
-    for k in range(low, high):
-        x = (radius[k] - p[0]) * iw
-        if abs(x) > 2.5:
-            continue
-        if may_clip and p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * (radius[k] - r0) > trusted:
+    for k in range(count):
+        x = (t[k] - p[0]) * iw
+        if may_clip and p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * t[k] > trusted:
             clipped += 1
-        elif x < -0.5:
+        elif -3.0 < x < -0.5:
             inner += 1
-        elif x > 0.5:
+        elif 0.5 < x < 3.0:
             outer += 1
     return clipped, inner, outer
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
+@numba.njit(cache=True, nogil=True)
+def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-untyped-def]
+    """Take Gauss–Newton steps from ``p`` until the next would not matter; return χ², NaN when they do not end.
+
+    A weak prior on ln w holds the width where clipping leaves little of the profile. Late steps are halved:
+    the weights follow the model, and full steps may then go to and fro.
+    """
+    for step in range(_STEPS):
+        chi2 = _normal_equations(y, t, count, p, response, trusted, n, v)
+        n[1, 1] += 1.0 / _LOG_WIDTH_PRIOR**2
+        v[1] += (np.log(width) - p[1]) / _LOG_WIDTH_PRIOR**2
+        if not _factor(n):
+            return np.nan
+        _solve(n, v)
+        if step >= _FULL_STEPS:
+            v *= 0.5
+        settled = abs(v[0]) < _SETTLED_WIDTHS * width and abs(v[1]) < _SETTLED_LOG_WIDTH
+        v[0] = min(max(v[0], -width), width)
+        v[1] = min(max(v[1], -0.3), 0.3)
+        p += v
+        if abs(p[0]) > WINDOW_WIDTHS * width:
+            return np.nan
+        if settled:
+            return chi2 if p[2] > 0 else np.nan
+    return np.nan
+
+
+@numba.njit(cache=True, nogil=True)
 def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, response, trusted, out):  # type: ignore[no-untyped-def]
     n, v, p = np.empty((5, 5)), np.empty(5), np.empty(5)
     half = WINDOW_WIDTHS * width
-    prior = 1.0 / _LOG_WIDTH_PRIOR**2
+    y, t = np.empty(int(8 * half) + 64), np.empty(int(8 * half) + 64)
+    out[:] = np.nan
     for a in range(seed.size):
-        out[:, a] = np.nan
-        r0 = seed[a]
-        if not np.isfinite(r0):
+        if not np.isfinite(seed[a]):
             continue
-        low = first_at_least(radius, start[a], start[a + 1], r0 - half)
-        high = first_at_least(radius, low, start[a + 1], r0 + half)
-        b0, b1, height, seen = _guess(image, pixel, radius, low, high, r0, width)
-        if not seen or high - low <= v.size:
+        count = _gather(image, start, pixel, radius, offset, a, seed[a], slope[a], half, y, t)
+        if count <= v.size or not _guess(y, t, count, width, p):
             continue
-        p[0], p[1], p[2], p[3], p[4] = r0, np.log(width), height, b0, b1
-        chi2, settled = 0.0, False
-        for step in range(_STEPS):
-            chi2 = _normal_equations(
-                image, pixel, radius, offset, low, high, r0, p, slope[a], response, trusted, n, v
-            )
-            n[1, 1] += prior
-            v[1] += prior * (np.log(width) - p[1])
-            if not _factor(n):
-                break
-            _solve(n, v)
-            if step >= _FULL_STEPS:
-                v *= 0.5
-            settled = abs(v[0]) < _SETTLED_WIDTHS * width and abs(v[1]) < _SETTLED_LOG_WIDTH
-            v[0] = min(max(v[0], -width), width)
-            v[1] = min(max(v[1], -0.3), 0.3)
-            p += v
-            if settled or abs(p[0] - r0) > half:
-                break
-        if not settled or abs(p[0] - r0) > half or p[2] <= 0.0:
+        chi2 = _settle(y, t, count, width, response, trusted, n, v, p)
+        if np.isnan(chi2):
             continue
-        out[0, a], out[1, a], out[2, a], out[3, a] = p[0], np.exp(p[1]), p[2], p[3]
+        out[0, a], out[1, a], out[2, a], out[3, a] = seed[a] + p[0], np.exp(p[1]), p[2], p[3]
         out[4, a] = np.sqrt(_inverse_diagonal(n, 0, v))
         out[5, a] = np.sqrt(_inverse_diagonal(n, 2, v))
-        out[6, a] = chi2 / (high - low - v.size)
-        clipped, inner, outer = _flank_counts(radius, low, high, r0, p, trusted)
-        out[7, a], out[8, a], out[9, a] = clipped, inner, outer
+        out[6, a] = chi2 / (count - v.size)
+        out[7, a], out[8, a], out[9, a] = _flank_counts(t, count, p, trusted)

@@ -42,6 +42,11 @@ class Sectors:
     radius_px: NDArray[np.float32]
     offset_rad: NDArray[np.float32]
 
+    @property
+    def outermost_px(self) -> Float:
+        """(A,) radius of each sector's outermost pixel."""
+        return self.radius_px[self.start[1:] - 1].astype(float)
+
     def pixels_near(self, radius_px: Float, least_px: float, most_px: float) -> NDArray[np.int32]:
         """Return flat indices of the pixels whose distance to the ring (A,) is in [least, most), px."""
         away = np.abs(self.radius_px - np.repeat(radius_px, np.diff(self.start)).astype(np.float32))

@@ -14,9 +14,11 @@ from stages.rings.search import BAND_WIDTHS, Image, Peaks, detection_limit, find
 from stages.rings.sectors import Sectors
 from stages.rings.validity import middle_and_spread
 
-_LEAST_FLANK_PIXELS = 2
+_EDGE_WIDTHS = 2.5
 _ODD, _TYPICAL = 6.0, 3.0
 _LEAST_SPREAD = 0.02
+# No wall reflects so evenly that a line a fifth fainter could not be the true one.
+_REFLECTANCE_SPREAD = 0.2
 _MOST = 0.5
 
 
@@ -82,7 +84,7 @@ def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace 
     if missing.any():
         peaks = _search_rays(image, sectors, peaks, missing, width, noise)
     fit = fit_line(image, sectors, peaks.radius_px, width, before.response)
-    return RingTrace(fit, _judge(fit, peaks), float(np.nanmedian(fit.width_px)), before.response)
+    return RingTrace(fit, _judge(fit, peaks, sectors), float(np.nanmedian(fit.width_px)), before.response)
 
 
 def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrace | None:
@@ -101,7 +103,7 @@ def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrac
         width = float(np.nanmedian(fit.width_px))
         response = noise_response(image, sectors, fit, response)
         fit = fit_line(image, sectors, peaks.radius_px, width, response)
-    return RingTrace(fit, _judge(fit, peaks), width, response)
+    return RingTrace(fit, _judge(fit, peaks, sectors), width, response)
 
 
 def _limit(sectors: Sectors, positions: float) -> float:
@@ -119,7 +121,7 @@ def _search_rays(
     return Peaks(*(np.where(missing, w + found, p) for w, p in zip(wide, peaks, strict=True)))
 
 
-def _judge(fit: ProfileFit, peaks: Peaks) -> Byte:
+def _judge(fit: ProfileFit, peaks: Peaks, sectors: Sectors) -> Byte:
     """Return `RingValidity` (A,) as far as a single image tells; of several reasons the last named here wins.
 
     Limits come from the ring itself: a sample is odd when it leaves the spread of the ring's own samples.
@@ -127,20 +129,20 @@ def _judge(fit: ProfileFit, peaks: Peaks) -> Byte:
     v = RingValidity
     brightness, width, misfit = np.log(fit.amplitude), np.log(fit.width_px), np.log(fit.chi2)
     rival = np.log(fit.amplitude * np.maximum(peaks.rival_score, 1e-9) / peaks.score)
-    thin = ~(np.minimum(fit.unclipped_below, fit.unclipped_above) >= _LEAST_FLANK_PIXELS)
+    thin = ~(np.minimum(fit.unclipped_below, fit.unclipped_above) >= 1)
     out = np.full(len(thin), v.VALID, np.uint8)
     out[np.abs(_oddness(width, width)) > _ODD] = v.WIDTH
-    out[_oddness(brightness, brightness) > _ODD] = v.GLINT
+    out[_oddness(brightness, brightness, _REFLECTANCE_SPREAD) > _ODD] = v.GLINT
     out[_oddness(misfit, misfit) > _ODD] = v.GHOST
-    out[_oddness(rival, brightness) > -_TYPICAL] = v.GHOST
+    out[_oddness(rival, brightness, _REFLECTANCE_SPREAD) > -_TYPICAL] = v.GHOST
     out[~(fit.amplitude > detection_limit(len(thin)) * fit.amplitude_sigma)] = v.LOW_CONTRAST
     out[thin & (fit.clipped > 0)] = v.SATURATED
-    out[thin & ~(fit.clipped > 0)] = v.OUT_OF_VIEW
+    out[fit.radius_px > sectors.outermost_px - _EDGE_WIDTHS * fit.width_px] = v.OUT_OF_VIEW
     out[np.isnan(fit.radius_px)] = v.NO_LINE
     return out
 
 
-def _oddness(value: Float, ring: Float) -> Float:
+def _oddness(value: Float, ring: Float, least_spread: float = _LEAST_SPREAD) -> Float:
     """Return how many robust σ of the ``ring``'s own values each ``value`` (A,) is above their median."""
     middle, spread = middle_and_spread(ring)
-    return np.asarray((value - middle) / max(spread, _LEAST_SPREAD))
+    return np.asarray((value - middle) / max(spread, least_spread))

@@ -1,0 +1,125 @@
+"""The rings stage on whole recordings in memory: counting, defects kept, spikes removed, lit walls, true σ."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.artefacts import RingValidity
+from pipeline.errors import UnusableError
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from pipeline.stage import quiet_context
+from stages.rings import RINGS, RingParameters, extract_rings
+from tests.ring_images import exposed, memory_recording, off_centre, ring_light
+
+SIZE, CENTRE = (640, 480), (318.7, 241.3)
+PROBE = Probe(KannalaBrandt(SIZE, (140.0, 140.0), CENTRE), LaserSheet(22.0), np.zeros((20, 20)))
+PARAMETERS = RingParameters(azimuths=720)
+SECTOR = 2 * np.pi / 720
+
+
+def image(radius, seed, amplitude=90.0):
+    return exposed(ring_light(SIZE, CENTRE, radius, 1.2, amplitude), np.random.default_rng(seed))
+
+
+def extracted(images, illumination=None, context=None):
+    recording = memory_recording(images, illumination or ["laser"] * len(images), SIZE)
+    return extract_rings(recording, PROBE, PARAMETERS, context or quiet_context())
+
+
+def test_every_frame_is_accounted_for():
+    ring = off_centre(165.0, 7.0)
+    images = {i: image(ring, i) for i in range(6)}
+    images[2] = None
+    images[4] = exposed(np.zeros(SIZE[::-1]), np.random.default_rng(9))
+    told = {}
+    context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
+    kinds = ["laser"] * 5 + ["led"]
+    samples = extracted(images, kinds, context)
+    assert samples.frame.tolist() == [0, 1, 2, 3, 4]
+    assert samples.valid.mean(1).round(2).tolist() == [1, 1, 0, 1, 0]
+    assert (samples.validity[[2, 4]] == RingValidity.FRAME_REJECTED).all()
+    assert told["ring samples rejected: frame_rejected"] == 2 * 720
+    assert sum(v for k, v in told.items() if k.startswith("ring samples")) == 5 * 720
+    assert np.allclose(samples.pixels()[0, 0], np.array(CENTRE) - [samples.radius_px[0, 0], 0], atol=1e-4)
+
+
+def test_a_recording_without_rings_is_unusable():
+    dark = {i: exposed(np.zeros(SIZE[::-1]), np.random.default_rng(i)) for i in range(2)}
+    with pytest.raises(UnusableError, match="no laser ring"):
+        extracted(dark)
+    with pytest.raises(UnusableError, match="laser is on in no frame"):
+        extracted(dark, ["led", "led"])
+
+
+def test_a_pit_three_millimetres_wide_survives_and_a_spike_does_not():
+    pit_sectors, depth = 12, 4.0
+
+    def radius(psi):
+        return 165.0 + depth * (np.abs(psi - 1.0) < pit_sectors / 2 * SECTOR)
+
+    images = {i: image(radius if i == 1 else off_centre(165.0, 0.0), i) for i in range(3)}
+    v, u = np.mgrid[: SIZE[1], : SIZE[0]]
+    spot = np.hypot(u - (CENTRE[0] + 168 * np.cos(-2)), v - (CENTRE[1] + 168 * np.sin(-2))) < 1.3
+    images[1] = np.where(spot, 200, images[1]).astype(np.uint8)
+    samples = extracted(images)
+    row = samples.radius_px[1]
+    inside = np.abs(samples.azimuth_rad - 1.0) < (pit_sectors / 2 - 2) * SECTOR
+    assert samples.valid[1][inside].all()
+    assert np.allclose(row[inside], 169.0, atol=0.2)
+    left = samples.valid[1] & (np.abs(samples.azimuth_rad - 1.0) > (pit_sectors / 2 + 1) * SECTOR)
+    assert np.abs(row[left] - 165.0).max() < 0.6
+
+
+def test_sigma_holds_what_it_says_when_speckle_moves_the_line():
+    """Speckle of the wall, narrower than the line's image, shifts the line by more than its noise."""
+    random, error, z = np.random.default_rng(4), [], []
+    ring, images = off_centre(165.0, 5.0), {}
+    for i in range(6):
+        light = ring_light(SIZE, CENTRE, ring, 0.6, 300.0) * random.gamma(4.0, 0.25, SIZE[::-1])
+        light = cv2.GaussianBlur(light, (0, 0), 1.0)
+        images[i] = exposed(light, random, read=0.7, shot=0.05)
+    samples = extracted(images)
+    error = np.where(samples.valid, samples.radius_px - ring(samples.azimuth_rad), np.nan)
+    z = error / samples.sigma_px
+    assert np.isfinite(z).mean() > 0.98
+    assert 0.93 < np.mean(np.abs(z[np.isfinite(z)]) < 1.96) < 0.97
+    assert abs(np.nanmean(error)) < 0.01
+
+
+def lit_image(ring, seed, texture):
+    """A green line on a wall of grey and rust, lit by white LEDs."""
+    random = np.random.default_rng(seed)
+    line = ring_light(SIZE, CENTRE, ring, 1.5, 90.0)
+    rust = cv2.resize(random.uniform(0, 1, (12, 16)), SIZE, interpolation=cv2.INTER_CUBIC)[..., None]
+    wall = texture[..., None] * (
+        np.array([90.0, 95.0, 110.0]) * (1 - rust) + rust * np.array([30.0, 60.0, 120.0])
+    )
+    light = wall + line[..., None] * np.array([0.35, 1.0, 0.1])
+    noisy = light + random.normal(size=light.shape) * np.sqrt(1 + 0.1 * light)
+    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+
+
+def test_the_line_is_found_on_a_lit_textured_wall():
+    ring, random = off_centre(165.0, 8.0), np.random.default_rng(2)
+    texture = cv2.GaussianBlur(random.uniform(0.3, 1.7, SIZE[::-1]), (0, 0), 1.2)
+    images = {i: lit_image(ring, i, texture) for i in range(3)}
+    samples = extracted(images, ["both"] * 3)
+    error = np.where(samples.valid, samples.radius_px - ring(samples.azimuth_rad), np.nan)
+    assert samples.valid.mean() > 0.97
+    assert np.nanmedian(np.abs(error)) < 0.15
+    assert abs(np.nanmean(error)) < 0.02
+
+
+def test_the_same_recording_gives_the_same_bytes():
+    images = {i: image(off_centre(165.0, 7.0), i) for i in range(3)}
+    first, second = extracted(images), extracted(images)
+    assert first.radius_px.tobytes() == second.radius_px.tobytes()
+    assert first.sigma_px.tobytes() == second.sigma_px.tobytes()
+
+
+def test_the_stage_is_wired_by_type():
+    assert list(RINGS.inputs()) == ["recording", "probe"]

@@ -1,0 +1,101 @@
+"""Finding the ring without help: off centre, broken, beside glints, or not there at all."""
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts import RingValidity
+from stages.rings.sectors import cut_sectors
+from stages.rings.trace import trace_ring
+from tests.ring_images import exposed, off_centre, ring_light
+
+SIZE, CENTRE, AZIMUTHS = (640, 480), (318.7, 241.3), 720
+
+
+@pytest.fixture(scope="module")
+def sectors():
+    return cut_sectors(SIZE, np.array(CENTRE), AZIMUTHS)
+
+
+def image_of(light, seed=0, **noise):
+    return exposed(light, np.random.default_rng(seed), **noise)
+
+
+def errors(trace, truth):
+    return np.where(trace.validity == RingValidity.VALID, trace.fit.radius_px - truth, np.nan)
+
+
+def test_every_pixel_belongs_to_the_sector_nearest_to_it(sectors):
+    assert np.array_equal(np.sort(sectors.pixel), np.arange(SIZE[0] * SIZE[1]))
+    sector = np.repeat(np.arange(AZIMUTHS), np.diff(sectors.start))
+    du, dv = sectors.pixel % SIZE[0] - CENTRE[0], sectors.pixel // SIZE[0] - CENTRE[1]
+    away = np.angle(np.exp(1j * (np.arctan2(dv, du) - sectors.azimuth_rad[sector])))
+    assert np.abs(away).max() <= np.pi / AZIMUTHS * (1 + 1e-6)
+    assert np.allclose(away, sectors.offset_rad, atol=1e-6)
+    assert np.allclose(np.hypot(du, dv), sectors.radius_px, atol=1e-4)
+    inside = np.diff(sector) == 0
+    assert (np.diff(sectors.radius_px)[inside] >= 0).all()
+
+
+@pytest.mark.parametrize(("radius", "along"), [(150.0, 0.0), (120.0, 45.0), (200.0, 15.0)])
+@pytest.mark.parametrize("width", [0.9, 1.6, 3.0])
+def test_a_ring_is_found_wherever_it_is_and_however_thick(sectors, radius, along, width):
+    ring = off_centre(radius, along)
+    trace = trace_ring(image_of(ring_light(SIZE, CENTRE, ring, width, 60.0)), sectors, 255.0)
+    error = errors(trace, ring(sectors.azimuth_rad))
+    assert np.isfinite(error).mean() > 0.97
+    assert np.nanmax(np.abs(error)) < 0.5
+    assert trace.width_px == pytest.approx(width, rel=0.05)
+
+
+def test_gap_and_glint_are_not_taken_for_the_ring(sectors):
+    ring = off_centre(150.0, 20.0)
+    light = ring_light(SIZE, CENTRE, ring, 1.2, lambda psi: 80.0 * (np.abs(psi - 1.5) > 0.15))
+    light[100:112, 300:330] += 230
+    trace = trace_ring(image_of(light), sectors, 255.0)
+    error = errors(trace, ring(sectors.azimuth_rad))
+    gap = np.abs(sectors.azimuth_rad - 1.5) < 0.14
+    assert np.isnan(error[gap]).all()
+    assert np.isfinite(error[~gap]).mean() > 0.94
+    assert np.nanmax(np.abs(error)) < 0.5
+
+
+@pytest.mark.parametrize("read", [0.0, 1.0, 6.0])
+def test_no_ring_is_invented_in_an_empty_image(sectors, read):
+    trace = trace_ring(image_of(np.zeros(SIZE[::-1]), read=read), sectors, 255.0)
+    assert trace is None or trace.coverage < 0.01
+
+
+def test_a_ring_that_steps_to_another_bore_is_followed(sectors):
+    def stepped(psi):
+        return np.where(np.abs(psi) < 0.8, 190.0, 150.0)
+
+    first = trace_ring(image_of(ring_light(SIZE, CENTRE, lambda p: 150.0 + 0 * p, 1.2, 80.0)), sectors, 255.0)
+    part = trace_ring(image_of(ring_light(SIZE, CENTRE, stepped, 1.2, 80.0), 1), sectors, 255.0, first)
+    whole = trace_ring(
+        image_of(ring_light(SIZE, CENTRE, lambda p: 190.0 + 0 * p, 1.2, 80.0), 2), sectors, 255.0, part
+    )
+    clear = np.abs(np.abs(sectors.azimuth_rad) - 0.8) > 0.03
+    assert np.nanmax(np.abs(errors(part, stepped(sectors.azimuth_rad))[clear])) < 0.5
+    assert np.isfinite(errors(part, 0.0)[clear]).mean() > 0.98
+    assert np.nanmax(np.abs(errors(whole, 190.0))) < 0.5
+    assert whole.coverage > 0.98
+
+
+def test_two_equally_bright_lines_are_ghosts(sectors):
+    light = ring_light(SIZE, CENTRE, off_centre(150.0, 0.0), 1.2, 80.0)
+    light += ring_light(SIZE, CENTRE, off_centre(158.5, 0.0), 1.2, lambda psi: 78.0 * (np.abs(psi) < 0.5))
+    trace = trace_ring(image_of(light), sectors, 255.0)
+    double = np.abs(sectors.azimuth_rad) < 0.48
+    assert (trace.validity[double] != RingValidity.VALID).all()
+    assert (trace.validity[double] == RingValidity.GHOST).mean() > 0.5
+    assert (trace.validity[~double] == RingValidity.VALID).mean() > 0.95
+
+
+def test_a_ring_partly_outside_the_image_is_told_apart(sectors):
+    ring = off_centre(235.0, 30.0, np.pi / 2)
+    trace = trace_ring(image_of(ring_light(SIZE, CENTRE, ring, 1.2, 80.0)), sectors, 255.0)
+    v = CENTRE[1] + ring(sectors.azimuth_rad) * np.sin(sectors.azimuth_rad)
+    outside = (v > SIZE[1] - 1) | (v < 0)
+    assert outside.sum() > 50
+    assert (trace.validity[outside] != RingValidity.VALID).all()
+    assert (trace.validity[(v < SIZE[1] - 5) & (v > 5)] == RingValidity.VALID).mean() > 0.98
