@@ -1,0 +1,164 @@
+"""What a run is compared with: another map of the radius, or a surface or cloud of the wall; its files."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import InputError
+from pipeline.native import open3d
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_MAP_KEYS = ("distance_mm", "azimuth_rad", "radius_mm")
+SURFACE_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".pcd", ".xyz")
+
+
+@dataclass(frozen=True)
+class WallMap:
+    """Radius of a wall over distance and azimuth.
+
+    Attributes
+    ----------
+    distance_mm : (S,)
+        Uniform, increasing.
+    azimuth_rad : (A,)
+        Uniform over the whole turn.
+    radius_mm, sigma_mm, sigma_random_mm : (S, A)
+        NaN where nothing is known; σ 0 for a reference that states none.
+    """
+
+    distance_mm: Float
+    azimuth_rad: Float
+    radius_mm: Float
+    sigma_mm: Float
+    sigma_random_mm: Float
+
+
+@dataclass(frozen=True)
+class WallPoints:
+    """Points (M, 3) of a run's wall in P, outward normals (M, 3), pipe coordinates and σ (M,)."""
+
+    xyz_p: Float
+    outward_p: Float
+    distance_mm: Float
+    azimuth_rad: Float
+    sigma_mm: Float
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Vertices (V, 3), mm, and triangles (T, 3); no triangles for a cloud of points."""
+
+    vertices: Float
+    triangles: Int
+
+
+def read_wall_map(path: Path) -> WallMap:
+    """Read a radius map: a .npz, or a folder (a run, a truth folder) with exactly one .npz that holds one.
+
+    Raises
+    ------
+    InputError
+        If there is none, there are several, or it is malformed.
+    """
+    file = path if path.is_file() else _only_map(path)
+    with _opened(file) as content:
+        arrays = {
+            k: np.asarray(content[k], float) for k in content.files if k in _MAP_KEYS or k.startswith("sigma")
+        }
+    missing = [k for k in _MAP_KEYS if k not in arrays]
+    if missing:
+        raise InputError(file, f"lacks {', '.join(missing)}", expected=f"arrays {', '.join(_MAP_KEYS)}")
+    distance, azimuth, radius = (arrays[k] for k in _MAP_KEYS)
+    _check_grid(file, distance, azimuth, radius)
+    sigma = arrays.get("sigma_mm", np.zeros_like(radius))
+    return WallMap(distance, azimuth, radius, sigma, arrays.get("sigma_random_mm", sigma))
+
+
+def read_wall_points(run: Path, at_most: int = 200_000) -> WallPoints:
+    """Read the points of ``cloud.ply`` of a run folder, evenly thinned to ``at_most``."""
+    file = run / "cloud.ply"
+    if not file.is_file():
+        raise InputError(file, "is missing", expected="a run folder with a point cloud",
+                         hint="complete the run: boresight run RECORDING -o RUN")  # fmt: skip
+    from plyfile import PlyData, PlyParseError
+
+    try:
+        vertex = PlyData.read(str(file))["vertex"].data
+    except (PlyParseError, OSError, KeyError) as error:
+        raise InputError(file, f"is no point cloud: {error}") from error
+    vertex = vertex[:: max(1, -(-len(vertex) // at_most))]
+    azimuth = np.asarray(vertex["azimuth_rad"], float)
+    normal = np.stack([vertex[f"n{axis}"] for axis in "xyz"], -1).astype(float)
+    across = np.stack([np.cos(azimuth), np.sin(azimuth)], -1)
+    outward = normal * np.where((normal[:, :2] * across).sum(-1) < 0, -1.0, 1.0)[:, None]
+    xyz = np.stack([vertex[axis] for axis in "xyz"], -1).astype(float)
+    sigma = np.asarray(vertex["sigma_mm"], float)
+    return WallPoints(xyz, outward, np.asarray(vertex["distance_mm"], float), azimuth, sigma)
+
+
+def read_surface(file: Path, unit_mm: float) -> Surface:
+    """Read a mesh or a cloud of points; ``unit_mm`` is the length of the file's unit in mm.
+
+    Raises
+    ------
+    InputError
+        If the file holds neither.
+    """
+    o3d = open3d()
+    quiet = o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error)
+    with quiet:
+        mesh = o3d.io.read_triangle_mesh(str(file))
+        triangles = np.asarray(mesh.triangles, np.int64).reshape(-1, 3)
+        vertices = np.asarray(mesh.vertices, float)
+        if len(triangles) == 0:
+            vertices = np.asarray(o3d.io.read_point_cloud(str(file)).points, float)
+    if len(vertices) < 100 or not np.isfinite(vertices).all():
+        raise InputError(
+            file, f"holds {len(vertices)} usable points", expected="a mesh or a cloud of the pipe's wall"
+        )
+    return Surface(vertices * unit_mm, triangles)
+
+
+def _only_map(folder: Path) -> Path:
+    if not folder.is_dir():
+        raise InputError(folder, "does not exist", expected="a file, a run folder or a truth folder")
+    found = []
+    for file in sorted(folder.glob("*.npz")):
+        with _opened(file) as content:
+            if all(key in content.files for key in _MAP_KEYS):
+                found.append(file)
+    if len(found) != 1:
+        names = ", ".join(f.name for f in found) or "none"
+        raise InputError(
+            folder, f"{len(found)} radius maps found: {names}",
+            expected=f"one .npz with {', '.join(_MAP_KEYS)}", hint="name the file itself",
+        )  # fmt: skip
+    return found[0]
+
+
+def _opened(file: Path) -> np.lib.npyio.NpzFile:
+    try:
+        content = np.load(file, allow_pickle=False)
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        raise InputError(file, f"cannot be read: {error}", expected="a NumPy .npz archive") from error
+    if not isinstance(content, np.lib.npyio.NpzFile):
+        raise InputError(file, "is no archive", expected="a NumPy .npz archive")
+    return content
+
+
+def _check_grid(file: Path, distance: Float, azimuth: Float, radius: Float) -> None:
+    if radius.shape != (len(distance), len(azimuth)) or min(radius.shape) < 4:
+        raise InputError(file, f"radius_mm is {radius.shape}", place="radius_mm",
+                         expected=f"{len(distance)} × {len(azimuth)}, at least 4 × 4")  # fmt: skip
+    for name, axis in (("distance_mm", distance), ("azimuth_rad", azimuth)):
+        step = np.diff(axis)
+        if not (np.isfinite(axis).all() and step.min() > 0 and np.ptp(step) < 1e-3 * step.mean()):
+            raise InputError(file, "is not uniform and increasing", place=name)
+    if not np.isfinite(radius).any():
+        raise InputError(file, "holds no measured radius", place="radius_mm")

@@ -1,0 +1,113 @@
+"""Figures of accuracy: differences of a run from its reference, point by point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import UnusableError
+from pipeline.reference import WallMap
+
+Float = NDArray[np.float64]
+_NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Run minus reference, positive where the run's radius is larger.
+
+    Attributes
+    ----------
+    distance_mm, azimuth_rad : (N,)
+        Of the run.
+    error_mm, sigma_mm, sigma_random_mm : (N,)
+        Differences, and 1 σ of them: with the instrument's part, and without it.
+    """
+
+    distance_mm: Float
+    azimuth_rad: Float
+    error_mm: Float
+    sigma_mm: Float
+    sigma_random_mm: Float
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """The figures of a certificate, mm; shares from 0 to 1.
+
+    Attributes
+    ----------
+    points : int
+    bias_mm, median_mm, rms_mm, mad_sigma_mm, p95_mm, max_mm : float
+        Mean, median, root mean square, robust σ about the median, 95th percentile and largest size.
+    within_95, within_95_random : float
+        Share of differences inside their 95 % interval, with the total and with the random σ; NaN where no
+        σ is stated.
+    """
+
+    points: int
+    bias_mm: float
+    median_mm: float
+    rms_mm: float
+    mad_sigma_mm: float
+    p95_mm: float
+    max_mm: float
+    within_95: float
+    within_95_random: float
+
+
+def accuracy(differences: Differences) -> Accuracy:
+    """Return the figures of differences.
+
+    Raises
+    ------
+    UnusableError
+        If fewer than 100 points could be compared.
+    """
+    error = differences.error_mm
+    if len(error) < 100:
+        raise UnusableError(
+            "verify", f"only {len(error)} points of the run lie on the reference", limit="at least 100",
+            hint="check that both show the same stretch of pipe, and --max-shift-mm",
+        )  # fmt: skip
+    spread = 1.4826 * np.median(np.abs(error - np.median(error)))
+    return Accuracy(
+        len(error),
+        float(error.mean()),
+        float(np.median(error)),
+        float(np.sqrt(np.mean(error**2))),
+        float(spread),
+        float(np.percentile(np.abs(error), 95)),
+        float(np.abs(error).max()),
+        _inside(error, differences.sigma_mm),
+        _inside(error, differences.sigma_random_mm),
+    )
+
+
+def wall_coverage(wall: WallMap) -> float:
+    """Return the measured share of the map between its first and last seen station."""
+    seen = np.isfinite(wall.radius_mm)
+    station = np.flatnonzero(seen.any(1))
+    return float(seen[station[0] : station[-1] + 1].mean())
+
+
+def bore_differences(wall: WallMap, diameter_mm: float, tolerance_mm: float) -> Differences:
+    """Return the differences of a wall from a known bore; the tolerance is a uniform ± of its radius."""
+    known = np.isfinite(wall.radius_mm)
+    station, azimuth = np.nonzero(known)
+    bore = tolerance_mm**2 / 3
+    return Differences(
+        wall.distance_mm[station],
+        wall.azimuth_rad[azimuth],
+        wall.radius_mm[known] - diameter_mm / 2,
+        np.sqrt(wall.sigma_mm[known] ** 2 + bore),
+        np.sqrt(wall.sigma_random_mm[known] ** 2 + bore),
+    )
+
+
+def _inside(error: Float, sigma: Float) -> float:
+    if not np.all(sigma > 0):
+        return float("nan")
+    return float(np.mean(np.abs(error) < _NORMAL_95 * sigma))

@@ -1,0 +1,190 @@
+"""Two maps of the radius brought together and compared.
+
+A run cannot know where its pipe frame's origin lies: shift along the pipe, roll, and the first pose, seen as
+first and second order terms of the centre line, are taken out. The distance scale is found and reported.
+Radius and shape stay.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+from scipy.optimize import least_squares
+
+from pipeline.errors import UnusableError
+from pipeline.reference import WallMap
+from stages.verify.accuracy import Differences
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_FIT_POINTS, _SEARCH_POINTS = 10_000, 2000
+_SMOOTH_MM, _SMOOTH_CELLS = 1.0, 1.5
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """What was taken out: reference distance = middle + scale (distance − middle) + shift, azimuth + roll.
+
+    ``pose_mm`` (6,): amplitudes of cos ψ, sin ψ, and of both times x and x², x from −1 to 1 along the run.
+    """
+
+    shift_mm: float
+    roll_deg: float
+    scale_error: float
+    pose_mm: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Measured cells of a map: distance from the middle, azimuth, radius, and x from −1 to 1; each (N,)."""
+
+    middle_mm: float
+    offset_mm: Float
+    azimuth_rad: Float
+    radius_mm: Float
+    x: Float
+
+
+def align_maps(run: WallMap, reference: WallMap, max_shift_mm: float, max_roll_deg: float) -> Alignment:
+    """Return the alignment of least robust squared difference within the limits.
+
+    Raises
+    ------
+    UnusableError
+        If at no shift within the limits half of the run lies on the reference.
+    """
+    samples, reference = _samples(_smoothed(run), _FIT_POINTS), _smoothed(reference)
+    start = _search(samples, reference, max_shift_mm, math.radians(max_roll_deg))
+    spread = _spread(_residual(start, samples, reference))
+    found = least_squares(
+        _residual, start, args=(samples, reference), loss="cauchy", f_scale=max(2 * spread, 1e-6),
+        x_scale=np.array([0.1, 0.01, 1e-3] + [0.1] * 7),
+    ).x  # fmt: skip
+    return Alignment(
+        float(found[0]), math.degrees(found[1]), float(found[2]), tuple(float(p) for p in found[3:9])
+    )
+
+
+def map_differences(run: WallMap, reference: WallMap, alignment: Alignment) -> Differences:
+    """Return run minus aligned reference for every cell of the run that lies on it."""
+    samples = _samples(run, run.radius_mm.size)
+    at = np.array([alignment.shift_mm, math.radians(alignment.roll_deg), alignment.scale_error])
+    error = samples.radius_mm - _looked_up(reference.radius_mm, reference, samples, at)
+    error = error - _pose_design(samples) @ np.array(alignment.pose_mm)
+    on = np.isfinite(error)
+    known = np.isfinite(run.radius_mm)
+
+    cell, weight = _corners(reference, samples, at)
+    # the random part of neighbouring cells averages in the interpolation, the instrument's does not
+    its_random = np.sum(weight**2 * reference.sigma_random_mm[cell] ** 2, 0)[on]
+    shared = np.maximum(reference.sigma_mm**2 - reference.sigma_random_mm**2, 0.0)
+    its_shared = np.sum(weight * shared[cell], 0)[on]
+    return Differences(
+        samples.middle_mm + samples.offset_mm[on],
+        samples.azimuth_rad[on],
+        error[on],
+        np.sqrt(run.sigma_mm[known][on] ** 2 + its_random + its_shared),
+        np.sqrt(run.sigma_random_mm[known][on] ** 2 + its_random),
+    )
+
+
+def _samples(wall: WallMap, at_most: int) -> _Samples:
+    station, azimuth = np.nonzero(np.isfinite(wall.radius_mm))
+    if len(station) > at_most:
+        chosen = np.sort(np.random.default_rng(0).choice(len(station), at_most, replace=False))
+        station, azimuth = station[chosen], azimuth[chosen]
+    distance = wall.distance_mm[station]
+    middle = float(distance.min() + distance.max()) / 2
+    half = max(float(np.ptp(distance)) / 2, 1.0)
+    offset = distance - middle
+    return _Samples(
+        middle, offset, wall.azimuth_rad[azimuth], wall.radius_mm[station, azimuth], offset / half
+    )
+
+
+def _search(samples: _Samples, reference: WallMap, max_shift_mm: float, max_roll_rad: float) -> Float:
+    """Return the best of a grid of shifts and rolls, everything else 0 but the pose, which is linear."""
+    best: tuple[float, Float] | None = None
+    few = slice(None, None, max(1, len(samples.x) // _SEARCH_POINTS))
+    thin = _Samples(samples.middle_mm, *(a[few] for a in (
+        samples.offset_mm, samples.azimuth_rad, samples.radius_mm, samples.x)))  # fmt: skip
+    design = _nuisance_design(thin)
+    for shift in np.arange(-max_shift_mm, max_shift_mm + 1e-9, 0.5):
+        for roll in np.arange(-max_roll_rad, max_roll_rad + 1e-9, math.radians(1)):
+            error = thin.radius_mm - _looked_up(
+                reference.radius_mm, reference, thin, np.array([shift, roll, 0.0])
+            )
+            on = np.isfinite(error)
+            if on.mean() < 0.5:
+                continue
+            pose = np.linalg.lstsq(design[on], error[on], rcond=None)[0]
+            cost = float(np.mean(np.abs(error[on] - design[on] @ pose)))
+            if best is None or cost < best[0]:
+                best = cost, np.concatenate([[shift, roll, 0.0], pose])
+    if best is None:
+        raise UnusableError(
+            "verify", "run and reference do not overlap",
+            limit=f"half of the run within ±{max_shift_mm:g} mm",
+            hint="give a reference of the same stretch, or raise --max-shift-mm",
+        )  # fmt: skip
+    return best[1]
+
+
+def _residual(parameters: Float, samples: _Samples, reference: WallMap) -> Float:
+    """Return run minus aligned reference (N,), 0 where the reference knows nothing."""
+    error = samples.radius_mm - _looked_up(reference.radius_mm, reference, samples, parameters)
+    return np.where(np.isfinite(error), error - _nuisance_design(samples) @ parameters[3:], 0.0)
+
+
+def _pose_design(samples: _Samples) -> Float:
+    c, s, x = np.cos(samples.azimuth_rad), np.sin(samples.azimuth_rad), samples.x
+    return np.stack([c, s, x * c, x * s, x * x * c, x * x * s], -1)
+
+
+def _nuisance_design(samples: _Samples) -> Float:
+    """Return the pose and a constant, which else would pull shift and scale; only the pose is taken out."""
+    return np.concatenate([_pose_design(samples), np.ones((len(samples.x), 1))], -1)
+
+
+def _looked_up(values: Float, grid: WallMap, samples: _Samples, at: Float) -> Float:
+    """Return (N,) bilinear values (S, A) of a grid at the aligned samples; NaN beyond its ends."""
+    cell, weight = _corners(grid, samples, at)
+    return np.asarray(np.sum(weight * values[cell], 0))
+
+
+def _corners(grid: WallMap, samples: _Samples, at: Float) -> tuple[tuple[Int, Int], Float]:
+    """Return the four cells next to each aligned sample, (4, N) rows and columns, and weights (4, N)."""
+    shift, roll, scale_error = at[:3]
+    distance = samples.middle_mm + samples.offset_mm * (1 + scale_error) + shift
+    row = (distance - grid.distance_mm[0]) / (grid.distance_mm[1] - grid.distance_mm[0])
+    count = len(grid.azimuth_rad)
+    column = np.mod((samples.azimuth_rad + roll - grid.azimuth_rad[0]) * count / (2 * math.pi), count)
+    row = np.where((row >= 0) & (row <= len(grid.distance_mm) - 1), row, np.nan)
+    i = np.nan_to_num(np.minimum(row, len(grid.distance_mm) - 2)).astype(int)
+    j = np.minimum(column.astype(int), count - 1)
+    u, v = row - i, column - j
+    weight = np.stack([(1 - u) * (1 - v), (1 - u) * v, u * (1 - v), u * v])
+    return (np.stack([i, i, i + 1, i + 1]), np.stack([j, (j + 1) % count, j, (j + 1) % count])), weight
+
+
+def _smoothed(wall: WallMap) -> WallMap:
+    """Return a map whose noise spans cells, else interpolating between them looks like a better match."""
+    step = wall.distance_mm[1] - wall.distance_mm[0]
+    arc = float(np.nanmean(wall.radius_mm)) * (wall.azimuth_rad[1] - wall.azimuth_rad[0])
+    size = tuple(max(_SMOOTH_MM / s, _SMOOTH_CELLS) for s in (step, arc))
+    known = np.isfinite(wall.radius_mm)
+    middle = float(np.nanmean(wall.radius_mm))
+    filled, weight = (
+        gaussian_filter(a, size, mode=("nearest", "wrap"))
+        for a in (np.where(known, wall.radius_mm - middle, 0.0), known.astype(float))
+    )
+    radius = np.where(known, middle + filled / np.maximum(weight, 1e-12), np.nan)
+    return replace(wall, radius_mm=radius)
+
+
+def _spread(values: Float) -> float:
+    return float(1.4826 * np.median(np.abs(values - np.median(values))))

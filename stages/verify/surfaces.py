@@ -1,0 +1,166 @@
+"""A run's wall points against a reference mesh or cloud: registration, then signed distances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipeline.errors import UnusableError
+from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
+from pipeline.native import open3d
+from pipeline.reference import Surface, WallPoints
+from stages.verify.accuracy import Differences
+
+Float = NDArray[np.float64]
+_FIT_POINTS = 5000
+_ROLLS = 12
+_NEIGHBOURS = 12
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Pose ``T_rp`` (4, 4) of the run in the reference, and the weighted distances that stay."""
+
+    T_rp: Float
+    rms_mm: float
+
+
+def register(points: WallPoints, reference: Surface) -> Registration:
+    """Return the pose of least squared distances along the wall's normals, robustly.
+
+    Starts: the reference's frame as it is, and the long axes of both brought together, either way round, at
+    twelve rolls. A pipe without features fixes neither roll nor shift: then any of them serves.
+
+    Raises
+    ------
+    UnusableError
+        If the surfaces do not come together.
+    """
+    chosen = np.random.default_rng(0).choice(
+        len(points.xyz_p), min(_FIT_POINTS, len(points.xyz_p)), replace=False
+    )
+    nearest = NearestPoints(reference)
+    xyz, outward = points.xyz_p[chosen], points.outward_p[chosen]
+    few = slice(None, None, max(1, len(chosen) // 800))
+    starts = [np.eye(4), *_axis_starts(points.xyz_p, reference.vertices)]
+    rough = [_refined(xyz[few], outward[few], nearest, start, 12) for start in starts]
+    best = min(rough, key=lambda r: r.rms_mm)
+    found = _refined(xyz, outward, nearest, best.T_rp, 60)
+    size = float(np.linalg.norm(np.ptp(xyz, axis=0)))
+    if found.rms_mm > 0.05 * size:
+        raise UnusableError(
+            "verify", f"run and reference stay {found.rms_mm:.3g} mm apart", limit=f"{0.05 * size:.3g} mm",
+            hint="check the reference's unit (--reference-unit) and that it shows this pipe",
+        )  # fmt: skip
+    return found
+
+
+def surface_differences(
+    points: WallPoints, reference: Surface, pose: Registration, reach_mm: float
+) -> Differences:
+    """Return the distances of the run's points from the reference along its outward normals.
+
+    Points farther than ``reach_mm`` from the reference do not lie on it and are left out.
+    """
+    xyz, outward = transform(pose.T_rp, points.xyz_p), points.outward_p @ pose.T_rp[:3, :3].T
+    closest = NearestPoints(reference)(xyz)
+    away = xyz - closest
+    error = np.sum(away * outward, -1)
+    on = np.linalg.norm(away, axis=-1) <= reach_mm
+    sigma = points.sigma_mm[on]
+    return Differences(points.distance_mm[on], points.azimuth_rad[on], error[on], sigma, sigma)
+
+
+class NearestPoints:
+    """Finds the closest points of a mesh, or of quadrics through the neighbours in a cloud."""
+
+    def __init__(self, reference: Surface) -> None:
+        self.reference = reference
+        if len(reference.triangles):
+            o3d = open3d()
+            self.scene = o3d.t.geometry.RaycastingScene()
+            self.scene.add_triangles(
+                o3d.core.Tensor(reference.vertices.astype(np.float32)),
+                o3d.core.Tensor(reference.triangles.astype(np.uint32)),
+            )
+        else:
+            self.tree = cKDTree(reference.vertices)
+
+    def __call__(self, xyz: Float) -> Float:
+        """Return the closest points (N, 3) to points (N, 3)."""
+        if len(self.reference.triangles):
+            answer = self.scene.compute_closest_points(open3d().core.Tensor(xyz.astype(np.float32)))
+            return np.asarray(answer["points"].numpy(), float)
+        found = self.tree.query(xyz, k=_NEIGHBOURS)
+        distance, index = np.asarray(found[0]), np.asarray(found[1])
+        patch = self.reference.vertices[index]
+        size = np.linalg.norm(np.ptp(patch, axis=1), axis=-1)
+        far = distance[:, 0] > 4 * size
+        return np.where(far[:, None], patch[:, 0], _on_quadric(xyz, patch))
+
+
+def _on_quadric(xyz: Float, patch: Float) -> Float:
+    """Return points (N, 3) brought along the normal onto the quadric through their patch (N, K, 3).
+
+    A plane would lie inside a pipe's wall by the sagitta of the patch.
+    """
+    arm = patch - patch.mean(1, keepdims=True)
+    frame = np.linalg.eigh(np.einsum("nki,nkj->nij", arm, arm))[1]
+    normal, across = frame[..., 0], frame[..., 1:]
+    local = patch - xyz[:, None]
+    x, y = np.moveaxis(np.einsum("nki,nij->nkj", local, across), -1, 0)
+    height = np.einsum("nki,ni->nk", local, normal)
+    design = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
+    square = np.einsum("nki,nkj->nij", design, design) + 1e-9 * np.eye(6)
+    right = np.einsum("nki,nk->ni", design, height)
+    rise = np.linalg.solve(square, right[..., None])[:, 0, 0]
+    return np.asarray(xyz + rise[:, None] * normal)
+
+
+def _axis_starts(xyz: Float, vertices: Float) -> list[Float]:
+    middle_p, frame_p = _long_axis(xyz)
+    middle_r, frame_r = _long_axis(vertices)
+    starts = []
+    for way in (np.eye(3), np.diag([1.0, -1.0, -1.0])):
+        for k in range(_ROLLS):
+            roll = rotation_from_vector(np.array([2 * math.pi * k / _ROLLS, 0.0, 0.0]))
+            rotation = frame_r @ way @ roll @ frame_p.T
+            starts.append(from_parts(rotation, middle_r - rotation @ middle_p))
+    return starts
+
+
+def _long_axis(xyz: Float) -> tuple[Float, Float]:
+    """Return the middle and a right-handed frame (3, 3) whose first column is the longest direction."""
+    middle = xyz.mean(0)
+    vectors = np.linalg.eigh(np.cov((xyz - middle).T))[1][:, ::-1].copy()
+    # of a short wide pipe the axis is the direction unlike the other two
+    values = np.linalg.eigvalsh(np.cov((xyz - middle).T))[::-1]
+    if values[0] - values[1] < values[1] - values[2]:
+        vectors = vectors[:, ::-1].copy()
+    vectors[:, 2] = np.cross(vectors[:, 0], vectors[:, 1])
+    return middle, vectors
+
+
+def _refined(xyz: Float, outward: Float, nearest: NearestPoints, start: Float, steps: int) -> Registration:
+    """Gauss-Newton on distances along the normals, Cauchy weights at twice their spread."""
+    T, rms = start, math.inf
+    for _ in range(steps):
+        here, normal = transform(T, xyz), outward @ T[:3, :3].T
+        error = np.sum((here - nearest(here)) * normal, -1)
+        spread = 1.4826 * float(np.median(np.abs(error))) + 1e-9
+        weight = 1 / (1 + (error / (2 * spread)) ** 2)
+        pivot = here.mean(0)
+        design = np.concatenate([np.cross(here - pivot, normal), normal], -1)
+        root = np.sqrt(weight)[:, None]
+        # a smooth pipe fixes neither roll nor shift: leave such directions alone
+        move = np.linalg.lstsq(design * root, -error * root[:, 0], rcond=1e-3)[0]
+        rotation = rotation_from_vector(move[:3])
+        T = from_parts(rotation, move[3:] + pivot - rotation @ pivot) @ T
+        rms = float(np.sqrt(np.average(error**2, weights=weight)))
+        if np.abs(move[3:]).max() < 1e-6 and np.abs(move[:3]).max() < 1e-8:
+            break
+    return Registration(T, rms)
