@@ -45,6 +45,8 @@ class CameraCalibration:
         The V views used.
     T_cb : (V, 4, 4)
         Board to camera, mm.
+    shape_mm : (3,)
+        Sag of the board along x², xy and y² about its centre, at its half diagonal.
     view : (M,) int
         The view that each corner belongs to.
     uv, residual_px : (M, 2)
@@ -57,6 +59,7 @@ class CameraCalibration:
     covariance: Float
     names: tuple[str, ...]
     T_cb: Float
+    shape_mm: Float
     view: Int
     uv: Float
     residual_px: Float
@@ -71,6 +74,92 @@ class CameraCalibration:
     def view_rms_px(self) -> Float:
         """(V,) the same of each view."""
         return np.array([rms(self.residual_px[self.view == v]) for v in range(len(self.names))])
+
+
+@dataclass(frozen=True)
+class ModelScore:
+    """How a camera model did on the same views as others.
+
+    Attributes
+    ----------
+    model : str
+    calibration
+        Fitted to all views; None when the model was refused.
+    parameters : int
+        Number of parameters estimated.
+    rms_px, held_out_rms_px : float
+        Of the views fitted to, and of views held out in turn; NaN when refused.
+    refusal : str
+        Why the model was refused, or empty.
+    """
+
+    model: str
+    calibration: CameraCalibration | None
+    parameters: int
+    rms_px: float
+    held_out_rms_px: float
+    refusal: str
+
+
+@dataclass(frozen=True)
+class UncertaintyMap:
+    """1 σ of the projection, px, at pixels ``uv`` (R, C, 2); NaN where the model has no ray.
+
+    Attributes
+    ----------
+    sigma_px : (R, C)
+        With the best rotation of the camera taken out.
+    raw_sigma_px : (R, C)
+        In the camera's own frame.
+    """
+
+    uv: Float
+    sigma_px: Float
+    raw_sigma_px: Float
+
+
+@dataclass(frozen=True)
+class DisplacementMap:
+    """By how many px another camera sees the same directions elsewhere, at pixels ``uv`` (R, C, 2).
+
+    Attributes
+    ----------
+    displacement_px : (R, C, 2)
+        NaN where either camera has no such ray.
+    rotation_rad : (3,)
+        Rotation between the two cameras that was taken out, as a vector.
+    """
+
+    uv: Float
+    displacement_px: Float
+    rotation_rad: Float
+
+
+@dataclass(frozen=True)
+class CalibrationReport:
+    """Everything a camera calibration found.
+
+    Attributes
+    ----------
+    calibration
+        Of the chosen model.
+    scores
+        Of every model that was tried.
+    uncertainty
+    rejected : tuple of (str, str)
+        Images not used, and why.
+    compared_with : str
+        File of the camera compared with, or empty.
+    displacement
+        From the calibration to that camera.
+    """
+
+    calibration: CameraCalibration
+    scores: tuple[ModelScore, ...]
+    uncertainty: UncertaintyMap
+    rejected: tuple[tuple[str, str], ...]
+    compared_with: str = ""
+    displacement: DisplacementMap | None = None
 
 
 def rms(residual_px: Float) -> float:

@@ -2,13 +2,15 @@
 
 Each pose couples only to its own view and to the camera, so eliminating the 6 × 6 pose blocks leaves a dense
 system of the camera's few parameters (W. Triggs et al., "Bundle adjustment - a modern synthesis", 2000, § 6).
-Residuals are weighted after Huber by iterated reweighting.
+Residuals are weighted after Huber by iterated reweighting. A plane board may be bent: the same quadratic
+sag in all views, as in mrcal's board warp.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,33 +32,64 @@ _LARGEST_DAMPING = 1e12
 
 @dataclass(frozen=True)
 class Corners:
-    """All corners of all views: view (M,) ascending, board point ``xyz_b`` (M, 3), pixel ``uv`` (M, 2)."""
+    """All corners of all views.
+
+    Attributes
+    ----------
+    view : (M,) int
+        Ascending.
+    xyz_b : (M, 3)
+        On the flat board, mm.
+    uv : (M, 2)
+    sag : (M, 3)
+        How far each corner leaves the plane, mm, for 1 mm of each of the three shape parameters.
+    views : int
+    """
 
     view: Int
     xyz_b: Float
     uv: Float
+    sag: Float
     views: int
 
     @staticmethod
     def of(views: Sequence[BoardView]) -> Corners:
         """Return the corners of board views, one after another."""
         view = np.repeat(np.arange(len(views)), [len(v.uv) for v in views])
-        return Corners(
-            view, np.concatenate([v.xyz_b for v in views]), np.concatenate([v.uv for v in views]), len(views)
-        )
+        xyz_b, uv = np.concatenate([v.xyz_b for v in views]), np.concatenate([v.uv for v in views])
+        return Corners(view, xyz_b, uv, _sag(xyz_b), len(views))
 
     def slices(self) -> list[slice]:
         """Return the rows of each view."""
         edges = np.searchsorted(self.view, np.arange(self.views + 1))
-        return [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+@dataclass(frozen=True)
+class Free:
+    """What is estimated beside the poses: indices of camera parameters, and of the shape's parameters."""
+
+    camera: Int
+    shape: Int
+
+    @property
+    def count(self) -> int:
+        """Number of shared parameters."""
+        return len(self.camera) + len(self.shape)
+
+
+FLAT = np.zeros(0, np.int64)
+BENT = np.arange(3)
+POSES_ONLY = Free(FLAT, FLAT)
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A camera and board poses ``T_cb`` (V, 4, 4)."""
+    """A camera, board poses ``T_cb`` (V, 4, 4) and the board's shape (3,), mm: see `Corners.sag`."""
 
     camera: Camera
     T_cb: Float
+    shape_mm: Float
 
     def residuals(self, corners: Corners) -> Float:
         """Return projected minus observed (M, 2), px; NaN where the model does not reach."""
@@ -65,52 +98,53 @@ class Estimate:
     def points(self, corners: Corners) -> Float:
         """Return the corners (M, 3), mm, in C."""
         T = self.T_cb[corners.view]
-        return np.asarray(np.einsum("mij,mj->mi", T[:, :3, :3], corners.xyz_b) + T[:, :3, 3])
+        xyz_b = corners.xyz_b + (corners.sag @ self.shape_mm)[:, None] * np.array([0.0, 0.0, 1.0])
+        return np.asarray(np.einsum("mij,mj->mi", T[:, :3, :3], xyz_b) + T[:, :3, 3])
 
-    def moved(self, free: Int, camera_step: Float, pose_step: Float) -> Estimate:
-        """Return the estimate after a step of the free camera parameters and of (V, 6) pose tangents."""
-        parameters = self.camera.parameters
-        parameters[free] += camera_step
-        turn = rotation_from_vector(pose_step[:, :3])
-        rotation = turn @ self.T_cb[:, :3, :3]
+    def moved(self, free: Free, shared_step: Float, pose_step: Float) -> Estimate:
+        """Return the estimate after a step of the free shared parameters and of (V, 6) pose tangents."""
+        parameters, shape_mm = self.camera.parameters, self.shape_mm.copy()
+        parameters[free.camera] += shared_step[: len(free.camera)]
+        shape_mm[free.shape] += shared_step[len(free.camera) :]
+        rotation = rotation_from_vector(pose_step[:, :3]) @ self.T_cb[:, :3, :3]
         T_cb = from_parts(rotation, self.T_cb[:, :3, 3] + pose_step[:, 3:])
-        return replace(self, camera=self.camera.with_parameters(parameters), T_cb=T_cb)
+        return replace(self, camera=self.camera.with_parameters(parameters), T_cb=T_cb, shape_mm=shape_mm)
 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Gauss-Newton system in blocks: camera (F, F), coupling (V, F, 6), poses (V, 6, 6), and gradients."""
+    """Gauss-Newton system in blocks: shared (F, F), coupling (V, F, 6), poses (V, 6, 6), and gradients."""
 
-    camera: Float
+    shared: Float
     coupling: Float
     pose: Float
-    camera_gradient: Float
+    shared_gradient: Float
     pose_gradient: Float
 
     def step(self, damping: float) -> tuple[Float, Float]:
-        """Return the damped step of the camera (F,) and of the poses (V, 6)."""
+        """Return the damped step of the shared parameters (F,) and of the poses (V, 6)."""
         pose = self.pose + damping * _diagonals(self.pose)
-        camera = self.camera + damping * np.diag(np.diag(self.camera))
+        shared = self.shared + damping * np.diag(np.diag(self.shared))
         solved = np.linalg.solve(pose, np.swapaxes(self.coupling, 1, 2))
         solved_gradient = np.linalg.solve(pose, self.pose_gradient[..., None])[..., 0]
-        reduced = camera - np.einsum("vfp,vpg->fg", self.coupling, solved)
-        gradient = self.camera_gradient - np.einsum("vfp,vp->f", self.coupling, solved_gradient)
-        camera_step = -_solve_scaled(reduced, gradient)
-        return camera_step, -solved_gradient - np.einsum("vpf,f->vp", solved, camera_step)
+        reduced = shared - np.einsum("vfp,vpg->fg", self.coupling, solved)
+        gradient = self.shared_gradient - np.einsum("vfp,vp->f", self.coupling, solved_gradient)
+        shared_step = -_solve_scaled(reduced, gradient)
+        return shared_step, -solved_gradient - np.einsum("vpf,f->vp", solved, shared_step)
 
-    def camera_information(self) -> Float:
-        """Return the camera's information (F, F) with the poses marginalised."""
+    def shared_information(self) -> Float:
+        """Return the information (F, F) of the shared parameters with the poses marginalised."""
         solved = np.linalg.solve(self.pose, np.swapaxes(self.coupling, 1, 2))
-        return np.asarray(self.camera - np.einsum("vfp,vpg->fg", self.coupling, solved))
+        return np.asarray(self.shared - np.einsum("vfp,vpg->fg", self.coupling, solved))
 
 
-def solve(start: Estimate, corners: Corners, free: Int, huber_px: float) -> Estimate:
+def solve(start: Estimate, corners: Corners, free: Free, huber_px: float) -> Estimate:
     """Return the estimate of least robust cost reached from ``start``.
 
     Parameters
     ----------
     free
-        Indices of the camera parameters to estimate; none leaves only the poses.
+        What to estimate beside the poses.
     huber_px
         Residual length beyond which a corner counts linearly.
     """
@@ -145,7 +179,7 @@ def weights(residual: Float, huber_px: float) -> Float:
     return np.nan_to_num(huber_px / np.maximum(length, huber_px), nan=0.0)
 
 
-def linearise(estimate: Estimate, corners: Corners, free: Int, huber_px: float) -> NormalEquations:
+def linearise(estimate: Estimate, corners: Corners, free: Free, huber_px: float) -> NormalEquations:
     """Return the weighted normal equations at an estimate."""
     points = estimate.points(corners)
     residual = estimate.residuals(corners)
@@ -155,10 +189,13 @@ def linearise(estimate: Estimate, corners: Corners, free: Int, huber_px: float) 
     by_pose = jacobian.by_point @ np.concatenate(
         [-skew(arms), np.broadcast_to(np.eye(3), (len(arms), 3, 3))], -1
     )
-    rows = np.concatenate([jacobian.by_parameters[..., free], by_pose, residual[..., None]], -1)
+    normal = estimate.T_cb[corners.view][:, :3, 2]
+    by_shape = (jacobian.by_point @ normal[..., None]) * corners.sag[:, None, free.shape]
+    by_camera = jacobian.by_parameters[..., free.camera]
+    rows = np.concatenate([by_camera, by_shape, by_pose, residual[..., None]], -1)
     rows = np.where(root > 0, rows, 0.0) * root
     blocks = np.stack([_gram(rows[part]) for part in corners.slices()])
-    f = len(free)
+    f = free.count
     pose = slice(f, f + POSE)
     return NormalEquations(
         blocks[:, :f, :f].sum(0), blocks[:, :f, pose], blocks[:, pose, pose] + 1e-12 * np.eye(POSE),
@@ -166,16 +203,22 @@ def linearise(estimate: Estimate, corners: Corners, free: Int, huber_px: float) 
     )  # fmt: skip
 
 
-def covariance(estimate: Estimate, corners: Corners, huber_px: float) -> tuple[Float, float]:
-    """Return the camera's covariance (P, P) and the 1 σ of a corner coordinate, px."""
-    free = np.arange(len(estimate.camera.parameters))
+def covariance(estimate: Estimate, corners: Corners, free: Free, huber_px: float) -> tuple[Float, float]:
+    """Return the covariance (F, F) of the shared parameters and the 1 σ of a corner coordinate, px."""
     residual = estimate.residuals(corners)
     weight = weights(residual, huber_px)
     squares = float(np.nansum(weight * np.sum(residual**2, -1)))
-    freedom = 2 * int(np.count_nonzero(weight)) - len(free) - POSE * corners.views
+    freedom = 2 * int(np.count_nonzero(weight)) - free.count - POSE * corners.views
     sigma = np.sqrt(squares / max(freedom, 1))
-    information = linearise(estimate, corners, free, huber_px).camera_information()
+    information = linearise(estimate, corners, free, huber_px).shared_information()
     return sigma**2 * _inverse_scaled(information), float(sigma)
+
+
+def _sag(xyz_b: Float) -> Float:
+    """Return x², xy and y² about the board's centre, 1 at its half diagonal."""
+    xy = xyz_b[:, :2] - (xyz_b[:, :2].min(0) + xyz_b[:, :2].max(0)) / 2
+    x, y = (xy / max(float(np.linalg.norm(xy, axis=1).max()), 1e-12)).T
+    return np.stack([x * x, x * y, y * y], -1)
 
 
 def _gram(rows: Float) -> Float:

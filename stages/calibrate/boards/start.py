@@ -16,14 +16,15 @@ from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.camera.pinhole import Pinhole
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
 from pipeline.instrument.camera.unified import Unified
-from stages.calibrate.boards.bundle import Corners, Estimate, cost, solve
+from stages.calibrate.boards.bundle import FLAT, POSES_ONLY, Corners, Estimate, Free, cost, solve
 
 Float = NDArray[np.float64]
 _HALF_FIELDS_RAD = np.geomspace(0.15, 2.6, 14)
 _SAMPLE_CORNERS = 24
 _START_HUBER_PX = 5.0
 _NEAR_FORWARD = 0.3
-_NO_PARAMETERS = np.zeros(0, np.int64)
+_WIDEST_FIT_RAD = 2.8
+_FOCAL, _ALL = Free(np.arange(2), FLAT), Free(np.arange(4), FLAT)
 
 
 def start(views: Sequence[BoardView], image_size: tuple[int, int]) -> Estimate:
@@ -35,8 +36,8 @@ def start(views: Sequence[BoardView], image_size: tuple[int, int]) -> Estimate:
     corners = Corners.of(sample)
     tried = [_posed(sample, corners, _equidistant(image_size, half)) for half in _HALF_FIELDS_RAD]
     best = min(tried, key=lambda e: cost(e.residuals(corners), _START_HUBER_PX))
-    best = solve(best, corners, np.arange(2), _START_HUBER_PX)
-    return solve(best, Corners.of(views), np.arange(4), _START_HUBER_PX)
+    best = solve(best, corners, _FOCAL, _START_HUBER_PX)
+    return solve(best, Corners.of(views), _ALL, _START_HUBER_PX)
 
 
 def pose(view: BoardView, camera: Camera) -> Float:
@@ -62,15 +63,18 @@ def pose(view: BoardView, camera: Camera) -> Float:
     return from_parts(turn.T @ cv2.Rodrigues(w)[0], turn.T @ t[:, 0])
 
 
-def model_start(model: str, estimate: Estimate, theta_max: float) -> Camera:
-    """Return a camera of ``model`` that projects nearly as the equidistant ``estimate`` up to ``theta_max``."""
+def model_start(model: str, estimate: Estimate, theta_max: float, degree: int) -> Camera:
+    """Return a camera of ``model`` that projects nearly as the equidistant one up to ``theta_max``.
+
+    ``degree`` is that of Scaramuzza's polynomial.
+    """
     seed = estimate.camera
     size, (fx, fy, cx, cy) = seed.image_size, (float(p) for p in seed.parameters)
     match model:
         case "kannala_brandt":
             return KannalaBrandt(size, (fx, fy), (cx, cy))
         case "scaramuzza":
-            return Scaramuzza(size, (cx, cy), _equidistant_polynomial((fx + fy) / 2, theta_max))
+            return Scaramuzza(size, (cx, cy), _equidistant_polynomial((fx + fy) / 2, theta_max, degree))
         case "unified":
             return Unified(size, 1.0, (2 * fx, 2 * fy), (cx, cy))
         case "pinhole":
@@ -87,18 +91,19 @@ def _equidistant(image_size: tuple[int, int], half_field_rad: float) -> Equidist
     return Equidistant(image_size, (focal, focal), ((width - 1) / 2, (height - 1) / 2))
 
 
-def _equidistant_polynomial(focal: float, theta_max: float) -> tuple[float, ...]:
-    """Fit z(ρ) = ρ / tan(ρ/f) by a0 + a2 ρ² + a3 ρ³ + a4 ρ⁴, in OCamCalib's sign."""
-    theta = np.linspace(1e-3, min(theta_max, 2.8), 200)
-    rho = focal * theta
-    basis = np.stack([np.ones_like(theta), theta**2, theta**3, theta**4], -1)
-    a0, a2, a3, a4 = np.linalg.lstsq(basis, -rho / np.tan(theta), rcond=None)[0]
-    return float(a0), 0.0, float(a2 / focal**2), float(a3 / focal**3), float(a4 / focal**4)
+def _equidistant_polynomial(focal: float, theta_max: float, degree: int) -> tuple[float, ...]:
+    """Fit z(ρ) = ρ / tan(ρ/f) by a0 + a2 ρ² + … + aN ρᴺ, in OCamCalib's sign."""
+    theta = np.linspace(1e-3, min(theta_max, _WIDEST_FIT_RAD), 200)
+    powers = np.array([0, *range(2, degree + 1)])
+    fitted = np.linalg.lstsq(theta[:, None] ** powers, -focal * theta / np.tan(theta), rcond=None)[0]
+    coefficients = np.zeros(degree + 1)
+    coefficients[powers] = fitted / focal**powers
+    return tuple(float(a) for a in coefficients)
 
 
 def _posed(sample: list[BoardView], corners: Corners, camera: Camera) -> Estimate:
     T_cb = np.stack([pose(view, camera) for view in sample])
-    return solve(Estimate(camera, T_cb), corners, _NO_PARAMETERS, _START_HUBER_PX)
+    return solve(Estimate(camera, T_cb, np.zeros(3)), corners, POSES_ONLY, _START_HUBER_PX)
 
 
 def _thinned(view: BoardView) -> BoardView:

@@ -54,4 +54,4 @@ Board = Chessboard | Charuco
 def grid(columns: int, rows: int, square_mm: float) -> Float:
     """Return (columns · rows, 3) points of a plane grid, row by row."""
     x, y = np.meshgrid(np.arange(columns), np.arange(rows))
-    return np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3) * float(square_mm)
+    return np.asarray(square_mm * np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3), np.float64)

@@ -1,0 +1,141 @@
+"""Judging calibrations: held-out reprojection, uncertainty over the image, displacement between two."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import UnusableError
+from pipeline.geometry.rigid import rotation_from_vector, skew
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.calibration import (
+    BoardView,
+    CameraCalibration,
+    DisplacementMap,
+    ModelScore,
+    UncertaintyMap,
+    rms,
+)
+from stages.calibrate.boards.bundle import Estimate
+from stages.calibrate.boards.fit import fit, held_out_residuals
+from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
+
+Float = NDArray[np.float64]
+_GRID_COLUMNS = 41
+_TURNING_STEPS = 20
+
+
+def score(
+    views: Sequence[BoardView], first: Estimate, model: ModelName, parameters: BoardCalibrationParameters
+) -> ModelScore:
+    """Return how well a model fits, and how well it predicts views that it was not fitted to.
+
+    The views are dealt out to ``parameters.folds`` parts by turns; each part is held out once.
+    """
+    try:
+        whole = fit(views, first, model, parameters)
+        parts = [_held_out(views, first, model, parameters, part) for part in _parts(len(views), parameters)]
+    except UnusableError as error:
+        return ModelScore(model, None, 0, np.nan, np.nan, error.problem)
+    held_out = np.concatenate([residual for part in parts for residual in part])
+    if np.isnan(held_out).any():
+        return ModelScore(model, whole, 0, whole.rms_px, np.nan, "fails to reach corners that were held out")
+    free = int(np.count_nonzero(np.diag(whole.covariance)))
+    return ModelScore(model, whole, free, whole.rms_px, rms(held_out), "")
+
+
+def best(scores: Sequence[ModelScore]) -> ModelScore | None:
+    """Return the model that predicts held-out views best, or None when every model was refused."""
+    usable = [s for s in scores if np.isfinite(s.held_out_rms_px)]
+    return min(usable, key=lambda s: s.held_out_rms_px) if usable else None
+
+
+def uncertainty_map(calibration: CameraCalibration) -> UncertaintyMap:
+    """Return 1 σ, px, of where the camera projects a direction, over the image.
+
+    A small rotation of the camera with all boards changes nothing that can be seen. So the rotation that best
+    undoes a change of parameters over the image is taken out of ``sigma_px``, not of ``raw_sigma_px``.
+    """
+    camera = calibration.camera
+    uv, ray, valid = _grid_rays(camera)
+    jacobian = camera.project_jacobian(ray)
+    turning = -jacobian.by_point @ skew(ray)
+    undone = np.linalg.lstsq(turning[valid].reshape(-1, 3), _flat(jacobian.by_parameters[valid]), rcond=None)[
+        0
+    ]
+    left = jacobian.by_parameters - turning @ undone
+    covariance = calibration.covariance
+    return UncertaintyMap(uv, _root_trace(left, covariance), _root_trace(jacobian.by_parameters, covariance))
+
+
+def displacement_map(camera: Camera, other: Camera) -> DisplacementMap:
+    """Return by how much ``other`` projects what ``camera`` sees at each pixel elsewhere.
+
+    The rotation between the two cameras that makes the displacement least is taken out and returned.
+    """
+    uv, ray, valid = _grid_rays(camera)
+    rotation = np.zeros(3)
+    for _ in range(_TURNING_STEPS):
+        turned = ray @ rotation_from_vector(rotation).T
+        seen = valid & other.project(turned).valid
+        difference = other.project(turned[seen]).uv - uv[seen]
+        weight = 1 / np.maximum(np.hypot(*difference.T), 1.0)
+        by_rotation = -other.project_jacobian(turned[seen]).by_point @ skew(turned[seen])
+        rows, right = (by_rotation * weight[:, None, None]).reshape(-1, 3), difference * weight[:, None]
+        step = np.linalg.lstsq(rows, -right.ravel(), rcond=None)[0]
+        rotation = rotation + step
+        if np.abs(step).max() < 1e-12:
+            break
+    turned = ray @ rotation_from_vector(rotation).T
+    return DisplacementMap(uv, other.project(turned).uv - uv, rotation)
+
+
+def without_outlier_views(
+    views: Sequence[BoardView], first: Estimate, calibration: CameraCalibration, factor: float
+) -> tuple[list[BoardView], Estimate, list[str]]:
+    """Return views with an rms of at most ``factor`` times the median, their poses, and the others' names."""
+    view_rms = calibration.view_rms_px
+    kept = view_rms <= factor * np.median(view_rms)
+    names = [view.name for view, keep in zip(views, kept, strict=True) if not keep]
+    remaining = [view for view, keep in zip(views, kept, strict=True) if keep]
+    return remaining, replace(first, T_cb=first.T_cb[kept]), names
+
+
+def _parts(count: int, parameters: BoardCalibrationParameters) -> list[NDArray[np.bool_]]:
+    folds = min(parameters.folds, count)
+    return [np.arange(count) % folds == part for part in range(folds)]
+
+
+def _held_out(
+    views: Sequence[BoardView],
+    first: Estimate,
+    model: ModelName,
+    parameters: BoardCalibrationParameters,
+    out: NDArray[np.bool_],
+) -> list[Float]:
+    inside = [view for view, left in zip(views, out, strict=True) if not left]
+    outside = [view for view, left in zip(views, out, strict=True) if left]
+    fitted = fit(inside, replace(first, T_cb=first.T_cb[~out]), model, parameters)
+    return held_out_residuals(fitted, outside, parameters.huber_px)
+
+
+def _grid_rays(camera: Camera) -> tuple[Float, Float, NDArray[np.bool_]]:
+    width, height = camera.image_size
+    rows = max(round(_GRID_COLUMNS * height / width), 2)
+    u, v = np.meshgrid(np.linspace(0, width - 1, _GRID_COLUMNS), np.linspace(0, height - 1, rows))
+    uv = np.stack([u, v], -1)
+    rays = camera.unproject(uv)
+    return uv, rays.ray, rays.valid
+
+
+def _flat(array: Float) -> Float:
+    return array.reshape(-1, array.shape[-1])
+
+
+def _root_trace(jacobian: Float, covariance: Float) -> Float:
+    """Return the root of the mean variance of the two pixel coordinates."""
+    variance = np.einsum("...ip,pq,...iq->...", jacobian, covariance, jacobian) / 2
+    return np.asarray(np.sqrt(variance))

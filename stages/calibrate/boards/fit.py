@@ -1,0 +1,192 @@
+"""Fitting one camera model to board views, and refusing views that cannot determine a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import UnusableError
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.calibration import BoardView, CameraCalibration
+from pipeline.instrument.camera.scaramuzza import Scaramuzza
+from stages.calibrate.boards.bundle import (
+    BENT,
+    FLAT,
+    POSES_ONLY,
+    Corners,
+    Estimate,
+    Free,
+    covariance,
+    solve,
+)
+from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
+from stages.calibrate.boards.start import model_start, pose
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+NAME = "calibrate-camera"
+
+
+def fit(
+    views: Sequence[BoardView], first: Estimate, model: ModelName, parameters: BoardCalibrationParameters
+) -> CameraCalibration:
+    """Fit a camera model to board views.
+
+    Parameters
+    ----------
+    views
+        At least as many as ``parameters.least_views``.
+    first
+        An equidistant camera and poses near the answer, from `stages.calibrate.boards.start.start`.
+
+    Raises
+    ------
+    UnusableError
+        When the model cannot see the boards, or the views leave the image scale undetermined.
+    """
+    corners = Corners.of(views)
+    camera = model_start(model, first, _widest_angle(first, corners), parameters.polynomial_degree)
+    seed = replace(first, camera=camera)
+    free = shared_parameters(seed.camera, corners, parameters)
+    estimate = solve(
+        solve(seed, corners, _flat(free), parameters.huber_px), corners, free, parameters.huber_px
+    )
+    residual = estimate.residuals(corners)
+    _refuse_unseen(model, residual)
+    spread, sigma_px = covariance(estimate, corners, free, parameters.huber_px)
+    calibration = CameraCalibration(
+        estimate.camera,
+        _embedded(spread, free, len(estimate.camera.parameters)),
+        tuple(view.name for view in views),
+        estimate.T_cb,
+        estimate.shape_mm,
+        corners.view,
+        corners.uv,
+        residual,
+        sigma_px,
+    )
+    _refuse_undetermined(calibration, parameters)
+    return calibration
+
+
+def held_out_residuals(
+    calibration: CameraCalibration, views: Sequence[BoardView], huber_px: float
+) -> list[Float]:
+    """Return residuals (N, 2), px, of views not used before: only their poses are fitted."""
+    residuals = []
+    for view in views:
+        corners = Corners.of([view])
+        posed = Estimate(calibration.camera, pose(view, calibration.camera)[None], calibration.shape_mm)
+        residuals.append(solve(posed, corners, POSES_ONLY, huber_px).residuals(corners))
+    return residuals
+
+
+def shared_parameters(camera: Camera, corners: Corners, parameters: BoardCalibrationParameters) -> Free:
+    """Return what is estimated beside the poses.
+
+    Scaramuzza's e stays 0: turning the sensor against the boards' poses changes nothing, so of c, d, e and
+    the scale of the polynomial only two shape the image.
+    """
+    plane = bool(np.ptp(corners.xyz_b[:, 2]) < 1e-9)
+    shape = BENT if plane and parameters.board_shape == "bent" else FLAT
+    indices = np.arange(len(camera.parameters))
+    if isinstance(camera, Scaramuzza):
+        indices = indices[indices != camera.parameter_names.index("e")]
+    return Free(indices, shape)
+
+
+def refuse_one_plane(
+    views: Sequence[BoardView], first: Estimate, parameters: BoardCalibrationParameters
+) -> None:
+    """Raise when there are too few views, or plane boards that all face the same way.
+
+    Parallel boards constrain the camera no better than a single one: focal length and distance trade off.
+
+    Raises
+    ------
+    UnusableError
+        Saying how many views there are, or how far the boards' directions differ.
+    """
+    if len(views) < parameters.least_views:
+        raise UnusableError(
+            NAME,
+            f"the board was found in {len(views)} images",
+            limit=f"at least {parameters.least_views}",
+            hint="take more pictures, with the board at different places, distances and tilts",
+        )
+    spread = np.rad2deg(_largest_tilt(first.T_cb))
+    flat = max(float(np.ptp(v.xyz_b[:, 2])) for v in views) < 1e-9
+    if flat and spread < parameters.least_tilt_deg:
+        raise UnusableError(
+            NAME,
+            f"all {len(views)} views show the board in one plane or in parallel planes: "
+            f"its direction changes by no more than {spread:.1f}°",
+            limit=f"at least {parameters.least_tilt_deg:g}°",
+            hint="tilt the board to all sides, by 20° to 50°, and move it into the corners of the image",
+        )
+
+
+def _largest_tilt(T_cb: Float) -> float:
+    normal = T_cb[:, :3, 2]
+    return float(np.arccos(np.clip(np.abs(normal @ normal.T), 0, 1)).max())
+
+
+def _widest_angle(estimate: Estimate, corners: Corners) -> float:
+    points = estimate.points(corners)
+    return float(np.arctan2(np.hypot(points[:, 0], points[:, 1]), points[:, 2]).max())
+
+
+def _flat(free: Free) -> Free:
+    return Free(free.camera, FLAT)
+
+
+def _embedded(spread: Float, free: Free, count: int) -> Float:
+    """Return the camera's block of the shared covariance, zero for parameters that were held."""
+    full = np.zeros((count, count))
+    inner = len(free.camera)
+    full[np.ix_(free.camera, free.camera)] = spread[:inner, :inner]
+    return full
+
+
+def _refuse_unseen(model: str, residual: Float) -> None:
+    lost = int(np.isnan(residual).any(1).sum())
+    if lost:
+        raise UnusableError(
+            NAME,
+            f"the model {model} does not reach {lost} of {len(residual)} corners",
+            hint="choose a model that sees this far from its axis: kannala_brandt, scaramuzza or unified",
+        )
+
+
+def _refuse_undetermined(calibration: CameraCalibration, parameters: BoardCalibrationParameters) -> None:
+    """Raise when the scale at a typical corner is uncertain: relative 1 σ of the image radius there."""
+    camera = calibration.camera
+    radius = np.hypot(*(calibration.uv - camera.centre_px).T)
+    typical = calibration.uv[np.argsort(radius)[len(radius) // 2]]
+    ray = camera.unproject(typical).ray
+    jacobian = camera.project_jacobian(ray).by_parameters
+    outward = (typical - camera.centre_px) / np.linalg.norm(typical - camera.centre_px)
+    centre = np.array([n in ("cx", "cy") for n in camera.parameter_names])
+    row = np.where(centre, 0.0, outward @ jacobian)
+    relative = float(np.sqrt(row @ calibration.covariance @ row) / np.linalg.norm(typical - camera.centre_px))
+    if not relative <= parameters.largest_scale_sigma:
+        weakest = _weakest_direction(calibration)
+        raise UnusableError(
+            NAME,
+            f"the views leave the image scale uncertain by {100 * relative:.1f} % (1 σ); "
+            f"weakest direction: {weakest}",
+            limit=f"{100 * parameters.largest_scale_sigma:g} %",
+            hint="tilt the board more, and show it at more places of the image",
+        )
+
+
+def _weakest_direction(calibration: CameraCalibration) -> str:
+    sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 1e-300))
+    correlation = calibration.covariance / sigma / sigma[:, None]
+    vector = np.linalg.eigh(correlation)[1][:, -1]
+    strongest = np.argsort(-np.abs(vector))[:3]
+    names = calibration.camera.parameter_names
+    return ", ".join(f"{vector[i]:+.2f} {names[i]}" for i in strongest)
