@@ -29,7 +29,7 @@ def decimate(original: Surface, target_faces: int) -> Decimated:
     """Return ``original`` with about ``target_faces`` triangles, or more where its allowance asks for it.
 
     The distance of every original vertex from the new surface is measured (one-sided Hausdorff distance), and
-    that of the new vertices from the original, since a collapse on a flat wall may throw a vertex far along it.
+    that of the new vertices from the original, as a collapse on a flat wall may throw a vertex far along it.
     Where one is larger than its vertex' allowance, the original is decimated again, half as much; if nothing
     is left to take away, the original itself is returned.
     """

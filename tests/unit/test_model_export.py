@@ -104,9 +104,8 @@ def test_cloud_has_the_agreed_properties(wall: Wall, tmp_path: Path) -> None:
     assert not ply.text
     assert ply.byte_order == "<"
     points = ply["vertex"]
-    assert [p.name for p in points.properties] == (
-        "x y z nx ny nz red green blue sigma_mm radius_mm distance_mm azimuth_rad frame"
-    ).split()
+    names = ",".join(p.name for p in points.properties)
+    assert names == "x,y,z,nx,ny,nz,red,green,blue,sigma_mm,radius_mm,distance_mm,azimuth_rad,frame"
     cloud = wall.cloud
     np.testing.assert_array_equal(np.stack([points[a] for a in "xyz"], -1), cloud.xyz_p)
     for name in ("sigma_mm", "radius_mm", "distance_mm", "azimuth_rad", "frame"):
