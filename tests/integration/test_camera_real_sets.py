@@ -1,0 +1,35 @@
+"""Published cameras pose the boards of their own photographs; those of another camera do not."""
+
+import pytest
+
+from pipeline.instrument.camera.formats import read_camera
+from stages.calibrate.boards.targets import Chessboard
+from tests.board_sets import detected, matlab_camera, pose_rms_px
+from tests.shared_data import shared
+
+
+@pytest.mark.parametrize(
+    ("image", "own", "other", "limit_px"),
+    [
+        ("Pro2.jpg", "Real1", "Real2old", 0.4),
+        ("testr28_1.jpg", "Real2old", "Real1", 0.5),
+        ("testr32_1_2.jpg", "Real2old", "Real1", 0.5),
+    ],
+)
+def test_matlab_cameras_pose_their_boards(image, own, other, limit_px):
+    view = detected(
+        shared("real", "omni_laser_zhang", "calib_experience_real", image), Chessboard(9, 6, 26.0)
+    )
+    assert view is not None
+    assert pose_rms_px(view, matlab_camera(own)) <= limit_px
+    assert pose_rms_px(view, matlab_camera(other)) > 1.3 * pose_rms_px(view, matlab_camera(own))
+
+
+def test_ocamcalib_camera_poses_a_red_and_white_board_far_off_its_axis():
+    """The only photograph there shows the board at 63°, where the published camera is 1.6 px off."""
+    camera = read_camera(shared("real", "ocam_umh", "calib_results.txt"))
+    image = shared("real", "ocam_umh", "images", "1686048866194162000.png")
+    view = detected(image, Chessboard(9, 6, 59.4))
+    assert view is not None
+    assert len(view.uv) == 54
+    assert pose_rms_px(view, camera) <= 1.7
