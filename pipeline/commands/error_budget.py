@@ -25,7 +25,7 @@ ACCURACIES_MM = (0.1, 0.02)
 def error_budget(
     probe: Annotated[
         Path | None,
-        typer.Argument(help="probe.yaml, stated or calibrated [default: a typical uncalibrated probe]"),
+        typer.Argument(help="probe.yaml, stated or calibrated (default: a typical uncalibrated probe)"),
     ] = None,
     diameter_mm: Annotated[float, typer.Option(help="inner diameter of the pipe, mm")] = 101.6,
     offset_x_mm: Annotated[float, typer.Option(help="probe off the pipe's axis, right, mm")] = 0.0,
@@ -36,14 +36,14 @@ def error_budget(
     ] = None,
     accuracy_mm: Annotated[
         list[float] | None,
-        typer.Option(help="wished accuracy for the tolerances, mm [default: 0.1 and 0.02]"),
+        typer.Option(help="wished accuracy for the tolerances, mm (default: 0.1 and 0.02)"),
     ] = None,
     draws: Annotated[
         int, typer.Option(min=0, max=65536, help="Monte Carlo draws through the exact chain; 0 for none")
     ] = 256,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="folder for table, chart and page [default: error-budget]"),
+        typer.Option("--output", "-o", help="folder for table, chart and page (default: error-budget)"),
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="print the budget as JSON; files only with -o")

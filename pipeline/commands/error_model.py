@@ -40,10 +40,10 @@ def error_model(
     diameter_mm: Annotated[float, typer.Option(help="inner diameter of the pipe, mm")] = 101.6,
     tilt_deg: Annotated[float, typer.Option(help="tilt of the laser sheet, deg")] = 0.6,
     baseline_mm: Annotated[
-        float | None, typer.Option(help="camera to laser sheet, mm [default: the probe's, else 22]")
+        float | None, typer.Option(help="camera to laser sheet, mm (default: the probe's, else 22)")
     ] = None,
     accuracy_mm: Annotated[
-        float | None, typer.Option(help="wished accuracy, mm: gives the tilt it allows [page: 0.1]")
+        float | None, typer.Option(help="wished accuracy, mm: gives the tilt it allows (page: 0.1)")
     ] = None,
     tilt_direction_deg: Annotated[
         float, typer.Option(help="azimuth in C toward which the sheet leans forward, deg")
@@ -52,7 +52,7 @@ def error_model(
     offset_x_mm: Annotated[float, typer.Option(help="probe off the pipe's axis, right, mm")] = 0.0,
     offset_y_mm: Annotated[float, typer.Option(help="probe off the pipe's axis, down, mm")] = 0.0,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="folder for figures and page [default: error-model]")
+        Path | None, typer.Option("--output", "-o", help="folder for figures and page (default: error-model)")
     ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="print the numbers as JSON; files only with -o")

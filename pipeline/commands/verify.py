@@ -57,7 +57,7 @@ def verify(
         float, typer.Option(min=0.01, help="points farther from a mesh or cloud do not lie on it, mm")
     ] = 5.0,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="folder of the certificate [default: RUN/verify]")
+        Path | None, typer.Option("--output", "-o", help="folder of the certificate (default: RUN/verify)")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print the figures; files only with -o")] = False,
 ) -> None:
