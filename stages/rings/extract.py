@@ -112,15 +112,17 @@ def _first_weights(bgr: NDArray[np.uint8], sectors: Sectors, probe: Probe) -> Fl
 
 def _learn_clip_level(recording: Recording, frames: Int, sectors: Sectors) -> float:
     """Learn at which grey level the line clips from the first of ``frames`` that shows a ring."""
-    for grey, bgr in zip(_copies(recording, frames, "grey"), _copies(recording, frames, "bgr"), strict=True):
+    for frame in frames:
+        grey, bgr = _single(recording, frame, "grey"), _single(recording, frame, "bgr")
         trace = None if grey is None or bgr is None else trace_ring(grey, sectors, np.inf)
         if trace is not None and grey is not None and bgr is not None:
             return clip_level_of(grey, bgr, sectors.pixels_near(trace.radius_everywhere(), 0, trace.width_px))
     return np.inf
 
 
-def _copies(recording: Recording, frames: Int, planes: Planes) -> list[NDArray[np.uint8] | None]:
-    return [None if image is None else image.copy() for _, image in recording.read(frames, planes)]
+def _single(recording: Recording, frame: int, planes: Planes) -> NDArray[np.uint8] | None:
+    _, image = next(iter(recording.read([frame], planes)))
+    return None if image is None else image.copy()
 
 
 def _samples(frames: Int, sectors: Sectors, traces: dict[int, RingTrace]) -> RingSamples:

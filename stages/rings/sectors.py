@@ -55,17 +55,30 @@ class Sectors:
 
 def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) -> Sectors:
     """Assign every pixel of an image (width, height) to the nearest of ``azimuths`` directions."""
-    width, height = image_size
     centre = np.asarray(centre_px, float)
-    du, dv = np.arange(width) - centre[0], (np.arange(height) - centre[1])[:, None]
-    radius, turn = np.hypot(du, dv).ravel(), np.arctan2(dv, du).ravel()
+    sector, radius, offset = _polar(*image_size, centre[0], centre[1], azimuths)
+    start, order = _grouped(sector, radius, azimuths)
+    azimuth = -np.pi + 2 * np.pi / azimuths * np.arange(azimuths)
+    return Sectors(azimuth, centre, image_size, start, order, radius[order], offset[order])
+
+
+@numba.njit(cache=True, nogil=True)
+def _polar(width, height, u, v, azimuths):  # type: ignore[no-untyped-def]
+    """Sector, radius and azimuth from the sector's centre of every pixel, (height × width,) each."""
     step = 2 * np.pi / azimuths
-    nearest = np.rint((turn + np.pi) / step)
-    start, order = _grouped(nearest.astype(np.int64) % azimuths, radius, azimuths)
-    return Sectors(
-        -np.pi + step * np.arange(azimuths), centre, image_size, start, order,
-        radius[order].astype(np.float32), (turn + np.pi - nearest * step)[order].astype(np.float32),
-    )  # fmt: skip
+    sector = np.empty(width * height, np.int32)
+    radius = np.empty(width * height, np.float32)
+    offset = np.empty(width * height, np.float32)
+    k = 0
+    for row in range(height):
+        for column in range(width):
+            turn = (np.arctan2(row - v, column - u) + np.pi) / step
+            nearest = int(turn + 0.5)
+            sector[k] = nearest % azimuths
+            radius[k] = np.hypot(row - v, column - u)
+            offset[k] = (turn - nearest) * step
+            k += 1
+    return sector, radius, offset
 
 
 @numba.njit(cache=True, nogil=True)

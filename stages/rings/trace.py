@@ -128,13 +128,14 @@ def _judge(fit: ProfileFit, peaks: Peaks, sectors: Sectors) -> Byte:
     """
     v = RingValidity
     brightness, width, misfit = np.log(fit.amplitude), np.log(fit.width_px), np.log(fit.chi2)
-    rival = np.log(fit.amplitude * np.maximum(peaks.rival_score, 1e-9) / peaks.score)
+    flicker = middle_and_spread(np.diff(brightness))[1] / np.sqrt(2)
+    ambiguous = peaks.rival_score > np.exp(-_TYPICAL * max(flicker, _REFLECTANCE_SPREAD)) * peaks.score
     thin = ~(np.minimum(fit.unclipped_below, fit.unclipped_above) >= 1)
     out = np.full(len(thin), v.VALID, np.uint8)
     out[np.abs(_oddness(width, width)) > _ODD] = v.WIDTH
     out[_oddness(brightness, brightness, _REFLECTANCE_SPREAD) > _ODD] = v.GLINT
     out[_oddness(misfit, misfit) > _ODD] = v.GHOST
-    out[_oddness(rival, brightness, _REFLECTANCE_SPREAD) > -_TYPICAL] = v.GHOST
+    out[ambiguous & (peaks.rival_score > detection_limit(peaks.score.size))] = v.GHOST
     out[~(fit.amplitude > detection_limit(len(thin)) * fit.amplitude_sigma)] = v.LOW_CONTRAST
     out[thin & (fit.clipped > 0)] = v.SATURATED
     out[fit.radius_px > sectors.outermost_px - _EDGE_WIDTHS * fit.width_px] = v.OUT_OF_VIEW

@@ -1,0 +1,130 @@
+"""Ring extraction: speed against decoding alone, and accuracy against the Cramér–Rao bound.
+
+usage: python -m tests.benchmarks.bench_rings [RECORDING]
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.instrument.probe_file import read_probe
+from pipeline.recording import open_recording
+from pipeline.stage import quiet_context
+from stages.rings import RingParameters, extract_rings
+from stages.rings.profile import Response, fit_line
+from stages.rings.sectors import cut_sectors
+from tests.ring_images import exposed, off_centre, ring_light
+
+SIZE, CENTRE, AZIMUTHS, WIDTH, AMPLITUDE, BLACK = (640, 480), (318.7, 241.3), 720, 1.2, 90.0, 16.0
+ROUNDS = 3
+
+
+def seconds(work):
+    """Least wall time of ``ROUNDS`` calls: what the machine can do when left alone."""
+    spent = []
+    for _ in range(ROUNDS):
+        start = time.perf_counter()
+        work()
+        spent.append(time.perf_counter() - start)
+    return min(spent)
+
+
+def speed(folder):
+    recording = open_recording(folder)
+    probe = read_probe(recording.probe_file)
+    planes = "bgr" if "both" in recording.frames.illumination else "grey"
+
+    def extract():
+        extract_rings(recording, probe, RingParameters(), quiet_context())
+
+    extract()
+    alone = seconds(lambda: sum(1 for _ in recording.read(recording.frames.frame, planes)))
+    whole = seconds(extract)
+    frames = len(recording.frames.frame)
+    print(f"{recording.name}: decoding alone ({planes}) {frames / alone:.0f} frames/s, "
+          f"with extraction {frames / whole:.0f} frames/s, ratio {alone / whole:.2f}")  # fmt: skip
+
+
+def sector_profiles(image, sectors, truth):
+    """Yield distance to the ring and grey level above black of each sector's pixels near it."""
+    for a, r in enumerate(truth):
+        own = slice(sectors.start[a], sectors.start[a + 1])
+        x = sectors.radius_px[own] - r
+        near = np.abs(x) < 6 * WIDTH
+        yield x[near], image.ravel()[sectors.pixel[own][near]] - BLACK
+
+
+def centre_of_gravity(image, sectors, truth, noise):
+    """Mean distance weighted by what stands out of three noise σ."""
+    out = []
+    for x, y in sector_profiles(image, sectors, truth):
+        weight = np.where(y > 3 * noise, y, 0.0)
+        out.append(weight @ x / max(weight.sum(), 1e-9))
+    return np.array(out)
+
+
+def steger(image, sectors, truth):
+    """Zero of the first derivative over the second of the profile smoothed by the line's own width."""
+    out = []
+    for x, y in sector_profiles(image, sectors, truth):
+        at = 0.0
+        for _ in range(5):
+            t = (x - at) / WIDTH
+            g = np.exp(-0.5 * t * t)
+            slope, bend = (g * t) @ y, (g * (t * t - 1)) @ y
+            at += np.clip(-slope / min(bend, -1e-9) * WIDTH * -1, -0.5, 0.5) if bend < 0 else 0.0
+        out.append(at)
+    return np.array(out)
+
+
+def bound(sectors, truth, read, shot):
+    """Root mean square Cramér–Rao 1 σ with height, width and background unknown."""
+    variance = []
+    for a, r in enumerate(truth):
+        x = sectors.radius_px[sectors.start[a] : sectors.start[a + 1]] - r
+        x = x[np.abs(x) < 8]
+        e = np.exp(-0.5 * (x / WIDTH) ** 2)
+        weight = 1 / (read**2 + 1 / 12 + shot * AMPLITUDE * e)
+        d = np.stack([AMPLITUDE * e * x / WIDTH**2, AMPLITUDE * e * (x / WIDTH) ** 2, e, np.ones_like(e)], 1)
+        variance.append(np.linalg.inv(d.T @ (d * weight[:, None]))[0, 0])
+    return np.sqrt(np.mean(variance))
+
+
+def accuracy():
+    sectors, ring = cut_sectors(SIZE, np.array(CENTRE), AZIMUTHS), off_centre(170.0, 2.0)
+    truth = ring(sectors.azimuth_rad)
+    print("read  shot   bound  matched  ratio  Steger  centre of gravity   (rms error, px)")
+    for read, shot in ((0.7, 0.0), (1.0, 0.1), (2.0, 0.4), (4.0, 1.0), (8.0, 1.0)):
+        rows = []
+        for seed in range(4):
+            image = exposed(
+                ring_light(SIZE, CENTRE, ring, WIDTH, AMPLITUDE),
+                np.random.default_rng(seed),
+                read=read,
+                shot=shot,
+            )
+            response = Response(BLACK, read**2 + 1 / 12, shot, 255.0)
+            fit = fit_line(image, sectors, truth, WIDTH, response)
+            rows.append(
+                (
+                    fit.radius_px - truth,
+                    steger(image, sectors, truth),
+                    centre_of_gravity(image, sectors, truth, read),
+                )
+            )
+        matched, ridge, gravity = (np.sqrt(np.nanmean(np.square(r))) for r in zip(*rows, strict=True))
+        least = bound(sectors, truth, read, shot)
+        print(f"{read:4.1f}  {shot:4.1f}  {least:6.4f}  {matched:6.4f}  {matched / least:5.2f}  "
+              f"{ridge:6.4f}  {gravity:6.4f}")  # fmt: skip
+
+
+def main():
+    default = Path(__file__).resolve().parents[2].parent / "shared" / "recordings" / "open-1-field"
+    speed(Path(sys.argv[1]) if len(sys.argv) > 1 else default)
+    accuracy()
+
+
+if __name__ == "__main__":
+    main()
