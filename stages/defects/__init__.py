@@ -4,7 +4,7 @@
    is known where the defects are.
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis to instances with outlines; all-round beads are welds (`segment`).
-4. Depth as the extreme of a 1 mm mean, without what noise adds to an extreme, ± 1 σ (`depth`).
+4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
 5. Kind from named features as a probability; codes; words (`classify`, `codes`, `describe`).
 """
 
@@ -18,7 +18,7 @@ from pipeline.errors import UnusableError
 from pipeline.findings import Defects
 from pipeline.recording.base import Recording
 from pipeline.stage import Context, Stage
-from stages.defects.depth import Depth, measure_depth, noise_field
+from stages.defects.depth import Depth, measure_depth, measured_surface
 from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, detect
 from stages.defects.parameters import DefectParameters
@@ -52,10 +52,10 @@ def find_defects(
     known = footprint(relief, segment(relief, detection, parameters))
     relief = smooth_shape_removed(wall.radius_map, parameters, known)
     regions = segment(relief, detection, parameters)
-    noise = noise_field(relief, regions)
+    surface = measured_surface(relief, wall.cloud, regions)
     measured: list[tuple[Region, Depth]] = []
     for k, region in enumerate(regions):
-        measured.append((region, measure_depth(relief, region, noise, parameters.draws, context.random)))
+        measured.append((region, measure_depth(relief, region, surface, parameters.draws, context.random)))
         context.progress(k + 1, len(regions))
     kept = [(r, d) for r, d in measured if abs(d.depth_mm) >= parameters.min_depth_mm]
     kept.sort(key=lambda pair: (pair[0].row, pair[0].column))
@@ -74,5 +74,5 @@ def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float
 
 
 DEFECTS = Stage(
-    "defects", "1", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
+    "defects", "2", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
 )

@@ -41,6 +41,8 @@ class Relief:
         Its part from noise alone.
     welds : tuple of slice
         Rows of all-round beads.
+    harmonics_mm : (S, 5)
+        Of the smooth shape that ``all_mm`` refers to: mean, cos ψ, sin ψ, cos 2ψ, sin 2ψ.
     """
 
     distance_mm: Float
@@ -51,6 +53,15 @@ class Relief:
     sigma_mm: Float
     noise_mm: Float
     welds: tuple[slice, ...]
+    harmonics_mm: Float
+
+    def shape_at(self, row: Float, column: Float) -> Float:
+        """Return the smooth shape's radius (N,) at fractional rows and columns (N,)."""
+        step = float(self.azimuth_rad[1] - self.azimuth_rad[0])
+        basis = _basis(self.azimuth_rad[0] + step * column)
+        at = np.arange(len(self.harmonics_mm))
+        coefficients = np.stack([np.interp(row, at, c) for c in self.harmonics_mm.T], -1)
+        return np.asarray((coefficients * basis).sum(-1))
 
     @property
     def cell_mm(self) -> tuple[float, float]:
@@ -90,8 +101,16 @@ def smooth_shape_removed(radius_map: RadiusMap, parameters: DefectParameters, kn
     sigma, noise = _spread(local, radius_map)
     mean = float(np.nanmedian(measured))
     return Relief(
-        radius_map.distance_mm, radius_map.azimuth_rad, mean, local, everything, sigma, noise, welds
-    )
+        radius_map.distance_mm,
+        radius_map.azimuth_rad,
+        mean,
+        local,
+        everything,
+        sigma,
+        noise,
+        welds,
+        slow + shifted,
+    )  # fmt: skip
 
 
 def _basis(azimuth_rad: Float) -> Float:
