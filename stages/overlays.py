@@ -125,7 +125,7 @@ def _range(size_mm: NDArray[np.floating], parameters: OverlayParameters) -> floa
     size = float(np.quantile(measured, parameters.shown_quantile)) if len(measured) else 0.0
     size = max(size, parameters.smallest_range_mm)
     unit = 10.0 ** (np.floor(np.log10(size)) - 1)
-    return float(np.ceil(size / unit - 1e-9) * unit)
+    return float(f"{np.ceil(size / unit - 1e-9) * unit:.6g}")
 
 
 def _overlay(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.artefacts import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
-from pipeline.geometry.axis import axis_through, from_pipe, straight_axis
+from pipeline.geometry.axis import axis_through, from_pipe, straight_axis, to_pipe
 
 RADIUS = 25.0
 PIT = (22.0, 1.0, 1.2, 2.0)  # distance mm, azimuth rad, depth mm, 1 σ mm
@@ -72,3 +72,21 @@ def smooth_photo(distance_from_mm: float = -2.0, length_mm: float = 60.0) -> Wal
     bgra[..., 1], bgra[..., 2] = np.rint(128 + 90 * np.cos(psi)), np.rint(128 + 90 * np.sin(psi))
     bgra[..., 3] = 255
     return WallTexture(bgra, distance_from_mm, 0.2, float(psi[0]), 2 * np.pi / columns)
+
+
+def tee(points: int = 24000) -> tuple[PointCloud, PipeAxis]:
+    """Cloud of a pipe of radius 25 mm with a branch of radius 12 mm toward +x at distance 25 mm."""
+    random = np.random.default_rng(0)
+    psi, z = random.uniform(-np.pi, np.pi, points), random.uniform(0, 50, points)
+    run = np.stack([25 * np.cos(psi), 25 * np.sin(psi), z], -1)
+    mouth = (np.hypot(run[:, 1], z - 25) < 12) & (run[:, 0] > 0)
+    t, x = random.uniform(-np.pi, np.pi, points // 4), random.uniform(20, 42, points // 4)
+    branch = np.stack([x, 12 * np.sin(t), 25 + 12 * np.cos(t)], -1)
+    beyond = np.hypot(branch[:, 0], branch[:, 1]) >= 25
+    xyz = np.concatenate([run[~mouth], branch[beyond]])
+    inward = [-run[~mouth] / 25 * [1, 1, 0], (np.stack([0 * t, -np.sin(t), -np.cos(t)], -1))[beyond]]
+    axis = straight_axis(-40.0, 120.0)
+    s, azimuth, r = to_pipe(axis, xyz)
+    sigma, frame = np.full(len(s), 0.02), np.zeros(len(s), np.int64)
+    columns = (xyz, np.concatenate(inward), sigma, r, s, azimuth)
+    return PointCloud(*(c.astype(np.float32) for c in columns), frame), axis

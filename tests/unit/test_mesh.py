@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pipeline.artefacts import PipeAxis, PointCloud, Wall
+from pipeline.artefacts import PipeAxis, Wall
 from pipeline.codec import digest
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import from_pipe, straight_axis, to_pipe
@@ -15,10 +15,9 @@ from pipeline.native import open3d
 from pipeline.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.decimate import decimate
-from stages.mesh.poisson import folded_cells
 from stages.mesh.surface import grid_surface, row_pieces, weld
 from stages.overlays import OverlayParameters, overlays_of
-from tests.unit.small_wall import PIT, RADIUS, bent_axis, drawn_radius, small_wall, smooth_photo
+from tests.unit.small_wall import PIT, RADIUS, bent_axis, drawn_radius, small_wall, smooth_photo, tee
 
 HOLE = (slice(60, 72), slice(100, 130))
 SRGB_LINEAR = np.where(
@@ -250,51 +249,3 @@ def test_a_wall_of_nothing_is_refused() -> None:
             MeshParameters(),
             quiet_context(),
         )
-
-
-def tee(points: int = 24000) -> tuple[PointCloud, PipeAxis]:
-    """Cloud of a pipe of radius 25 mm with a branch of radius 12 mm toward +x at distance 25 mm."""
-    random = np.random.default_rng(0)
-    psi, z = random.uniform(-np.pi, np.pi, points), random.uniform(0, 50, points)
-    run = np.stack([25 * np.cos(psi), 25 * np.sin(psi), z], -1)
-    mouth = (np.hypot(run[:, 1], z - 25) < 12) & (run[:, 0] > 0)
-    t, x = random.uniform(-np.pi, np.pi, points // 4), random.uniform(20, 42, points // 4)
-    branch = np.stack([x, 12 * np.sin(t), 25 + 12 * np.cos(t)], -1)
-    beyond = np.hypot(branch[:, 0], branch[:, 1]) >= 25
-    xyz = np.concatenate([run[~mouth], branch[beyond]])
-    inward = [-run[~mouth] / 25 * [1, 1, 0], (np.stack([0 * t, -np.sin(t), -np.cos(t)], -1))[beyond]]
-    axis = straight_axis(-40.0, 120.0)
-    s, azimuth, r = to_pipe(axis, xyz)
-    sigma, frame = np.full(len(s), 0.02), np.zeros(len(s), np.int64)
-    columns = (xyz, np.concatenate(inward), sigma, r, s, azimuth)
-    return PointCloud(*(c.astype(np.float32) for c in columns), frame), axis
-
-
-def test_a_branch_is_reconstructed_by_poisson_within_its_limit() -> None:
-    cloud, axis = tee()
-    wall = Wall(cloud, small_wall().radius_map, axis)
-    mesh = meshed(wall, time_limit_s=120.0)
-    assert mesh.surface == "poisson"
-    scene = open3d().t.geometry.RaycastingScene()
-    for tile in mesh.tiles:
-        scene.add_triangles(tile.vertex_p, tile.face.astype(np.uint32))
-    far = scene.compute_distance(cloud.xyz_p).numpy()
-    assert np.quantile(far, 0.99) < 0.2
-    vertex = np.concatenate([t.vertex_p for t in mesh.tiles])
-    assert vertex[:, 0].max() > 40
-
-
-def test_poisson_is_given_up_at_its_time_limit() -> None:
-    cloud, axis = tee()
-    with pytest.raises(UnusableError, match="longer than"):
-        meshed(
-            Wall(cloud, small_wall().radius_map, axis),
-            surface="poisson",
-            time_limit_s=1.0,
-            poisson_cell_mm=0.05,
-        )
-
-
-def test_only_a_wall_that_folds_over_counts_as_folded() -> None:
-    assert folded_cells(tee()[0], 2.0, 0.35) >= 20
-    assert folded_cells(small_wall(noise_mm=0.05).cloud, 2.0, 0.35) == 0
