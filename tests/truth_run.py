@@ -1,4 +1,4 @@
-"""Trajectory and wall of an open recording from its truth: what a perfect chain would hand to later stages."""
+"""Trajectory and wall of an open recording from its truth: what a perfect chain would give."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def truth_run(name: str, *, margin_mm: float = 1.0) -> TruthRun:
 
 
 def true_axis(curvature: float, direction_rad: float) -> PipeAxis:
-    """Return the axis: an arc of ``curvature``, 1/mm, tangent to z at distance 0, bending toward a direction."""
+    """Return the axis: an arc of ``curvature``, 1/mm, tangent to z at distance 0."""
     distance = np.arange(-60.0, 400.0, 2.0)
     angle = curvature * distance
     toward = np.array([np.cos(direction_rad), np.sin(direction_rad), 0.0])
@@ -59,7 +59,9 @@ def true_axis(curvature: float, direction_rad: float) -> PipeAxis:
 def true_radius_map(name: str, distance_from_mm: float, distance_to_mm: float) -> RadiusMap:
     """Return the true radii between two distances, columns moved to start at −π."""
     with np.load(shared("recordings", name, "truth_wall.npz")) as file:
-        distance, azimuth, radius = (file[k].astype(float) for k in ("distance_mm", "azimuth_rad", "radius_mm"))
+        distance, azimuth, radius = (
+            file[k].astype(float) for k in ("distance_mm", "azimuth_rad", "radius_mm")
+        )
     rows = (distance >= distance_from_mm) & (distance <= distance_to_mm)
     columns = -np.pi + np.arange(len(azimuth)) * 2 * np.pi / len(azimuth)
     radius = np.array([np.interp(columns, azimuth, r, period=2 * np.pi) for r in radius[rows]])
