@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,8 +149,8 @@ class CalibrationReport:
     uncertainty
     rejected : tuple of (str, str)
         Images not used, and why.
-    compared_with : str
-        File of the camera compared with, or empty.
+    compared_with
+        The camera compared with: a given one, or the next best model's.
     displacement
         From the calibration to that camera.
     """
@@ -158,8 +159,12 @@ class CalibrationReport:
     scores: tuple[ModelScore, ...]
     uncertainty: UncertaintyMap
     rejected: tuple[tuple[str, str], ...]
-    compared_with: str = ""
+    compared_with: Camera | None = None
     displacement: DisplacementMap | None = None
+
+    def with_rejected(self, rejected: Sequence[tuple[str, str]]) -> CalibrationReport:
+        """Return the report with further images that were not used."""
+        return replace(self, rejected=(*rejected, *self.rejected))
 
 
 def rms(residual_px: Float) -> float:

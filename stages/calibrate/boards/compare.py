@@ -47,10 +47,11 @@ def score(
     return ModelScore(model, whole, free, whole.rms_px, rms(held_out), "")
 
 
-def best(scores: Sequence[ModelScore]) -> ModelScore | None:
-    """Return the model that predicts held-out views best, or None when every model was refused."""
-    usable = [s for s in scores if np.isfinite(s.held_out_rms_px)]
-    return min(usable, key=lambda s: s.held_out_rms_px) if usable else None
+def ranked(scores: Sequence[ModelScore]) -> list[CameraCalibration]:
+    """Return the calibrations that were not refused, the one that predicts held-out views best first."""
+    usable = [s for s in scores if s.calibration is not None and np.isfinite(s.held_out_rms_px)]
+    ordered = sorted(usable, key=lambda s: s.held_out_rms_px)
+    return [s.calibration for s in ordered if s.calibration is not None]
 
 
 def uncertainty_map(calibration: CameraCalibration) -> UncertaintyMap:

@@ -33,6 +33,22 @@ NAME = "calibrate-camera"
 def fit(
     views: Sequence[BoardView], first: Estimate, model: ModelName, parameters: BoardCalibrationParameters
 ) -> CameraCalibration:
+    """Fit a camera model to board views, and refuse a fit that is not to be trusted: see `adjust`.
+
+    Raises
+    ------
+    UnusableError
+        When the model cannot see the boards, or the views leave the image scale undetermined.
+    """
+    calibration = adjust(views, first, model, parameters)
+    _refuse_unseen(calibration)
+    _refuse_undetermined(calibration, parameters)
+    return calibration
+
+
+def adjust(
+    views: Sequence[BoardView], first: Estimate, model: ModelName, parameters: BoardCalibrationParameters
+) -> CameraCalibration:
     """Fit a camera model to board views.
 
     Parameters
@@ -41,11 +57,6 @@ def fit(
         At least as many as ``parameters.least_views``.
     first
         An equidistant camera and poses near the answer, from `stages.calibrate.boards.start.start`.
-
-    Raises
-    ------
-    UnusableError
-        When the model cannot see the boards, or the views leave the image scale undetermined.
     """
     corners = Corners.of(views)
     camera = model_start(model, first, _widest_angle(first, corners), parameters.polynomial_degree)
@@ -55,9 +66,8 @@ def fit(
         solve(seed, corners, _flat(free), parameters.huber_px), corners, free, parameters.huber_px
     )
     residual = estimate.residuals(corners)
-    _refuse_unseen(model, residual)
     spread, sigma_px = covariance(estimate, corners, free, parameters.huber_px)
-    calibration = CameraCalibration(
+    return CameraCalibration(
         estimate.camera,
         _embedded(spread, free, len(estimate.camera.parameters)),
         tuple(view.name for view in views),
@@ -68,8 +78,6 @@ def fit(
         residual,
         sigma_px,
     )
-    _refuse_undetermined(calibration, parameters)
-    return calibration
 
 
 def held_out_residuals(
@@ -98,25 +106,29 @@ def shared_parameters(camera: Camera, corners: Corners, parameters: BoardCalibra
     return Free(indices, shape)
 
 
+def refuse_too_few(views: Sequence[BoardView], parameters: BoardCalibrationParameters) -> None:
+    """Raise `UnusableError` when there are fewer views than a calibration needs."""
+    if len(views) < parameters.least_views:
+        raise UnusableError(
+            NAME,
+            f"the board was found in {len(views)} usable images",
+            limit=f"at least {parameters.least_views}",
+            hint="take more pictures, with the board at different places, distances and tilts",
+        )
+
+
 def refuse_one_plane(
     views: Sequence[BoardView], first: Estimate, parameters: BoardCalibrationParameters
 ) -> None:
-    """Raise when there are too few views, or plane boards that all face the same way.
+    """Raise when plane boards all face the same way.
 
-    Parallel boards constrain the camera no better than a single one: focal length and distance trade off.
+    Parallel boards constrain the camera hardly better than a single one: focal length and distance trade off.
 
     Raises
     ------
     UnusableError
-        Saying how many views there are, or how far the boards' directions differ.
+        Saying by how much the boards' directions differ.
     """
-    if len(views) < parameters.least_views:
-        raise UnusableError(
-            NAME,
-            f"the board was found in {len(views)} images",
-            limit=f"at least {parameters.least_views}",
-            hint="take more pictures, with the board at different places, distances and tilts",
-        )
     spread = np.rad2deg(_largest_tilt(first.T_cb))
     flat = max(float(np.ptp(v.xyz_b[:, 2])) for v in views) < 1e-9
     if flat and spread < parameters.least_tilt_deg:
@@ -151,12 +163,12 @@ def _embedded(spread: Float, free: Free, count: int) -> Float:
     return full
 
 
-def _refuse_unseen(model: str, residual: Float) -> None:
-    lost = int(np.isnan(residual).any(1).sum())
+def _refuse_unseen(calibration: CameraCalibration) -> None:
+    lost = int(np.isnan(calibration.residual_px).any(1).sum())
     if lost:
         raise UnusableError(
             NAME,
-            f"the model {model} does not reach {lost} of {len(residual)} corners",
+            f"the model {calibration.camera.model} does not reach {lost} of {len(calibration.uv)} corners",
             hint="choose a model that sees this far from its axis: kannala_brandt, scaramuzza or unified",
         )
 

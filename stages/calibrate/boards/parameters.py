@@ -16,22 +16,32 @@ class BoardCalibrationParameters(Parameters):
     """How a camera is fitted to board views, and what makes views unfit for it."""
 
     huber_px: float = Field(
-        1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
+        default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
     )
     board_shape: Literal["flat", "bent"] = Field(
-        "bent", description="whether the board's flatness is taken for granted or its sag estimated"
+        default="bent", description="whether the board's flatness is taken for granted or its sag estimated"
     )
     polynomial_degree: int = Field(
-        7, ge=3, le=12, description="degree of Scaramuzza's polynomial; OCamCalib's own default is 4"
+        default=7, ge=3, le=12, description="degree of Scaramuzza's polynomial; OCamCalib's own default is 4"
     )
-    folds: int = Field(5, ge=2, le=50, description="parts for held-out reprojection: each is held out once")
-    least_views: int = Field(4, ge=3, le=1000, description="views below which a calibration is refused")
+    folds: int = Field(
+        default=5, ge=2, le=50, description="parts for held-out reprojection: each is held out once"
+    )
+    least_views: int = Field(
+        default=4, ge=3, le=1000, description="views below which a calibration is refused"
+    )
     least_tilt_deg: float = Field(
-        8.0, ge=0, le=90, description="largest angle between boards below which a calibration is refused, deg"
+        default=8.0,
+        ge=0,
+        le=90,
+        description="largest angle between boards below which a calibration is refused, deg",
     )
     outlier_view_factor: float = Field(
-        4.0, gt=1, le=100, description="views whose rms is this many times the median are left out"
+        default=4.0, gt=1, le=100, description="views whose rms is this many times the median are left out"
     )
     largest_scale_sigma: float = Field(
-        0.02, gt=0, le=1, description="relative 1 σ of the image scale above which a calibration is refused"
+        default=0.02,
+        gt=0,
+        le=1,
+        description="relative 1 σ of the image scale above which a calibration is refused",
     )

@@ -47,6 +47,11 @@ class Charuco:
         board.setLegacyPattern(legacy)
         return board
 
+    def fits_dictionary(self) -> bool:
+        """Return whether the dictionary has a marker for every white square."""
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
+        return self.columns * self.rows // 2 <= len(dictionary.bytesList)
+
 
 Board = Chessboard | Charuco
 

@@ -1,0 +1,116 @@
+"""The report of a camera calibration: calibration.json, and calibration.html with its maps."""
+
+from __future__ import annotations
+
+import base64
+import json
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, StrictUndefined
+from numpy.typing import NDArray
+
+from pipeline.commands.calibrate_camera_figures import (
+    displacement_figure,
+    png,
+    residual_figure,
+    uncertainty_figure,
+)
+from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
+from pipeline.instrument.camera.mapping import camera_to_mapping
+
+Float = NDArray[np.float64]
+
+
+def write_report(report: CalibrationReport, compared_file: str, folder: Path) -> None:
+    """Write calibration.json and calibration.html; ``compared_file`` is empty unless one was given."""
+    document = report_document(report, compared_file)
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    (folder / "calibration.json").write_text(text + "\n", "utf-8")
+    (folder / "calibration.html").write_text(report_page(report, document), "utf-8")
+
+
+def report_document(report: CalibrationReport, compared_file: str) -> dict[str, Any]:
+    """Return the report as plain data; what is not known is None."""
+    fitted = report.calibration
+    sigma = np.sqrt(np.diag(fitted.covariance))
+    map_ = report.uncertainty
+    return {
+        "format": 1,
+        "camera": camera_to_mapping(fitted.camera),
+        "parameters": [
+            {"name": n, "value": float(v), "sigma": float(s)}
+            for n, v, s in zip(fitted.camera.parameter_names, fitted.camera.parameters, sigma, strict=True)
+        ],
+        "covariance": fitted.covariance.tolist(),
+        "rms_px": fitted.rms_px,
+        "rms_per_coordinate_px": fitted.rms_px / float(np.sqrt(2)),
+        "mean_distance_px": float(np.hypot(*fitted.residual_px.T).mean()),
+        "corner_sigma_px": fitted.sigma_px,
+        "corners": len(fitted.uv),
+        "board_sag_mm": dict(zip(("xx", "xy", "yy"), map(float, fitted.shape_mm), strict=True)),
+        "views": [
+            {"name": n, "rms_px": float(r)} for n, r in zip(fitted.names, fitted.view_rms_px, strict=True)
+        ],
+        "rejected": [{"name": n, "reason": r} for n, r in report.rejected],
+        "models": [_score(s) for s in sorted(report.scores, key=_rank)],
+        "projection_sigma_px": {
+            "u": map_.uv[0, :, 0].tolist(),
+            "v": map_.uv[:, 0, 1].tolist(),
+            "without_rotation": _rounded(map_.sigma_px),
+            "in_camera_frame": _rounded(map_.raw_sigma_px),
+        },
+        "comparison": _comparison(report, compared_file),
+    }
+
+
+def report_page(report: CalibrationReport, document: dict[str, Any]) -> str:
+    """Return the report as one file that needs nothing else."""
+    pictures = {"uncertainty": png(uncertainty_figure(report)), "residuals": png(residual_figure(report))}
+    if report.displacement is not None:
+        pictures["displacement"] = png(displacement_figure(report))
+    template = (files("pipeline.commands.calibrate_camera_page") / "page.html").read_text("utf-8")
+    environment = Environment(undefined=StrictUndefined, autoescape=True)
+    encoded = {name: base64.b64encode(data).decode("ascii") for name, data in pictures.items()}
+    return environment.from_string(template).render(d=document, pictures=encoded)
+
+
+def _score(score: ModelScore) -> dict[str, Any]:
+    return {
+        "model": score.model,
+        "parameters": score.parameters,
+        "rms_px": _number(score.rms_px),
+        "held_out_rms_px": _number(score.held_out_rms_px),
+        "refusal": score.refusal,
+    }
+
+
+def _rank(score: ModelScore) -> float:
+    return float(np.nan_to_num(score.held_out_rms_px, nan=np.inf))
+
+
+def _comparison(report: CalibrationReport, compared_file: str) -> dict[str, Any] | None:
+    if report.displacement is None or report.compared_with is None:
+        return None
+    length = np.hypot(*np.moveaxis(report.displacement.displacement_px, -1, 0))
+    seen = length[np.isfinite(length)]
+    if not seen.size:
+        return None
+    return {
+        "with": compared_file or f"the next best model, {report.compared_with.model}",
+        "rotation_taken_out_deg": np.rad2deg(report.displacement.rotation_rad).tolist(),
+        "median_px": float(np.median(seen)),
+        "p95_px": float(np.percentile(seen, 95)),
+        "largest_px": float(seen.max()),
+        "length_px": _rounded(length),
+    }
+
+
+def _rounded(values: Float) -> list[list[float | None]]:
+    return [[_number(round(float(v), 4)) for v in row] for row in values]
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

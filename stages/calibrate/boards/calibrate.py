@@ -1,0 +1,93 @@
+"""Camera calibration from board views: the whole of it, from corners to a judged camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.errors import UnusableError
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.calibration import BoardView, CalibrationReport, ModelScore
+from pipeline.stage import Context
+from stages.calibrate.boards.bundle import Estimate
+from stages.calibrate.boards.compare import (
+    displacement_map,
+    ranked,
+    score,
+    uncertainty_map,
+    without_outlier_views,
+)
+from stages.calibrate.boards.fit import NAME, adjust, refuse_one_plane, refuse_too_few
+from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
+from stages.calibrate.boards.start import start
+
+
+def calibrate_boards(
+    views: Sequence[BoardView],
+    image_size: tuple[int, int],
+    models: Sequence[ModelName],
+    reference: Camera | None,
+    parameters: BoardCalibrationParameters,
+    context: Context,
+) -> CalibrationReport:
+    """Fit camera models to board views and return the one that predicts held-out views best.
+
+    Parameters
+    ----------
+    views
+        Corners found, one entry an image; at least four corners each, not in one line.
+    image_size
+        Width and height, px.
+    models
+        Those to try.
+    reference
+        A camera to compare with; without one, the best model is compared with the next best.
+
+    Raises
+    ------
+    UnusableError
+        When there are too few views, when plane boards all lie in one plane or in parallel ones, when the
+        views leave the image scale undetermined, or when no model reaches all corners.
+    """
+    refuse_too_few(views, parameters)
+    first = start(views, image_size)
+    refuse_one_plane(views, first, parameters)
+    trial = adjust(views, first, "kannala_brandt", parameters)
+    used, first, outliers = without_outlier_views(views, first, trial, parameters.outlier_view_factor)
+    refuse_too_few(used, parameters)
+    scores = _scores(used, first, models, parameters, context)
+    ranking = ranked(scores)
+    if not ranking:
+        raise _no_model(scores)
+    chosen = ranking[0]
+    other = reference if reference is not None else next((c.camera for c in ranking[1:]), None)
+    return CalibrationReport(
+        chosen,
+        scores,
+        uncertainty_map(chosen),
+        tuple((name, "its corners fit no camera that fits the other images") for name in outliers),
+        other,
+        None if other is None else displacement_map(chosen.camera, other),
+    )
+
+
+def _scores(
+    views: Sequence[BoardView],
+    first: Estimate,
+    models: Sequence[ModelName],
+    parameters: BoardCalibrationParameters,
+    context: Context,
+) -> tuple[ModelScore, ...]:
+    scores = []
+    for done, model in enumerate(models, start=1):
+        scores.append(score(views, first, model, parameters))
+        context.progress(done, len(models))
+    return tuple(scores)
+
+
+def _no_model(scores: Sequence[ModelScore]) -> UnusableError:
+    reasons = "; ".join(f"{s.model}: {s.refusal}" for s in scores)
+    return UnusableError(
+        NAME,
+        f"no camera model can be calibrated from these views: {reasons}",
+        hint="tilt the board more, and show it at more places of the image, also near its edges",
+    )
