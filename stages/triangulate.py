@@ -74,9 +74,8 @@ def _triangulate_chunk(
     flat = replace(probe, laser=untilted_sheet(probe.laser))
     xyz, uncorrected = probe.triangulate(uv), flat.triangulate(uv)
     covariance = calibration_covariance(by_parameters, probe.covariance)
-    return (
-        _spread(xyz, usable), _spread(uncorrected, usable), _spread(noise, usable), _spread(covariance, usable),
-    )  # fmt: skip
+    xyz_c, flat_c = _spread(xyz, usable), _spread(uncorrected, usable)
+    return xyz_c, flat_c, _spread(noise, usable), _spread(covariance, usable)
 
 
 def _spread(values: Float, where: NDArray[np.bool_]) -> Float32:

@@ -30,7 +30,7 @@ def ring_light(
     width_px: float,
     amplitude: float | Callable[[Float], Float],
 ) -> Float:
-    """Return (H, W) light of a Gaussian line along ρ(ψ), in grey levels, without noise or background."""  # fmt: skip
+    """Return (H, W) light of a Gaussian line along ρ(ψ), in grey levels, without noise or background."""
     v, u = np.mgrid[: size[1], : size[0]]
     du, dv = u - centre[0], v - centre[1]
     psi = np.arctan2(dv, du)

@@ -33,9 +33,9 @@ def discriminant_weights(
 ) -> Float:
     """Return (3,) Fisher discriminant weights between line and wall beside it.
 
-    The wall's colour covariance holds both its reflectance and the sensor's noise, so the mixture has the best
-    ratio of line height to what is not line. Scaled so that the line keeps its height in the strongest channel;
-    ``otherwise`` is returned where line and wall do not differ in colour.
+    The wall's colour covariance holds both its reflectance and the sensor's noise, so the mixture has the
+    best ratio of line height to what is not line. Scaled so that the line keeps its height in the strongest
+    channel; ``otherwise`` is returned where line and wall do not differ in colour.
     """
     radius, width = trace.radius_everywhere(), trace.width_px
     line = bgr.reshape(-1, 3)[sectors.pixels_near(radius, 0, _LINE_WIDTHS * width)].astype(float)

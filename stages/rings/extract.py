@@ -52,11 +52,9 @@ def extract_rings(
         )
     sectors = cut_sectors(recording.source.image_size, probe.camera.centre_px, parameters.azimuths)
     traces: dict[int, RingTrace] = {}
-    done = 0
-    for frame, trace in _traces(recording, probe, sectors):
+    for done, (frame, trace) in enumerate(_traces(recording, probe, sectors), 1):
         if trace is not None and trace.coverage >= parameters.least_coverage:
             traces[frame] = trace
-        done += 1
         context.progress(done, len(frames))
     if not traces:
         raise UnusableError(

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response, first_at_least
+from stages.rings.kernels import first_at_least
+from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response
 from stages.rings.search import Image
 from stages.rings.sectors import Sectors
 

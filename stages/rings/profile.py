@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import Float
+from stages.rings.kernels import FAST, factor, first_at_least, inverse_diagonal, solve
 from stages.rings.sectors import Sectors
 
-# Sums may be reordered; NaN keeps its meaning.
-FAST = {"reassoc", "contract", "arcp", "nsz"}
 WINDOW_WIDTHS = 5.0
 _FLANK = 0.6
 _STEPS, _FULL_STEPS = 12, 4
@@ -99,18 +98,6 @@ def fit_line(
 
 
 @numba.njit(cache=True, nogil=True)
-def first_at_least(values, low, high, limit):  # type: ignore[no-untyped-def]
-    """Index of the first of the rising ``values[low:high]`` that is >= ``limit``."""
-    while low < high:
-        middle = (low + high) >> 1
-        if values[middle] < limit:
-            low = middle + 1
-        else:
-            high = middle
-    return low
-
-
-@numba.njit(cache=True, nogil=True)
 def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  # type: ignore[no-untyped-def]
     """Copy grey levels and distances to the seed of sector ``a``'s pixels near it; return their number.
 
@@ -152,49 +139,6 @@ def _guess(y, t, count, width, p):  # type: ignore[no-untyped-def]
     p[0], p[1], p[3] = 0.0, np.log(width), 0.5 * (inner + outer)
     p[2], p[4] = max(top - p[3], 1.0), (outer - inner) / ((1 + _FLANK) * WINDOW_WIDTHS * width)
     return True
-
-
-@numba.njit(cache=True, nogil=True)
-def _factor(n):  # type: ignore[no-untyped-def]
-    """Replace the lower triangle of ``n`` by its Cholesky factor; False when it is not positive."""
-    for i in range(n.shape[0]):
-        for j in range(i + 1):
-            s = n[i, j]
-            for k in range(j):
-                s -= n[i, k] * n[j, k]
-            if i != j:
-                n[i, j] = s / n[j, j]
-            elif s <= 1e-12:
-                return False
-            else:
-                n[i, i] = np.sqrt(s)
-    return True
-
-
-@numba.njit(cache=True, nogil=True)
-def _solve(n, v):  # type: ignore[no-untyped-def]
-    """Solve L Lᵀ x = v in place."""
-    for i in range(v.size):
-        for k in range(i):
-            v[i] -= n[i, k] * v[k]
-        v[i] /= n[i, i]
-    for i in range(v.size - 1, -1, -1):
-        for k in range(i + 1, v.size):
-            v[i] -= n[k, i] * v[k]
-        v[i] /= n[i, i]
-
-
-@numba.njit(cache=True, nogil=True)
-def _inverse_diagonal(n, index, v):  # type: ignore[no-untyped-def]
-    """Entry (index, index) of (L Lᵀ)⁻¹, with ``v`` as working space."""
-    s = 0.0
-    for i in range(index, v.size):
-        v[i] = 1.0 if i == index else 0.0
-        for k in range(index, i):
-            v[i] -= n[i, k] * v[k]
-        v[i] /= n[i, i]
-        s += v[i] * v[i]
-    return s
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
@@ -263,7 +207,7 @@ def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-untyped-def]
-    """Take Gauss–Newton steps from ``p`` until the next would not matter; return χ², NaN when they do not end.
+    """Take Gauss–Newton steps from ``p`` until the next would not matter; return χ², or NaN.
 
     A weak prior on ln w holds the width where clipping leaves little of the profile. Late steps are halved:
     the weights follow the model, and full steps may then go to and fro.
@@ -272,9 +216,9 @@ def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-
         chi2 = _normal_equations(y, t, count, p, response, trusted, n, v)
         n[1, 1] += 1.0 / _LOG_WIDTH_PRIOR**2
         v[1] += (np.log(width) - p[1]) / _LOG_WIDTH_PRIOR**2
-        if not _factor(n):
+        if not factor(n):
             return np.nan
-        _solve(n, v)
+        solve(n, v)
         if step >= _FULL_STEPS:
             v *= 0.5
         settled = abs(v[0]) < _SETTLED_WIDTHS * width and abs(v[1]) < _SETTLED_LOG_WIDTH
@@ -304,7 +248,7 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
         if np.isnan(chi2):
             continue
         out[0, a], out[1, a], out[2, a], out[3, a] = seed[a] + p[0], np.exp(p[1]), p[2], p[3]
-        out[4, a] = np.sqrt(_inverse_diagonal(n, 0, v))
-        out[5, a] = np.sqrt(_inverse_diagonal(n, 2, v))
+        out[4, a] = np.sqrt(inverse_diagonal(n, 0, v))
+        out[5, a] = np.sqrt(inverse_diagonal(n, 2, v))
         out[6, a] = chi2 / (count - v.size)
         out[7, a], out[8, a], out[9, a] = _flank_counts(t, count, p, trusted)

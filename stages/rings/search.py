@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import Float
-from stages.rings.profile import FAST, first_at_least
+from stages.rings.kernels import FAST, first_at_least
 from stages.rings.sectors import Sectors
 
 Image = NDArray[np.uint8] | NDArray[np.float32]
 BAND_WIDTHS = 10.0
+_BELT_WIDTHS = 16.0
 _REACH_WIDTHS = 4.0
 _SMALLEST_RADIUS_PX = 12
 _CREDIT = 6.0
@@ -25,8 +26,8 @@ _TRIAL_WIDTHS_PX = (1.0, 2.0, 4.0)
 class Peaks(NamedTuple):
     """Best line candidate of every sector, and the best other one, (A,) each.
 
-    ``radius_px`` and ``score`` (amplitude over its noise), ``rival_px`` and ``rival_score``: the best candidate
-    at least four line widths away.
+    ``radius_px`` and ``score`` (amplitude over its noise), ``rival_px`` and ``rival_score``: the best
+    candidate at least four line widths away.
     """
 
     radius_px: Float
@@ -56,63 +57,80 @@ def search_band(
     out = np.full((4, len(low_px)), np.nan)
     template = matched_template(width_px)
     _search_sectors(
-        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template, 4 * width_px, out
+        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template,
+        4 * width_px, out,
     )  # fmt: skip
     out[1] /= noise
     out[3] /= noise
     return Peaks(*out)
 
 
+@numba.njit(cache=True, nogil=True)
+def _radial_profile(image, pixel, radius, low, high, first, bins, total, count):  # type: ignore[no-untyped-def]
+    """Mean grey level in bins of one pixel from radius ``first``; return how many bins are seen.
+
+    Bins without a pixel, where sectors are narrow, take the value of the bin before.
+    """
+    total[:bins] = 0.0
+    count[:bins] = 0
+    seen = 0
+    k = first_at_least(radius, low, high, first - 0.5)
+    while k < high:
+        b = int(radius[k] - first + 0.5)
+        if b >= bins:
+            break
+        total[b] += image[pixel[k]]
+        count[b] += 1
+        seen = b + 1
+        k += 1
+    level = 0.0
+    for b in range(seen - 1, -1, -1):
+        if count[b] > 0:
+            level = total[b] / count[b]
+    for b in range(seen):
+        if count[b] > 0:
+            level = total[b] / count[b]
+        total[b] = level
+    return seen
+
+
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _correlate(profile, seen, template, response):  # type: ignore[no-untyped-def]
+    """Write ``profile`` · ``template`` to ``response`` where it fits; return the place of the largest."""
+    reach = template.size // 2
+    at = -1
+    for b in range(reach, seen - reach):
+        s = 0.0
+        for j in range(template.size):
+            s += template[j] * profile[b - reach + j]
+        response[b] = s
+        if s > 0.0 and (at < 0 or s > response[at]):
+            at = b
+    return at
+
+
+@numba.njit(cache=True, nogil=True)
 def _search_sectors(image, start, pixel, radius, low_px, high_px, template, apart, out):  # type: ignore[no-untyped-def]
     reach = template.size // 2
     size = int(np.nanmax(high_px - low_px)) + 2 * reach + 4
-    total, count, response = np.empty(size), np.empty(size), np.empty(size)
+    total, count, response = np.empty(size), np.empty(size, np.int64), np.empty(size)
     for a in range(low_px.size):
         if not np.isfinite(low_px[a]):
             continue
         first = int(np.floor(low_px[a])) - reach
         bins = int(np.ceil(high_px[a])) + reach + 1 - first
-        total[:bins] = 0.0
-        count[:bins] = 0.0
-        k = first_at_least(radius, start[a], start[a + 1], first - 0.5)
-        seen = -1
-        while k < start[a + 1]:
-            b = int(radius[k] - first + 0.5)
-            if b >= bins:
-                break
-            total[b] += image[pixel[k]]
-            count[b] += 1.0
-            seen = b
-            k += 1
-        before = -1
-        for b in range(seen + 1):
-            if count[b] > 0:
-                total[b] /= count[b]
-                for gap in range(before + 1, b):
-                    total[gap] = total[b] if before < 0 else total[before]
-                before = b
-        best, at = 0.0, -1
-        for b in range(reach, seen + 1 - reach):
-            s = 0.0
-            for j in range(-reach, reach + 1):
-                s += template[j + reach] * total[b + j]
-            response[b] = s
-            if s > best:
-                best, at = s, b
+        seen = _radial_profile(image, pixel, radius, start[a], start[a + 1], first, bins, total, count)
+        at = _correlate(total, seen, template, response)
         if at < 0:
             continue
-        shift = 0.0
-        if reach < at < seen - reach:
+        out[0, a], out[1, a], out[3, a] = first + at, response[at], 0.0
+        if reach < at < seen - reach - 1:
             bend = response[at - 1] - 2 * response[at] + response[at + 1]
             if bend < 0:
-                shift = 0.5 * (response[at - 1] - response[at + 1]) / bend
-        out[0, a], out[1, a] = first + at + shift, best
-        second, there = 0.0, -1
-        for b in range(reach, seen + 1 - reach):
-            if abs(b - at) >= apart and response[b] > second:
-                second, there = response[b], b
-        out[2, a], out[3, a] = first + there, second
+                out[0, a] += 0.5 * (response[at - 1] - response[at + 1]) / bend
+        for b in range(reach, seen - reach):
+            if abs(b - at) >= apart and response[b] > out[3, a]:
+                out[2, a], out[3, a] = first + b, response[b]
 
 
 def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, float]:
@@ -124,7 +142,8 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
     polar = _polar_image(image, sectors)
     best_total, best = -np.inf, (np.full(len(sectors.azimuth_rad), np.nan), _TRIAL_WIDTHS_PX[0])
     for width in _TRIAL_WIDTHS_PX:
-        response = cv2.filter2D(polar, cv2.CV_32F, matched_template(width)[None].astype(np.float32))
+        kernel = matched_template(width)[None].astype(np.float32)
+        response = np.asarray(cv2.filter2D(polar, cv2.CV_32F, kernel), np.float32)
         score = response / np.maximum(_texture_noise(response, width), noise)
         score[np.isnan(score)] = 0
         credit = np.clip(score, 0, _CREDIT)
@@ -143,11 +162,11 @@ def _texture_noise(response: NDArray[np.float32], width_px: float) -> NDArray[np
 
     The belt is wide against the line, so that a well centred ring does not pass for noise.
     """
-    belt = int(np.ceil(BAND_WIDTHS * width_px))
+    belt = int(np.ceil(_BELT_WIDTHS * width_px))
     size = np.nan_to_num(np.abs(response)).T
     spread = [np.median(size[max(0, r - belt) : r + belt + 1]) for r in range(0, len(size), belt)]
     every = np.interp(np.arange(len(size)), np.arange(0, len(size), belt), spread)
-    return (1.4826 * every).astype(np.float32)
+    return np.asarray(1.4826 * every, np.float32)
 
 
 def _polar_image(image: Image, sectors: Sectors) -> NDArray[np.float32]:
@@ -161,40 +180,38 @@ def _polar_image(image: Image, sectors: Sectors) -> NDArray[np.float32]:
         image.astype(np.float32), map_u.astype(np.float32), map_v.astype(np.float32),
         cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"),
     )  # fmt: skip
-    return np.asarray(out)
+    return np.asarray(out, np.float32)
+
+
+@numba.njit(cache=True, nogil=True)
+def _moved(value, jump, moved, origin):  # type: ignore[no-untyped-def]
+    """Best ``value`` (R,) less its way to each radius, 1 a px, at most ``jump``; and where it came from."""
+    top = np.argmax(value)
+    for r in range(value.size):
+        moved[r], origin[r] = value[r], r
+        if r > 0 and moved[r - 1] - 1 > moved[r]:
+            moved[r], origin[r] = moved[r - 1] - 1, origin[r - 1]
+    for r in range(value.size - 2, -1, -1):
+        if moved[r + 1] - 1 > moved[r]:
+            moved[r], origin[r] = moved[r + 1] - 1, origin[r + 1]
+    for r in range(value.size):
+        if value[top] - jump > moved[r]:
+            moved[r], origin[r] = value[top] - jump, top
 
 
 @numba.njit(cache=True, nogil=True)
 def _closed_path(credit, jump):  # type: ignore[no-untyped-def]
-    """Path (A,) of largest credit (A, R) minus |step| in px, at most ``jump`` a step, around the circle.
+    """Path (A,) of largest credit (A, R) less its moves around the circle.
 
     Walked twice around; the middle turn is returned, where neither end is felt.
     """
     azimuths, radii = credit.shape
     steps = 2 * azimuths
     origin = np.empty((steps, radii), np.int16)
-    value = np.zeros(radii, np.float32)
-    moved = np.empty(radii, np.float32)
+    value, moved = np.zeros(radii, np.float32), np.empty(radii, np.float32)
     for s in range(steps):
-        top = 0
-        for r in range(radii):
-            moved[r] = value[r]
-            origin[s, r] = r
-            if value[r] > value[top]:
-                top = r
-        for r in range(1, radii):
-            if moved[r - 1] - 1 > moved[r]:
-                moved[r] = moved[r - 1] - 1
-                origin[s, r] = origin[s, r - 1]
-        for r in range(radii - 2, -1, -1):
-            if moved[r + 1] - 1 > moved[r]:
-                moved[r] = moved[r + 1] - 1
-                origin[s, r] = origin[s, r + 1]
-        for r in range(radii):
-            if value[top] - jump > moved[r]:
-                moved[r] = value[top] - jump
-                origin[s, r] = top
-            value[r] = moved[r] + credit[s % azimuths, r]
+        _moved(value, jump, moved, origin[s])
+        value[:] = moved + credit[s % azimuths]
     path = np.empty(azimuths, np.int64)
     at = np.argmax(value)
     for s in range(steps - 1, -1, -1):

@@ -58,7 +58,7 @@ def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) ->
     centre = np.asarray(centre_px, float)
     sector, radius, offset = _polar(*image_size, centre[0], centre[1], azimuths)
     start, order = _grouped(sector, radius, azimuths)
-    azimuth = -np.pi + 2 * np.pi / azimuths * np.arange(azimuths)
+    azimuth: Float = -np.pi + 2 * np.pi / azimuths * np.arange(azimuths, dtype=np.float64)
     return Sectors(azimuth, centre, image_size, start, order, radius[order], offset[order])
 
 

@@ -113,7 +113,7 @@ def _limit(sectors: Sectors, positions: float) -> float:
 def _search_rays(
     image: Image, sectors: Sectors, peaks: Peaks, missing: NDArray[np.bool_], width_px: float, noise: float
 ) -> Peaks:
-    """Return ``peaks`` with those ``missing`` looked for along their whole ray, NaN where nothing is found."""
+    """Return ``peaks`` with the ``missing`` looked for along their whole ray; NaN where none is found."""
     far = float(sectors.radius_px.max())
     low, high = np.where(missing, 4 * width_px, np.nan), np.where(missing, far, np.nan)
     wide = search_band(image, sectors, low, high, width_px, noise)

@@ -40,9 +40,9 @@ def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte
 def wander_px(samples: RingSamples) -> float:
     """Return the 1 σ, px, by which the line wanders beyond its noise: speckle, texture, compression.
 
-    From second differences along the ring between sectors far enough apart to share neither pixels nor speckle
-    (blurred together over the line's width), near enough for the wall to be straight; medians keep true edges
-    out of it.
+    From second differences along the ring between sectors far enough apart to share neither pixels nor
+    speckle (blurred together over the line's width), near enough for the wall to be straight; medians keep
+    true edges out of it.
     """
     valid = samples.valid
     arc = np.median(samples.radius_px[valid]) * (samples.azimuth_rad[1] - samples.azimuth_rad[0])

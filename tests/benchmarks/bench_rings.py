@@ -74,7 +74,7 @@ def steger(image, sectors, truth):
             t = (x - at) / WIDTH
             g = np.exp(-0.5 * t * t)
             slope, bend = (g * t) @ y, (g * (t * t - 1)) @ y
-            at += np.clip(-slope / min(bend, -1e-9) * WIDTH * -1, -0.5, 0.5) if bend < 0 else 0.0
+            at += np.clip(-slope / bend * WIDTH, -0.5, 0.5) if bend < 0 else 0.0
         out.append(at)
     return np.array(out)
 

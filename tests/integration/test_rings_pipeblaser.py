@@ -1,4 +1,4 @@
-"""Real rings of the CMU pipe probe: all frames extracted as they are, diameters as published for each model."""
+"""Real rings of the CMU pipe probe: all frames extracted as they are, diameters as published."""
 
 import cv2
 import numpy as np

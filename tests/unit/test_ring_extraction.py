@@ -1,4 +1,4 @@
-"""The rings stage on whole recordings in memory: counting, defects kept, spikes removed, lit walls, true σ."""
+"""The rings stage on whole recordings in memory: counts, pits kept, spikes removed, lit walls, true σ."""
 
 from dataclasses import replace
 
