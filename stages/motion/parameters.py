@@ -20,12 +20,12 @@ class MotionParameters(Parameters):
         38.0, ge=10, lt=45, description="smallest polar angle, deg, at which wall texture is tracked"
     )
     patch_half_px: int = Field(10, ge=4, le=30, description="half size, strip px, of a tracked patch")
-    cell_px: int = Field(28, ge=10, le=200, description="one landmark is kept in each such cell, strip px")
+    cell_px: int = Field(24, ge=10, le=200, description="one landmark is kept in each such cell, strip px")
     min_correlation: float = Field(
-        0.45, ge=0.2, le=0.99, description="normalised cross-correlation below which a match is refused"
+        0.35, ge=0.2, le=0.99, description="normalised cross-correlation below which a match is refused"
     )
     landmark_sigma_px: float = Field(
-        0.4, gt=0, le=2, description="patches whose predicted match σ, strip px, is larger are not used"
+        0.3, gt=0, le=2, description="patches whose predicted match σ, strip px, is larger are not used"
     )
     ring_bins: int = Field(72, ge=12, le=720, description="azimuth bins into which a ring is condensed")
     surface_sigma_mm: float = Field(
@@ -45,7 +45,7 @@ class MotionParameters(Parameters):
         30.0, ge=1, le=10000, description="number of neighbouring observations of a landmark that err alike"
     )
     match_bias_px: float = Field(
-        0.05, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
+        0.1, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
     )
     iterations: int = Field(6, ge=2, le=50, description="Gauss-Newton steps of the joint adjustment")
     max_track_frames: int = Field(

@@ -23,7 +23,9 @@ Float32 = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 _COARSE = 4
 _BLUR_PX = 1.2  # keeps noise finer than a strip sample from folding into it
-_SMOOTH_PX = 1.0
+_SMOOTH_PX = 0.7
+_IMAGE_BLUR_PX = 1.5  # lens, pixel and the blur above
+_BLURS = 4
 _MEAN_PX = 41
 _COURSE_PX = 3.0
 _DARKEST, _BRIGHTEST = 5.0, 250.0
@@ -118,7 +120,7 @@ def unroll(
     ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
     seen[(ahead > blocked_mm[0]) & (ahead < blocked_mm[1])] = False
     usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST)
-    contrast = _without_light(grey, usable)
+    contrast = _equally_sharp(_without_light(grey, usable), coarse_uv)
     return Strip(first_row, contrast, usable, coarse_uv, _noise_of(contrast, usable))
 
 
@@ -140,8 +142,34 @@ def _without_light(grey: Float32, usable: Mask) -> Float32:
     size = (_MEAN_PX, _MEAN_PX)
     share = cv2.blur(usable.astype(np.float32), size)
     mean = cv2.blur(flat, size) / np.maximum(share, 1e-3)
-    contrast = np.where(usable, flat / np.maximum(mean, 0.05) - 1, 0).astype(np.float32)
-    return cv2.GaussianBlur(contrast, (0, 0), _SMOOTH_PX)
+    return np.where(usable, flat / np.maximum(mean, 0.05) - 1, 0).astype(np.float32)
+
+
+def _equally_sharp(contrast: Float32, coarse_uv: Float32) -> Float32:
+    """Smooth each row so that the near wall is as blurred as the far one.
+
+    Contrast that falls off across a patch shifts its match just as light does, and the image's blur is larger
+    on the wall far ahead. Blurs of some sizes are mixed by variance.
+    """
+    along, around = (_blur_of(coarse_uv, axis) for axis in (0, 1))
+    wanted = np.sqrt(np.maximum(np.stack([along.max() - along, around.max() - around], -1), 0) + _SMOOTH_PX**2)
+    share = np.linspace(0, 1, _BLURS)
+    sizes = wanted.min(0) + share[:, None] * (wanted.max(0) - wanted.min(0))
+    level = np.clip((wanted[:, 0] - sizes[0, 0]) / max(float(sizes[-1, 0] - sizes[0, 0]), 1e-6), 0, 1) * (_BLURS - 1)
+    out = np.zeros_like(contrast)
+    for k, (sigma_along, sigma_around) in enumerate(sizes):
+        weight = np.maximum(1 - np.abs(level - k), 0).astype(np.float32)[:, None]
+        out += weight * cv2.GaussianBlur(contrast, (0, 0), sigma_around, None, sigma_along)
+    return out
+
+
+def _blur_of(coarse_uv: Float32, axis: int) -> Float:
+    """Return the image blur's variance (H,), strip px², along rows (axis 0) or columns (1)."""
+    step = np.linalg.norm(np.diff(coarse_uv.astype(np.float64), axis=axis), axis=-1) / _COARSE
+    per_px = np.nanmedian(step, axis=1)
+    variance = (_IMAGE_BLUR_PX / np.maximum(np.nan_to_num(per_px, nan=1.0), 1e-3)) ** 2
+    rows = (np.arange((coarse_uv.shape[0] - 1) * _COARSE) + 0.5) / _COARSE
+    return np.asarray(np.interp(rows, np.arange(len(variance)) + (0.5 if axis == 0 else 0.0), variance))
 
 
 def _coarse_pixels(camera: Camera, T_pc: Float, grid: StripGrid, first_row: int) -> Float32:

@@ -168,7 +168,9 @@ class TextureTracker:
         """Keep the pixels of matched landmarks; return the strip's common displacement (2,) and if lost."""
         m, good = self._map, found.good
         index = found.landmark[good]
-        m.misses[found.landmark] = np.where(good, 0, m.misses[found.landmark] + 1)
+        # A patch hidden under the laser line or outside the picture is not missing.
+        missing = ~good & np.isfinite(found.at[:, 0])
+        m.misses[found.landmark] = np.where(good, 0, m.misses[found.landmark] + missing)
         m.retired[found.landmark] |= m.misses[found.landmark] > _MOST_MISSES
         at = found.at[good]
         sigma = np.maximum(found.sigma[good], 0.02) * self._px_per_strip(strip, at)
@@ -192,11 +194,8 @@ class TextureTracker:
         sigma_strip = strip.noise[row] * np.sqrt(variance)
         good = sigma_strip < self._parameters.landmark_sigma_px
         at = np.stack([row[good] + strip.first_row, column[good]], -1).astype(float)
-        first = len(self._map.row)
+        # Where it starts is no observation: the patch's own noise fits itself there and nowhere else.
         self._map.add(at - drift, frame, patches.of(good))
-        sigma = np.maximum(sigma_strip[good], 0.02) * self._px_per_strip(strip, at)
-        index = first + np.arange(len(at))
-        self._rows.append((index, np.full(len(at), frame), strip.pixel(at[:, 0], at[:, 1]), sigma))
 
     def _free_spots(self, strip: Strip) -> tuple[Int, Int]:
         """Return rows and columns (in the strip) of the best corner of each unoccupied cell."""
