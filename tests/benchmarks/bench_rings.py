@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from pipeline.instrument.probe_file import read_probe
@@ -47,36 +48,29 @@ def speed(folder):
           f"with extraction {frames / whole:.0f} frames/s, ratio {alone / whole:.2f}")  # fmt: skip
 
 
-def sector_profiles(image, sectors, truth):
-    """Yield distance to the ring and grey level above black of each sector's pixels near it."""
-    for a, r in enumerate(truth):
-        own = slice(sectors.start[a], sectors.start[a + 1])
-        x = sectors.radius_px[own] - r
-        near = np.abs(x) < 6 * WIDTH
-        yield x[near], image.ravel()[sectors.pixel[own][near]] - BLACK
+def resampled(image, sectors, truth):
+    """Distances (N,) and grey levels above black (A, N) along each ray about the ring, cubically resampled."""
+    x = np.arange(-6 * WIDTH, 6 * WIDTH, 0.2)
+    rho = (truth[:, None] + x).astype(np.float32)
+    u = CENTRE[0] + rho * np.cos(sectors.azimuth_rad)[:, None]
+    v = CENTRE[1] + rho * np.sin(sectors.azimuth_rad)[:, None]
+    grey = cv2.remap(image.astype(np.float32), u.astype(np.float32), v.astype(np.float32), cv2.INTER_CUBIC)
+    return x, grey - BLACK
 
 
 def centre_of_gravity(image, sectors, truth, noise):
     """Mean distance weighted by what stands out of three noise σ."""
-    out = []
-    for x, y in sector_profiles(image, sectors, truth):
-        weight = np.where(y > 3 * noise, y, 0.0)
-        out.append(weight @ x / max(weight.sum(), 1e-9))
-    return np.array(out)
+    x, y = resampled(image, sectors, truth)
+    weight = np.where(y > 3 * noise, y, 0.0)
+    return weight @ x / np.maximum(weight.sum(1), 1e-9)
 
 
 def steger(image, sectors, truth):
-    """Zero of the first derivative over the second of the profile smoothed by the line's own width."""
-    out = []
-    for x, y in sector_profiles(image, sectors, truth):
-        at = 0.0
-        for _ in range(5):
-            t = (x - at) / WIDTH
-            g = np.exp(-0.5 * t * t)
-            slope, bend = (g * t) @ y, (g * (t * t - 1)) @ y
-            at += np.clip(-slope / bend * WIDTH, -0.5, 0.5) if bend < 0 else 0.0
-        out.append(at)
-    return np.array(out)
+    """Ridge of the image smoothed by the line's own width, along the line's normal."""
+    x, y = resampled(cv2.GaussianBlur(image.astype(np.float32), (0, 0), WIDTH), sectors, truth)
+    at = np.clip(np.argmax(y, 1), 1, len(x) - 2)
+    left, top, right = (np.take_along_axis(y, (at + k)[:, None], 1)[:, 0] for k in (-1, 0, 1))
+    return x[at] + 0.5 * (x[1] - x[0]) * (left - right) / np.minimum(left - 2 * top + right, -1e-9)
 
 
 def bound(sectors, truth, read, shot):
