@@ -49,7 +49,7 @@ def speed(folder):
 
 
 def resampled(image, sectors, truth):
-    """Distances (N,) and grey levels above black (A, N) along each ray about the ring, cubically resampled."""
+    """Distances (N,) and grey levels above black (A, N) along each ray about the ring."""
     x = np.arange(-6 * WIDTH, 6 * WIDTH, 0.2)
     rho = (truth[:, None] + x).astype(np.float32)
     u = CENTRE[0] + rho * np.cos(sectors.azimuth_rad)[:, None]
@@ -66,7 +66,11 @@ def centre_of_gravity(image, sectors, truth, noise):
 
 
 def steger(image, sectors, truth):
-    """Ridge of the image smoothed by the line's own width, along the line's normal."""
+    """Ridge of the image smoothed by the line's own width, along the line's normal.
+
+    Smoothing also averages along the line over neighbouring samples: in strong noise it falls below the
+    bound of a single sample, at the price of correlated neighbours.
+    """
     x, y = resampled(cv2.GaussianBlur(image.astype(np.float32), (0, 0), WIDTH), sectors, truth)
     at = np.clip(np.argmax(y, 1), 1, len(x) - 2)
     left, top, right = (np.take_along_axis(y, (at + k)[:, None], 1)[:, 0] for k in (-1, 0, 1))
