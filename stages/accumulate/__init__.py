@@ -24,7 +24,7 @@ class AccumulateParameters(Parameters):
     distance_step_mm: float = Field(0.5, ge=0.05, le=10, description="row spacing, mm, of the radius map")
     azimuth_samples: int = Field(720, ge=90, le=5760, description="columns of the radius map")
     smoothing_mm: float = Field(
-        0.45, gt=0, le=10, description="smallest 1 σ, mm, of the kernel along distance; rings further apart widen it"
+        0.3, gt=0, le=10, description="smallest 1 σ, mm, of the kernel along distance; rings further apart widen it"
     )
     largest_gap_mm: float = Field(
         3.0, gt=0, le=50, description="largest distance, mm, between rings that is bridged"

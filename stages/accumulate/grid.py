@@ -18,6 +18,7 @@ from stages.accumulate.samples import WallSamples
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 _BLOCK = 64
+_WIDTH_IN_RINGS = 0.4
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,14 @@ class RingColumns:
     variance: Float
     misalignment_mm: Float
     count: NDArray[np.int64]
+
+    def every_other(self, first: int) -> RingColumns:
+        """Return every second ring of each column."""
+        part = (slice(None), slice(first, None, 2))
+        return RingColumns(
+            self.distance_mm[part], self.radius_mm[part], self.variance[part],
+            self.misalignment_mm[part], self.count[part],
+        )  # fmt: skip
 
 
 def map_grid(samples: WallSamples, step_mm: float, azimuths: int) -> MapGrid:
@@ -80,20 +89,47 @@ def rings_on_columns(samples: WallSamples, grid: MapGrid) -> RingColumns:
 def gridded(
     columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float, progress: Progress
 ) -> tuple[Float32, Float32, NDArray[np.int64], Float32]:
-    """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen."""
+    """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen.
+
+    The noise of single samples does not tell all: speckle is alike in neighbouring azimuths and each ring has
+    an error of its pose. What rings really differ by is measured from two maps, each of every other ring.
+    """
+    width = max(smoothing_mm, _WIDTH_IN_RINGS * _usual_spacing(columns))
+    radius, sigma, count, misalignment = _map_of(columns, grid, width, largest_gap_mm, progress)
+    halves = [
+        _map_of(columns.every_other(first), grid, 2 * width, 2 * largest_gap_mm, _no_progress)[:2]
+        for first in (0, 1)
+    ]
+    return radius, sigma * _excess(halves), count, misalignment
+
+
+def _map_of(
+    columns: RingColumns, grid: MapGrid, width: float, gap: float, progress: Progress
+) -> tuple[Float32, Float32, NDArray[np.int64], Float32]:
     shape = (len(grid.distance_mm), len(grid.azimuth_rad))
     radius, sigma, misalignment = (np.full(shape, np.nan, np.float32) for _ in range(3))
     count = np.zeros(shape, np.int64)
-    width = max(smoothing_mm, 0.6 * _usual_spacing(columns))
     for a in range(0, shape[1], _BLOCK):
         part = slice(a, min(a + _BLOCK, shape[1]))
         _regress(
             columns.distance_mm[part], columns.radius_mm[part], columns.variance[part],
-            columns.misalignment_mm[part], columns.count[part], grid.distance_mm, width, largest_gap_mm,
+            columns.misalignment_mm[part], columns.count[part], grid.distance_mm, width, gap,
             radius[:, part], sigma[:, part], count[:, part], misalignment[:, part],
         )  # fmt: skip
         progress(part.stop, shape[1])
     return radius, sigma, count, misalignment
+
+
+def _excess(halves: list[tuple[Float32, Float32]]) -> np.float32:
+    """Return by how much two independent maps differ more than their σ says; at least 1."""
+    (a, sigma_a), (b, sigma_b) = halves
+    ratio = np.abs(a - b) / np.hypot(sigma_a, sigma_b)
+    ratio = ratio[np.isfinite(ratio)]
+    return np.float32(max(1.0, 1.4826 * np.median(ratio))) if ratio.size else np.float32(1)
+
+
+def _no_progress(done: int, total: int) -> None:
+    """Keep silent."""
 
 
 def _usual_spacing(columns: RingColumns) -> float:
