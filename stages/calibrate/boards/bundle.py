@@ -113,12 +113,12 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Gauss-Newton system in blocks: shared (F, F), coupling (V, F, 6), poses (V, 6, 6), and gradients."""
+    """Gauss-Newton system: shared (F, F), coupling (V, F, 6) and pose (V, 6, 6) blocks, gradients by view."""
 
     shared: Float
     coupling: Float
     pose: Float
-    shared_gradient: Float
+    shared_gradients: Float
     pose_gradient: Float
 
     def step(self, damping: float) -> tuple[Float, Float]:
@@ -128,7 +128,7 @@ class NormalEquations:
         solved = np.linalg.solve(pose, np.swapaxes(self.coupling, 1, 2))
         solved_gradient = np.linalg.solve(pose, self.pose_gradient[..., None])[..., 0]
         reduced = shared - np.einsum("vfp,vpg->fg", self.coupling, solved)
-        gradient = self.shared_gradient - np.einsum("vfp,vp->f", self.coupling, solved_gradient)
+        gradient = self.shared_gradients.sum(0) - np.einsum("vfp,vp->f", self.coupling, solved_gradient)
         shared_step = -_solve_scaled(reduced, gradient)
         return shared_step, -solved_gradient - np.einsum("vpf,f->vp", solved, shared_step)
 
@@ -199,19 +199,36 @@ def linearise(estimate: Estimate, corners: Corners, free: Free, huber_px: float)
     pose = slice(f, f + POSE)
     return NormalEquations(
         blocks[:, :f, :f].sum(0), blocks[:, :f, pose], blocks[:, pose, pose] + 1e-12 * np.eye(POSE),
-        blocks[:, :f, -1].sum(0), blocks[:, pose, -1],
+        blocks[:, :f, -1], blocks[:, pose, -1],
     )  # fmt: skip
 
 
 def covariance(estimate: Estimate, corners: Corners, free: Free, huber_px: float) -> tuple[Float, float]:
-    """Return the covariance (F, F) of the shared parameters and the 1 σ of a corner coordinate, px."""
+    """Return the covariance (F, F) of the shared parameters and the 1 σ of a corner coordinate, px.
+
+    The residuals of one picture tend to err together (a board that bends, a pattern that the model cannot
+    follow), so that a picture tells less than its corners' number says. The covariance is scaled up by the
+    factor by which the pictures' gradients scatter more than independent corners would make them.
+    """
     residual = estimate.residuals(corners)
     weight = weights(residual, huber_px)
     squares = float(np.nansum(weight * np.sum(residual**2, -1)))
     freedom = 2 * int(np.count_nonzero(weight)) - free.count - POSE * corners.views
-    sigma = np.sqrt(squares / max(freedom, 1))
-    information = linearise(estimate, corners, free, huber_px).shared_information()
-    return sigma**2 * _inverse_scaled(information), float(sigma)
+    variance = squares / max(freedom, 1)
+    system = linearise(estimate, corners, free, huber_px)
+    inverse = _inverse_scaled(system.shared_information())
+    return variance * _togetherness(system, inverse, variance) * inverse, float(np.sqrt(variance))
+
+
+def _togetherness(system: NormalEquations, inverse: Float, variance: float) -> float:
+    """Return the mean scatter of the pictures' gradients against that of independent corners, at least 1."""
+    views, count = system.shared_gradients.shape
+    if views < 2 or count == 0 or variance == 0:
+        return 1.0
+    solved = np.linalg.solve(system.pose, system.pose_gradient[..., None])[..., 0]
+    gradients = system.shared_gradients - np.einsum("vfp,vp->vf", system.coupling, solved)
+    scatter = float(np.einsum("vf,fg,vg->", gradients, inverse, gradients)) / variance / count
+    return float(max(scatter * views / (views - 1), 1.0))
 
 
 def _sag(xyz_b: Float) -> Float:

@@ -25,16 +25,14 @@ class BoardCalibrationParameters(Parameters):
         default=7, ge=3, le=12, description="degree of Scaramuzza's polynomial; OCamCalib's own default is 4"
     )
     folds: int = Field(
-        default=5, ge=2, le=50, description="parts for held-out reprojection: each is held out once"
+        default=5, ge=2, le=50, description="parts for held-out reprojection, each left out once"
     )
-    least_views: int = Field(
-        default=4, ge=3, le=1000, description="views below which a calibration is refused"
-    )
+    least_views: int = Field(default=4, ge=3, le=1000, description="fewer views than this are refused")
     least_tilt_deg: float = Field(
         default=8.0,
         ge=0,
         le=90,
-        description="largest angle between boards below which a calibration is refused, deg",
+        description="boards whose directions differ by less are refused, deg",
     )
     outlier_view_factor: float = Field(
         default=4.0, gt=1, le=100, description="views whose rms is this many times the median are left out"
@@ -43,5 +41,5 @@ class BoardCalibrationParameters(Parameters):
         default=0.02,
         gt=0,
         le=1,
-        description="relative 1 σ of the image scale above which a calibration is refused",
+        description="a larger relative 1 σ of the image scale is refused",
     )
