@@ -7,6 +7,7 @@ rings' uneven spacing, and its variance follows from its weights.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numba
 import numpy as np
@@ -19,6 +20,7 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 _BLOCK = 64
 _WIDTH_IN_RINGS = 0.4
+_SEEN_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -57,14 +59,14 @@ class RingColumns:
 
 
 def map_grid(samples: WallSamples, step_mm: float, azimuths: int) -> MapGrid:
-    """Return the grid that covers the distances at which at least half of a ring was seen."""
+    """Return the grid that covers the distances at which at least a tenth of a ring was seen."""
     s = np.where(samples.valid, samples.distance_mm, np.nan)
-    some = samples.valid.mean(1) > 0.1
+    some = samples.valid.mean(1) > _SEEN_SHARE
     if not some.any():
         some = samples.valid.any(1)
     middle = np.nanmedian(s[some], axis=1)
     first, last = np.ceil(middle.min() / step_mm), np.floor(middle.max() / step_mm)
-    distance = step_mm * np.arange(first, max(last, first + 1) + 1)
+    distance = step_mm * np.arange(int(first), int(max(last, first + 1)) + 1)
     return MapGrid(distance, -np.pi + 2 * np.pi / azimuths * np.arange(azimuths))
 
 
@@ -72,7 +74,8 @@ def rings_on_columns(samples: WallSamples, grid: MapGrid) -> RingColumns:
     """Average each ring's samples in every column's bin, with weights from their noise."""
     columns = len(grid.azimuth_rad)
     frames = samples.valid.shape[0]
-    bin_of = np.rint(np.nan_to_num(samples.azimuth_rad + np.pi) / (2 * np.pi / columns)).astype(np.int64) % columns
+    turn = np.nan_to_num(samples.azimuth_rad + np.pi) / (2 * np.pi)
+    bin_of = np.rint(turn * columns).astype(np.int64) % columns
     sums = np.zeros((4, columns, frames))
     count = np.zeros((columns, frames), np.int64)
     _bin(
@@ -82,8 +85,8 @@ def rings_on_columns(samples: WallSamples, grid: MapGrid) -> RingColumns:
     weight = np.where(count > 0, sums[0], np.nan)
     distance, radius, misalignment = (part / weight for part in sums[1:])
     order = np.argsort(distance, axis=1, kind="stable")
-    pick = [np.take_along_axis(x, order, 1) for x in (distance, radius, 1 / weight, misalignment)]
-    return RingColumns(*pick, np.take_along_axis(count, order, 1))
+    sort = partial(np.take_along_axis, indices=order, axis=1)
+    return RingColumns(sort(distance), sort(radius), sort(1 / weight), sort(misalignment), sort(count))
 
 
 def gridded(
@@ -139,8 +142,8 @@ def _usual_spacing(columns: RingColumns) -> float:
     return float(np.median(step)) if step.size else 0.0
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _bin(valid, bin_of, distance, radius, misalignment, sigma, sums, count):  # type: ignore[no-untyped-def]  # pragma: no cover
+@numba.njit(cache=True)
+def _bin(valid, bin_of, distance, radius, misalignment, sigma, sums, count):  # type: ignore[no-untyped-def]
     for f in range(valid.shape[0]):
         for a in range(valid.shape[1]):
             if valid[f, a]:
@@ -153,62 +156,57 @@ def _bin(valid, bin_of, distance, radius, misalignment, sigma, sums, count):  # 
                 count[j, f] += 1
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _regress(  # type: ignore[no-untyped-def]  # pragma: no cover
+@numba.njit(cache=True)
+def _regress(  # type: ignore[no-untyped-def]
     distance, radius, variance, misalignment, count, rows, width, gap,
     out_radius, out_sigma, out_count, out_misalignment,
 ):  # fmt: skip
-    reach = 3.0 * width
+    reach = max(3.0 * width, gap)
     for a in range(distance.shape[0]):
-        n = 0
-        while n < distance.shape[1] and np.isfinite(distance[a, n]):
-            n += 1
-        first = 0
+        known = np.isfinite(distance[a]).sum()
+        first, last = 0, 0
         for i in range(len(rows)):
-            s = rows[i]
-            while first < n and distance[a, first] < s - max(reach, gap):
+            while first < known and distance[a, first] < rows[i] - reach:
                 first += 1
-            before, after = np.inf, np.inf
-            m0 = m1 = m2 = b0 = b1 = c0 = total = 0.0
-            k = first
-            while k < n and distance[a, k] <= s + max(reach, gap):
-                d = distance[a, k] - s
-                if d <= 0:
-                    before = -d
-                elif after == np.inf:
-                    after = d
-                w = np.exp(-0.5 * (d / width) ** 2) / variance[a, k]
-                m0 += w
-                m1 += w * d
-                m2 += w * d * d
-                b0 += w * radius[a, k]
-                b1 += w * d * radius[a, k]
-                c0 += w * misalignment[a, k]
-                if abs(d) <= width:
-                    total += count[a, k]
-                k += 1
-            if before + after > gap and min(before, after) > 0.5 * width:
+            while last < known and distance[a, last] <= rows[i] + reach:
+                last += 1
+            d = distance[a, first:last] - rows[i]
+            kernel = np.exp(-0.5 * (d / width) ** 2)
+            weight = kernel / variance[a, first:last]
+            if weight.sum() <= 0 or not _near_rings(d, width, gap):
                 continue
-            if m0 <= 0:
-                continue
-            determinant = m0 * m2 - m1 * m1
-            line = determinant > 1e-6 * m0 * m0 * width * width
-            value = (m2 * b0 - m1 * b1) / determinant if line else b0 / m0
-            slope = (m0 * b1 - m1 * b0) / determinant if line else 0.0
-            variance_sum, misfit, weight_sum, spread = 0.0, 0.0, 0.0, 0.0
-            for j in range(first, k):
-                d = distance[a, j] - s
-                w = np.exp(-0.5 * (d / width) ** 2) / variance[a, j]
-                c = w * (m2 - m1 * d) / determinant if line else w / m0
-                variance_sum += c * c * variance[a, j]
-                e = radius[a, j] - value - slope * d
-                u = np.exp(-0.5 * (d / width) ** 2)
-                misfit += u * e * e / variance[a, j]
-                weight_sum += u
-                spread += u * u
-            freedom = weight_sum - 2.0 * spread / max(weight_sum, 1e-12)
-            excess = misfit / freedom if freedom > 0.2 else 1.0
-            out_radius[i, a] = value
-            out_sigma[i, a] = np.sqrt(variance_sum * max(1.0, excess))
-            out_count[i, a] = int(total)
-            out_misalignment[i, a] = c0 / m0
+            out_radius[i, a], out_sigma[i, a] = _line_at(
+                d, kernel, radius[a, first:last], variance[a, first:last], width
+            )
+            out_count[i, a] = np.where(np.abs(d) <= width, count[a, first:last], 0).sum()
+            out_misalignment[i, a] = (weight * misalignment[a, first:last]).sum() / weight.sum()
+
+
+@numba.njit(cache=True)
+def _near_rings(d, width, gap):  # type: ignore[no-untyped-def]
+    """Tell if rings at signed distances ``d``, ascending, are near: on both sides, or one very near."""
+    before, after = np.inf, np.inf
+    for x in d:
+        if x <= 0:
+            before = -x
+        elif after == np.inf:
+            after = x
+    return before + after <= gap or min(before, after) <= 0.5 * width
+
+
+@numba.njit(cache=True)
+def _line_at(d, kernel, radius, variance, width):  # type: ignore[no-untyped-def]
+    """Return value at d = 0 of the weighted line, and its 1 σ with the scatter about the line where larger."""
+    w = kernel / variance
+    m0, m1, m2 = w.sum(), (w * d).sum(), (w * d * d).sum()
+    b0, b1 = (w * radius).sum(), (w * d * radius).sum()
+    determinant = m0 * m2 - m1 * m1
+    if determinant > 1e-6 * m0 * m0 * width * width:
+        value, slope = (m2 * b0 - m1 * b1) / determinant, (m0 * b1 - m1 * b0) / determinant
+        share = w * (m2 - m1 * d) / determinant
+    else:
+        value, slope, share = b0 / m0, 0.0, w / m0
+    misfit = (w * (radius - value - slope * d) ** 2).sum()
+    freedom = kernel.sum() - 2.0 * (kernel * kernel).sum() / max(kernel.sum(), 1e-12)
+    excess = misfit / freedom if freedom > 0.2 else 1.0
+    return value, np.sqrt((share * share * variance).sum() * max(1.0, excess))

@@ -67,4 +67,4 @@ def wall_samples(
 
 def _placed(T_pc: Float, xyz_c: Float) -> Float:
     """Return ring points (F, A, 3) of C in P."""
-    return np.einsum("fij,faj->fai", T_pc[:, :3, :3], xyz_c) + T_pc[:, None, :3, 3]
+    return np.asarray(np.einsum("fij,faj->fai", T_pc[:, :3, :3], xyz_c) + T_pc[:, None, :3, 3])

@@ -103,8 +103,9 @@ class BorderedSystem:
         count = len(rows.start) - 1
         inverse, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
         _add_landmarks(
-            rows.start, rows.frame, rows.by_pose, rows.by_point, rows.by_instrument, rows.residual, rows.weight,
-            rows.surface_by_point, rows.surface_by_border, rows.surface_residual, rows.surface_weight,
+            rows.start, rows.frame, rows.by_pose, rows.by_point, rows.by_instrument,
+            rows.residual, rows.weight, rows.surface_by_point, rows.surface_by_border,
+            rows.surface_residual, rows.surface_weight,
             self._band, self._border, self._corner, self._right, self._right_border, inverse, right,
         )  # fmt: skip
         return inverse, right
@@ -161,17 +162,19 @@ def landmark_steps(
 ) -> Float:
     """Return the steps (L, 3) of the eliminated landmarks."""
     instrument = border_step[len(border_step) - rows.by_instrument.shape[2] :]
-    moved = np.einsum("mij,mj->mi", rows.by_pose, frame_step[rows.frame, :6]) + rows.by_instrument @ instrument
+    by_frames = np.einsum("mij,mj->mi", rows.by_pose, frame_step[rows.frame, :6])
+    moved = by_frames + rows.by_instrument @ instrument
     pull = np.einsum("mij,mi,m->mj", rows.by_point, moved, rows.weight)
     total = np.add.reduceat(pull, rows.start[:-1], axis=0) if len(pull) else np.zeros((0, 3))
     surface = rows.surface_weight * (rows.surface_by_border @ border_step)
-    return np.einsum("lij,lj->li", inverse, right - total - surface[:, None] * rows.surface_by_point)
+    return np.asarray(
+        np.einsum("lij,lj->li", inverse, right - total - surface[:, None] * rows.surface_by_point)
+    )
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _add_rows(frame, by_frame, by_border, residual, weight, band, border, corner, right, right_border):  # type: ignore[no-untyped-def]  # pragma: no cover
+@numba.njit(cache=True)
+def _add_rows(frame, by_frame, by_border, residual, weight, band, border, corner, right, right_border):  # type: ignore[no-untyped-def]
     block = by_frame.shape[2]
-    size = by_border.shape[1]
     for m in range(frame.shape[0]):
         w = weight[m]
         for p in range(frame.shape[1]):
@@ -181,24 +184,35 @@ def _add_rows(frame, by_frame, by_border, residual, weight, band, border, corner
                     continue
                 row = frame[m, p] * block + a
                 right[row] -= w * ja * residual[m]
-                for q in range(frame.shape[1]):
-                    for b in range(block):
-                        column = frame[m, q] * block + b
-                        if column <= row and by_frame[m, q, b] != 0.0:
-                            band[row - column, column] += w * ja * by_frame[m, q, b]
-                for b in range(size):
+                _add_to_band(frame[m], by_frame[m], w * ja, row, band)
+                for b in range(border.shape[1]):
                     border[row, b] += w * ja * by_border[m, b]
-        for a in range(size):
-            ja = by_border[m, a]
-            if ja == 0.0:
-                continue
-            right_border[a] -= w * ja * residual[m]
-            for b in range(size):
-                corner[a, b] += w * ja * by_border[m, b]
+        _add_to_corner(by_border[m], residual[m], w, corner, right_border)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _add_landmarks(  # type: ignore[no-untyped-def]  # pragma: no cover
+@numba.njit(cache=True)
+def _add_to_band(frame, by_frame, factor, row, band):  # type: ignore[no-untyped-def]
+    block = by_frame.shape[1]
+    for q in range(frame.shape[0]):
+        for b in range(block):
+            column = frame[q] * block + b
+            if column <= row and by_frame[q, b] != 0.0:
+                band[row - column, column] += factor * by_frame[q, b]
+
+
+@numba.njit(cache=True)
+def _add_to_corner(by_border, residual, w, corner, right_border):  # type: ignore[no-untyped-def]
+    for a in range(by_border.shape[0]):
+        ja = by_border[a]
+        if ja == 0.0:
+            continue
+        right_border[a] -= w * ja * residual
+        for b in range(by_border.shape[0]):
+            corner[a, b] += w * ja * by_border[b]
+
+
+@numba.njit(cache=True)
+def _add_landmarks(  # type: ignore[no-untyped-def]
     start, frame, by_pose, by_point, by_instrument, residual, weight,
     s_point, s_border, s_residual, s_weight,
     band, border, corner, right, right_border, inverse, right_point,
@@ -209,7 +223,6 @@ def _add_landmarks(  # type: ignore[no-untyped-def]  # pragma: no cover
     for k in range(len(start) - 1):
         most = max(most, start[k + 1] - start[k])
     cross = np.empty((most, 6, 3))
-    solved = np.empty((most, 6, 3))
     for k in range(len(start) - 1):
         ws = s_weight[k]
         h = ws * np.outer(s_point[k], s_point[k])
@@ -228,25 +241,41 @@ def _add_landmarks(  # type: ignore[no-untyped-def]  # pragma: no cover
             side[first:] += w * (jc.T @ jx)
             corner[first:, first:] += w * (jc.T @ jc)
             right_border[first:] -= w * (jc.T @ r)
-            for a in range(6):
-                for b in range(a + 1):
-                    band[a - b, f + b] += w * (jp[0, a] * jp[0, b] + jp[1, a] * jp[1, b])
+            _add_pose(jp, w, f, band)
         hi = np.linalg.inv(h)
         inverse[k], right_point[k] = hi, g
         solved_side = side @ hi
         right_border -= solved_side @ g
         corner -= solved_side @ side.T
-        for i in range(start[k + 1] - start[k]):
-            f = frame[start[k] + i] * 7
-            solved[i] = cross[i] @ hi
-            right[f : f + 6] -= solved[i] @ g
-            border[f : f + 6] -= solved[i] @ side.T
-            for j in range(i + 1):
-                e = frame[start[k] + j] * 7
-                for a in range(6):
-                    for b in range(6):
-                        if f + a >= e + b:
-                            total = 0.0
-                            for c in range(3):
-                                total += solved[i, a, c] * cross[j, b, c]
-                            band[f + a - e - b, e + b] -= total
+        _eliminate(frame[start[k] : start[k + 1]], cross, hi, g, side, band, border, right)
+
+
+@numba.njit(cache=True)
+def _add_pose(jp, w, f, band):  # type: ignore[no-untyped-def]
+    for a in range(6):
+        for b in range(a + 1):
+            band[a - b, f + b] += w * (jp[0, a] * jp[0, b] + jp[1, a] * jp[1, b])
+
+
+@numba.njit(cache=True)
+def _eliminate(frame, cross, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
+    """Subtract what one landmark, seen in ``frame``, takes along when it leaves."""
+    solved = np.empty((len(frame), 6, 3))
+    for i in range(len(frame)):
+        f = frame[i] * 7
+        solved[i] = cross[i] @ hi
+        right[f : f + 6] -= solved[i] @ g
+        border[f : f + 6] -= solved[i] @ side.T
+        for j in range(i + 1):
+            _subtract_pair(solved[i], cross[j], f, frame[j] * 7, band)
+
+
+@numba.njit(cache=True)
+def _subtract_pair(solved, cross, f, e, band):  # type: ignore[no-untyped-def]
+    for a in range(6):
+        for b in range(6):
+            if f + a >= e + b:
+                total = 0.0
+                for c in range(3):
+                    total += solved[a, c] * cross[b, c]
+                band[f + a - e - b, e + b] -= total

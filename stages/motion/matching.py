@@ -20,7 +20,7 @@ _STEPS = 30
 
 @dataclass(frozen=True)
 class Patches:
-    """Templates: zero-mean ``value`` (N, n, n), gradients along rows and columns, and ``information`` (N, 2, 2)."""
+    """Templates: zero-mean ``value`` (N, n, n), slopes along rows and columns, ``information`` (N, 2, 2)."""
 
     value: Float32
     by_row: Float32
@@ -83,8 +83,8 @@ def match(
     return Matches(offset, correlation, sigma)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _look(contrast, usable, r, c, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+@numba.njit(cache=True)
+def _look(contrast, usable, r, c, out):  # type: ignore[no-untyped-def]
     """Sample a patch centred on (r, c) into ``out``; False where it leaves the usable strip."""
     n = out.shape[0]
     half = n // 2
@@ -111,8 +111,8 @@ def _look(contrast, usable, r, c, out):  # type: ignore[no-untyped-def]  # pragm
     return True
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _match(contrast, usable, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]  # pragma: no cover
+@numba.njit(cache=True)
+def _match(contrast, usable, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]
     count, n = value.shape[0], value.shape[1]
     offset = np.full((count, 2), np.nan)
     correlation = np.zeros(count)
@@ -121,39 +121,49 @@ def _match(contrast, usable, value, by_row, by_column, inverse, row, column, ste
     limit = n / 2
     for k in range(count):
         dr, dc, step = 0.0, 0.0, 1.0
-        lost = False
         tt, ts, ss = 0.0, 0.0, 0.0
         for _ in range(steps + 1):
             if not _look(contrast, usable, row[k] + dr, column[k] + dc, seen):
-                lost = True
+                tt = 0.0
                 break
-            tt, ts, ss = 0.0, 0.0, 0.0
-            for i in range(n):
-                for j in range(n):
-                    t, s = value[k, i, j], seen[i, j]
-                    tt += t * t
-                    ts += t * s
-                    ss += s * s
+            tt, ts, ss = _products(value[k], seen)
             if step < 0.003:
                 break
-            gain = ts / ss if ss > 0 else 1.0
-            g0, g1 = 0.0, 0.0
-            for i in range(n):
-                for j in range(n):
-                    e = value[k, i, j] - gain * seen[i, j]
-                    g0 += by_row[k, i, j] * e
-                    g1 += by_column[k, i, j] * e
-            s0 = inverse[k, 0, 0] * g0 + inverse[k, 0, 1] * g1
-            s1 = inverse[k, 1, 0] * g0 + inverse[k, 1, 1] * g1
+            s0, s1 = _step(value[k], by_row[k], by_column[k], inverse[k], seen, ts / ss if ss > 0 else 1.0)
             dr += s0
             dc += s1
             step = abs(s0) + abs(s1)
-            if abs(dr) > limit or abs(dc) > limit:
-                lost = True
+            if max(abs(dr), abs(dc)) > limit:
+                tt = 0.0
                 break
-        if lost or tt <= 0 or ss <= 0:
+        if tt <= 0 or ss <= 0:
             continue
         offset[k, 0], offset[k, 1] = dr, dc
         correlation[k] = ts / np.sqrt(tt * ss)
         residual[k] = np.sqrt(max(tt - ts * ts / ss, 0.0) / (n * n - 4))
     return offset, correlation, residual
+
+
+@numba.njit(cache=True)
+def _products(template, seen):  # type: ignore[no-untyped-def]
+    """Return Σ t², Σ t s and Σ s²."""
+    tt, ts, ss = 0.0, 0.0, 0.0
+    for i in range(seen.shape[0]):
+        for j in range(seen.shape[1]):
+            t, s = template[i, j], seen[i, j]
+            tt += t * t
+            ts += t * s
+            ss += s * s
+    return tt, ts, ss
+
+
+@numba.njit(cache=True)
+def _step(template, by_row, by_column, inverse, seen, gain):  # type: ignore[no-untyped-def]
+    """Return the Gauss-Newton step along rows and columns."""
+    g0, g1 = 0.0, 0.0
+    for i in range(seen.shape[0]):
+        for j in range(seen.shape[1]):
+            e = template[i, j] - gain * seen[i, j]
+            g0 += by_row[i, j] * e
+            g1 += by_column[i, j] * e
+    return inverse[0, 0] * g0 + inverse[0, 1] * g1, inverse[1, 0] * g0 + inverse[1, 1] * g1

@@ -188,8 +188,8 @@ def _noise_of(contrast: Float32, usable: Mask) -> Float32:
     return np.sqrt(power).astype(np.float32)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _sample(image, coarse, step):  # type: ignore[no-untyped-def]  # pragma: no cover
+@numba.njit(cache=True)
+def _sample(image, coarse, step):  # type: ignore[no-untyped-def]
     """Bilinear look-up of the image on the coarse pixel grid refined ``step`` times."""
     rows, columns = (coarse.shape[0] - 1) * step, (coarse.shape[1] - 1) * step
     grey = np.zeros((rows, columns), np.float32)

@@ -7,6 +7,7 @@ G. Golub, C. Van Loan, "Matrix computations", § 4.5.1 (block tridiagonal system
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,7 @@ class BlockTridiagonal:
         edges = [*range(0, max(size - width + 1, 1), width), size]
         diagonal: list[Float] = []
         below: list[Float] = []
-        for k, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        for k, (a, b) in enumerate(pairwise(edges)):
             block = _dense(band, a, b, a, b)
             block = block + np.tril(block, -1).T
             if below:
@@ -49,7 +50,7 @@ class BlockTridiagonal:
     def solve(self, right: Float) -> Float:
         """Return the solution (N, R) for right sides (N, R)."""
         edges = np.cumsum([0] + [len(d) for d in self.diagonal])
-        parts = [right[a:b] for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        parts = [right[a:b] for a, b in pairwise(edges)]
         for k, factor in enumerate(self.diagonal):
             part = parts[k] - self.below[k - 1] @ parts[k - 1] if k else parts[k]
             parts[k] = solve_triangular(factor, part, lower=True, check_finite=False)
