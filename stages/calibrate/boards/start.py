@@ -22,7 +22,7 @@ Float = NDArray[np.float64]
 _HALF_FIELDS_RAD = np.geomspace(0.15, 2.6, 14)
 _SAMPLE_CORNERS = 24
 _START_HUBER_PX = 5.0
-_NEAR_FORWARD = 0.3
+_NEAR_FORWARD, _LEAST_POINTS = 0.3, 4
 _WIDEST_FIT_RAD = 2.8
 _FOCAL, _ALL = Free(np.arange(2), FLAT), Free(np.arange(4), FLAT)
 
@@ -46,21 +46,29 @@ def pose(view: BoardView, camera: Camera) -> Float:
     Turning the rays so that their mean looks forward lets a method for pinhole images serve beyond 90°.
     """
     rays = camera.unproject(view.uv)
-    ray = rays.ray[rays.valid]
-    if len(ray) < 4:
-        return from_parts(np.eye(3), np.array([0.0, 0.0, float(np.ptp(view.xyz_b)) or 1.0]))
-    turn = _rotation_to_forward(ray.mean(0))
+    ray, xyz_b = rays.ray[rays.valid], view.xyz_b[rays.valid]
+    turn = _rotation_to_forward(ray.mean(0)) if len(ray) else np.eye(3)
     turned = ray @ turn.T
     ahead = turned[:, 2] > _NEAR_FORWARD
-    if np.count_nonzero(ahead) < 4:
-        ahead = turned[:, 2] > np.sort(turned[:, 2])[-5]
-        turned = np.maximum(turned, [-np.inf, -np.inf, 1e-2])
-    plane = turned[ahead, :2] / turned[ahead, 2:]
-    xyz_b = view.xyz_b[rays.valid][ahead]
-    found, w, t = cv2.solvePnP(xyz_b, plane, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_SQPNP)
-    if not found:
-        return from_parts(turn.T, turn.T @ np.array([0.0, 0.0, float(np.ptp(view.xyz_b))]))
-    return from_parts(turn.T @ cv2.Rodrigues(w)[0], turn.T @ t[:, 0])
+    if np.count_nonzero(ahead) < _LEAST_POINTS:
+        return from_parts(np.eye(3), np.array([0.0, 0.0, float(np.ptp(view.xyz_b))]) - view.xyz_b.mean(0))
+    T_fb = _pinhole_pose(xyz_b[ahead], turned[ahead, :2] / turned[ahead, 2:])
+    return from_parts(turn.T @ T_fb[:3, :3], turn.T @ T_fb[:3, 3])
+
+
+def _pinhole_pose(xyz_b: Float, plane: Float) -> Float:
+    """Return the pose (4, 4) of points seen at ``plane`` (N, 2), z = 1; facing the camera where it fails.
+
+    OpenCV refuses points that are few or crowd together, as wrong focal lengths make them.
+    """
+    try:
+        found, w, t = cv2.solvePnP(xyz_b, plane, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_SQPNP)
+    except cv2.error:
+        found = False
+    if found:
+        return from_parts(cv2.Rodrigues(w)[0].astype(float), t[:, 0].astype(float))
+    size, angle = np.ptp(xyz_b, axis=0).max(), max(float(np.ptp(plane)), 1e-6)
+    return from_parts(np.eye(3), np.array([0.0, 0.0, size / angle]) - xyz_b.mean(0))
 
 
 def model_start(model: str, estimate: Estimate, theta_max: float, degree: int) -> Camera:
