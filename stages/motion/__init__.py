@@ -17,10 +17,11 @@ from stages.motion.adjustment import MATCH_BIASES, Estimate, Measurements, adjus
 from stages.motion.events import find_events
 from stages.motion.output import in_pipe_frame
 from stages.motion.parameters import MotionParameters
+from stages.motion.prediction import Predictor
 from stages.motion.sections import at_all_frames, ring_bins, ring_centres
 from stages.motion.state import State, straight_start
 from stages.motion.strip import StripGrid
-from stages.motion.tracking import Predictor, TextureTracker, Tracks, track_texture
+from stages.motion.tracking import TextureTracker, Tracks, track_texture
 
 __all__ = ["MOTION", "MotionParameters", "estimate_motion"]
 

@@ -36,10 +36,10 @@ class MotionParameters(Parameters):
         2e-3, gt=0, le=0.1, description="1 σ, 1/mm, of the change of the axis' curvature from knot to knot"
     )
     encoder_sigma_mm: float = Field(
-        0.05, gt=0, le=10, description="1 σ, mm, of an encoder reading (quantisation and clock)"
+        0.005, gt=0, le=10, description="1 σ, mm, of an encoder reading beside its quantisation, which is measured"
     )
     encoder_slip_sigma_mm: float = Field(
-        0.01, gt=0, le=1, description="1 σ, mm, of the encoder's slip from one frame to the next"
+        0.002, gt=0, le=1, description="1 σ, mm, of the encoder's creep from frame to frame; slips may be far larger"
     )
     alike: float = Field(
         30.0, ge=1, le=10000, description="number of neighbouring observations of a landmark that err alike"

@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 
 from pipeline.artefacts import PipeAxis
 from pipeline.geometry.axis import axis_through, frames_at, from_pipe
-from stages.motion.tracking import moved
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
 
 Float = NDArray[np.float64]
 GLOBALS = 4
@@ -53,7 +53,7 @@ class State:
     @property
     def knots(self) -> int:
         """Number of spline coefficients along each direction."""
-        return self.curve.shape[1]
+        return int(self.curve.shape[1])
 
     @property
     def border_size(self) -> int:
@@ -91,7 +91,13 @@ class State:
 
     def _knot_vector(self) -> Float:
         first = self.axis.distance_mm[0] - _DEGREE * self.knot_mm
-        return first + self.knot_mm * np.arange(self.knots + _DEGREE + 1)
+        return np.asarray(first + self.knot_mm * np.arange(self.knots + _DEGREE + 1))
+
+
+def moved(T_pc: Float, step: Float) -> Float:
+    """Return T = [R exp(w), t + d] for a step (..., 6) = (d, w)."""
+    turn = rotation_from_vector(step[..., 3:])
+    return from_parts(T_pc[..., :3, :3] @ turn, T_pc[..., :3, 3] + step[..., :3])
 
 
 def straight_start(

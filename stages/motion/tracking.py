@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.geometry.rigid import from_parts, rotation_from_vector, vector_from_rotation
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.base import Camera
-from stages.motion.matching import Patches, cut, match
+from stages.motion.landmarks import LandmarkMap
+from stages.motion.matching import cut, match
 from stages.motion.parameters import MotionParameters
+from stages.motion.prediction import Predictor
 from stages.motion.strip import Strip, StripGrid, unroll
 
 Float = NDArray[np.float64]
@@ -71,39 +73,6 @@ class _Found:
         return float(self.good.mean()) if self.good.size else 0.0
 
 
-@dataclass
-class _Map:
-    """Landmarks alive: strip positions, patches, first frame; grown while tracking."""
-
-    half: int
-    row: Float = field(default_factory=lambda: np.zeros(0))
-    column: Float = field(default_factory=lambda: np.zeros(0))
-    offset: Float = field(default_factory=lambda: np.zeros((0, 2)))
-    born: Int = field(default_factory=lambda: np.zeros(0, np.int64))
-    retired: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
-    misses: Int = field(default_factory=lambda: np.zeros(0, np.int64))
-    patches: list[Patches] = field(default_factory=list)
-
-    def gather(self, index: Int) -> Patches:
-        """Return the patches of landmarks (N,) as one batch."""
-        starts = np.cumsum([0] + [len(p.value) for p in self.patches])
-        batch = np.searchsorted(starts, index, side="right") - 1
-        if not index.size:
-            return Patches.none(2 * self.half + 1)
-        parts = [(self.patches[b], index[batch == b] - starts[b]) for b in np.unique(batch)]
-        return Patches.joined([p.of(i) for p, i in parts])
-
-    def add(self, at: Float, born: int, patches: Patches) -> None:
-        """Add landmarks at strip positions (N, 2)."""
-        n = len(at)
-        self.row, self.column = np.append(self.row, at[:, 0]), np.append(self.column, at[:, 1])
-        self.offset = np.concatenate([self.offset, np.zeros((n, 2))])
-        self.born = np.append(self.born, np.full(n, born))
-        self.retired = np.append(self.retired, np.zeros(n, bool))
-        self.misses = np.append(self.misses, np.zeros(n, np.int64))
-        self.patches.append(patches)
-
-
 class TextureTracker:
     """Follows the wall's texture; distance and roll follow from it, the rest of the pose from the rings.
 
@@ -115,7 +84,7 @@ class TextureTracker:
         self, camera: Camera, grid: StripGrid, parameters: MotionParameters, blocked_mm: tuple[float, float]
     ) -> None:
         self._camera, self._grid, self._parameters, self._blocked = camera, grid, parameters, blocked_mm
-        self._map = _Map(parameters.patch_half_px)
+        self._map = LandmarkMap(parameters.patch_half_px)
         self._rows: list[tuple[Int, Int, Float, Float]] = []
         self._poses: list[tuple[int, Float, bool]] = []
         self._last: Strip | None = None
@@ -223,11 +192,6 @@ class TextureTracker:
         return np.asarray(out)
 
 
-def moved(T_pc: Float, step: Float) -> Float:
-    """Return T = [R exp(w), t + d] for a step (6,) = (d, w); also batched."""
-    return from_parts(T_pc[..., :3, :3] @ rotation_from_vector(step[..., 3:]), T_pc[..., :3, 3] + step[..., :3])
-
-
 def _displacement(before: Strip, now: Strip) -> Float:
     """Return by how many rows and columns the wall in ``now`` lies off where ``before`` had it."""
     lag = now.first_row - before.first_row
@@ -269,61 +233,3 @@ def track_texture(
             predict.learn(frame, tracker.follow(frame, image, predict(frame)))
         progress(done + 1)
     return tracker.tracks()
-
-
-class Predictor:
-    """Predicts the next pose in the straightened pipe.
-
-    Distance and roll go on as before (distance by the encoder's advance where there is one); the rings say
-    where the pipe's axis passes; pitch and yaw are taken as zero.
-
-    Parameters
-    ----------
-    time_s : (N,)
-        Of all frames.
-    encoder_mm : (N,) or None
-        Encoder distance at the frames' times.
-    centre_c : (N, 2)
-        Where the pipe's axis passes the laser's plane, mm in C.
-    """
-
-    def __init__(self, time_s: Float, encoder_mm: Float | None, centre_c: Float) -> None:
-        self._time, self._encoder, self._centre = time_s, encoder_mm, centre_c
-        self._known: list[tuple[int, float, float]] = []
-
-    def learn(self, frame: int, T_pc: Float) -> None:
-        """Take note of a frame's pose."""
-        roll = float(np.arctan2(T_pc[1, 0], T_pc[0, 0]))
-        self._known = [*self._known[-1:], (frame, float(T_pc[2, 3]), roll)]
-
-    def __call__(self, frame: int) -> Float:
-        """Return the predicted pose (4, 4) of a frame."""
-        z, roll = self._ahead(frame)
-        rotation = rotation_from_vector(np.array([0, 0, roll]))
-        offset = rotation @ np.append(-self._centre[frame], 0.0)
-        return from_parts(rotation, offset + np.array([0, 0, z]))
-
-    def _ahead(self, frame: int) -> tuple[float, float]:
-        if not self._known:
-            return 0.0, 0.0
-        last, z, roll = self._known[-1]
-        before, z_before, roll_before = self._known[0]
-        ratio = (self._time[frame] - self._time[last]) / max(self._time[last] - self._time[before], 1e-9)
-        turn = (roll - roll_before + np.pi) % (2 * np.pi) - np.pi
-        if self._encoder is not None:
-            return z + float(self._encoder[frame] - self._encoder[last]), roll + turn * ratio
-        return z + (z - z_before) * ratio, roll + turn * ratio
-
-    def between(self, frames: Int, T_pc: Float, count: int) -> Float:
-        """Return first guesses (count, 4, 4) of all poses from those of the tracked ``frames``."""
-        z = self._encoder if self._encoder is not None else np.zeros(count)
-        roll = np.zeros(count)
-        if len(frames):
-            near = np.arange(count)
-            z = np.interp(near, frames, T_pc[:, 2, 3])
-            roll = np.interp(near, frames, np.unwrap(np.arctan2(T_pc[:, 1, 0], T_pc[:, 0, 0])))
-        turn = rotation_from_vector(np.stack([0 * roll, 0 * roll, roll], -1))
-        centre = np.concatenate([-self._centre, np.zeros((count, 1))], 1)
-        origin = np.einsum("nij,nj->ni", turn, centre)
-        origin[:, 2] = z
-        return from_parts(turn, origin)

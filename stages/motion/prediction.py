@@ -1,0 +1,69 @@
+"""Where the camera will be in the next frame, before its texture is looked at."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+class Predictor:
+    """Predicts the next pose in the straightened pipe.
+
+    Distance and roll go on as before (distance by the encoder's advance where there is one); the rings say
+    where the pipe's axis passes; pitch and yaw are taken as zero.
+
+    Parameters
+    ----------
+    time_s : (N,)
+        Of all frames.
+    encoder_mm : (N,) or None
+        Encoder distance at the frames' times.
+    centre_c : (N, 2)
+        Where the pipe's axis passes the laser's plane, mm in C.
+    """
+
+    def __init__(self, time_s: Float, encoder_mm: Float | None, centre_c: Float) -> None:
+        self._time, self._encoder, self._centre = time_s, encoder_mm, centre_c
+        self._known: list[tuple[int, float, float]] = []
+
+    def learn(self, frame: int, T_pc: Float) -> None:
+        """Take note of a frame's pose."""
+        roll = float(np.arctan2(T_pc[1, 0], T_pc[0, 0]))
+        self._known = [*self._known[-1:], (frame, float(T_pc[2, 3]), roll)]
+
+    def __call__(self, frame: int) -> Float:
+        """Return the predicted pose (4, 4) of a frame."""
+        z, roll = self._ahead(frame)
+        rotation = rotation_from_vector(np.array([0, 0, roll]))
+        offset = rotation @ np.append(-self._centre[frame], 0.0)
+        return from_parts(rotation, offset + np.array([0, 0, z]))
+
+    def _ahead(self, frame: int) -> tuple[float, float]:
+        if not self._known:
+            return 0.0, 0.0
+        last, z, roll = self._known[-1]
+        before, z_before, roll_before = self._known[0]
+        ratio = (self._time[frame] - self._time[last]) / max(self._time[last] - self._time[before], 1e-9)
+        turn = (roll - roll_before + np.pi) % (2 * np.pi) - np.pi
+        if self._encoder is not None:
+            return z + float(self._encoder[frame] - self._encoder[last]), roll + turn * ratio
+        return z + (z - z_before) * ratio, roll + turn * ratio
+
+    def between(self, frames: Int, T_pc: Float, count: int) -> Float:
+        """Return first guesses (count, 4, 4) of all poses from those of the tracked ``frames``."""
+        z = self._encoder if self._encoder is not None else np.zeros(count)
+        roll = np.zeros(count)
+        if len(frames):
+            near = np.arange(count)
+            z = np.interp(near, frames, T_pc[:, 2, 3])
+            roll = np.interp(near, frames, np.unwrap(np.arctan2(T_pc[:, 1, 0], T_pc[:, 0, 0])))
+        turn = rotation_from_vector(np.stack([0 * roll, 0 * roll, roll], -1))
+        centre = np.concatenate([-self._centre, np.zeros((count, 1))], 1)
+        origin = np.einsum("nij,nj->ni", turn, centre)
+        origin[:, 2] = z
+        return from_parts(turn, origin)
