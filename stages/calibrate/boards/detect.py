@@ -66,7 +66,7 @@ def _part_of_chessboard(image: Image, board: Chessboard, name: str) -> BoardView
 
 
 def _view(picture: Image, size: tuple[int, int], board: Chessboard, name: str, uv: Float) -> BoardView:
-    return BoardView(name, grid(*size, board.square_mm), _refined(picture, uv))
+    return BoardView(name, grid(*size, board.square_mm), _refined(picture, uv, _WINDOW_SHARE))
 
 
 def _grey(image: Image) -> Image:
@@ -88,10 +88,10 @@ def _parts(board: Chessboard) -> list[tuple[int, int]]:
     return sorted((p for p in parts if min(p) >= _SHORTEST_SIDE), key=lambda p: -p[0] * p[1])
 
 
-def _refined(picture: Image, uv: Float) -> Float:
-    """Refine each corner on its own squares: the window follows their size, which varies in a fisheye."""
+def _refined(picture: Image, uv: Float, share: float) -> Float:
+    """Refine each corner in a window of ``share`` of its squares, whose size varies in a fisheye."""
     spacing = np.asarray(cKDTree(uv).query(uv, 2)[0])[:, 1]
-    halves = np.clip(np.round(_WINDOW_SHARE * spacing), _SMALLEST_WINDOW, _LARGEST_WINDOW).astype(int)
+    halves = np.clip(np.floor(share * spacing), _SMALLEST_WINDOW, _LARGEST_WINDOW).astype(int)
     refined = uv.astype(np.float32)
     for i, half in enumerate(halves):
         size = (int(half), int(half))
@@ -105,7 +105,8 @@ def _charuco(grey: Image, board: Charuco, name: str) -> BoardView | None:
     best = max(views, key=lambda view: len(view.uv))
     if len(best.uv) < LEAST_CORNERS or _in_one_line(best.xyz_b):
         return None
-    return BoardView(name, best.xyz_b, _refined(grey, best.uv))
+    clear_of_markers = (board.square_mm - board.marker_mm) / 2 / board.square_mm
+    return BoardView(name, best.xyz_b, _refined(grey, best.uv, min(clear_of_markers, _WINDOW_SHARE)))
 
 
 def _charuco_layout(grey: Image, board: cv2.aruco.CharucoBoard, name: str) -> BoardView:
