@@ -62,7 +62,7 @@ class LaserSheet:
     def with_parameters(self, parameters: Float) -> LaserSheet:
         """Return the sheet with other geometric parameters."""
         lead = dict(zip(self.PARAMETER_NAMES[:6], map(float, parameters[:6]), strict=True))
-        return replace(self, **lead, waviness=tuple(float(p) for p in parameters[6:]))  # type: ignore[arg-type]
+        return replace(self, **lead, waviness=tuple(float(p) for p in parameters[6:]))
 
     def slope(self, azimuth_rad: Float) -> Float:
         """Return dz/dq (...) of the sheet's rays at azimuth ψ (...) in C."""

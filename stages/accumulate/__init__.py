@@ -1,4 +1,4 @@
-"""Accumulation: ring points and trajectory to a point cloud and the wall's radius over distance and azimuth."""
+"""Accumulation: ring points and trajectory to a cloud and the wall's radius over distance and azimuth."""
 
 from __future__ import annotations
 
@@ -18,17 +18,22 @@ __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 
 Float = NDArray[np.float64]
 
+
 class AccumulateParameters(Parameters):
     """Parameters of the accumulate stage."""
 
     distance_step_mm: float = Field(0.5, ge=0.05, le=10, description="row spacing, mm, of the radius map")
     azimuth_samples: int = Field(720, ge=90, le=5760, description="columns of the radius map")
     smoothing_mm: float = Field(
-        0.3, gt=0, le=10, description="smallest 1 σ, mm, of the kernel along distance; rings further apart widen it"
+        0.3,
+        gt=0,
+        le=10,
+        description="smallest 1 σ, mm, of the kernel along distance; wider where rings are sparse",
     )
     largest_gap_mm: float = Field(
         3.0, gt=0, le=50, description="largest distance, mm, between rings that is bridged"
     )
+
 
 def accumulate_wall(
     probe: Probe,
@@ -48,7 +53,8 @@ def accumulate_wall(
     found = probe.as_found_in(trajectory)
     samples = wall_samples(found, rings, points, trajectory)
     if not samples.valid.any():
-        raise UnusableError("accumulate", "no valid ring sample", hint="see the rejected samples of stage rings")
+        hint = "see the rejected samples of stage rings"
+        raise UnusableError("accumulate", "no valid ring sample", hint=hint)
     grid = map_grid(samples, parameters.distance_step_mm, parameters.azimuth_samples)
     columns = rings_on_columns(samples, grid)
     radius, random, count, misalignment = gridded(
@@ -57,12 +63,11 @@ def accumulate_wall(
     calibration = calibration_sigma(found, rings, trajectory, grid)
     total = np.hypot(random, calibration).astype(np.float32)
     total[~np.isfinite(radius)] = np.nan
-    radius_map = RadiusMap(
-        grid.distance_mm, grid.azimuth_rad, radius, total, random, count, misalignment
-    )
+    radius_map = RadiusMap(grid.distance_mm, grid.azimuth_rad, radius, total, random, count, misalignment)
     cloud = _cloud(samples, radius_map)
     _report(context, radius_map, samples, calibration)
     return Wall(cloud, radius_map, trajectory.axis)
+
 
 def _cloud(samples: WallSamples, radius_map: RadiusMap) -> PointCloud:
     """Return the valid samples as points with inward normals of the smoothed wall and total 1 σ."""
@@ -81,6 +86,7 @@ def _cloud(samples: WallSamples, radius_map: RadiusMap) -> PointCloud:
         samples.azimuth_rad[ok].astype(single), frame.astype(np.int64),
     )  # fmt: skip
 
+
 def _nearest(
     samples: WallSamples, radius_map: RadiusMap, ok: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -88,6 +94,7 @@ def _nearest(
     row = np.clip(np.rint((samples.distance_mm[ok] - s[0]) / (s[1] - s[0])), 0, len(s) - 1).astype(np.int64)
     column = np.rint((samples.azimuth_rad[ok] - a[0]) / (a[1] - a[0])).astype(np.int64) % len(a)
     return row, column
+
 
 def _normals(
     radius_map: RadiusMap, row: NDArray[np.int64], column: NDArray[np.int64], section: Float
@@ -106,9 +113,8 @@ def _normals(
     normal = np.einsum("mij,mj->mi", section, local)
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
-def _report(
-    context: Context, radius_map: RadiusMap, samples: WallSamples, calibration: Float
-) -> None:
+
+def _report(context: Context, radius_map: RadiusMap, samples: WallSamples, calibration: Float) -> None:
     seen = np.isfinite(radius_map.radius_mm)
     context.report("wall points", int(samples.valid.sum()), "")
     context.report("coverage", float(100 * seen.mean()), "%")
@@ -117,6 +123,7 @@ def _report(
     context.report("1 σ of the radius, random, median", float(np.nanmedian(radius_map.sigma_random_mm)), "mm")
     context.report("1 σ of the radius, calibration, median", float(np.median(calibration)), "mm")
 
+
 ACCUMULATE = Stage(
     "accumulate",
     "1",
@@ -124,4 +131,3 @@ ACCUMULATE = Stage(
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",
 )
-

@@ -1,4 +1,4 @@
-"""What the instrument's uncertainty does to the radius: it is common to all rings and does not average away."""
+"""What the instrument's uncertainty does to the radius: common to all rings, it does not average away."""
 
 from __future__ import annotations
 
@@ -17,20 +17,18 @@ _RINGS = 24
 def calibration_sigma(probe: Probe, rings: RingSamples, trajectory: Trajectory, grid: MapGrid) -> Float:
     """Return the 1 σ (S, A) of the radius from the probe's covariance.
 
-    Computed on some rings and interpolated. The first harmonic of each change is taken out, because the pipe's
-    axis follows the rings' centres.
+    Computed on some rings; rows take the nearest, columns are interpolated. The first harmonic of each change
+    is taken out, because the pipe's axis follows the rings' centres.
     """
-    azimuth = np.arange(_AZIMUTHS) * (2 * np.pi / _AZIMUTHS) - np.pi
-    usable = np.flatnonzero(rings.valid.sum(1) > 0.3 * rings.valid.shape[1])
+    azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
+    seen = rings.valid.mean(1)
+    usable = np.flatnonzero(seen > min(0.3, 0.99 * seen.max()))
     some = usable[np.unique(np.linspace(0, len(usable) - 1, min(len(usable), _RINGS)).astype(int))]
     index = np.searchsorted(trajectory.frame, rings.frame[some])
     distance = trajectory.T_pc[index, 2, 3] + probe.laser.baseline_mm
     roll = np.arctan2(trajectory.T_pc[index, 1, 0], trajectory.T_pc[index, 0, 0])
     profiles = np.stack([_around(probe, rings, k, azimuth, t) for k, t in zip(some, roll, strict=True)])
-    order = np.argsort(distance)
-    at = np.clip(np.searchsorted(distance[order], grid.distance_mm), 1, max(len(some) - 1, 1))
-    near = np.minimum(at - (grid.distance_mm - distance[order][at - 1] < _half(distance[order], at)), len(some) - 1)
-    rows = profiles[order][near]
+    rows = profiles[_nearest(distance, grid.distance_mm)]
     wide = np.concatenate([rows, rows[:, :1]], 1)
     fine = (grid.azimuth_rad + np.pi) / (2 * np.pi / _AZIMUTHS)
     left = np.minimum(fine.astype(int), _AZIMUTHS - 1)
@@ -38,8 +36,11 @@ def calibration_sigma(probe: Probe, rings: RingSamples, trajectory: Trajectory, 
     return np.asarray(wide[:, left] * (1 - part) + wide[:, left + 1] * part)
 
 
-def _half(distance: Float, at: NDArray[np.int64]) -> Float:
-    return np.asarray((distance[np.minimum(at, len(distance) - 1)] - distance[at - 1]) / 2)
+def _nearest(distance: Float, wanted: Float) -> NDArray[np.int64]:
+    """Return for each wanted distance the index of the nearest of the distances, in any order."""
+    order = np.argsort(distance, kind="stable")
+    middle = (distance[order][1:] + distance[order][:-1]) / 2
+    return np.asarray(order[np.searchsorted(middle, wanted)])
 
 
 def _around(probe: Probe, rings: RingSamples, row: int, azimuth_p: Float, roll: float) -> Float:
@@ -51,4 +52,4 @@ def _around(probe: Probe, rings: RingSamples, row: int, azimuth_p: Float, roll: 
     change = np.einsum("ai,aip->ap", outward, by_parameters[:, :2])
     first = np.stack([np.cos(azimuth_c), np.sin(azimuth_c)], -1)
     change = change - first @ (first.T @ change) * (2 / len(azimuth_p))
-    return np.sqrt(np.einsum("ap,pq,aq->a", change, probe.covariance, change))
+    return np.asarray(np.sqrt(np.einsum("ap,pq,aq->a", change, probe.covariance, change)))

@@ -66,8 +66,9 @@ def map_grid(samples: WallSamples, step_mm: float, azimuths: int) -> MapGrid:
         some = samples.valid.any(1)
     middle = np.nanmedian(s[some], axis=1)
     first, last = np.ceil(middle.min() / step_mm), np.floor(middle.max() / step_mm)
-    distance = step_mm * np.arange(int(first), int(max(last, first + 1)) + 1)
-    return MapGrid(distance, -np.pi + 2 * np.pi / azimuths * np.arange(azimuths))
+    distance = step_mm * np.arange(first, max(last, first + 1) + 1, dtype=float)
+    azimuth = 2 * np.pi / azimuths * np.arange(azimuths) - np.pi
+    return MapGrid(distance.astype(np.float64), azimuth.astype(np.float64))
 
 
 def rings_on_columns(samples: WallSamples, grid: MapGrid) -> RingColumns:
@@ -196,7 +197,7 @@ def _near_rings(d, width, gap):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True)
 def _line_at(d, kernel, radius, variance, width):  # type: ignore[no-untyped-def]
-    """Return value at d = 0 of the weighted line, and its 1 σ with the scatter about the line where larger."""
+    """Return value at d = 0 of the weighted line and its 1 σ, from the scatter about it where larger."""
     w = kernel / variance
     m0, m1, m2 = w.sum(), (w * d).sum(), (w * d * d).sum()
     b0, b1 = (w * radius).sum(), (w * d * radius).sum()

@@ -45,9 +45,7 @@ class WallSamples:
     section: Float
 
 
-def wall_samples(
-    probe: Probe, rings: RingSamples, points: RingPoints, trajectory: Trajectory
-) -> WallSamples:
+def wall_samples(probe: Probe, rings: RingSamples, points: RingPoints, trajectory: Trajectory) -> WallSamples:
     """Triangulate with the probe as found in the run and place the points on the wall."""
     index = np.searchsorted(trajectory.frame, rings.frame)
     T_pc = trajectory.T_pc[np.minimum(index, len(trajectory.frame) - 1)]

@@ -62,7 +62,8 @@ def estimate_motion(
     bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
     bins = replace(bins, frame=_index_of(recording, bins.frame))
     measured = Measurements(tracks, bins, recording.frames.time_s, encoder_mm, probe, unsure, _LOOSE)
-    start = _first_guess(tracks, predictor, grid, len(recording.frames.frame), unsure.shape[1] + MATCH_BIASES, parameters)
+    T_pc = predictor.between(tracks.frames, tracks.T_pc, len(recording.frames.frame))
+    start = _first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
     estimate = _adjusted(start, measured, parameters)
     trajectory = in_pipe_frame(estimate, recording.frames, measured)
     events = find_events(recording.frames, trajectory, tracks, estimate.state.slip, encoder_mm is not None)
@@ -145,17 +146,11 @@ def _require_distance(tracks: Tracks, encoder_mm: Float | None) -> None:
 
 
 def _first_guess(
-    tracks: Tracks,
-    predictor: Predictor,
-    grid: StripGrid,
-    frames: int,
-    unsure: int,
-    parameters: MotionParameters,
+    T_pc: Float, xyz: Float, grid: StripGrid, unsure: int, parameters: MotionParameters
 ) -> State:
-    T_pc = predictor.between(tracks.frames, tracks.T_pc, frames)
     z = T_pc[:, 2, 3]
     span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
-    return straight_start(T_pc, tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, unsure)
+    return straight_start(T_pc, xyz, *span, grid.radius_mm, parameters.axis_knot_mm, unsure)
 
 
 def _adjusted(start: State, measured: Measurements, parameters: MotionParameters) -> Estimate:

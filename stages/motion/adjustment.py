@@ -100,11 +100,8 @@ def assembled(state: State, measured: Measurements, parameters: MotionParameters
                 state, measured.encoder_mm, parameters.encoder_sigma_mm, parameters.encoder_slip_sigma_mm
             )
         )
-    rows.append(
-        terms.border_rows(
-            state, parameters.axis_bend_sigma, measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm
-        )
-    )
+    encoder_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm
+    rows.append(terms.border_rows(state, parameters.axis_bend_sigma, encoder_sigma, radius_sigma_mm))
     for row in rows:
         system.add(row)
     return system
@@ -138,7 +135,11 @@ def landmark_rows(
         normal, by_border, s_residual, cauchy(s_residual / s_sigma) / s_sigma**2,
     )  # fmt: skip
     new_excess = float(np.median(size / tracks.sigma_px)) / np.sqrt(2 * np.log(2)) if len(size) else 1.0
-    return rows, float(np.median(size)) if len(size) else 0.0, max(new_excess, 0.3) * np.sqrt(parameters.alike)
+    return (
+        rows,
+        float(np.median(size)) if len(size) else 0.0,
+        max(new_excess, 0.3) * np.sqrt(parameters.alike),
+    )
 
 
 def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
@@ -149,7 +150,7 @@ def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
     """
     theta = np.arctan2(np.hypot(xyz_c[:, 0], xyz_c[:, 1]), xyz_c[:, 2])
     radial = from_centre_px / np.maximum(np.linalg.norm(from_centre_px, axis=1), 1.0)[:, None]
-    return radial[:, :, None] * np.stack([np.ones_like(theta), theta - 1.0], -1)[:, None, :]
+    return np.asarray(radial[:, :, None] * np.stack([np.ones_like(theta), theta - 1.0], -1)[:, None, :])
 
 
 def third_difference_sigma(state: State, lit: NDArray[np.int64]) -> Float:
@@ -163,7 +164,7 @@ def third_difference_sigma(state: State, lit: NDArray[np.int64]) -> Float:
     pose = np.concatenate([T[..., :3, 3], turn], -1)
     third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), pose)
     stride = float(np.median(np.diff(lit)))
-    return np.maximum(1.4826 * np.median(np.abs(third), 0) / stride**2, floor)
+    return np.asarray(np.maximum(1.4826 * np.median(np.abs(third), 0) / stride**2, floor))
 
 
 def _span(tracks: Tracks) -> float:
@@ -173,4 +174,3 @@ def _span(tracks: Tracks) -> float:
     start = np.flatnonzero(np.diff(tracks.landmark, prepend=-1))
     end = np.append(start[1:], len(tracks.landmark)) - 1
     return float(np.max(tracks.frame[end] - tracks.frame[start]))
-

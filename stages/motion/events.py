@@ -72,13 +72,13 @@ def _duplicates(f: NDArray[np.int64], z: Float, tracks: Tracks) -> Iterator[Moti
     for k in np.flatnonzero((step < 0.05 * around) & (around > 0.05))[:50]:
         if 0 < k < len(step) - 1:
             a, b = tracks.frames[k], tracks.frames[k + 1]
-            yield MotionEvent("duplicated_frame", int(f[a]), int(f[b]), 1.0, "frames", "no motion between them")
+            yield MotionEvent("duplicated_frame", int(f[a]), int(f[b]), 1.0, "frames", "no motion between")
 
 
 def _lost(f: NDArray[np.int64], tracks: Tracks) -> Iterator[MotionEvent]:
     for a, b in _runs(tracks.lost & (np.arange(len(tracks.lost)) > 0)):
         first, last = int(f[tracks.frames[a]]), int(f[tracks.frames[b]])
-        yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", "too little texture to follow")
+        yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", "too little texture")
 
 
 def _slips(f: NDArray[np.int64], slip: Float) -> Iterator[MotionEvent]:
@@ -87,4 +87,4 @@ def _slips(f: NDArray[np.int64], slip: Float) -> Iterator[MotionEvent]:
     for a, b in _runs(np.abs(step) > max(6 * usual, 0.02)):
         size = float(slip[b + 1] - slip[a])
         if abs(size) > _SLIP_MM:
-            yield MotionEvent("encoder_slip", int(f[a]), int(f[b + 1]), size, "mm", "encoder and wall disagree")
+            yield MotionEvent("encoder_slip", int(f[a]), int(f[b + 1]), size, "mm", "encoder and wall differ")

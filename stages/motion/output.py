@@ -77,7 +77,7 @@ def _covariances(estimate: Estimate, rotation: Float) -> Float:
     turn = np.eye(6)
     turn[:3, :3] = rotation
     own = turn @ own @ turn.T
-    right = np.clip(np.searchsorted(some, np.arange(n)), 1, len(some) - 1) if len(some) > 1 else np.zeros(n, int)
+    right = np.clip(np.searchsorted(some, np.arange(n)), min(1, len(some) - 1), len(some) - 1)
     left = np.maximum(right - 1, 0)
     weight = ((np.arange(n) - some[left]) / np.maximum(some[right] - some[left], 1))[:, None, None]
     return np.asarray(own[left] * (1 - weight) + own[right] * weight)

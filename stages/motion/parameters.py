@@ -11,7 +11,7 @@ class MotionParameters(Parameters):
     """What the motion stage lets the user choose; every default holds for 2 to 4 inch pipe."""
 
     strip_step_mm: float = Field(
-        0.22, gt=0.02, le=5, description="sample spacing, mm on the wall, of the strips in which texture is tracked"
+        0.22, gt=0.02, le=5, description="sample spacing, mm, of the strips in which texture is tracked"
     )
     near_angle_deg: float = Field(
         78.0, gt=45, le=110, description="largest polar angle, deg, at which wall texture is tracked"
@@ -36,10 +36,16 @@ class MotionParameters(Parameters):
         2e-3, gt=0, le=0.1, description="1 σ, 1/mm, of the change of the axis' curvature from knot to knot"
     )
     encoder_sigma_mm: float = Field(
-        0.005, gt=0, le=10, description="1 σ, mm, of an encoder reading beside its quantisation, which is measured"
+        0.005,
+        gt=0,
+        le=10,
+        description="1 σ, mm, of an encoder reading beside its quantisation, which is measured",
     )
     encoder_slip_sigma_mm: float = Field(
-        0.002, gt=0, le=1, description="1 σ, mm, of the encoder's creep from frame to frame; slips may be far larger"
+        0.002,
+        gt=0,
+        le=1,
+        description="1 σ, mm, of the encoder's creep from frame to frame; slips may be far larger",
     )
     alike: float = Field(
         30.0, ge=1, le=10000, description="number of neighbouring observations of a landmark that err alike"

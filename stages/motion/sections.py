@@ -35,24 +35,26 @@ def ring_centres(points: RingPoints) -> tuple[Float, Float, Float]:
         right = np.einsum("fai,fa,fa->fi", design, weight, target)[usable]
         out[usable] = np.linalg.solve(normal, right[..., None])[..., 0]
         error = target - np.einsum("fai,fi->fa", design, np.nan_to_num(out))
-        scale = 1.4826 * np.array([np.median(np.abs(e[s])) if s.any() else 1.0 for e, s in zip(error, seen, strict=True)])
+        size = np.where(seen & usable[:, None], np.abs(error), np.nan)
+        scale = np.ones(len(xy))
+        scale[usable] = 1.4826 * np.nanmedian(size[usable], axis=1)
         weight = seen / (1 + (error / (3 * np.maximum(scale, 1e-6))[:, None]) ** 2)
     centre = out[:, :2] / 2
     return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1)), coverage
 
 
 def at_all_frames(frame: Int, value: Float, frames: int) -> Float:
-    """Return values (frames, ...) at all frames by linear interpolation over frames (F,) with NaN left out."""
+    """Return values (frames, ...) at all frames, linear between the frames (F,) where they are not NaN."""
     ok = np.isfinite(value).reshape(len(value), -1).all(1)
     if ok.sum() < 2:
-        return np.broadcast_to(np.nanmean(value[ok], 0) if ok.any() else 0.0, (frames, *value.shape[1:])).copy()
-    line = interp1d(frame[ok], value[ok], axis=0, bounds_error=False, fill_value=(value[ok][0], value[ok][-1]))
+        only = value[ok][0] if ok.any() else np.zeros(value.shape[1:])
+        return np.broadcast_to(only, (frames, *only.shape)).copy()
+    ends = (value[ok][0], value[ok][-1])
+    line = interp1d(frame[ok], value[ok], axis=0, bounds_error=False, fill_value=ends)
     return np.asarray(line(np.arange(frames)))
 
 
-def ring_bins(
-    rings: RingSamples, probe: Probe, unsure: Float, bins: int, wall_sigma_mm: float
-) -> RingBins:
+def ring_bins(rings: RingSamples, probe: Probe, unsure: Float, bins: int, wall_sigma_mm: float) -> RingBins:
     """Condense each ring to the mean of every azimuth bin that is at least half seen.
 
     ``unsure`` (P, Q) are the instrument's principal uncertainties. The wall's own relief is alike in

@@ -152,10 +152,10 @@ def _equally_sharp(contrast: Float32, coarse_uv: Float32) -> Float32:
     on the wall far ahead. Blurs of some sizes are mixed by variance.
     """
     along, around = (_blur_of(coarse_uv, axis) for axis in (0, 1))
-    wanted = np.sqrt(np.maximum(np.stack([along.max() - along, around.max() - around], -1), 0) + _SMOOTH_PX**2)
+    wanted = np.sqrt(np.stack([along.max() - along, around.max() - around], -1) + _SMOOTH_PX**2)
     share = np.linspace(0, 1, _BLURS)
     sizes = wanted.min(0) + share[:, None] * (wanted.max(0) - wanted.min(0))
-    level = np.clip((wanted[:, 0] - sizes[0, 0]) / max(float(sizes[-1, 0] - sizes[0, 0]), 1e-6), 0, 1) * (_BLURS - 1)
+    level = (_BLURS - 1) * np.clip((wanted[:, 0] - sizes[0, 0]) / max(np.ptp(sizes[:, 0]), 1e-6), 0, 1)
     out = np.zeros_like(contrast)
     for k, (sigma_along, sigma_around) in enumerate(sizes):
         weight = np.maximum(1 - np.abs(level - k), 0).astype(np.float32)[:, None]
@@ -184,8 +184,8 @@ def _noise_of(contrast: Float32, usable: Mask) -> Float32:
     d = contrast[:, 4:] - 2 * contrast[:, 2:-2] + contrast[:, :-4]
     ok = usable[:, 4:] & usable[:, 2:-2] & usable[:, :-4]
     power = np.where(ok, d * d, 0).sum(1) / np.maximum(ok.sum(1), 1) / 6
-    power = gaussian_filter1d(power, 2 * _COURSE_PX) / np.maximum(gaussian_filter1d(ok.mean(1), 2 * _COURSE_PX), 1e-3)
-    return np.sqrt(power).astype(np.float32)
+    known = gaussian_filter1d(ok.mean(1), 2 * _COURSE_PX)
+    return np.sqrt(gaussian_filter1d(power, 2 * _COURSE_PX) / np.maximum(known, 1e-3)).astype(np.float32)
 
 
 @numba.njit(cache=True)

@@ -1,4 +1,4 @@
-"""The equations of the joint adjustment that need no landmark: rings, smooth motion, encoder, axis, origin."""
+"""The equations of the joint adjustment without landmarks: rings, smooth motion, encoder, axis, origin."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def cauchy(residual_over_sigma: Float, scale: float = 2.5) -> Float:
 
 
 def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
-    """Return residual (M,), gradient by point (M, 3) and by border (M, B) of points against the smooth pipe."""
+    """Return residual (M,) of points against the smooth pipe, its slope by point (M, 3) and border (M, B)."""
     s, psi, rho = to_pipe(state.axis, xyz_p)
     basis = state.axis_basis(s)
     a2, b2 = state.globals[1:3]
@@ -78,8 +78,9 @@ def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
     first = np.arange(n - 3)
     frame = first[:, None] + np.arange(4)
     coefficient = _third_difference(time_s[frame])
-    turn = vector_from_rotation(np.swapaxes(state.T_pc[first + 1, :3, :3], 1, 2)[:, None] @ state.T_pc[frame][..., :3, :3])
-    pose = np.concatenate([state.T_pc[frame][..., :3, 3], turn], -1)
+    T, second_T = state.T_pc[frame], state.T_pc[first + 1]
+    turn = vector_from_rotation(np.swapaxes(second_T[:, :3, :3], 1, 2)[:, None] @ T[..., :3, :3])
+    pose = np.concatenate([T[..., :3, 3], turn], -1)
     residual = np.einsum("mk,mki->mi", coefficient, pose)
     by_frame = np.zeros((n - 3, 6, 4, BLOCK))
     for i in range(6):
@@ -155,7 +156,7 @@ def border_rows(state: State, bend_sigma: float, encoder_sigma: float, radius_si
 
 
 def _third_difference(time_s: Float) -> Float:
-    """Return coefficients (M, 4) of the third divided difference, those of even spacing being −1, 3, −3, 1."""
+    """Return coefficients (M, 4) of the third divided difference; −1, 3, −3, 1 for even spacing."""
     t = (time_s - time_s[:, :1]) / np.maximum(time_s[:, 3:] - time_s[:, :1], 1e-12) * 3
     gap = t[:, :, None] - t[:, None, :] + np.eye(4)
-    return 6 / np.prod(gap, -1)
+    return np.asarray(6 / np.prod(gap, -1))

@@ -18,6 +18,7 @@ from stages.motion.prediction import Predictor
 from stages.motion.strip import Strip, StripGrid, unroll
 
 Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 Image = NDArray[np.uint8]
 _FEWEST = 12
@@ -153,7 +154,7 @@ class TextureTracker:
     def _px_per_strip(self, strip: Strip, at: Float) -> Float:
         du = strip.pixel(at[:, 0] + 1, at[:, 1]) - strip.pixel(at[:, 0], at[:, 1])
         dv = strip.pixel(at[:, 0], at[:, 1] + 1) - strip.pixel(at[:, 0], at[:, 1])
-        return np.sqrt((np.sum(du * du, 1) + np.sum(dv * dv, 1)) / 2)
+        return np.asarray(np.sqrt((np.sum(du * du, 1) + np.sum(dv * dv, 1)) / 2))
 
     def _grow(self, strip: Strip, frame: int, drift: Float) -> None:
         """Start a landmark at the most distinct spot of every free cell."""
@@ -169,7 +170,7 @@ class TextureTracker:
     def _free_spots(self, strip: Strip) -> tuple[Int, Int]:
         """Return rows and columns (in the strip) of the best corner of each unoccupied cell."""
         cell, half = self._parameters.cell_px, self._map.half
-        corner = cv2.cornerMinEigenVal(strip.contrast, 2 * half + 1)
+        corner = np.asarray(cv2.cornerMinEigenVal(strip.contrast, 2 * half + 1), np.float32)
         corner[cv2.erode(strip.usable.astype(np.uint8), np.ones((2 * half + 3,) * 2)) == 0] = 0
         corner[: half + 2], corner[-half - 3 :] = 0, 0
         first_cell, last_cell = strip.first_row // cell, (strip.first_row + corner.shape[0]) // cell
@@ -200,13 +201,14 @@ def _displacement(before: Strip, now: Strip) -> Float:
         return np.zeros(2)
     a = before.contrast[max(lag, 0) : max(lag, 0) + rows]
     b = now.contrast[max(-lag, 0) : max(-lag, 0) + rows]
-    halves = [cv2.resize(np.clip(x, -1, 1), None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for x in (a, b)]
+    size = (a.shape[1] // 2, a.shape[0] // 2)
+    halves = [cv2.resize(np.clip(x, -1, 1), size, interpolation=cv2.INTER_AREA) for x in (a, b)]
     window = np.broadcast_to(np.hanning(halves[0].shape[0])[:, None], halves[0].shape)
     (dx, dy), response = cv2.phaseCorrelate(*(np.asarray(h * window, np.float32) for h in halves))
     return np.array([2 * dy, 2 * dx]) if response > 0.05 else np.zeros(2)
 
 
-def _best_of_cells(corner: Float, taken: NDArray[np.bool_], offset: int, cell: int) -> tuple[Int, Int]:
+def _best_of_cells(corner: Float32, taken: NDArray[np.bool_], offset: int, cell: int) -> tuple[Int, Int]:
     rows, columns = [], []
     for i, j in zip(*np.nonzero(~taken), strict=True):
         r0 = max(i * cell + offset, 0)
