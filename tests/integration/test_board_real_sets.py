@@ -1,0 +1,48 @@
+"""Calibrations of published real sets: held-out reprojection and boards found."""
+
+import numpy as np
+import pytest
+
+from pipeline.instrument.camera.calibration import rms
+from stages.calibrate.boards.compare import without_outlier_views
+from stages.calibrate.boards.fit import adjust, fit, held_out_residuals
+from stages.calibrate.boards.parameters import BoardCalibrationParameters
+from stages.calibrate.boards.start import start
+from stages.calibrate.boards.targets import Chessboard
+from tests.board_sets import babelcalib, detected
+from tests.shared_data import shared
+
+
+@pytest.mark.parametrize(("name", "limit_px"), [("ov_plane", 0.475), ("ov_cube", 0.294)])
+def test_babelcalib_held_out(name, limit_px):
+    """Kannala-Brandt, Huber 1 px, board taken for flat and intrinsics fixed, as the published check did."""
+    parameters = BoardCalibrationParameters(board_shape="flat", huber_px=1.0)
+    train, size = babelcalib(name, "train")
+    test, _ = babelcalib(name, "test")
+    found = fit(train, start(train, size), "kannala_brandt", parameters)
+    residuals = np.concatenate(held_out_residuals(found, test, parameters.huber_px))
+    assert rms(residuals) <= limit_px
+    assert len(residuals) == sum(len(v.uv) for v in test)
+
+
+def test_babelcalib_plane_is_bent():
+    """Estimating the sag of the printed board explains boards that were not fitted to, too."""
+    train, size = babelcalib("ov_plane", "train")
+    test, _ = babelcalib("ov_plane", "test")
+    found = fit(train, start(train, size), "kannala_brandt", BoardCalibrationParameters())
+    assert rms(np.concatenate(held_out_residuals(found, test, 1.0))) <= 0.43
+
+
+def test_urban_fisheye_boards_are_found_and_fitted():
+    """The published 0.241 px is the mean distance with board "rotations" left free to be any matrix."""
+    files = sorted(shared("real", "fisheye_urban_ocamcalib", "fish_1").glob("*.jpg"))
+    seen = [detected(file, Chessboard(8, 6, 32.5)) for file in files]
+    views = [view for view in seen if view is not None]
+    assert sum(len(view.uv) == 48 for view in views) >= 9
+    first = start(views, (1032, 778))
+    parameters = BoardCalibrationParameters()
+    trial = adjust(views, first, "kannala_brandt", parameters)
+    used, first, left_out = without_outlier_views(views, first, trial, parameters.outlier_view_factor)
+    assert not left_out
+    for model in ("kannala_brandt", "scaramuzza"):
+        assert fit(used, first, model, parameters).rms_px / np.sqrt(2) <= 0.241
