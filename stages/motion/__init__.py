@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from pipeline.artefacts import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
@@ -19,7 +20,7 @@ from stages.motion.output import in_pipe_frame
 from stages.motion.parameters import MotionParameters
 from stages.motion.prediction import Predictor
 from stages.motion.sections import at_all_frames, ring_bins, ring_centres
-from stages.motion.state import State, straight_start
+from stages.motion.state import EncoderReadings, State, straight_start
 from stages.motion.strip import StripGrid
 from stages.motion.tracking import TextureTracker, Tracks, track_texture
 
@@ -52,21 +53,21 @@ def estimate_motion(
         When neither rings nor texture and encoder determine the motion.
     """
     centre_c, radius_mm = _pipe_in_rings(points)
-    encoder_mm = _encoder_at_frames(recording)
+    encoder = _encoder_at_frames(recording, parameters.encoder_sigma_mm)
     grid = _strip_grid(radius_mm, parameters)
     all_centres = at_all_frames(_index_of(recording, points.frame), centre_c, len(recording.frames.frame))
-    predictor = Predictor(recording.frames.time_s, encoder_mm, all_centres)
+    predictor = Predictor(recording.frames.time_s, encoder, all_centres)
     tracks = _tracked(recording, probe, grid, predictor, parameters, context)
-    _require_distance(tracks, encoder_mm)
+    _require_distance(tracks, encoder)
     unsure = probe.principal_uncertainties()
     bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
     bins = replace(bins, frame=_index_of(recording, bins.frame))
-    measured = Measurements(tracks, bins, recording.frames.time_s, encoder_mm, probe, unsure, _LOOSE)
+    measured = Measurements(tracks, bins, recording.frames.time_s, encoder, probe, unsure, _LOOSE)
     T_pc = predictor.between(tracks.frames, tracks.T_pc, len(recording.frames.frame))
     start = _first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
     estimate = _adjusted(start, measured, parameters)
     trajectory = in_pipe_frame(estimate, recording.frames, measured)
-    events = find_events(recording.frames, trajectory, tracks, estimate.state.slip, encoder_mm is not None)
+    events = find_events(recording.frames, trajectory, tracks, estimate.state.slip, encoder is not None)
     _report(context, estimate, tracks, trajectory)
     return replace(trajectory, events=events)
 
@@ -83,12 +84,18 @@ def _pipe_in_rings(points: RingPoints) -> tuple[Float, float]:
     return centre_c, float(np.nanmedian(radius))
 
 
-def _encoder_at_frames(recording: Recording) -> Float | None:
-    """Return the encoder's distance at the frames' times, relative to the first, or None."""
+def _encoder_at_frames(recording: Recording, sigma_mm: float) -> EncoderReadings | None:
+    """Return the encoder's distance at the frames' times, relative to the first, or None.
+
+    Its smallest step is its quantum q, which adds q²/12 to the readings' variance.
+    """
     if recording.encoder is None:
         return None
-    distance = np.interp(recording.frames.time_s, recording.encoder.time_s, recording.encoder.distance_mm)
-    return np.asarray(distance - distance[0])
+    time_s, distance_mm = recording.encoder.time_s, recording.encoder.distance_mm
+    at_frames = np.interp(recording.frames.time_s, time_s, distance_mm)
+    step = np.abs(np.diff(distance_mm))
+    quantum = float(step[step > 1e-9].min()) if np.any(step > 1e-9) else 0.0
+    return EncoderReadings(at_frames - at_frames[0], float(np.hypot(sigma_mm, quantum / np.sqrt(12))))
 
 
 def _strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:
@@ -133,9 +140,9 @@ def _wall_images(
         yield None if image is None else np.ascontiguousarray(image[..., channel])
 
 
-def _require_distance(tracks: Tracks, encoder_mm: Float | None) -> None:
+def _require_distance(tracks: Tracks, encoder: EncoderReadings | None) -> None:
     tracked = float(np.mean(~tracks.lost[1:])) if len(tracks.lost) > 1 else 0.0
-    if encoder_mm is None and tracked < 0.5:
+    if encoder is None and tracked < 0.5:
         raise UnusableError(
             "motion",
             f"the wall's texture could be followed in only {100 * tracked:.0f} % of the lit frames and "
@@ -156,9 +163,11 @@ def _first_guess(
 def _adjusted(start: State, measured: Measurements, parameters: MotionParameters) -> Estimate:
     """Adjust with free motion first, learn from it how smooth the motion is, then adjust again."""
     try:
-        free = adjust(start, measured, parameters)
-        sigma = third_difference_sigma(free.state, measured.tracks.frames)
-        return adjust(free.state, replace(measured, smooth_sigma=sigma), parameters)
+        # More threads gain nothing on blocks this small, and stall when the machine is busy.
+        with threadpool_limits(1):
+            free = adjust(start, measured, parameters)
+            sigma = third_difference_sigma(free.state, measured.tracks.frames)
+            return adjust(free.state, replace(measured, smooth_sigma=sigma), parameters)
     except np.linalg.LinAlgError as error:
         raise UnusableError(
             "motion",

@@ -13,7 +13,7 @@ from pipeline.instrument.probe import Probe
 from stages.motion import terms
 from stages.motion.bordered import BorderedSystem, Factor, LandmarkRows, Rows, landmark_steps
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import State
+from stages.motion.state import EncoderReadings, State
 from stages.motion.terms import RingBins, cauchy
 from stages.motion.tracking import Tracks
 
@@ -31,8 +31,7 @@ class Measurements:
     tracks : Tracks
     rings : RingBins
     time_s : (N,)
-    encoder_mm : (N,) or None
-        Encoder distance at the frames' times.
+    encoder : EncoderReadings or None
     probe : Probe
         As stated.
     unsure : (P, Q)
@@ -44,7 +43,7 @@ class Measurements:
     tracks: Tracks
     rings: RingBins
     time_s: Float
-    encoder_mm: Float | None
+    encoder: EncoderReadings | None
     probe: Probe
     unsure: Float
     smooth_sigma: Float
@@ -92,14 +91,10 @@ def assembled(state: State, measured: Measurements, parameters: MotionParameters
     system = BorderedSystem(len(state.T_pc), state.border_size, reach)
     rows: list[Rows] = [terms.origin_rows(state), terms.ring_rows(state, measured.rings)]
     rows.append(terms.smooth_rows(state, measured.time_s, measured.smooth_sigma))
-    if measured.encoder_mm is None:
+    if measured.encoder is None:
         rows.append(terms.no_slip_rows(state))
     else:
-        rows.extend(
-            terms.encoder_rows(
-                state, measured.encoder_mm, parameters.encoder_sigma_mm, parameters.encoder_slip_sigma_mm
-            )
-        )
+        rows.extend(terms.encoder_rows(state, measured.encoder, parameters.encoder_slip_sigma_mm))
     encoder_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm
     rows.append(terms.border_rows(state, parameters.axis_bend_sigma, encoder_sigma, radius_sigma_mm))
     for row in rows:
@@ -134,12 +129,15 @@ def landmark_rows(
         start, tracks.frame, by_pose, by_point, by_instrument, residual, weight,
         normal, by_border, s_residual, cauchy(s_residual / s_sigma) / s_sigma**2,
     )  # fmt: skip
-    new_excess = float(np.median(size / tracks.sigma_px)) / np.sqrt(2 * np.log(2)) if len(size) else 1.0
-    return (
-        rows,
-        float(np.median(size)) if len(size) else 0.0,
-        max(new_excess, 0.3) * np.sqrt(parameters.alike),
-    )
+    reprojection = float(np.median(size)) if len(size) else 0.0
+    return rows, reprojection, _excess_of(size, tracks.sigma_px) * np.sqrt(parameters.alike)
+
+
+def _excess_of(size: Float, sigma: Float) -> float:
+    """Return by how much residuals (M,) of two coordinates exceed their σ: for Rayleigh's median, 1."""
+    if not len(size):
+        return 1.0
+    return max(float(np.median(size / sigma)) / np.sqrt(2 * np.log(2)), 0.3)
 
 
 def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:

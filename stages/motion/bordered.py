@@ -148,13 +148,13 @@ class Factor:
     def frame_covariance(self, frames: Int) -> Float:
         """Return (len(frames), 7, 7) marginal covariances."""
         border = self.border_covariance()
-        out = np.empty((len(frames), BLOCK, BLOCK))
-        for k, frame in enumerate(frames):
-            at = slice(BLOCK * frame, BLOCK * frame + BLOCK)
-            unit = np.zeros((len(self.right), BLOCK))
-            unit[at] = np.eye(BLOCK)
-            out[k] = self.band.solve(unit)[at] + self.solved_border[at] @ border @ self.solved_border[at].T
-        return out
+        rows = (BLOCK * frames[:, None] + np.arange(BLOCK)).ravel()
+        unit = np.zeros((len(self.right), len(rows)))
+        unit[rows, np.arange(len(rows))] = 1
+        own = self.band.solve(unit)[rows] + self.solved_border[rows] @ border @ self.solved_border[rows].T
+        blocks = own.reshape(len(frames), BLOCK, len(frames), BLOCK)
+        each = np.arange(len(frames))
+        return np.asarray(blocks[each, :, each])
 
 
 def landmark_steps(
@@ -231,17 +231,10 @@ def _add_landmarks(  # type: ignore[no-untyped-def]
         right_border -= ws * s_residual[k] * s_border[k]
         corner += ws * np.outer(s_border[k], s_border[k])
         for m in range(start[k], start[k + 1]):
-            w, f = weight[m], frame[m] * 7
-            jx, jp, jc, r = by_point[m], by_pose[m], by_instrument[m], residual[m]
-            h += w * (jx.T @ jx)
-            g -= w * (jx.T @ r)
-            cross[m - start[k]] = w * (jp.T @ jx)
-            right[f : f + 6] -= w * (jp.T @ r)
-            border[f : f + 6, first:] += w * (jp.T @ jc)
-            side[first:] += w * (jc.T @ jx)
-            corner[first:, first:] += w * (jc.T @ jc)
-            right_border[first:] -= w * (jc.T @ r)
-            _add_pose(jp, w, f, band)
+            _add_observation(
+                weight[m], frame[m] * 7, by_pose[m], by_point[m], by_instrument[m], residual[m], first,
+                band, border, corner, right, right_border, h, g, side, cross[m - start[k]],
+            )  # fmt: skip
         hi = np.linalg.inv(h)
         inverse[k], right_point[k] = hi, g
         solved_side = side @ hi
@@ -251,21 +244,54 @@ def _add_landmarks(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True)
-def _add_pose(jp, w, f, band):  # type: ignore[no-untyped-def]
-    for a in range(6):
-        for b in range(a + 1):
-            band[a - b, f + b] += w * (jp[0, a] * jp[0, b] + jp[1, a] * jp[1, b])
+def _add_observation(  # type: ignore[no-untyped-def]
+    w, f, jp, jx, jc, r, first, band, border, corner, right, right_border, h, g, side, cross
+):
+    """Add one texture observation; products of tiny matrices are written out, which is faster."""
+    cross[:] = 0.0
+    for c in range(2):
+        wr = w * r[c]
+        for a in range(3):
+            g[a] -= wr * jx[c, a]
+            for b in range(3):
+                h[a, b] += w * jx[c, a] * jx[c, b]
+        for a in range(6):
+            wa = w * jp[c, a]
+            right[f + a] -= wr * jp[c, a]
+            for b in range(3):
+                cross[a, b] += wa * jx[c, b]
+            for b in range(a + 1):
+                band[a - b, f + b] += wa * jp[c, b]
+            for b in range(jc.shape[1]):
+                border[f + a, first + b] += wa * jc[c, b]
+        _add_instrument(w, wr, c, jx, jc, first, corner, right_border, side)
+
+
+@numba.njit(cache=True)
+def _add_instrument(w, wr, c, jx, jc, first, corner, right_border, side):  # type: ignore[no-untyped-def]
+    for a in range(jc.shape[1]):
+        wa = w * jc[c, a]
+        right_border[first + a] -= wr * jc[c, a]
+        for b in range(3):
+            side[first + a, b] += wa * jx[c, b]
+        for b in range(jc.shape[1]):
+            corner[first + a, first + b] += wa * jc[c, b]
 
 
 @numba.njit(cache=True)
 def _eliminate(frame, cross, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
     """Subtract what one landmark, seen in ``frame``, takes along when it leaves."""
-    solved = np.empty((len(frame), 6, 3))
+    solved = np.zeros((len(frame), 6, 3))
     for i in range(len(frame)):
         f = frame[i] * 7
-        solved[i] = cross[i] @ hi
-        right[f : f + 6] -= solved[i] @ g
-        border[f : f + 6] -= solved[i] @ side.T
+        for a in range(6):
+            for b in range(3):
+                for c in range(3):
+                    solved[i, a, b] += cross[i, a, c] * hi[c, b]
+                right[f + a] -= solved[i, a, b] * g[b]
+            for b in range(side.shape[0]):
+                for c in range(3):
+                    border[f + a, b] -= solved[i, a, c] * side[b, c]
         for j in range(i + 1):
             _subtract_pair(solved[i], cross[j], f, frame[j] * 7, band)
 

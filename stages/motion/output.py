@@ -33,7 +33,7 @@ def in_pipe_frame(estimate: Estimate, frames: FrameTable, measured: Measurements
     unsure = measured.unsure.shape[1]
     own = slice(len(border) - len(state.instrument), len(border) - len(state.instrument) + unsure)
     instrument = border[own, own]
-    has_encoder = measured.encoder_mm is not None
+    has_encoder = measured.encoder is not None
     return Trajectory(
         frame=frames.frame,
         time_s=frames.time_s,

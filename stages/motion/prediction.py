@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from stages.motion.state import EncoderReadings
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -21,14 +22,14 @@ class Predictor:
     ----------
     time_s : (N,)
         Of all frames.
-    encoder_mm : (N,) or None
-        Encoder distance at the frames' times.
+    encoder : EncoderReadings or None
     centre_c : (N, 2)
         Where the pipe's axis passes the laser's plane, mm in C.
     """
 
-    def __init__(self, time_s: Float, encoder_mm: Float | None, centre_c: Float) -> None:
-        self._time, self._encoder, self._centre = time_s, encoder_mm, centre_c
+    def __init__(self, time_s: Float, encoder: EncoderReadings | None, centre_c: Float) -> None:
+        self._time, self._centre = time_s, centre_c
+        self._encoder = None if encoder is None else encoder.distance_mm
         self._known: list[tuple[int, float, float]] = []
 
     def learn(self, frame: int, T_pc: Float) -> None:

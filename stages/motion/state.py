@@ -100,6 +100,14 @@ def moved(T_pc: Float, step: Float) -> Float:
     return from_parts(T_pc[..., :3, :3] @ turn, T_pc[..., :3, 3] + step[..., :3])
 
 
+@dataclass(frozen=True)
+class EncoderReadings:
+    """Encoder distance at all frames (N,), mm, and the 1 σ of one reading, mm."""
+
+    distance_mm: Float
+    sigma_mm: float
+
+
 def straight_start(
     T_pc: Float, xyz_p: Float, from_mm: float, to_mm: float, radius_mm: float, knot_mm: float, unsure: int
 ) -> State:

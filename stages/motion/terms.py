@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation
 from stages.motion.bordered import BLOCK, Rows
-from stages.motion.state import GLOBALS, State
+from stages.motion.state import GLOBALS, EncoderReadings, State
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -92,18 +92,18 @@ def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
     )  # fmt: skip
 
 
-def encoder_rows(state: State, encoder_mm: Float, sigma_mm: float, slip_sigma_mm: float) -> tuple[Rows, Rows]:
+def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -> tuple[Rows, Rows]:
     """Distance = scale × encoder + slip, and slip hardly changes from frame to frame."""
-    n = len(encoder_mm)
+    n = len(encoder.distance_mm)
     origin = state.T_pc[:, :3, 3]
     s = to_pipe(state.axis, origin)[0]
     scale = state.globals[3]
     by_frame = np.zeros((n, 1, BLOCK))
     by_frame[:, 0, :3], by_frame[:, 0, 6] = state.section_frames(s)[:, :, 2], -1
     by_border = np.zeros((n, state.border_size))
-    by_border[:, 3] = -encoder_mm
-    residual = s - scale * encoder_mm - state.slip
-    reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, np.full(n, sigma_mm**-2.0))
+    by_border[:, 3] = -encoder.distance_mm
+    residual = s - scale * encoder.distance_mm - state.slip
+    reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, np.full(n, encoder.sigma_mm**-2.0))
     pair = np.stack([np.arange(n - 1), np.arange(1, n)], -1)
     by_pair = np.zeros((n - 1, 2, BLOCK))
     by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
