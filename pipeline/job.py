@@ -66,7 +66,8 @@ def open_job(
     opened = open_recording(recording)
     file = probe or opened.probe_file
     if file is None:
-        raise InputError(recording, "names no probe", hint="give one with --probe FILE")
+        noticed = "; ".join(("names no probe that is there", *opened.warnings))
+        raise InputError(recording, noticed, expected="a probe file", hint="give one with --probe FILE")
     believed = read_probe(file)
     check_probe_fits(opened, believed)
     return Job(opened, believed, file, tuple(stages), tuple(exporters), configuration, folder)
