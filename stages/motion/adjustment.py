@@ -129,8 +129,8 @@ def landmark_rows(
         start, tracks.frame, by_pose, by_point, by_instrument, residual, weight,
         normal, by_border, s_residual, cauchy(s_residual / s_sigma) / s_sigma**2,
     )  # fmt: skip
-    reprojection = float(np.median(size)) if len(size) else 0.0
-    return rows, reprojection, _excess_of(size, tracks.sigma_px) * np.sqrt(parameters.alike)
+    reprojection = float(np.median(size[~bad])) if not bad.all() else 0.0
+    return rows, reprojection, _excess_of(size[~bad], tracks.sigma_px[~bad]) * np.sqrt(parameters.alike)
 
 
 def _excess_of(size: Float, sigma: Float) -> float:

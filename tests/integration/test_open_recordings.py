@@ -1,0 +1,119 @@
+"""Motion and wall of the sample recording against its truth, with and without its encoder."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts import Trajectory, Wall
+from pipeline.export.radius_map import write_radius_map
+from pipeline.export.trajectory import write_trajectory
+from pipeline.instrument.probe_file import read_probe
+from pipeline.recording.folder import open_folder
+from pipeline.stage import quiet_context
+from stages.accumulate import AccumulateParameters, accumulate_wall
+from stages.motion import MotionParameters, estimate_motion
+from stages.rings import RingParameters, extract_rings
+from stages.triangulate import TriangulateParameters, triangulate_rings
+from tests.shared_data import PROJECT_ROOT, shared
+from tests.truth_comparison import compare_motion, compare_wall
+
+SAMPLE = PROJECT_ROOT / "data" / "sample"
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the chain made of the sample."""
+
+    trajectory: Trajectory
+    wall: Wall
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[str, Run]:
+    recording, probe, context = open_folder(SAMPLE), read_probe(SAMPLE / "probe.yaml"), quiet_context()
+    rings = extract_rings(recording, probe, RingParameters(), context)
+    points = triangulate_rings(rings, probe, TriangulateParameters(), context)
+    made = {}
+    for name, seen in {"encoder": recording, "no encoder": replace(recording, encoder=None)}.items():
+        trajectory = estimate_motion(seen, probe, rings, points, MotionParameters(), context)
+        wall = accumulate_wall(probe, rings, points, trajectory, AccumulateParameters(), context)
+        made[name] = Run(trajectory, wall)
+    return made
+
+
+@pytest.mark.parametrize(("name", "limit_percent"), [("encoder", 0.1), ("no encoder", 0.3)])
+def test_distance_and_roll_at_the_end(runs: dict[str, Run], name: str, limit_percent: float) -> None:
+    got = compare_motion(runs[name].trajectory, SAMPLE)
+    assert abs(got.distance_mm[-1]) <= limit_percent / 100 * got.path_mm
+    assert np.degrees(abs(got.roll_rad[-1])) <= 0.2
+
+
+@pytest.mark.parametrize("name", ["encoder", "no encoder"])
+def test_distance_and_roll_lie_within_their_sigma(runs: dict[str, Run], name: str) -> None:
+    run = runs[name].trajectory
+    got = compare_motion(run, SAMPLE)
+    assert abs(got.distance_mm[-1]) < 3 * np.sqrt(run.covariance[-1, 2, 2])
+    assert abs(got.roll_rad[-1]) < 3 * np.sqrt(run.covariance[-1, 5, 5])
+
+
+@pytest.mark.parametrize("name", ["encoder", "no encoder"])
+def test_wall_lies_within_its_sigma(runs: dict[str, Run], name: str) -> None:
+    got = compare_wall(runs[name].wall.radius_map, SAMPLE)
+    assert abs(got.error_mm.mean()) < 3 * np.median(got.sigma_mm)
+    assert got.robust_sigma_mm <= 0.035
+    assert got.coverage >= 0.98
+    assert got.inside_95 >= 0.93
+
+
+def test_sigma_is_not_won_by_claiming_nothing(runs: dict[str, Run]) -> None:
+    run = runs["encoder"]
+    got = compare_wall(run.wall.radius_map, SAMPLE)
+    assert np.median(got.sigma_mm) < 5 * np.sqrt(np.mean(np.minimum(np.abs(got.error_mm), 0.2) ** 2))
+    assert (
+        np.sqrt(run.trajectory.covariance[-1, 2, 2]) < 0.005 * compare_motion(run.trajectory, SAMPLE).path_mm
+    )
+
+
+def test_encoder_scale_is_found(runs: dict[str, Run]) -> None:
+    run = runs["encoder"].trajectory
+    assert abs(run.encoder_scale - 1) < 4 * run.encoder_scale_sigma + 0.01
+    assert np.isnan(runs["no encoder"].trajectory.encoder_scale)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # it leaves files open
+def test_the_shared_score_agrees(runs: dict[str, Run], tmp_path: Path) -> None:
+    tool = _score_run()
+    write_trajectory(runs["encoder"].trajectory, tmp_path)
+    thin = _every_fourth_column(runs["encoder"].wall)
+    write_radius_map(thin, tmp_path)
+    truth = tool.truth_of(str(SAMPLE))
+    wall = tool.wall_error(str(tmp_path), *truth[1:4])
+    motion = tool.trajectory_error(str(tmp_path), truth[0])
+    own = compare_wall(thin.radius_map, SAMPLE)
+    assert wall["coverage"] == pytest.approx(own.coverage, abs=0.01)
+    assert wall["radius_bias_mm"] == pytest.approx(own.error_mm.mean(), abs=0.01)
+    assert wall["radius_mad_sigma_mm"] == pytest.approx(own.robust_sigma_mm, abs=0.003)
+    assert wall["within_1.96_sigma"] == pytest.approx(own.inside_95, abs=0.02)
+    distance = compare_motion(runs["encoder"].trajectory, SAMPLE).distance_mm[-1]
+    assert motion["axial_end_error_mm"] == pytest.approx(distance, abs=1e-3)
+
+
+def _every_fourth_column(wall: Wall) -> Wall:
+    full = wall.radius_map
+    part = {n: v[:, ::4] for n, v in vars(full).items() if v.ndim == 2}
+    return replace(wall, radius_map=replace(full, azimuth_rad=full.azimuth_rad[::4], **part))
+
+
+def _score_run() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("score_run", shared("score_run.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,124 @@
+"""A small motion problem without pictures: a bent, oval pipe with landmarks, rings and an encoder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.axis import from_pipe
+from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from stages.motion.adjustment import MATCH_BIASES, Measurements
+from stages.motion.state import GLOBALS, EncoderReadings, State, straight_start
+from stages.motion.terms import RingBins
+from stages.motion.tracking import Tracks
+
+Float = NDArray[np.float64]
+RADIUS = 50.0
+ENCODER_SIGMA_MM = 0.05
+_SIGMA_PX = 0.1
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The true state and what was measured of it."""
+
+    truth: State
+    measured: Measurements
+
+
+def probe(uncertain: bool = True) -> Probe:
+    camera = KannalaBrandt((400, 300), (90.0, 90.0), (199.0, 148.0), (-0.011, 0.001, 0.0, 0.0))
+    sigma = np.zeros(20)
+    if uncertain:
+        sigma[[0, 2, 3]], sigma[[8, 9, 10]] = 0.02, (0.008, 1e-4, 1e-4)
+    return Probe(camera, LaserSheet(22.0, tilt_x=0.004), np.diag(sigma**2))
+
+
+def scene(
+    frames: int = 12, landmarks: int = 30, *, noise: float = 0.0, encoder: bool = True, seed: int = 0
+) -> Scene:
+    """Return a scene; ``noise`` is in units of the stated σ."""
+    random = np.random.default_rng(seed)
+    instrument = probe()
+    unsure = instrument.principal_uncertainties()
+    k = np.arange(frames)
+    turn = np.stack([0.02 * np.sin(0.3 * k), 0.015 * np.cos(0.4 * k) - 0.015, 0.01 * k], -1)
+    t = np.stack([1.0 * np.sin(0.2 * k), 0.8 * np.cos(0.25 * k) - 0.8, 1.2 * k], -1)
+    T_pc = from_parts(rotation_from_vector(turn), t)
+    start = straight_start(
+        T_pc, np.zeros((landmarks, 3)), -20.0, 1.2 * frames + 60, RADIUS, 30.0, unsure.shape[1] + MATCH_BIASES
+    )
+    state = _bent(replace(start, globals=np.array([RADIUS, 0.2, -0.1, 1.0])))
+    truth = replace(state, xyz_p=_on_wall(state, random, landmarks))
+    tracks = _tracks(truth, instrument, noise, random)
+    rings = _rings(truth, noise, random, unsure.shape[1])
+    distance = t[:, 2] - t[0, 2] + noise * ENCODER_SIGMA_MM * random.standard_normal(frames)
+    readings = EncoderReadings(distance, ENCODER_SIGMA_MM) if encoder else None
+    sigma = np.array([0.05] * 3 + [1e-3] * 3)
+    return Scene(truth, Measurements(tracks, rings, k / 30, readings, instrument, unsure, sigma))
+
+
+def displaced(state: State, random: np.random.Generator, size: float = 1.0) -> State:
+    """Return the state moved at random by about ``size`` times what a first guess is off by."""
+    n, b = len(state.T_pc), state.border_size
+    step = size * random.standard_normal((n, 7)) * np.array([0.05] * 3 + [0.003] * 3 + [0.01])
+    step[0, :6] = 0
+    border = size * random.standard_normal(b) * 0.05
+    border[3] *= 0.01
+    return state.step(step, border, size * 0.2 * random.standard_normal(state.xyz_p.shape))
+
+
+def _bent(state: State) -> State:
+    bend = np.linspace(0, 0.5, state.knots) ** 2
+    border = np.zeros(state.border_size)
+    border[GLOBALS : GLOBALS + 2 * state.knots] = np.concatenate([bend, -0.5 * bend])
+    return state.step(np.zeros((len(state.T_pc), 7)), border, np.zeros_like(state.xyz_p))
+
+
+def _on_wall(state: State, random: np.random.Generator, count: int) -> Float:
+    s = random.uniform(12, 1.2 * len(state.T_pc) + 30, count)
+    psi = random.uniform(-np.pi, np.pi, count)
+    r, a, b, _ = state.globals
+    return from_pipe(state.axis, s, psi, r + a * np.cos(2 * psi) + b * np.sin(2 * psi))
+
+
+def _tracks(state: State, instrument: Probe, noise: float, random: np.random.Generator) -> Tracks:
+    frame, landmark = np.meshgrid(np.arange(len(state.T_pc)), np.arange(len(state.xyz_p)))
+    frame, landmark = frame.ravel(), landmark.ravel()
+    xyz_c = transform(inverse(state.T_pc[frame]), state.xyz_p[landmark])
+    theta = np.arctan2(np.hypot(xyz_c[:, 0], xyz_c[:, 1]), xyz_c[:, 2])
+    keep = (theta > 0.6) & (theta < 1.4)
+    keep &= np.bincount(landmark, keep)[landmark] >= 3
+    uv = instrument.camera.project(xyz_c[keep]).uv
+    uv = uv + noise * _SIGMA_PX * random.standard_normal(uv.shape)
+    index = np.unique(landmark[keep], return_inverse=True)
+    if len(index[0]) != len(state.xyz_p):
+        raise ValueError("a landmark is seen too seldom: choose another seed")
+    n = len(state.T_pc)
+    return Tracks(
+        landmark[keep], frame[keep], uv, np.full(len(uv), _SIGMA_PX), state.xyz_p,
+        np.arange(n), state.T_pc, np.zeros(n, bool),
+    )  # fmt: skip
+
+
+def _rings(state: State, noise: float, random: np.random.Generator, unsure: int, bins: int = 24) -> RingBins:
+    psi = np.linspace(-np.pi, np.pi, bins, endpoint=False)
+    r, a, b, _ = state.globals
+    points = []
+    for T in state.T_pc:
+        s = np.full(bins, T[2, 3] + 22.0)
+        for _ in range(6):
+            wall = from_pipe(state.axis, s, psi, r + a * np.cos(2 * psi) + b * np.sin(2 * psi))
+            s = s - (transform(inverse(T), wall)[:, 2] - 22.0)
+        points.append(transform(inverse(T), wall))
+    xyz_c = np.concatenate(points)
+    outward = xyz_c * [1, 1, 0] / np.linalg.norm(xyz_c[:, :2], axis=1)[:, None]
+    xyz_c = xyz_c + noise * 0.05 * random.standard_normal(len(xyz_c))[:, None] * outward
+    by_instrument = random.standard_normal((len(xyz_c), 3, unsure)) * 0.01
+    frame = np.repeat(np.arange(len(state.T_pc)), bins)
+    return RingBins(frame, xyz_c, by_instrument, np.full(len(xyz_c), 0.05))

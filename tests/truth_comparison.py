@@ -1,0 +1,83 @@
+"""A run held against a recording's truth, after what no run can know is taken out.
+
+That is the pose of the first frame, seen as a shift and a tilt of the pipe, and where distance and roll
+begin.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+from scipy.optimize import least_squares
+
+from pipeline.artefacts import RadiusMap, Trajectory
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WallComparison:
+    """Radius errors (M,), mm, of cells drawn at random, their stated σ, and the share of cells seen."""
+
+    error_mm: Float
+    sigma_mm: Float
+    coverage: float
+
+    @property
+    def robust_sigma_mm(self) -> float:
+        return float(1.4826 * np.median(np.abs(self.error_mm - np.median(self.error_mm))))
+
+    @property
+    def inside_95(self) -> float:
+        return float(np.mean(np.abs(self.error_mm) < 1.96 * self.sigma_mm))
+
+
+@dataclass(frozen=True)
+class MotionComparison:
+    """Errors of distance (N,), mm, and roll (N,), rad, since the first frame, and the path driven, mm."""
+
+    distance_mm: Float
+    roll_rad: Float
+    path_mm: float
+
+
+def compare_wall(found: RadiusMap, folder: Path, cells: int = 20000) -> WallComparison:
+    seen = np.isfinite(found.radius_mm)
+    row, column = np.nonzero(seen)
+    pick = np.random.default_rng(0).choice(len(row), min(cells, len(row)), replace=False)
+    row, column = row[pick], column[pick]
+    s, psi = found.distance_mm[row], found.azimuth_rad[column]
+    r, sigma = found.radius_mm[row, column].astype(float), found.sigma_mm[row, column].astype(float)
+    truth = _true_radius(folder)
+    x = (s - s.mean()) / np.ptp(s)
+    shape = np.stack([f(psi) * x**k for k in range(3) for f in (np.cos, np.sin)], -1)
+
+    def error(p: Float) -> Float:
+        return r - truth(np.stack([s + p[0] + 10 * x * p[1], psi + p[2]], -1)) - shape @ p[3:]
+
+    start = min(np.arange(-6, 6.1, 0.5), key=lambda d: np.median(np.abs(error(np.array([d, *[0] * 8])))))
+    best = least_squares(error, [start, *[0.0] * 8], loss="cauchy", f_scale=0.1, x_scale=0.1, diff_step=1e-4)
+    return WallComparison(error(best.x), sigma, float(seen[seen.any(1)].mean()))
+
+
+def compare_motion(found: Trajectory, folder: Path) -> MotionComparison:
+    poses = np.array(json.loads((folder / "truth.json").read_text())["camera_pose_in_pipe"])[found.frame]
+    z = found.T_pc[:, 2, 3] - poses[:, 2, 3]
+    roll = _roll(found.T_pc) - _roll(poses)
+    return MotionComparison(z - z[0], roll - roll[0], float(np.sum(np.abs(np.diff(poses[:, 2, 3])))))
+
+
+def _roll(T: Float) -> Float:
+    return np.unwrap(np.arctan2(T[:, 1, 0], T[:, 0, 0]))
+
+
+def _true_radius(folder: Path) -> RegularGridInterpolator:
+    with np.load(folder / "truth_wall.npz") as file:
+        s, psi, r = (file[k].astype(float) for k in ("distance_mm", "azimuth_rad", "radius_mm"))
+    wide = np.concatenate([psi - 2 * np.pi, psi, psi + 2 * np.pi])
+    return RegularGridInterpolator((s, wide), np.tile(r, 3), bounds_error=False, fill_value=None)
