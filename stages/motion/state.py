@@ -62,6 +62,8 @@ class State:
 
     def axis_basis(self, distance_mm: Float) -> Float:
         """Return the spline basis (M, knots) at distances (M,), clamped to the axis."""
+        if not len(distance_mm):
+            return np.zeros((0, self.knots))
         knots = self._knot_vector()
         s = np.clip(distance_mm, knots[_DEGREE], knots[-_DEGREE - 1] - 1e-9)
         return np.asarray(BSpline.design_matrix(s, knots, _DEGREE).toarray())
