@@ -1,7 +1,7 @@
 """Compiled sums of `stages.motion.bordered`: equations into a banded, bordered matrix, landmarks eliminated.
 
-The band holds entry (i, j), i ≥ j, at ``band[i - j, j]``. Arguments are those of `Rows` or `LandmarkRows`, then
-band, border, corner and both right sides, which are added to.
+The band holds entry (i, j), i ≥ j, at ``band[i - j, j]``. Arguments are those of `Rows` or `LandmarkRows`,
+then band, border, corner and both right sides, which are added to.
 """
 
 from __future__ import annotations

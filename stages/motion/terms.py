@@ -49,11 +49,14 @@ def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
     a2, b2 = state.globals[1:3]
     residual = rho - state.globals[0] - a2 * np.cos(2 * psi) - b2 * np.sin(2 * psi)
     frame = state.section_frames(s)
-    normal = frame[:, :, 0] * np.cos(psi)[:, None] + frame[:, :, 1] * np.sin(psi)[:, None]
+    c, sn = np.cos(psi)[:, None], np.sin(psi)[:, None]
+    tilt = 2 * (a2 * np.sin(2 * psi) - b2 * np.cos(2 * psi)) / rho
+    gradient = frame[:, :, 0] * c + frame[:, :, 1] * sn
+    gradient += tilt[:, None] * (frame[:, :, 1] * c - frame[:, :, 0] * sn)
     shape = np.stack([-np.ones_like(psi), -np.cos(2 * psi), -np.sin(2 * psi), np.zeros_like(psi)], -1)
-    deflect = [-basis * np.cos(psi)[:, None], -basis * np.sin(psi)[:, None]]
+    deflect = [-basis * c, -basis * sn]
     instrument = np.zeros((len(psi), len(state.instrument)))
-    return residual, normal, np.concatenate([shape, *deflect, instrument], 1)
+    return residual, gradient, np.concatenate([shape, *deflect, instrument], 1)
 
 
 def ring_rows(state: State, rings: RingBins) -> Rows:
