@@ -1,0 +1,115 @@
+"""Stops, reversals, dropped and doubled frames, lost texture and slip, and none where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.artefacts import MotionEvent, Trajectory
+from pipeline.geometry.axis import straight_axis
+from pipeline.recording.base import FrameTable
+from stages.motion.events import find_events
+from stages.motion.tracking import Tracks
+
+Float = NDArray[np.float64]
+FRAMES, RATE, STEP = 120, 30.0, 0.6
+
+
+def events(
+    z: Float,
+    *,
+    time_s: Float | None = None,
+    slip: Float | None = None,
+    lost: tuple[int, ...] = (),
+    encoder: bool = True,
+) -> dict[str, MotionEvent]:
+    n = len(z)
+    t = np.arange(n) / RATE if time_s is None else time_s
+    number = 10 + np.arange(n)
+    T = np.tile(np.eye(4), (n, 1, 1))
+    T[:, 2, 3] = z
+    run = Trajectory(
+        number, t, T, np.zeros((n, 6, 6)), straight_axis(-50, 200), 50.0, 1.0, 0.0, 0.0, ()
+    )  # fmt: skip
+    none = np.zeros(0, np.int64)
+    gone = np.zeros(n, bool)
+    gone[list(lost)] = True
+    tracks = Tracks(none, none, np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.arange(n), T, gone)
+    table = FrameTable(number, t, np.array(["both"] * n))
+    found = find_events(table, run, tracks, np.zeros(n) if slip is None else slip, encoder)
+    assert [e.frame_from for e in found] == sorted(e.frame_from for e in found)
+    assert len({e.kind for e in found}) == len(found), "each kind once"
+    return {e.kind: e for e in found}
+
+
+def steady(noise_mm: float = 0.005) -> Float:
+    return STEP * np.arange(FRAMES) + noise_mm * np.random.default_rng(0).standard_normal(FRAMES)
+
+
+def with_steps(step: Float) -> Float:
+    return np.concatenate([[0.0], np.cumsum(step)])
+
+
+def test_steady_motion_has_no_events() -> None:
+    creep = 0.002 * np.cumsum(np.random.default_rng(1).standard_normal(FRAMES))
+    assert events(steady(), slip=creep) == {}
+
+
+def test_stop_is_found() -> None:
+    step = np.full(FRAMES - 1, STEP)
+    step[40:60] = 0
+    found = events(with_steps(step))
+    assert set(found) == {"stop"}
+    assert found["stop"].frame_from == pytest.approx(50, abs=2)
+    assert found["stop"].size == pytest.approx(20 / RATE, abs=3 / RATE)
+
+
+def test_reversal_is_found() -> None:
+    step = np.full(FRAMES - 1, STEP)
+    step[50:70] = -STEP
+    found = events(with_steps(step))
+    assert set(found) == {"reversal"}
+    assert found["reversal"].size == pytest.approx(20 * STEP, abs=2 * STEP)
+    assert found["reversal"].frame_from == pytest.approx(60, abs=2)
+
+
+def test_running_backwards_all_the_way_is_no_reversal() -> None:
+    assert events(-steady()) == {}
+
+
+def test_gap_in_the_clock_is_dropped_frames() -> None:
+    t = np.arange(FRAMES) / RATE
+    t[70:] += 3 / RATE
+    found = events(STEP * RATE * t, time_s=t)
+    assert set(found) == {"dropped_frames"}
+    assert (found["dropped_frames"].frame_from, found["dropped_frames"].size) == (79, 3.0)
+
+
+def test_same_picture_twice_is_a_duplicated_frame() -> None:
+    step = np.full(FRAMES - 1, STEP)
+    step[30] = 0
+    found = events(with_steps(step))
+    assert set(found) == {"duplicated_frame"}
+    assert found["duplicated_frame"].frame_from == 40
+
+
+def test_lost_texture_is_told_but_not_in_the_first_frame() -> None:
+    found = events(steady(), lost=(0, 20, 21, 22))
+    assert set(found) == {"texture_lost"}
+    assert (found["texture_lost"].frame_from, found["texture_lost"].frame_to) == (30, 32)
+
+
+@pytest.mark.parametrize(("encoder", "expected"), [(True, {"encoder_slip"}), (False, set())])
+def test_slip_is_found_where_there_is_an_encoder(encoder: bool, expected: set[str]) -> None:
+    slip = 0.001 * np.cumsum(np.random.default_rng(2).standard_normal(FRAMES))
+    slip[60:] += 4.0
+    found = events(steady(), slip=slip, encoder=encoder)
+    assert set(found) == expected
+    if encoder:
+        assert found["encoder_slip"].size == pytest.approx(4.0, abs=0.1)
+        assert found["encoder_slip"].frame_from == 69
+
+
+def test_few_frames_have_no_events() -> None:
+    assert events(np.zeros(4)) == {}

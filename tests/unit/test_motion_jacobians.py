@@ -1,0 +1,150 @@
+"""Every derivative of the joint adjustment against central differences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stages.motion import terms
+from stages.motion.adjustment import landmark_rows
+from stages.motion.bordered import Rows
+from stages.motion.parameters import MotionParameters
+from stages.motion.state import GLOBALS, State
+from tests.motion_scene import displaced, scene
+
+Float = NDArray[np.float64]
+H = 1e-5
+
+
+@pytest.fixture(scope="module")
+def given():
+    made = scene(9, 25, seed=2)
+    return made.measured, displaced(made.truth, np.random.default_rng(5), 0.5)
+
+
+def stepped(
+    state: State, *, frame: tuple[int, int] | None = None, border: int | None = None, size: float
+) -> State:
+    frames, borders = np.zeros((len(state.T_pc), 7)), np.zeros(state.border_size)
+    if frame is not None:
+        frames[frame] = size
+    if border is not None:
+        borders[border] = size
+    return state.step(frames, borders, np.zeros_like(state.xyz_p))
+
+
+def slope(function: Callable[[State], Float], state: State, **what) -> Float:
+    return (function(stepped(state, size=H, **what)) - function(stepped(state, size=-H, **what))) / (2 * H)
+
+
+def check_rows(
+    make: Callable[[State], Rows], state: State, border_atol: float, frame_atol: float = 1e-5
+) -> None:
+    rows = make(state)
+    for f in (1, 4, len(state.T_pc) - 1):
+        for i in range(7):
+            wanted = slope(lambda s: make(s).residual, state, frame=(f, i))
+            got = np.sum(np.where(rows.frame == f, rows.by_frame[:, :, i], 0.0), 1)
+            atol = frame_atol * (60 if 3 <= i < 6 else 1)  # lever arm of a turn, mm
+            np.testing.assert_allclose(got, wanted, atol=atol, err_msg=f"frame {f} coordinate {i}")
+    for b in range(state.border_size):
+        wanted = slope(lambda s: make(s).residual, state, border=b)
+        np.testing.assert_allclose(rows.by_border[:, b], wanted, atol=border_atol, err_msg=f"border {b}")
+
+
+def test_ring_rows(given) -> None:
+    measured, state = given
+    # The axis' frames turn a little with its deflection, which the derivative leaves out.
+    check_rows(lambda s: terms.ring_rows(s, measured.rings), state, 0.02, 2e-4)
+
+
+def test_encoder_rows(given) -> None:
+    measured, state = given
+    reading, slip = (lambda s, k=k: terms.encoder_rows(s, measured.encoder, 0.01)[k] for k in (0, 1))
+    check_rows(slip, state, 1e-6)
+    check_rows(reading, state, 0.05, 1e-4)
+
+
+def test_no_slip_rows(given) -> None:
+    check_rows(terms.no_slip_rows, given[1], 1e-6)
+
+
+def test_border_rows(given) -> None:
+    check_rows(lambda s: terms.border_rows(s, 2e-3, 0.002, 5.0), given[1], 1e-5)
+
+
+def test_smooth_rows(given) -> None:
+    measured, state = given
+    make = lambda s: terms.smooth_rows(s, measured.time_s, measured.smooth_sigma)  # noqa: E731
+    # Rotations are taken as a vector space here: exact to the rotation between neighbours, about 0.03 rad.
+    check_rows(make, state, 1e-9, frame_atol=0.1 / 60)
+    rows = make(state)
+    for i in range(3):
+        wanted = slope(lambda s: make(s).residual, state, frame=(4, i))
+        got = np.sum(np.where(rows.frame == 4, rows.by_frame[:, :, i], 0.0), 1)
+        np.testing.assert_allclose(got, wanted, atol=1e-6)
+
+
+def test_third_difference_is_blind_to_parabolas_at_any_spacing() -> None:
+    t = np.array([[0.0, 0.1, 0.25, 0.3], [1.0, 2.0, 3.0, 4.0]])
+    coefficient = terms._third_difference(t)
+    np.testing.assert_allclose(coefficient[1], [-1, 3, -3, 1], atol=1e-12)
+    for power in range(3):
+        np.testing.assert_allclose(np.sum(coefficient * (t - t[:, :1]) ** power, 1), 0, atol=1e-12)
+    cubic = np.sum(coefficient * (3 * (t - t[:, :1]) / np.ptp(t, axis=1)[:, None]) ** 3, 1)
+    np.testing.assert_allclose(cubic, 6)
+
+
+def test_surface_by_point_and_border(given) -> None:
+    _, state = given
+    random = np.random.default_rng(0)
+    xyz = state.xyz_p + random.standard_normal(state.xyz_p.shape)
+    _, gradient, by_border = terms.surface(state, xyz)
+    for i in range(3):
+        d = H * np.eye(3)[i]
+        wanted = (terms.surface(state, xyz + d)[0] - terms.surface(state, xyz - d)[0]) / (2 * H)
+        np.testing.assert_allclose(gradient[:, i], wanted, atol=1e-4)
+    for b in range(GLOBALS):
+        wanted = slope(lambda s: terms.surface(s, xyz)[0], state, border=b)
+        np.testing.assert_allclose(by_border[:, b], wanted, atol=1e-6)
+
+
+def test_landmark_rows(given) -> None:
+    measured, state = given
+    parameters = MotionParameters()
+    residual = lambda s: landmark_rows(s, measured, parameters, 1.0)[0].residual  # noqa: E731
+    rows = landmark_rows(state, measured, parameters, 1.0)[0]
+    for f in (1, 5):
+        for i in range(6):
+            wanted = slope(residual, state, frame=(f, i))
+            got = np.where((rows.frame == f)[:, None], rows.by_pose[:, :, i], 0.0)
+            np.testing.assert_allclose(got, wanted, rtol=2e-3, atol=3e-3, err_msg=f"pose {i}")
+    first = state.border_size - rows.by_instrument.shape[2]
+    for b in range(state.border_size):
+        wanted = slope(residual, state, border=b)
+        got = rows.by_instrument[:, :, b - first] if b >= first else np.zeros_like(wanted)
+        np.testing.assert_allclose(got, wanted, rtol=2e-3, atol=1e-4, err_msg=f"border {b}")
+    for i in range(3):
+        step = np.zeros_like(state.xyz_p)
+        step[:, i] = H
+        frames, border = np.zeros((len(state.T_pc), 7)), np.zeros(state.border_size)
+        ahead, behind = (residual(state.step(frames, border, k * step)) for k in (1, -1))
+        np.testing.assert_allclose(rows.by_point[:, :, i], (ahead - behind) / (2 * H), rtol=2e-3, atol=3e-3)
+
+
+def test_a_landmark_behind_the_lens_is_left_out(given) -> None:
+    measured, state = given
+    camera = measured.probe.camera
+    narrow = camera.with_parameters(np.array([*camera.parameters[:4], -0.1, 0, 0, 0]))
+    measured = replace(measured, probe=replace(measured.probe, camera=narrow))
+    step = np.zeros_like(state.xyz_p)
+    step[0, 2] = -500.0
+    moved = state.step(np.zeros((len(state.T_pc), 7)), np.zeros(state.border_size), step)
+    rows, reprojection, excess = landmark_rows(moved, measured, MotionParameters(), 1.0)
+    assert np.isfinite(reprojection)
+    assert np.isfinite(excess)
+    assert np.all(rows.weight[measured.tracks.landmark == 0] == 0)
