@@ -11,6 +11,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.stage import Context, Parameters, Stage
 from stages.accumulate.calibration import calibration_sigma
+from stages.accumulate.centring import centred
 from stages.accumulate.grid import gridded, map_grid, rings_on_columns
 from stages.accumulate.samples import WallSamples, wall_samples
 
@@ -51,7 +52,7 @@ def accumulate_wall(
         When no ring sample lies on the wall.
     """
     found = probe.as_found_in(trajectory)
-    samples = wall_samples(found, rings, points, trajectory)
+    samples = centred(wall_samples(found, rings, points, trajectory))
     if not samples.valid.any():
         hint = "see the rejected samples of stage rings"
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
