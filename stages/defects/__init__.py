@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from pipeline.artefacts import Wall, WallTexture
@@ -27,7 +28,7 @@ from stages.defects.segment import Region, footprint, segment
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
-_MIN_CELLS = 1000
+_MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
 
 
 def find_defects(
@@ -40,11 +41,7 @@ def find_defects(
     UnusableError
         When too little of the wall was measured to know its own shape.
     """
-    seen = int(np.isfinite(wall.radius_map.radius_mm).sum())
-    if seen < _MIN_CELLS:
-        raise UnusableError(
-            "defects", f"{seen} cells of the wall were measured", limit=f"at least {_MIN_CELLS}"
-        )
+    _refuse_unseen(np.isfinite(wall.radius_map.radius_mm))
     relief = smooth_shape_removed(
         wall.radius_map, parameters, np.zeros(wall.radius_map.radius_mm.shape, bool)
     )
@@ -64,6 +61,18 @@ def find_defects(
     context.report("defects", len(items), "")
     context.report("rejected: shallower than the smallest depth", len(measured) - len(kept), "detections")
     return Defects(items, parameters.false_alarms, _smallest_depth(detection, parameters))
+
+
+def _refuse_unseen(seen: NDArray[np.bool_]) -> None:
+    """Refuse a wall (S, A) of which too little was ``seen`` to know the shape that defects depart from."""
+    cells, circles = int(seen.sum()), int((seen.mean(1) >= _HALF).sum())
+    if cells < _MIN_CELLS or circles < _MIN_CIRCLES:
+        raise UnusableError(
+            "defects",
+            f"{cells} cells of the wall were measured, {circles} circles of it to at least a half",
+            limit=f"at least {_MIN_CELLS} cells and {_MIN_CIRCLES} circles",
+            hint="see the rejected ring samples by reason, and whether the motion is right",
+        )
 
 
 def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float:

@@ -58,13 +58,14 @@ class RingTrace:
 def trace_ring(
     image: Image, sectors: Sectors, clip_level: float, before: RingTrace | None = None
 ) -> RingTrace | None:
-    """Find and fit the laser ring in ``image`` (H, W), grey levels; None when there is none.
+    """Find and fit the laser ring in ``image`` (H, W), grey levels; None when no sample of one is valid.
 
     With the ring of the image ``before``, a band about it is searched first; when most of the ring is not in
     there, or without it, the whole image is. ``clip_level``: grey level at which the line clips.
     """
     trace = None if before is None else follow_ring(image, sectors, before)
-    return discover_ring(image, sectors, clip_level) if trace is None else trace
+    found = discover_ring(image, sectors, clip_level) if trace is None else trace
+    return found if found is not None and found.coverage > 0 else None
 
 
 def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace | None:
