@@ -12,6 +12,7 @@ from functools import partial
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from pipeline.stage import Progress
 from stages.accumulate.samples import WallSamples
@@ -20,6 +21,7 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 _BLOCK = 64
 _WIDTH_IN_RINGS = 0.4
+_FINE_CELLS = (9, 9)
 _SEEN_SHARE = 0.1
 
 
@@ -104,7 +106,8 @@ def gridded(
         _map_of(columns.every_other(first), grid, 2 * width, 2 * largest_gap_mm, _no_progress)[:2]
         for first in (0, 1)
     ]
-    return radius, sigma * _excess(halves), count, misalignment
+    sigma = sigma * _excess(halves)
+    return radius, sigma * _roughness(radius, sigma), count, misalignment
 
 
 def _map_of(
@@ -128,6 +131,19 @@ def _excess(halves: list[tuple[Float32, Float32]]) -> np.float32:
     """Return by how much two independent maps differ more than their σ says; at least 1."""
     (a, sigma_a), (b, sigma_b) = halves
     ratio = np.abs(a - b) / np.hypot(sigma_a, sigma_b)
+    ratio = ratio[np.isfinite(ratio)]
+    return np.float32(max(1.0, 1.4826 * np.median(ratio))) if ratio.size else np.float32(1)
+
+
+def _roughness(radius: Float32, sigma: Float32) -> np.float32:
+    """Return by how much the map is rougher from cell to cell than its σ says; at least 1.
+
+    Reflectance under the line displaces neighbouring rings alike, which no comparison of rings shows; what is
+    finer than a few cells cannot be told from it and counts as noise.
+    """
+    filled = np.where(np.isfinite(radius), radius, np.nanmedian(radius))
+    fine = radius - median_filter(filled, size=_FINE_CELLS, mode="nearest")
+    ratio = np.abs(fine) / sigma
     ratio = ratio[np.isfinite(ratio)]
     return np.float32(max(1.0, 1.4826 * np.median(ratio))) if ratio.size else np.float32(1)
 
