@@ -52,10 +52,12 @@ class ModelChoice(StrEnum):
 
 
 class BoardShape(StrEnum):
-    """Whether the board is taken for flat or its sag is estimated."""
+    """What the board is taken for."""
 
+    BEST = "best"
     FLAT = "flat"
     BENT = "bent"
+    SURVEYED = "surveyed"
 
 
 def calibrate_camera(
@@ -74,8 +76,11 @@ def calibrate_camera(
         ModelChoice, typer.Option(help="camera model; best: the one that predicts held-out pictures best")
     ] = ModelChoice.BEST,
     board_shape: Annotated[
-        BoardShape, typer.Option(help="take the board for flat, or estimate its sag")
-    ] = BoardShape.BENT,
+        BoardShape,
+        typer.Option(
+            help="take the board for flat, estimate its sag, or where each corner is; best: the better"
+        ),
+    ] = BoardShape.BEST,
     folds: Annotated[int, typer.Option(min=2, max=50, help="parts for held-out reprojection")] = 5,
     compare: Annotated[
         Path | None, typer.Option(help="camera file of any known format to compare the result with")

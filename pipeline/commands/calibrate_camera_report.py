@@ -50,7 +50,7 @@ def report_document(report: CalibrationReport, compared_file: str) -> dict[str, 
         "mean_distance_px": float(np.hypot(*fitted.residual_px.T).mean()),
         "corner_sigma_px": fitted.sigma_px,
         "corners": len(fitted.uv),
-        "board_sag_mm": dict(zip(("xx", "xy", "yy"), map(float, fitted.shape_mm), strict=True)),
+        "board": _board(report),
         "views": [
             {"name": n, "rms_px": float(r)} for n, r in zip(fitted.names, fitted.view_rms_px, strict=True)
         ],
@@ -75,6 +75,19 @@ def report_page(report: CalibrationReport, document: dict[str, Any]) -> str:
     environment = Environment(undefined=StrictUndefined, autoescape=True)
     encoded = {name: base64.b64encode(data).decode("ascii") for name, data in pictures.items()}
     return environment.from_string(template).render(d=document, pictures=encoded)
+
+
+def _board(report: CalibrationReport) -> dict[str, Any]:
+    """Return the board's shape, and by how much its corners leave their nominal places."""
+    sag, survey = report.calibration.shape_mm, report.survey
+    largest = float(np.abs(sag).max() if survey is None else np.linalg.norm(survey.offset_mm, axis=1).max())
+    return {
+        "shape": report.board_shape,
+        "largest_offset_mm": largest,
+        "sag_mm": dict(zip(("xx", "xy", "yy"), map(float, sag), strict=True)),
+        "nominal_mm": [] if survey is None else survey.nominal_mm.tolist(),
+        "offset_mm": [] if survey is None else survey.offset_mm.tolist(),
+    }
 
 
 def _score(score: ModelScore) -> dict[str, Any]:

@@ -20,7 +20,8 @@ from tests.board_scene import chessboard_picture, facing_pose, render
 
 CAMERA = KannalaBrandt((640, 480), (184.0, 183.6), (318.6, 240.9), (-0.0118, 0.0008, -0.0008, 0.0001))
 PX_PER_MM = 4.0
-CHESSBOARD = ["--columns", "8", "--rows", "6", "--square-mm", "20"]
+SQUARES = ["--columns", "8", "--rows", "6", "--square-mm", "20"]
+CHESSBOARD = [*SQUARES, "--board-shape", "flat", "--folds", "3"]
 POSES = [
     ([0.0, 0.0, 1.0], 100.0, [0.3, 0.1, 0.0]),
     ([0.3, 0.1, 1.0], 120.0, [-0.3, 0.3, 0.2]),
@@ -100,8 +101,10 @@ def test_pictures_without_a_board_are_named(pictures, tmp_path):
 
 
 def test_all_models_are_compared(pictures, tmp_path):
-    run(pictures, *CHESSBOARD, "-o", tmp_path)
+    run(pictures, *SQUARES, "-o", tmp_path)
     document = json.loads((tmp_path / "calibration.json").read_text())
+    assert document["board"]["shape"] in ("bent", "surveyed")
+    assert document["board"]["largest_offset_mm"] < 0.3
     assert {m["model"] for m in document["models"]} == {
         "kannala_brandt", "scaramuzza", "unified", "equidistant", "pinhole",
     }  # fmt: skip

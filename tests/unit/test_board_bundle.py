@@ -22,7 +22,7 @@ from stages.calibrate.boards.start import start
 from tests.board_scene import varied_poses, views_of
 from tests.unit.camera_samples import CAMERAS, KANNALA_BRANDT
 
-PARAMETERS = BoardCalibrationParameters()
+PARAMETERS = BoardCalibrationParameters(board_shape="bent")
 FLAT_BOARD = BoardCalibrationParameters(board_shape="flat")
 SMALL_FISHEYE = KannalaBrandt((640, 480), (146.0, 145.6), (318.9, 236.8), (-0.0118, 0.0008, -0.0008, 0.0001))
 
@@ -108,15 +108,15 @@ def test_scaramuzza_follows_another_model_and_keeps_its_idle_parameter():
 
 
 def test_intervals_hold_over_many_noisy_sets():
-    """Squared errors over their covariance average the number of parameters (chi-square, 40 sets)."""
+    """Squared errors over their covariance average the number of parameters (chi-square, 30 sets)."""
     squares = []
-    for seed in range(40):
+    for seed in range(30):
         views = _setup(SMALL_FISHEYE, seed=seed, count=12, widest_rad=1.2)
         found = adjust(views, start(views, SMALL_FISHEYE.image_size), "kannala_brandt", FLAT_BOARD)
         error = found.camera.parameters - SMALL_FISHEYE.parameters
         squares.append(error @ np.linalg.solve(found.covariance, error))
-    # σ of the mean of 40 chi-squares of 8 is 0.63; the covariance is never scaled down, hence the lower side
-    assert 4.5 < np.mean(squares) < 8 + 3 * 0.63
+    # σ of the mean of 30 chi-squares of 8 is 0.73; the covariance is never scaled down, hence the lower side
+    assert 4.5 < np.mean(squares) < 8 + 3 * 0.73
 
 
 def test_covariance_grows_when_the_corners_of_a_picture_err_together():

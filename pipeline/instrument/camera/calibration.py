@@ -26,11 +26,15 @@ class BoardView:
         The corners on the board, mm, in the board's frame B.
     uv : (N, 2)
         The same corners in the image.
+    numbered : bool
+        Whether it is known which corners of the board these are, as on ChArUco boards; otherwise they are
+        known up to a shift on the board and half a turn.
     """
 
     name: str
     xyz_b: Float
     uv: Float
+    numbered: bool = True
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,14 @@ class DisplacementMap:
 
 
 @dataclass(frozen=True)
+class BoardSurvey:
+    """A board as measured: nominal corners (N, 3) and their offsets (N, 3), mm in B."""
+
+    nominal_mm: Float
+    offset_mm: Float
+
+
+@dataclass(frozen=True)
 class CalibrationReport:
     """Everything a camera calibration found.
 
@@ -153,6 +165,10 @@ class CalibrationReport:
         The camera compared with: a given one, or the next best model's.
     displacement
         From the calibration to that camera.
+    board_shape : str
+        What the board was taken for: flat, bent or surveyed.
+    survey
+        The board's corners, when they were measured.
     """
 
     calibration: CameraCalibration
@@ -161,6 +177,8 @@ class CalibrationReport:
     rejected: tuple[tuple[str, str], ...]
     compared_with: Camera | None = None
     displacement: DisplacementMap | None = None
+    board_shape: str = "flat"
+    survey: BoardSurvey | None = None
 
     def with_rejected(self, rejected: Sequence[tuple[str, str]]) -> CalibrationReport:
         """Return the report with further images that were not used."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport, ModelScore
@@ -18,6 +20,7 @@ from stages.calibrate.boards.compare import (
 )
 from stages.calibrate.boards.fit import NAME, adjust, refuse_one_plane, refuse_too_few
 from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
+from stages.calibrate.boards.parts import Part, deal
 from stages.calibrate.boards.start import start
 
 
@@ -51,10 +54,11 @@ def calibrate_boards(
     refuse_too_few(views, parameters)
     first = start(views, image_size)
     refuse_one_plane(views, first, parameters)
-    trial = adjust(views, first, "kannala_brandt", parameters)
+    trial = adjust(views, first, "kannala_brandt", with_shape(parameters, "bent"))
     used, first, outliers = without_outlier_views(views, first, trial, parameters.outlier_view_factor)
     refuse_too_few(used, parameters)
-    scores = _scores(used, first, models, parameters, context)
+    parameters, whole, parts = board_as_it_is(used, first, parameters)
+    scores = _scores(whole, parts, models, parameters, context)
     ranking = ranked(scores)
     if not ranking:
         raise _no_model(scores)
@@ -67,19 +71,44 @@ def calibrate_boards(
         tuple((name, "its corners fit no camera that fits the other images") for name in outliers),
         other,
         None if other is None else displacement_map(chosen.camera, other),
+        parameters.board_shape,
+        whole.survey,
     )
 
 
+def board_as_it_is(
+    views: Sequence[BoardView], first: Estimate, parameters: BoardCalibrationParameters
+) -> tuple[BoardCalibrationParameters, Part, tuple[Part, ...]]:
+    """Return parameters with a definite board shape, and the views dealt out accordingly.
+
+    Where the shape is left open, the one with which Kannala-Brandt predicts held-out views best is taken.
+    """
+    if parameters.board_shape != "best":
+        return parameters, *deal(views, first, parameters)
+    tried = []
+    for shape in ("bent", "surveyed"):
+        definite = with_shape(parameters, shape)
+        whole, parts = deal(views, first, definite)
+        held_out = score(whole, parts, "kannala_brandt", definite).held_out_rms_px
+        tried.append((np.nan_to_num(held_out, nan=np.inf), definite, whole, parts))
+    return min(tried, key=lambda t: float(t[0]))[1:]
+
+
+def with_shape(parameters: BoardCalibrationParameters, shape: str) -> BoardCalibrationParameters:
+    """Return the parameters with another board shape."""
+    return BoardCalibrationParameters.model_validate(parameters.model_dump() | {"board_shape": shape})
+
+
 def _scores(
-    views: Sequence[BoardView],
-    first: Estimate,
+    whole: Part,
+    parts: Sequence[Part],
     models: Sequence[ModelName],
     parameters: BoardCalibrationParameters,
     context: Context,
 ) -> tuple[ModelScore, ...]:
     scores = []
     for done, model in enumerate(models, start=1):
-        scores.append(score(views, first, model, parameters))
+        scores.append(score(whole, parts, model, parameters))
         context.progress(done, len(models))
     return tuple(scores)
 

@@ -22,6 +22,7 @@ from pipeline.instrument.camera.calibration import (
 from stages.calibrate.boards.bundle import Estimate
 from stages.calibrate.boards.fit import fit, held_out_residuals
 from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
+from stages.calibrate.boards.parts import Part
 
 Float = NDArray[np.float64]
 _GRID_COLUMNS = 41
@@ -29,22 +30,24 @@ _TURNING_STEPS = 20
 
 
 def score(
-    views: Sequence[BoardView], first: Estimate, model: ModelName, parameters: BoardCalibrationParameters
+    whole: Part, parts: Sequence[Part], model: ModelName, parameters: BoardCalibrationParameters
 ) -> ModelScore:
     """Return how well a model fits, and how well it predicts views that it was not fitted to.
 
-    The views are dealt out to ``parameters.folds`` parts by turns; each part is held out once.
+    ``parameters.board_shape`` must be a definite one, the one that the parts were dealt with.
     """
     try:
-        whole = fit(views, first, model, parameters)
-        parts = [_held_out(views, first, model, parameters, part) for part in _parts(len(views), parameters)]
+        fitted = fit(whole.inside, whole.first, model, parameters)
+        residuals = [_held_out(part, model, parameters) for part in parts]
     except UnusableError as error:
         return ModelScore(model, None, 0, np.nan, np.nan, error.problem)
-    held_out = np.concatenate([residual for part in parts for residual in part])
+    held_out = np.concatenate(residuals)
     if np.isnan(held_out).any():
-        return ModelScore(model, whole, 0, whole.rms_px, np.nan, "fails to reach corners that were held out")
-    free = int(np.count_nonzero(np.diag(whole.covariance)))
-    return ModelScore(model, whole, free, whole.rms_px, rms(held_out), "")
+        return ModelScore(
+            model, fitted, 0, fitted.rms_px, np.nan, "fails to reach corners that were held out"
+        )
+    free = int(np.count_nonzero(np.diag(fitted.covariance)))
+    return ModelScore(model, fitted, free, fitted.rms_px, rms(held_out), "")
 
 
 def ranked(scores: Sequence[ModelScore]) -> list[CameraCalibration]:
@@ -105,22 +108,9 @@ def without_outlier_views(
     return remaining, replace(first, T_cb=first.T_cb[kept]), names
 
 
-def _parts(count: int, parameters: BoardCalibrationParameters) -> list[NDArray[np.bool_]]:
-    folds = min(parameters.folds, count)
-    return [np.arange(count) % folds == part for part in range(folds)]
-
-
-def _held_out(
-    views: Sequence[BoardView],
-    first: Estimate,
-    model: ModelName,
-    parameters: BoardCalibrationParameters,
-    out: NDArray[np.bool_],
-) -> list[Float]:
-    inside = [view for view, left in zip(views, out, strict=True) if not left]
-    outside = [view for view, left in zip(views, out, strict=True) if left]
-    fitted = fit(inside, replace(first, T_cb=first.T_cb[~out]), model, parameters)
-    return held_out_residuals(fitted, outside, parameters.huber_px)
+def _held_out(part: Part, model: ModelName, parameters: BoardCalibrationParameters) -> Float:
+    fitted = fit(part.inside, part.first, model, parameters)
+    return np.concatenate(held_out_residuals(fitted, part.outside, parameters.huber_px))
 
 
 def _grid_rays(camera: Camera) -> tuple[Float, Float, NDArray[np.bool_]]:

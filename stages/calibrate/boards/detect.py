@@ -66,7 +66,8 @@ def _part_of_chessboard(image: Image, board: Chessboard, name: str) -> BoardView
 
 
 def _view(picture: Image, size: tuple[int, int], board: Chessboard, name: str, uv: Float) -> BoardView:
-    return BoardView(name, grid(*size, board.square_mm), _refined(picture, uv, _WINDOW_SHARE))
+    xyz_b = grid(*size, board.square_mm)
+    return BoardView(name, xyz_b, _refined(picture, uv, _WINDOW_SHARE), numbered=False)
 
 
 def _grey(image: Image) -> Image:

@@ -18,8 +18,13 @@ class BoardCalibrationParameters(Parameters):
     huber_px: float = Field(
         default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
     )
-    board_shape: Literal["flat", "bent"] = Field(
-        default="bent", description="whether the board's flatness is taken for granted or its sag estimated"
+    board_shape: Literal["flat", "bent", "surveyed", "best"] = Field(
+        default="best",
+        description="board taken for flat, its sag estimated, every corner estimated, or whichever of the "
+        "latter two predicts held-out views best",
+    )
+    survey_sigma_mm: float = Field(
+        default=0.3, gt=0, le=10, description="1 σ of a corner's offset from its nominal place, mm"
     )
     polynomial_degree: int = Field(
         default=7, ge=3, le=12, description="degree of Scaramuzza's polynomial; OCamCalib's own default is 4"
