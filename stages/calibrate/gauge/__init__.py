@@ -1,0 +1,1 @@
+"""Calibration of camera and laser sheet together from one run through a gauge."""

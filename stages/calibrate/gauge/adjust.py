@@ -1,0 +1,142 @@
+"""The joint adjustment: poses, camera, sheet, bores, fiducials and encoder from all measurements together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.calibrate.gauge.edges import Edges
+from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.calibrate.gauge.rings import BoreRings
+from stages.calibrate.gauge.state import Unknowns
+from stages.calibrate.gauge.terms import (
+    Equations,
+    edge_equations,
+    encoder_equations,
+    prior_rows,
+    ring_equations,
+    slip_origin,
+)
+from stages.motion.bordered import BorderedSystem, Factor
+from stages.calibrate.gauge.smooth import smooth_rows
+
+Float = NDArray[np.float64]
+_CONVERGED_SIGMA = 0.02
+# Frames that third differences of the motion tie together.
+_REACH = 3
+_CAUCHY = 2.5
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """All that the adjustment is fed with.
+
+    Attributes
+    ----------
+    edges : Edges
+    rings : BoreRings
+    time_s : (N,)
+    encoder : ((M,), (M,)) or None
+        Time and distance.
+    bore_sigma_mm : float
+        1 σ of each bore's radius.
+    smooth_sigma : (6,)
+        1 σ of the pose's third difference from frame to frame, mm and rad.
+    """
+
+    edges: Edges
+    rings: BoreRings
+    time_s: Float
+    encoder: tuple[Float, Float] | None
+    bore_sigma_mm: float
+    smooth_sigma: Float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """State at the optimum, the factorised equations there, and the measurements' residuals."""
+
+    state: Unknowns
+    factor: Factor
+    edges: Equations
+    rings: Equations
+
+    def cost(self, edge_spread: float, ring_spread: float) -> float:
+        """Return the robust sum of squares of the measurements in units of given spreads."""
+        total = 0.0
+        for equations, spread in ((self.edges, edge_spread), (self.rings, ring_spread)):
+            total += float(np.sum(_CAUCHY**2 * np.log1p((equations.in_sigma / spread / _CAUCHY) ** 2)))
+        return total
+
+
+def adjust(state: Unknowns, measured: Measurements, parameters: GaugeParameters) -> Solution:
+    """Minimise all residuals together by Gauss-Newton with Cauchy weights.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When something is not determined.
+    """
+    for _ in range(parameters.iterations):
+        solution = _linearised(state, measured, parameters)
+        frames, border = solution.factor.step()
+        state = state.step(frames, border)
+        at = state.layout.instrument
+        sigma = np.sqrt(np.diag(solution.factor.border_covariance())[at])
+        if np.abs(border[at] / sigma).max() < _CONVERGED_SIGMA:
+            break
+    return _linearised(state, measured, parameters)
+
+
+def _linearised(state: Unknowns, measured: Measurements, parameters: GaugeParameters) -> Solution:
+    edges, rings = edge_equations(state, measured.edges), ring_equations(state, measured.rings)
+    system = BorderedSystem(len(state.T_pc), state.border_size, _REACH)
+    system.add(edges.rows)
+    system.add(rings.rows)
+    system.add(smooth_rows(state, measured.time_s, measured.smooth_sigma))
+    system.add(slip_origin(state, measured.encoder is not None))
+    if measured.encoder is not None:
+        for rows in encoder_equations(state, measured.time_s, measured.encoder, parameters):
+            system.add(rows)
+    system.add(prior_rows(state, measured.bore_sigma_mm, parameters))
+    return Solution(state, system.factor(), edges, rings)
+
+
+def spread(equations: Equations) -> float:
+    """Return the robust spread of residuals in σ."""
+    used = equations.in_sigma[equations.rows.weight > 0]
+    return float(1.4826 * np.median(np.abs(used))) if len(used) else 1.0
+
+
+def instrument_covariance(solution: Solution) -> Float:
+    """Return (Q, Q), true also where neighbours err alike.
+
+    The variance of each correction is widened to that of the scores summed over cells of wall and edges of
+    fiducials (cluster-robust; H. White, "Asymptotic theory for econometricians", 1984, ch. 6), never
+    narrowed; correlations stay those of the equations.
+    """
+    at = solution.state.layout.instrument
+    covariance = solution.factor.border_covariance()
+    scores = np.zeros_like(covariance)
+    for equations in (solution.edges, solution.rings):
+        scores += _cluster_scores(equations, solution.factor)
+    robust = covariance @ scores @ covariance
+    ratio = np.sqrt(np.diag(robust)[at] / np.diag(covariance)[at])
+    widened = np.maximum(ratio, 1.0)
+    return np.asarray(covariance[at, at] * np.outer(widened, widened))
+
+
+def _cluster_scores(equations: Equations, factor: Factor) -> Float:
+    """Return Σ s sᵀ over clusters of the border's score s, the frames having been eliminated."""
+    rows = equations.rows
+    block = rows.by_frame.shape[2]
+    pose = factor.solved_border.reshape(-1, block, factor.solved_border.shape[1])[rows.frame[:, 0]]
+    own = rows.by_border - np.einsum("mi,mib->mb", rows.by_frame[:, 0], pose)
+    own *= (rows.weight * rows.residual)[:, None]
+    place = np.unique(equations.cluster, return_inverse=True)[1]
+    total = np.zeros((int(place.max(initial=-1)) + 1, own.shape[1]))
+    np.add.at(total, place, own)
+    count = max(len(total), 2)
+    return np.asarray(total.T @ total * count / (count - 1))

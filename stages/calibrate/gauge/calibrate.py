@@ -1,0 +1,115 @@
+"""A gauge run -> camera, laser sheet and poses, with what they are worth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from pipeline.artefacts import RingSamples
+from pipeline.errors import UnusableError
+from pipeline.geometry.rigid import transform
+from pipeline.instrument.probe import Probe
+from pipeline.recording.base import Illumination, Recording
+from pipeline.stage import Context
+from stages.calibrate.gauge import premises
+from stages.calibrate.gauge.adjust import Measurements
+from stages.calibrate.gauge.detect import Sighting, find_fiducials
+from stages.calibrate.gauge.edges import Edges, joined, measure_edges
+from stages.calibrate.gauge.geometry import Gauge
+from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.calibrate.gauge.poses import PosedFrames, frame_index, posed_frames, poses_of_all_frames
+from stages.calibrate.gauge.result import GaugeCalibration, calibration_of
+from stages.calibrate.gauge.rings import bore_rings
+from stages.calibrate.gauge.smooth import LOOSE
+from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
+from stages.calibrate.gauge.start import first_pose
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+def calibrate_gauge(
+    recording: Recording, rings: RingSamples, probe: Probe, parameters: GaugeParameters, context: Context
+) -> GaugeCalibration:
+    """Estimate camera, laser sheet, poses and encoder jointly from fiducials and rings on known bore.
+
+    Raises
+    ------
+    InputError
+        When the recording describes no gauge.
+    UnusableError
+        When fiducials or rings contradict the gauge's description, or cannot determine the instrument.
+    """
+    gauge = premises.require_gauge(recording)
+    sightings = _sightings(recording, gauge)
+    premises.require_fiducials(recording, gauge, sightings, parameters)
+    first = [first_pose(s, gauge, probe.camera, context.random) for s in sightings]
+    posed = posed_frames(recording, sightings, first)
+    premises.require_poses(posed, sightings, gauge, probe.camera, parameters)
+    wrong = premises.outvoted_fiducials(posed, gauge)
+    T_pc = poses_of_all_frames(recording, posed, rings, probe)
+    premises.require_offset(T_pc, parameters)
+    source = RingSource(rings, frame_index(recording, rings.frame), gauge)
+    _require_bores(source, T_pc, probe, parameters)
+    edges = _edges(recording, posed, wrong, gauge, probe, parameters)
+    encoder = recording.encoder and (recording.encoder.time_s, recording.encoder.distance_mm)
+    on_bore = bore_rings(rings, source.index, T_pc, probe, gauge, parameters)
+    measured = Measurements(edges, on_bore, recording.frames.time_s, encoder, gauge.radius_sigma_mm, LOOSE)
+    start = first_unknowns(T_pc, posed.index, gauge, measured, probe, parameters)
+    try:
+        # More threads gain nothing on blocks this small, and stall when the machine is busy.
+        with threadpool_limits(1):
+            finding = solve(start, measured, source, posed.index, parameters)
+    except np.linalg.LinAlgError as error:
+        raise UnusableError("calibrate", f"the run does not determine the instrument ({error})") from error
+    numbers = np.union1d(gauge.ids[wrong], gauge.ids[finding.wrong_fiducials])
+    finding = replace(
+        finding, wrong_fiducials=numbers, wrong_rings=recording.frames.frame[finding.wrong_rings]
+    )
+    result = calibration_of(recording.name, recording.frames.frame, gauge, finding)
+    _require_determined(result, parameters)
+    return result
+
+
+def _sightings(recording: Recording, gauge: Gauge) -> list[Sighting]:
+    lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
+    return [sighting for sighting, _ in find_fiducials(recording.read(lit, "grey"), gauge)]
+
+
+def _edges(
+    recording: Recording,
+    posed: PosedFrames,
+    wrong: Int,
+    gauge: Gauge,
+    probe: Probe,
+    parameters: GaugeParameters,
+) -> Edges:
+    """Measure the borders of the fiducials that fit, in all posed frames."""
+    parts = []
+    images = recording.read(recording.frames.frame[posed.index], "grey")
+    for k, (_, image) in enumerate(images):
+        if image is None:
+            continue
+        sighting, pose = posed.sightings[k], posed.poses[k]
+        marker = sighting.marker[pose.fits & ~np.isin(sighting.marker, wrong)]
+        index = int(posed.index[k])
+        parts.append(measure_edges(image, index, marker, pose.T_pc, probe.camera, gauge, parameters))
+    return joined(parts)
+
+
+def _require_bores(source: RingSource, T_pc: Float, probe: Probe, parameters: GaugeParameters) -> None:
+    """Refuse rings that are too few, or of another bore than stated; no fiducial hides a whole bore."""
+    rings = source.on_bore(T_pc, probe, parameters)
+    premises.require_rings(len(np.unique(rings.frame)), parameters)
+    xyz_p = transform(T_pc[rings.frame], probe.triangulate(rings.uv))
+    error = np.hypot(xyz_p[:, 0], xyz_p[:, 1]) - rings.radius_mm
+    premises.require_bores(source.gauge, rings.section, error)
+
+
+def _require_determined(result: GaugeCalibration, parameters: GaugeParameters) -> None:
+    widest = max(result.radii, key=lambda r: r.radius_mm)
+    names = " with ".join(result.weak[0].change)
+    premises.require_determined(float(widest.sigma_mm.max()), names, parameters)

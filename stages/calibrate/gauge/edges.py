@@ -1,0 +1,183 @@
+"""Edges of fiducials to sub-pixel accuracy: offsets across the borders that camera and pose predict.
+
+A corner refined on its own is drawn toward the image centre where the marker is seen foreshortened; a straight
+stretch of edge is not, because blur is alike on both of its sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erf
+
+from pipeline.geometry.rigid import inverse, transform
+from pipeline.instrument.camera.base import Camera
+from pipeline.recording.base import Image
+from stages.calibrate.gauge.geometry import Gauge
+from stages.calibrate.gauge.parameters import GaugeParameters
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_PROFILE = 21
+_SIDES = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+_SPAN = 0.7
+_LEAST_STEP_GREY = 8.0
+_LEAST_SIGMA_PX = 0.03
+# Markers are drawn in cells; the outermost is black all round.
+_BORDER_CELLS = 2
+_SMALL = 1e-3
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Measured points of fiducial borders.
+
+    Attributes
+    ----------
+    frame, marker, side : (M,) int
+        Index of the frame in the recording, place of the fiducial in the gauge's list, edge 0 to 3.
+    xyz_p, outward_p : (M, 3)
+        Point of the border on the wall, and unit direction along the wall out of the fiducial, in P.
+    uv : (M, 2)
+        Where it was measured; only its place along ``normal`` counts.
+    normal : (M, 2)
+        Across the edge in the image, out of the fiducial.
+    outward_mm : (M,)
+        Wall length of one pixel along the normal.
+    sigma_px : (M,)
+    """
+
+    frame: Int
+    marker: Int
+    side: Int
+    xyz_p: Float
+    outward_p: Float
+    uv: Float
+    normal: Float
+    outward_mm: Float
+    sigma_px: Float
+
+    def select(self, keep: NDArray[np.bool_]) -> Edges:
+        """Return the edges where ``keep`` (M,) is true."""
+        return Edges(**{k: v[keep] for k, v in vars(self).items()})
+
+
+def joined(parts: list[Edges]) -> Edges:
+    """Return all parts as one."""
+    return Edges(**{k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])})
+
+
+def measure_edges(
+    image: Image,
+    index: int,
+    marker: Int,
+    T_pc: Float,
+    camera: Camera,
+    gauge: Gauge,
+    parameters: GaugeParameters,
+) -> Edges:
+    """Measure the borders of fiducials (M,) in an image of the frame ``index``, near where they should be."""
+    predicted, border_px, half = _predicted(index, marker, T_pc, camera, gauge, parameters)
+    keep = (border_px >= parameters.least_border_px) & _inside(predicted.uv, image.shape, half)
+    predicted, half = predicted.select(keep), half[keep]
+    if not len(predicted.uv):
+        return predicted
+    t = half[:, None] * np.linspace(-1, 1, _PROFILE)
+    at = predicted.uv[:, None] + t[..., None] * predicted.normal[:, None]
+    grey = cv2.remap(
+        image, at[..., 0].astype(np.float32), at[..., 1].astype(np.float32), cv2.INTER_CUBIC
+    ).astype(float)
+    offset, sigma = fit_steps(t, grey)
+    uv = predicted.uv + offset[:, None] * predicted.normal
+    measured = Edges(**(vars(predicted) | {"uv": uv, "sigma_px": sigma}))
+    return measured.select(np.isfinite(offset))
+
+
+def fit_steps(t: Float, grey: Float) -> tuple[Float, Float]:
+    """Return place and 1 σ (M,) of blurred steps in profiles (M, K) at ``t`` (M, K); NaN where none is clear.
+
+    Model: (a + b Φ((t - δ) / w)) (1 + s t), dark before bright; s is the slope of the light.
+    """
+    half = t[:, -1]
+    third = t.shape[1] // 3
+    low, high = grey[:, :third].mean(1), grey[:, -third:].mean(1)
+    p = np.stack([low, high - low, 0 * low, 0 * low, np.full(len(t), 0.9)], -1)
+    for _ in range(12):
+        residual, jacobian = _step_model(p, t, grey)
+        normal = np.einsum("mki,mkj->mij", jacobian, jacobian)
+        normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(5) / 5
+        step = np.linalg.solve(normal, -np.einsum("mki,mk->mi", jacobian, residual)[..., None])[..., 0]
+        step[:, 3] = np.clip(step[:, 3], -0.5, 0.5)
+        step[:, 4] = np.clip(step[:, 4], -0.3, 0.3)
+        p = p + step
+        p[:, 4] = np.clip(p[:, 4], 0.25, 3.0)
+        p[:, 3] = np.clip(p[:, 3], -half, half)
+    residual, jacobian = _step_model(p, t, grey)
+    noise = np.sqrt(np.mean(residual**2, 1) * t.shape[1] / (t.shape[1] - 5))
+    normal = np.einsum("mki,mkj->mij", jacobian, jacobian)
+    normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(5)
+    sigma = noise * np.sqrt(np.linalg.inv(normal)[:, 3, 3])
+    clear = (p[:, 1] > _LEAST_STEP_GREY) & (np.abs(p[:, 3]) < 0.6 * half) & (noise < 0.12 * p[:, 1])
+    clear &= (p[:, 4] > 0.3) & (p[:, 4] < 2.5) & np.isfinite(sigma)
+    return np.where(clear, p[:, 3], np.nan), np.hypot(np.where(clear, sigma, np.nan), _LEAST_SIGMA_PX)
+
+
+def _step_model(p: Float, t: Float, grey: Float) -> tuple[Float, Float]:
+    a, b, s, d, w = (x[:, None] for x in p.T)
+    x = (t - d) / w
+    phi, density = 0.5 * (1 + erf(x / np.sqrt(2))), np.exp(-0.5 * x * x) / np.sqrt(2 * np.pi)
+    light = 1 + s * t
+    value = (a + b * phi) * light
+    by = [light, phi * light, (a + b * phi) * t, -b * density / w * light, -b * density * x / w * light]
+    return value - grey, np.stack(by, -1)
+
+
+def _predicted(
+    index: int, marker: Int, T_pc: Float, camera: Camera, gauge: Gauge, parameters: GaugeParameters
+) -> tuple[Edges, Float, Float]:
+    """Return border points as predicted, the width of the border there and the half profile length, px."""
+    along = np.linspace(-_SPAN, _SPAN, parameters.edge_samples)
+    m, side, k = (x.ravel() for x in np.meshgrid(marker, np.arange(4), np.arange(len(along)), indexing="ij"))
+    outward = _SIDES[side]
+    tangent = np.stack([-outward[:, 1], outward[:, 0]], -1)
+    local = outward + along[k][:, None] * tangent
+    T_cp = inverse(T_pc)
+    points = [gauge.on_marker(m, x) for x in (local, local + _SMALL * tangent, local + _SMALL * outward)]
+    uv, uv_along, uv_out = (camera.project(transform(T_cp, x)).uv for x in points)
+    direction = uv_along - uv
+    length = np.linalg.norm(direction, axis=1)
+    normal = np.stack([direction[:, 1], -direction[:, 0]], -1) / np.maximum(length, 1e-12)[:, None]
+    across = np.einsum("mi,mi->m", uv_out - uv, normal)
+    normal, across = normal * np.sign(across)[:, None], np.abs(across)
+    px_per_mm = across / _SMALL / (gauge.fiducials.size_mm / 2)
+    border_px = px_per_mm * gauge.fiducials.size_mm / _cells(gauge)
+    half = np.minimum(parameters.edge_half_px, 0.85 * border_px)
+    outward_p = points[2] - points[0]
+    outward_p /= np.linalg.norm(outward_p, axis=1)[:, None]
+    edges = Edges(
+        np.full(len(m), index),
+        m,
+        side,
+        points[0],
+        outward_p,
+        uv,
+        normal,
+        1 / np.maximum(px_per_mm, 1e-9),
+        0 * across,
+    )
+    return edges, border_px, half
+
+
+def _cells(gauge: Gauge) -> int:
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, gauge.fiducials.dictionary))
+    return int(dictionary.markerSize) + _BORDER_CELLS
+
+
+def _inside(uv: Float, shape: tuple[int, ...], margin: Float) -> NDArray[np.bool_]:
+    size = np.array([shape[1], shape[0]])
+    with np.errstate(invalid="ignore"):
+        inside = (uv > margin[:, None] + 2) & (uv < size - 3 - margin[:, None])
+    return np.asarray(inside.all(1))

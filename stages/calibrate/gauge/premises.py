@@ -1,0 +1,183 @@
+"""What a gauge run must fulfil before and after the adjustment; each refusal says what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import InputError, UnusableError
+from pipeline.geometry.rigid import inverse, transform
+from pipeline.instrument.camera.base import Camera
+from pipeline.recording.base import Illumination, Recording
+from stages.calibrate.gauge.detect import Sighting, detect, detector
+from stages.calibrate.gauge.geometry import Gauge, gauge_of
+from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.calibrate.gauge.poses import PosedFrames
+from stages.calibrate.gauge.start import disagreeing
+
+Float = NDArray[np.float64]
+STAGE = "calibrate"
+_LOOKED_AT = 6
+_SIZE_TOLERANCE = 0.05
+_WRONG_BORE_MM = 4.0
+_WRONG_SHARE = 0.2
+_OTHERS = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
+
+
+def require_gauge(recording: Recording) -> Gauge:
+    """Return the gauge; refuse a recording that describes none."""
+    facts = recording.pipe
+    if not facts.bore or facts.fiducials is None or not facts.fiducials.markers:
+        missing = "bore" if not facts.bore else "fiducials"
+        raise InputError(
+            recording.path, f"describes no {missing}: it is not a gauge run", place="pipe",
+            hint="give the gauge's bore and fiducials in recording.yaml, or name the gauge's recording",
+        )  # fmt: skip
+    if not hasattr(cv2.aruco, facts.fiducials.dictionary):
+        raise InputError(
+            recording.path, f"names a dictionary {facts.fiducials.dictionary!r} that OpenCV does not have",
+            place="pipe.fiducials.dictionary", expected="such as DICT_4X4_100",
+        )  # fmt: skip
+    numbers = [m.id for m in facts.fiducials.markers]
+    twice = sorted({n for n in numbers if numbers.count(n) > 1})
+    if twice:
+        raise InputError(recording.path, f"lists fiducial {twice[0]} twice", place="pipe.fiducials.markers")
+    return gauge_of(facts, facts.fiducials)
+
+
+def require_fiducials(
+    recording: Recording, gauge: Gauge, sightings: Sequence[Sighting], parameters: GaugeParameters
+) -> None:
+    """Refuse a run in which too few lit frames show fiducials, naming the likely cause."""
+    seen = [s for s in sightings if len(s.marker) >= 3]
+    if len(seen) >= parameters.least_posed_frames:
+        return
+    strangers = sorted({int(n) for s in sightings for n in s.strangers})
+    problem = (
+        f"three or more of the gauge's fiducials are seen in only {len(seen)} of {len(sightings)} lit frames"
+    )
+    raise UnusableError(
+        STAGE, problem + _likely_cause(recording, gauge, strangers),
+        limit=f"{parameters.least_posed_frames} frames",
+        hint="record a longer run with the wall lit, or correct the fiducials in recording.yaml",
+    )  # fmt: skip
+
+
+def require_poses(
+    posed: PosedFrames,
+    sightings: Sequence[Sighting],
+    gauge: Gauge,
+    camera: Camera,
+    parameters: GaugeParameters,
+) -> None:
+    """Refuse fiducials that lie elsewhere than stated, or are of another size."""
+    looked = sum(len(s.marker) >= 3 for s in sightings)
+    if len(posed.index) < max(parameters.least_posed_frames, looked / 2):
+        raise UnusableError(
+            STAGE,
+            f"in {looked - len(posed.index)} of {looked} frames no pose of the camera brings half of the fiducials "
+            "to where they are seen: they are mirrored, swapped or placed otherwise than recording.yaml says",
+            limit=f"{parameters.least_posed_frames} frames, and half of those with fiducials",
+            hint="check columns_along, rows_along and the distance and azimuth of each id",
+        )
+    ratio = _size_ratio(posed, gauge, camera)
+    if abs(ratio - 1) > _SIZE_TOLERANCE:
+        size = gauge.fiducials.size_mm
+        raise UnusableError(
+            STAGE, f"the fiducials measure {ratio * size:.2f} mm where recording.yaml says {size:g} mm",
+            limit=f"{100 * _SIZE_TOLERANCE:.0f} %", hint="size_mm is the edge of the black square",
+        )  # fmt: skip
+
+
+def outvoted_fiducials(posed: PosedFrames, gauge: Gauge) -> NDArray[np.int64]:
+    """Return the places of fiducials that most frames outvote; refuse when they are many."""
+    seen, wrong = disagreeing(list(zip(posed.sightings, posed.poses, strict=True)), len(gauge.ids))
+    if wrong.sum() > max(_WRONG_SHARE * (seen > 0).sum(), 1):
+        raise UnusableError(
+            STAGE, f"fiducials {', '.join(map(str, gauge.ids[wrong]))} are not where recording.yaml says",
+            limit=f"{100 * _WRONG_SHARE:.0f} % of those seen", hint="check id, distance and azimuth of each",
+        )  # fmt: skip
+    return np.flatnonzero(wrong)
+
+
+def require_bores(gauge: Gauge, section: NDArray[np.int64], radius_error_mm: Float) -> None:
+    """Refuse rings whose radius, by the stated probe, belongs to another bore."""
+    for k, radius in enumerate(gauge.radius_mm):
+        here = radius_error_mm[section == k]
+        error = float(np.median(here)) if len(here) else 0.0
+        if abs(error) > _WRONG_BORE_MM:
+            raise UnusableError(
+                STAGE,
+                f"in section {k + 1} from {gauge.start_mm[k]:g} mm on, the bore measures "
+                f"{2 * (radius + error):.1f} mm where recording.yaml says {2 * radius:g} mm",
+                limit=f"{2 * _WRONG_BORE_MM:g} mm in diameter",
+                hint="are the bores listed in the order in which the probe passes them?",
+            )
+
+
+def require_rings(frames: int, parameters: GaugeParameters) -> None:
+    """Refuse a run with too few rings on known bore."""
+    if frames < parameters.least_ring_frames:
+        raise UnusableError(
+            STAGE, f"only {frames} laser frames show a ring on known bore away from steps and fiducials",
+            limit=f"{parameters.least_ring_frames} frames", hint="record a longer run with the laser on",
+        )  # fmt: skip
+
+
+def require_offset(T_pc: Float, parameters: GaugeParameters) -> None:
+    """Refuse a camera that stays on the gauge's axis: tilt, principal point and decentring look alike there."""
+    across = T_pc[:, :2, 3]
+    offset = float(np.sqrt(np.mean(np.sum(across**2, 1))))
+    if offset < parameters.least_offset_mm:
+        raise UnusableError(
+            STAGE,
+            f"the camera stays within {offset:.2f} mm (r.m.s.) of the gauge's axis: the weak direction is a tilt "
+            "of the sheet against a shift of the principal point, which look alike there",
+            limit=f"{parameters.least_offset_mm:g} mm",
+            hint="drive the probe off-centre by several mm to all sides while it passes the bores",
+        )
+
+
+def require_determined(sigma_mm: float, direction: str, parameters: GaugeParameters) -> None:
+    """Refuse a result that leaves the radius of the widest bore too uncertain."""
+    if sigma_mm > parameters.largest_radius_sigma_mm:
+        raise UnusableError(
+            STAGE, f"the run leaves 1 σ of {sigma_mm:.3f} mm in the radius; the weak direction is {direction}",
+            limit=f"{parameters.largest_radius_sigma_mm:g} mm",
+            hint="record more of the gauge: all bores, off-centre, with roll, and fiducials in view",
+        )  # fmt: skip
+
+
+def _size_ratio(posed: PosedFrames, gauge: Gauge, camera: Camera) -> float:
+    """Return seen over stated size of the fiducials, the median over all."""
+    ratios = []
+    for sighting, pose in zip(posed.sightings, posed.poses, strict=True):
+        marker = sighting.marker[pose.fits]
+        uv = camera.project(transform(inverse(pose.T_pc), gauge.corners(marker))).uv
+        seen, stated = (
+            np.linalg.norm(x - np.roll(x, 1, 1), axis=-1).sum(1) for x in (sighting.corner_px[pose.fits], uv)
+        )
+        ratios.append(seen / stated)
+    return float(np.nanmedian(np.concatenate(ratios)))
+
+
+def _likely_cause(recording: Recording, gauge: Gauge, strangers: Sequence[int]) -> str:
+    """Return what a second look suggests: mirrored, another dictionary, other numbers, or nothing."""
+    lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
+    chosen = lit[:: max(len(lit) // _LOOKED_AT, 1)]
+    images = [image.copy() for _, image in recording.read(chosen, "grey") if image is not None]
+    own = detector(gauge.fiducials.dictionary)
+    known = set(gauge.ids.tolist())
+    mirrored = sum(len(known & set(detect(own, cv2.flip(i, 1))[0].tolist())) for i in images)
+    if mirrored >= 2 * len(images) and images:
+        return "; in the mirrored pictures they are: picture or fiducials are mirrored"
+    for name in _OTHERS:
+        count = sum(len(detect(detector(name), i)[0]) for i in images)
+        if count >= 3 * len(images) and images and name[:8] != gauge.fiducials.dictionary[:8]:
+            return f"; markers of {name} are seen instead of {gauge.fiducials.dictionary}"
+    if strangers:
+        return f"; markers with other numbers are seen: {', '.join(map(str, strangers[:8]))}"
+    return ""

@@ -1,0 +1,176 @@
+"""What a gauge calibration found, and what it is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.probe import Probe
+from stages.calibrate.gauge.adjust import Measurements, Solution, instrument_covariance, spread
+from stages.calibrate.gauge.geometry import Gauge
+from stages.calibrate.gauge.state import ENCODER, SheetModel
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_AZIMUTHS = 72
+
+
+@dataclass(frozen=True)
+class RadiusError:
+    """A bore of ``radius_mm`` with the probe centred, by azimuth (A,).
+
+    ``before_mm`` is what the stated probe would measure too much, ``sigma_mm`` the result's own 1 σ.
+    """
+
+    radius_mm: float
+    azimuth_rad: Float
+    before_mm: Float
+    stated_sigma_mm: Float
+    sigma_mm: Float
+
+
+@dataclass(frozen=True)
+class WeakDirection:
+    """A combination of parameters, one posterior σ long, and the radius it moves, mm (largest by azimuth)."""
+
+    change: dict[str, float]
+    radius_mm: float
+    prior_share: float
+
+
+@dataclass(frozen=True)
+class GaugeCalibration:
+    """The calibrated probe and all that the report tells.
+
+    Attributes
+    ----------
+    name : str
+        Of the gauge run.
+    stated, probe : Probe
+        Before and after; the latter with full covariance.
+    sheet : SheetModel
+    evidence : dict of SheetModel to float
+        Drop of χ², corrected for residuals that err alike, of the models that were tried.
+    encoder, encoder_sigma : (3,)
+        Scale, offset in mm and delay in s; NaN without encoder.
+    bore_mm, bore_sigma_mm : (S,)
+        Corrections of the stated radii.
+    frame : (N,) int
+    T_pc : (N, 4, 4)
+    measured : Measurements
+    edge_residual_px : (E,)
+    ring_residual_mm : (R,)
+    edge_spread, ring_spread : float
+        Robust spread of residuals in σ of noise.
+    wrong_fiducials, wrong_rings : (K,) int
+        Numbers of fiducials and frames outvoted.
+    left_out : dict of str to int
+    radii : tuple of RadiusError
+    weak : tuple of WeakDirection
+        Least determined first.
+    """
+
+    name: str
+    stated: Probe
+    probe: Probe
+    sheet: SheetModel
+    evidence: dict[SheetModel, float]
+    encoder: Float
+    encoder_sigma: Float
+    bore_mm: Float
+    bore_sigma_mm: Float
+    frame: Int
+    T_pc: Float
+    measured: Measurements
+    edge_residual_px: Float
+    ring_residual_mm: Float
+    edge_spread: float
+    ring_spread: float
+    wrong_fiducials: Int
+    wrong_rings: Int
+    left_out: dict[str, int]
+    radii: tuple[RadiusError, ...]
+    weak: tuple[WeakDirection, ...]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A solution with what was chosen and left out on the way to it."""
+
+    solution: Solution
+    measured: Measurements
+    sheet: SheetModel
+    evidence: dict[SheetModel, float]
+    wrong_fiducials: Int
+    wrong_rings: Int
+    left_out: dict[str, int]
+
+
+def calibration_of(name: str, frame: Int, gauge: Gauge, finding: Finding) -> GaugeCalibration:
+    """Return the calibration that a finished adjustment stands for."""
+    solution, state = finding.solution, finding.solution.state
+    unsure = state.unsure
+    covariance = unsure @ instrument_covariance(solution) @ unsure.T
+    probe = replace(
+        state.stated.with_parameters(state.probe.parameters, (covariance + covariance.T) / 2),
+        calibrated_from=name,
+    )
+    sigma = np.sqrt(np.diag(solution.factor.border_covariance()))
+    nothing = np.full(ENCODER, np.nan)
+    with_encoder = finding.measured.encoder is not None
+    return GaugeCalibration(
+        name, state.stated, probe, finding.sheet, finding.evidence,
+        state.encoder if with_encoder else nothing, sigma[:ENCODER] if with_encoder else nothing,
+        state.bore_mm, sigma[state.layout.bore], frame, state.T_pc, finding.measured,
+        solution.edges.rows.residual, solution.rings.rows.residual,
+        spread(solution.edges), spread(solution.rings),
+        finding.wrong_fiducials, finding.wrong_rings, finding.left_out,
+        tuple(radius_error(state.stated, probe, float(r)) for r in gauge.radius_mm),
+        weak_directions(probe, unsure, float(gauge.radius_mm.max())),
+    )  # fmt: skip
+
+
+def ring_pixels(probe: Probe, radius_mm: float, azimuth_rad: Float) -> Float:
+    """Return pixels (A, 2) of the ring in a bore with the probe on its axis."""
+    height = probe.laser.height(azimuth_rad) + radius_mm * probe.laser.slope(azimuth_rad)
+    xyz_c = np.stack([radius_mm * np.cos(azimuth_rad), radius_mm * np.sin(azimuth_rad), height], -1)
+    return probe.camera.project(xyz_c).uv
+
+
+def radius_jacobian(probe: Probe, radius_mm: float, azimuth_rad: Float) -> Float:
+    """Return (A, P) change of the measured radius with the probe's parameters."""
+    by_parameters = probe.triangulate_jacobian(ring_pixels(probe, radius_mm, azimuth_rad))[1]
+    direction = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
+    return np.einsum("aj,ajp->ap", direction, by_parameters[:, :2])
+
+
+def radius_error(stated: Probe, probe: Probe, radius_mm: float) -> RadiusError:
+    """Return how far off the stated probe is in a bore, and how well the calibrated one is known."""
+    azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
+    xyz_c = stated.triangulate(ring_pixels(probe, radius_mm, azimuth))
+    sigma = []
+    for covariance in (stated.covariance, probe.covariance):
+        jacobian = radius_jacobian(probe, radius_mm, azimuth)
+        sigma.append(np.sqrt(np.maximum(np.einsum("ap,pq,aq->a", jacobian, covariance, jacobian), 0)))
+    before = np.hypot(xyz_c[:, 0], xyz_c[:, 1]) - radius_mm
+    return RadiusError(radius_mm, azimuth, before, sigma[0], sigma[1])
+
+
+def weak_directions(probe: Probe, unsure: Float, radius_mm: float) -> tuple[WeakDirection, ...]:
+    """Return the combinations that the run determines least, by what they move the radius, largest first.
+
+    ``prior_share`` is the part of a direction's variance that is what was believed beforehand.
+    """
+    direction = probe.principal_uncertainties()
+    azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
+    moved = np.abs(radius_jacobian(probe, radius_mm, azimuth) @ direction).max(0)
+    sigma = np.sqrt(np.diag(probe.covariance))
+    out = []
+    for k in np.argsort(moved)[::-1]:
+        large = np.flatnonzero(np.abs(direction[:, k]) > 0.3 * np.where(sigma > 0, sigma, np.inf))
+        change = {probe.parameter_names[i]: float(direction[i, k]) for i in large}
+        share = np.linalg.norm(np.linalg.lstsq(unsure, direction[:, k], rcond=None)[0])
+        out.append(WeakDirection(change, float(moved[k]), float(min(share, 1.0))))
+    return tuple(out)

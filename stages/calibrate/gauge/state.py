@@ -1,0 +1,151 @@
+"""The unknowns of the gauge adjustment and their priors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from stages.calibrate.gauge.parameters import GaugeParameters
+
+Float = NDArray[np.float64]
+ENCODER = 3
+
+
+class SheetModel(StrEnum):
+    """What the laser sheet is allowed to be."""
+
+    PLAIN = "baseline, tilt and cone"
+    DECENTRED = "baseline, tilt, cone and decentring"
+    WAVY = "baseline, tilt, cone and waviness"
+    DECENTRED_WAVY = "baseline, tilt, cone, decentring and waviness"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where each global unknown lies in the border.
+
+    First the encoder's scale, offset and delay, then the radii of the bores, then the shift of each fiducial's
+    four edges, then the instrument.
+    """
+
+    bores: int
+    markers: int
+    instrument_size: int
+
+    @property
+    def size(self) -> int:
+        """Number of global unknowns."""
+        return ENCODER + self.bores + 4 * self.markers + self.instrument_size
+
+    @property
+    def bore(self) -> slice:
+        """Radii of the bores."""
+        return slice(ENCODER, ENCODER + self.bores)
+
+    @property
+    def marker(self) -> slice:
+        """Outward shifts of the fiducials' edges, four for each."""
+        return slice(self.bore.stop, self.bore.stop + 4 * self.markers)
+
+    @property
+    def instrument(self) -> slice:
+        """Corrections of the instrument."""
+        return slice(self.size - self.instrument_size, self.size)
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """All that the adjustment estimates.
+
+    Attributes
+    ----------
+    T_pc : (N, 4, 4)
+        Pose of every frame.
+    slip : (N,)
+        Encoder's accumulated slip, mm.
+    encoder : (3,)
+        Scale, offset in mm, and delay in s.
+    bore_mm : (S,)
+        Corrections of the bores' radii.
+    edge_mm : (K, 4)
+        Outward shift of each edge of each fiducial along the wall.
+    instrument : (Q,)
+        Corrections in units of their prior σ.
+    stated : Probe
+    unsure : (P, Q)
+        Change of the probe's parameters with each correction.
+    """
+
+    T_pc: Float
+    slip: Float
+    encoder: Float
+    bore_mm: Float
+    edge_mm: Float
+    instrument: Float
+    stated: Probe
+    unsure: Float
+
+    @property
+    def layout(self) -> Layout:
+        """Where each global unknown lies."""
+        return Layout(len(self.bore_mm), len(self.edge_mm), len(self.instrument))
+
+    @property
+    def border_size(self) -> int:
+        """Number of global unknowns."""
+        return self.layout.size
+
+    @property
+    def probe(self) -> Probe:
+        """The probe with the corrections found so far."""
+        parameters = self.stated.parameters + self.unsure @ self.instrument
+        return self.stated.with_parameters(parameters, self.stated.covariance)
+
+    def step(self, frames: Float, border: Float) -> Unknowns:
+        """Return the state after a step of the frames (N, 7) and of the border (B,)."""
+        at = self.layout
+        turned = self.T_pc[:, :3, :3] @ rotation_from_vector(frames[:, 3:6])
+        return replace(
+            self,
+            T_pc=from_parts(turned, self.T_pc[:, :3, 3] + frames[:, :3]),
+            slip=self.slip + frames[:, 6],
+            encoder=self.encoder + border[:ENCODER],
+            bore_mm=self.bore_mm + border[at.bore],
+            edge_mm=self.edge_mm + border[at.marker].reshape(-1, 4),
+            instrument=self.instrument + border[at.instrument],
+        )
+
+
+def prior_directions(probe: Probe, model: SheetModel, parameters: GaugeParameters) -> Float:
+    """Return (P, Q) one prior σ of each correction: the camera's as stated, the sheet's wide."""
+    split = len(probe.camera.parameter_names)
+    camera = replace(probe, covariance=_only(probe.covariance, split)).principal_uncertainties()
+    degree = np.radians(1.0)
+    sigma = {
+        "baseline_mm": parameters.baseline_prior_mm,
+        "tilt_x": parameters.tilt_prior_deg * degree,
+        "tilt_y": parameters.tilt_prior_deg * degree,
+        "cone_rad": parameters.cone_prior_deg * degree,
+    }
+    if model in (SheetModel.DECENTRED, SheetModel.DECENTRED_WAVY):
+        sigma |= dict.fromkeys(LaserSheet.PARAMETER_NAMES[4:6], parameters.decentre_prior_mm)
+    if model in (SheetModel.WAVY, SheetModel.DECENTRED_WAVY):
+        sigma |= dict.fromkeys(LaserSheet.PARAMETER_NAMES[6:], parameters.waviness_prior_rad)
+    names = probe.parameter_names
+    sheet = np.zeros((len(names), len(sigma)))
+    for k, (name, value) in enumerate(sigma.items()):
+        sheet[names.index(name), k] = value
+    return np.concatenate([parameters.camera_prior_scale * camera, sheet], 1)
+
+
+def _only(covariance: Float, count: int) -> Float:
+    """Return a covariance of the first ``count`` parameters, the others exact."""
+    out = np.zeros_like(covariance)
+    out[:count, :count] = covariance[:count, :count]
+    return out

@@ -1,0 +1,155 @@
+"""The equations of the gauge adjustment: edges of fiducials, rings on known bore, encoder, priors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.rigid import inverse, skew, transform
+from stages.calibrate.gauge.edges import Edges
+from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.calibrate.gauge.rings import BoreRings
+from stages.calibrate.gauge.state import ENCODER, Unknowns
+from stages.motion.bordered import BLOCK, Rows
+from stages.motion.terms import cauchy
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_STEP_S = 1e-3
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Linearised measurements: ``rows``, residuals in σ, and where on the wall each was made (cluster)."""
+
+    rows: Rows
+    in_sigma: Float
+    cluster: Int
+
+
+def edge_equations(state: Unknowns, edges: Edges) -> Equations:
+    """A border's image passes through where it was measured; each edge may be a little off its place."""
+    T = state.T_pc[edges.frame]
+    xyz_p = edges.xyz_p + state.edge_mm[edges.marker, edges.side][:, None] * edges.outward_p
+    xyz_c = transform(inverse(T), xyz_p)
+    camera = state.probe.camera
+    by_c, by_camera = camera.project_jacobian(xyz_c)
+    residual = np.einsum("mi,mi->m", camera.project(xyz_c).uv - edges.uv, edges.normal)
+    across_c = np.einsum("mi,mij->mj", edges.normal, by_c)
+    across_p = np.einsum("mj,mij->mi", across_c, T[:, :3, :3])
+    by_frame = np.zeros((len(residual), 1, BLOCK))
+    by_frame[:, 0, :3] = -across_p
+    by_frame[:, 0, 3:6] = np.einsum("mj,mjk->mk", across_c, skew(xyz_c))
+    at, m, edge = state.layout, np.arange(len(residual)), 4 * edges.marker + edges.side
+    by_border = np.zeros((len(residual), at.size))
+    by_border[m, at.marker.start + edge] = np.einsum("mi,mi->m", across_p, edges.outward_p)
+    by_border[:, at.instrument] = (
+        np.einsum("mi,mij->mj", edges.normal, by_camera) @ state.unsure[: by_camera.shape[2]]
+    )
+    return _weighted(edges.frame, by_frame, by_border, residual, edges.sigma_px, edge)
+
+
+def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
+    """A triangulated ring point lies on the bore of its section."""
+    T = state.T_pc[rings.frame]
+    xyz_c = state.probe.triangulate(rings.uv)
+    by_pixel, by_parameters = state.probe.triangulate_jacobian(rings.uv)
+    xyz_p = transform(T, xyz_c)
+    radius = np.hypot(xyz_p[:, 0], xyz_p[:, 1])
+    residual = radius - _bore_radius(state, rings)
+    normal = np.stack([xyz_p[:, 0] / radius, xyz_p[:, 1] / radius, 0 * radius], -1)
+    normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
+    by_frame = np.zeros((len(residual), 1, BLOCK))
+    by_frame[:, 0, :3] = normal
+    by_frame[:, 0, 3:6] = -np.einsum("mj,mjk->mk", normal_c, skew(xyz_c))
+    at = state.layout
+    by_border = np.zeros((len(residual), at.size))
+    by_border[np.arange(len(residual)), at.bore.start + rings.section] = -1
+    by_border[:, at.instrument] = np.einsum("mj,mjp->mp", normal_c, by_parameters) @ state.unsure
+    mm_per_px = np.abs(np.einsum("mj,mjk,mk->m", normal_c, by_pixel, rings.outward))
+    return _weighted(
+        rings.frame, by_frame, by_border, residual, rings.sigma_px * mm_per_px, wall_cells(rings.wall_mm)
+    )
+
+
+def wall_cells(wall_mm: Float, size_mm: float = 10.0) -> Int:
+    """Return numbers (M,) of the square cells of wall in which points (M, 2) lie."""
+    cell = np.floor(wall_mm / size_mm).astype(np.int64)
+    return np.asarray(cell[:, 0] * 10_000 + cell[:, 1])
+
+
+def encoder_equations(
+    state: Unknowns, time_s: Float, encoder: tuple[Float, Float], parameters: GaugeParameters
+) -> tuple[Rows, Rows]:
+    """Distance is scale × reading a delay ago + offset + slip, and slip hardly changes between frames."""
+    count = len(time_s)
+    scale, offset, delay = state.encoder
+    at_time = time_s - delay
+    reading = np.interp(at_time, *encoder)
+    speed = (np.interp(at_time + _STEP_S, *encoder) - np.interp(at_time - _STEP_S, *encoder)) / (2 * _STEP_S)
+    by_frame = np.zeros((count, 1, BLOCK))
+    by_frame[:, 0, 2], by_frame[:, 0, 6] = 1, -1
+    by_border = np.zeros((count, state.border_size))
+    by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), scale * speed], -1)
+    residual = state.T_pc[:, 2, 3] - scale * reading - offset - state.slip
+    sigma = parameters.encoder_sigma_mm
+    readings = Rows(
+        np.arange(count)[:, None], by_frame, by_border, residual, cauchy(residual / sigma) / sigma**2
+    )
+    pair = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
+    by_pair = np.zeros((count - 1, 2, BLOCK))
+    by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
+    change, slip_sigma = np.diff(state.slip), parameters.encoder_slip_sigma_mm
+    weight = cauchy(change / slip_sigma) / slip_sigma**2
+    return readings, Rows(pair, by_pair, np.zeros((count - 1, state.border_size)), change, weight)
+
+
+def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:
+    """The slip starts at zero; without an encoder it stays there."""
+    frame = np.arange(1 if with_encoder else len(state.slip))
+    by_frame = np.zeros((len(frame), 1, BLOCK))
+    by_frame[:, 0, 6] = 1
+    none = np.zeros((len(frame), state.border_size))
+    return Rows(frame[:, None], by_frame, none, state.slip[frame], np.full(len(frame), 1e6))
+
+
+def prior_rows(state: Unknowns, radius_sigma_mm: float, parameters: GaugeParameters) -> Rows:
+    """What is believed of the global numbers beforehand."""
+    at = state.layout
+    value = np.concatenate(
+        [state.encoder - [1.0, 0.0, 0.0], state.bore_mm, state.edge_mm.ravel(), state.instrument]
+    )
+    sigma = np.ones(at.size)
+    sigma[:ENCODER] = state.stated.encoder_scale_sigma, 1e4, parameters.delay_prior_s
+    sigma[at.bore] = max(radius_sigma_mm, 1e-5)
+    sigma[at.marker] = parameters.placement_sigma_mm
+    none = np.zeros((at.size, 0), np.int64)
+    return Rows(none, np.zeros((at.size, 0, BLOCK)), np.eye(at.size), value, sigma**-2)
+
+
+def _bore_radius(state: Unknowns, rings: BoreRings) -> Float:
+    return np.asarray(rings.radius_mm + state.bore_mm[rings.section])
+
+
+def _weighted(
+    frame: Int, by_frame: Float, by_border: Float, residual: Float, sigma: Float, cluster: Int
+) -> Equations:
+    """Return equations with Cauchy weights about the measurements' own spread, frame by frame for the σ."""
+    bad = ~(np.isfinite(residual) & np.isfinite(by_border).all(1) & np.isfinite(by_frame).all((1, 2)))
+    for part in (residual, by_frame, by_border):
+        part[bad] = 0.0
+    in_sigma = residual / np.where(np.isfinite(sigma), sigma, 1.0)
+    spread = frame_spread(frame, in_sigma)
+    scaled = in_sigma / spread
+    weight = np.where(bad, 0.0, cauchy(scaled) / np.where(np.isfinite(sigma), sigma * spread, 1.0) ** 2)
+    return Equations(Rows(frame[:, None], by_frame, by_border, residual, weight), in_sigma, cluster)
+
+
+def frame_spread(frame: Int, in_sigma: Float) -> Float:
+    """Return (M,) the robust spread of each equation's frame, in σ, not below that of the typical frame."""
+    numbers, place = np.unique(frame, return_inverse=True)
+    spread = np.array([1.4826 * np.median(np.abs(in_sigma[place == k])) for k in range(len(numbers))])
+    typical = np.median(spread) if len(spread) else 1.0
+    return np.maximum(np.maximum(spread, typical), 1e-3)[place]
