@@ -144,8 +144,9 @@ def open_video(path: Path) -> VideoSource:
             size = (stream.codec_context.width, stream.codec_context.height)
             index = list_frames(container, stream)
     except (av.FFmpegError, OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError | av.FFmpegError) else error
         raise InputError(
-            path, f"cannot be opened as a video ({error.strerror if isinstance(error, OSError | av.FFmpegError) else error})",
+            path, f"cannot be opened as a video ({reason})",
             expected="H.264, HEVC, MJPEG or FFV1 in a container that FFmpeg reads",
             hint="the copy may be incomplete: copy it again, or repair its container",
         )  from error  # fmt: skip
