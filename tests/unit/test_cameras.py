@@ -242,3 +242,11 @@ def _assert_close(analytic, numeric):
     scale = np.abs(np.where(known, numeric, 0)).max(tuple(range(numeric.ndim - 1)))
     error = np.abs(np.where(known, analytic - numeric, 0)).max(tuple(range(numeric.ndim - 1)))
     assert np.all(error <= 2e-6 * scale + 1e-12), (error / scale).tolist()
+
+
+@pytest.mark.parametrize("k4", [np.nan, np.inf, 1e-310, -1e-310])
+def test_absurd_coefficients_map_nothing_or_change_nothing(k4):
+    """A solver that overshoots must get an invalid projection, not an exception."""
+    camera = KannalaBrandt((640, 480), (200.0, 200.0), (320.0, 240.0), (0.0, 0.0, 0.0, k4))
+    projected = camera.project(np.array([[1.0, 2.0, 5.0]]))
+    assert projected.valid.all() == np.isfinite(k4)

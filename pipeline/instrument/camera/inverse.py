@@ -12,6 +12,7 @@ from pipeline.instrument.camera.base import ProjectionJacobian, RaysJacobian
 Float = NDArray[np.float64]
 _MOST_STEPS = 40
 _RELATIVE_STEP = 1e-13
+_NEGLIGIBLE = 1e-100
 
 
 def invert_increasing(
@@ -46,8 +47,15 @@ def invert_increasing(
 
 
 def smallest_positive_root(coefficients: list[float]) -> float:
-    """Return the smallest positive real root of Σ cᵢ xⁱ (lowest power first), or infinity."""
-    roots = np.polynomial.Polynomial(np.trim_zeros(np.array(coefficients, float), "b")).roots()
+    """Return the smallest positive real root of Σ cᵢ xⁱ (lowest power first), or infinity.
+
+    Coefficients that are not finite give 0: a model made of them maps nothing.
+    """
+    values = np.array(coefficients, float)
+    if not np.all(np.isfinite(values)):
+        return 0.0
+    values[np.abs(values) < _NEGLIGIBLE] = 0.0
+    roots = np.polynomial.Polynomial(np.trim_zeros(values, "b")).roots()
     real = roots.real[(np.abs(roots.imag) <= 1e-9 * np.abs(roots)) & (roots.real > 0)]
     return float(real.min()) if real.size else float("inf")
 
