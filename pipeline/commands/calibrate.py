@@ -49,7 +49,7 @@ def calibrate(
     require_gauge(recording)
     console = Console(stderr=True)
     with console.status("measuring rings"):
-        rings = extract_rings(recording, stated, RingParameters(), quiet_context())
+        rings = extract_rings(recording, stated, RingParameters.model_validate({}), quiet_context())
     with console.status("measuring fiducials, adjusting"):
         result = calibrate_gauge(recording, rings, stated, parameters, quiet_context())
     # matplotlib takes a second to load, for which a refusal need not wait
@@ -70,7 +70,7 @@ def gauge_parameters(assignments: Sequence[str]) -> GaugeParameters:
     InputError
         For an unknown name or a value out of range.
     """
-    values = {}
+    values: dict[str, object] = {}
     for assignment in assignments:
         name, _, value = assignment.partition("=")
         if name not in GaugeParameters.model_fields:
@@ -81,7 +81,7 @@ def gauge_parameters(assignments: Sequence[str]) -> GaugeParameters:
         wanted = GaugeParameters.model_fields[name].annotation
         values[name] = float(number) if wanted is float and isinstance(number, int) else number
     try:
-        return GaugeParameters(**values)
+        return GaugeParameters.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         raise InputError("--set", f"{first['loc'][0]}: {first['msg']}") from error

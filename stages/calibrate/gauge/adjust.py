@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
+from stages.calibrate.gauge.smooth import smooth_rows
 from stages.calibrate.gauge.state import Unknowns
 from stages.calibrate.gauge.terms import (
     Equations,
@@ -20,7 +22,6 @@ from stages.calibrate.gauge.terms import (
     slip_origin,
 )
 from stages.motion.bordered import BorderedSystem, Factor
-from stages.calibrate.gauge.smooth import smooth_rows
 
 Float = NDArray[np.float64]
 _CONVERGED_SIGMA = 0.02
@@ -38,8 +39,7 @@ class Measurements:
     edges : Edges
     rings : BoreRings
     time_s : (N,)
-    encoder : ((M,), (M,)) or None
-        Time and distance.
+    encoder : Encoder or None
     bore_sigma_mm : float
         1 σ of each bore's radius.
     smooth_sigma : (6,)
@@ -49,7 +49,7 @@ class Measurements:
     edges: Edges
     rings: BoreRings
     time_s: Float
-    encoder: tuple[Float, Float] | None
+    encoder: Encoder | None
     bore_sigma_mm: float
     smooth_sigma: Float
 

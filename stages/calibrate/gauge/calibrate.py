@@ -21,11 +21,11 @@ from stages.calibrate.gauge.edges import Edges, joined, measure_edges
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import PosedFrames, frame_index, posed_frames, poses_of_all_frames
-from stages.calibrate.gauge.result import GaugeCalibration, calibration_of
-from stages.calibrate.gauge.rings import bore_rings
+from stages.calibrate.gauge.result import Finding, GaugeCalibration, calibration_of
 from stages.calibrate.gauge.smooth import LOOSE
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
 from stages.calibrate.gauge.start import first_pose
+from stages.calibrate.gauge.state import Unknowns
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -44,27 +44,18 @@ def calibrate_gauge(
         When fiducials or rings contradict the gauge's description, or cannot determine the instrument.
     """
     gauge = premises.require_gauge(recording)
-    sightings = _sightings(recording, gauge)
-    premises.require_fiducials(recording, gauge, sightings, parameters)
-    first = [first_pose(s, gauge, probe.camera, context.random) for s in sightings]
-    posed = posed_frames(recording, sightings, first)
-    premises.require_poses(posed, sightings, gauge, probe.camera, parameters)
+    posed = _posed(recording, gauge, probe, parameters, context)
     wrong = premises.outvoted_fiducials(posed, gauge)
     T_pc = poses_of_all_frames(recording, posed, rings, probe)
     premises.require_offset(T_pc, parameters)
     source = RingSource(rings, frame_index(recording, rings.frame), gauge)
     _require_bores(source, T_pc, probe, parameters)
     edges = _edges(recording, posed, wrong, gauge, probe, parameters)
-    encoder = recording.encoder and (recording.encoder.time_s, recording.encoder.distance_mm)
-    on_bore = bore_rings(rings, source.index, T_pc, probe, gauge, parameters)
-    measured = Measurements(edges, on_bore, recording.frames.time_s, encoder, gauge.radius_sigma_mm, LOOSE)
+    on_bore = source.on_bore(T_pc, probe, parameters)
+    time_s, encoder = recording.frames.time_s, recording.encoder
+    measured = Measurements(edges, on_bore, time_s, encoder, gauge.radius_sigma_mm, LOOSE)
     start = first_unknowns(T_pc, posed.index, gauge, measured, probe, parameters)
-    try:
-        # More threads gain nothing on blocks this small, and stall when the machine is busy.
-        with threadpool_limits(1):
-            finding = solve(start, measured, source, posed.index, parameters)
-    except np.linalg.LinAlgError as error:
-        raise UnusableError("calibrate", f"the run does not determine the instrument ({error})") from error
+    finding = _solved(start, measured, source, posed, parameters)
     numbers = np.union1d(gauge.ids[wrong], gauge.ids[finding.wrong_fiducials])
     finding = replace(
         finding, wrong_fiducials=numbers, wrong_rings=recording.frames.frame[finding.wrong_rings]
@@ -72,6 +63,33 @@ def calibrate_gauge(
     result = calibration_of(recording.name, recording.frames.frame, gauge, finding)
     _require_determined(result, parameters)
     return result
+
+
+def _posed(
+    recording: Recording, gauge: Gauge, probe: Probe, parameters: GaugeParameters, context: Context
+) -> PosedFrames:
+    """Return the frames in which fiducials give a pose."""
+    sightings = _sightings(recording, gauge)
+    premises.require_fiducials(recording, gauge, sightings, parameters)
+    first = [first_pose(s, gauge, probe.camera, context.random) for s in sightings]
+    posed = posed_frames(recording, sightings, first)
+    premises.require_poses(posed, sightings, gauge, probe.camera, parameters)
+    return posed
+
+
+def _solved(
+    start: Unknowns,
+    measured: Measurements,
+    source: RingSource,
+    posed: PosedFrames,
+    parameters: GaugeParameters,
+) -> Finding:
+    try:
+        # More threads gain nothing on blocks this small, and stall when the machine is busy.
+        with threadpool_limits(1):
+            return solve(start, measured, source, posed.index, parameters)
+    except np.linalg.LinAlgError as error:
+        raise UnusableError("calibrate", f"the run does not determine the instrument ({error})") from error
 
 
 def _sightings(recording: Recording, gauge: Gauge) -> list[Sighting]:

@@ -1,7 +1,7 @@
 """Edges of fiducials to sub-pixel accuracy: offsets across the borders that camera and pose predict.
 
-A corner refined on its own is drawn toward the image centre where the marker is seen foreshortened; a straight
-stretch of edge is not, because blur is alike on both of its sides.
+A corner refined on its own is off where the marker is seen foreshortened; a straight stretch of edge is not,
+because blur is alike on both of its sides.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def measure_edges(
     parameters: GaugeParameters,
 ) -> Edges:
     """Measure the borders of fiducials (M,) in an image of the frame ``index``, near where they should be."""
-    predicted, border_px, half = _predicted(index, marker, T_pc, camera, gauge, parameters)
+    predicted, border_px, half = predicted_edges(index, marker, T_pc, camera, gauge, parameters)
     keep = (border_px >= parameters.least_border_px) & _inside(predicted.uv, image.shape, half)
     predicted, half = predicted.select(keep), half[keep]
     if not len(predicted.uv):
@@ -135,7 +135,7 @@ def _step_model(p: Float, t: Float, grey: Float) -> tuple[Float, Float]:
     return value - grey, np.stack(by, -1)
 
 
-def _predicted(
+def predicted_edges(
     index: int, marker: Int, T_pc: Float, camera: Camera, gauge: Gauge, parameters: GaugeParameters
 ) -> tuple[Edges, Float, Float]:
     """Return border points as predicted, the width of the border there and the half profile length, px."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.recording.base import Fiducials, Marker, PipeFacts
+from pipeline.recording.base import Fiducials, PipeFacts
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -95,8 +95,3 @@ def gauge_of(facts: PipeFacts, fiducials: Fiducials) -> Gauge:
     start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
     radius = np.array([b.diameter_mm for b in facts.bore]) / 2
     return Gauge(start, radius, facts.bore_tolerance_mm / 2 / np.sqrt(3), fiducials)
-
-
-def without(gauge: Gauge, ids: Int) -> tuple[Marker, ...]:
-    """Return the fiducials other than those numbered ``ids``."""
-    return tuple(m for m in gauge.fiducials.markers if m.id not in set(np.ravel(ids).tolist()))

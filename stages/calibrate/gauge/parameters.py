@@ -66,6 +66,6 @@ class GaugeParameters(Parameters):
     )  # fmt: skip
     evidence: float = Field(
         25.0, ge=0, le=1e6,
-        description="drop of χ², beyond ln n for each parameter, for which decentring or waviness is taken in",
+        description="drop of χ², beyond ln n for each parameter, for which decentring or waviness is taken",
     )  # fmt: skip
     iterations: int = Field(12, ge=3, le=100, description="most Gauss-Newton steps of each adjustment")

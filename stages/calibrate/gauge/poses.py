@@ -31,7 +31,7 @@ class PosedFrames:
     poses: tuple[FirstPose, ...]
 
     @property
-    def T_pc(self) -> Float:
+    def T_pc(self) -> Float:  # noqa: N802  a frame's name
         """(K, 4, 4)."""
         return np.stack([p.T_pc for p in self.poses])
 

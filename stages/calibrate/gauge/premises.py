@@ -78,8 +78,8 @@ def require_poses(
     if len(posed.index) < max(parameters.least_posed_frames, looked / 2):
         raise UnusableError(
             STAGE,
-            f"in {looked - len(posed.index)} of {looked} frames no pose of the camera brings half of the fiducials "
-            "to where they are seen: they are mirrored, swapped or placed otherwise than recording.yaml says",
+            f"in {looked - len(posed.index)} of {looked} frames no pose of the camera brings half of the "
+            "fiducials to where they are seen: they are mirrored, swapped or placed otherwise than stated",
             limit=f"{parameters.least_posed_frames} frames, and half of those with fiducials",
             hint="check columns_along, rows_along and the distance and azimuth of each id",
         )
@@ -128,14 +128,14 @@ def require_rings(frames: int, parameters: GaugeParameters) -> None:
 
 
 def require_offset(T_pc: Float, parameters: GaugeParameters) -> None:
-    """Refuse a camera that stays on the gauge's axis: tilt, principal point and decentring look alike there."""
+    """Refuse a camera that stays on the gauge's axis, where tilt and principal point look alike."""
     across = T_pc[:, :2, 3]
     offset = float(np.sqrt(np.mean(np.sum(across**2, 1))))
     if offset < parameters.least_offset_mm:
         raise UnusableError(
             STAGE,
-            f"the camera stays within {offset:.2f} mm (r.m.s.) of the gauge's axis: the weak direction is a tilt "
-            "of the sheet against a shift of the principal point, which look alike there",
+            f"the camera stays within {offset:.2f} mm (r.m.s.) of the gauge's axis: the weak direction is a "
+            "tilt of the sheet against a shift of the principal point, which look alike there",
             limit=f"{parameters.least_offset_mm:g} mm",
             hint="drive the probe off-centre by several mm to all sides while it passes the bores",
         )
@@ -145,7 +145,8 @@ def require_determined(sigma_mm: float, direction: str, parameters: GaugeParamet
     """Refuse a result that leaves the radius of the widest bore too uncertain."""
     if sigma_mm > parameters.largest_radius_sigma_mm:
         raise UnusableError(
-            STAGE, f"the run leaves 1 σ of {sigma_mm:.3f} mm in the radius; the weak direction is {direction}",
+            STAGE,
+            f"the run leaves 1 σ of {sigma_mm:.3f} mm in the radius; the weak direction is {direction}",
             limit=f"{parameters.largest_radius_sigma_mm:g} mm",
             hint="record more of the gauge: all bores, off-centre, with roll, and fiducials in view",
         )  # fmt: skip
@@ -171,12 +172,14 @@ def _likely_cause(recording: Recording, gauge: Gauge, strangers: Sequence[int]) 
     images = [image.copy() for _, image in recording.read(chosen, "grey") if image is not None]
     own = detector(gauge.fiducials.dictionary)
     known = set(gauge.ids.tolist())
-    mirrored = sum(len(known & set(detect(own, cv2.flip(i, 1))[0].tolist())) for i in images)
-    if mirrored >= 2 * len(images) and images:
+    mirrored = sum(
+        len(known & set(detect(own, np.ascontiguousarray(i[:, ::-1]))[0].tolist())) for i in images
+    )
+    if mirrored >= max(2 * len(images), 1):
         return "; in the mirrored pictures they are: picture or fiducials are mirrored"
     for name in _OTHERS:
         count = sum(len(detect(detector(name), i)[0]) for i in images)
-        if count >= 3 * len(images) and images and name[:8] != gauge.fiducials.dictionary[:8]:
+        if name[:8] != gauge.fiducials.dictionary[:8] and count >= max(3 * len(images), 1):
             return f"; markers of {name} are seen instead of {gauge.fiducials.dictionary}"
     if strangers:
         return f"; markers with other numbers are seen: {', '.join(map(str, strangers[:8]))}"

@@ -143,7 +143,7 @@ def radius_jacobian(probe: Probe, radius_mm: float, azimuth_rad: Float) -> Float
     """Return (A, P) change of the measured radius with the probe's parameters."""
     by_parameters = probe.triangulate_jacobian(ring_pixels(probe, radius_mm, azimuth_rad))[1]
     direction = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
-    return np.einsum("aj,ajp->ap", direction, by_parameters[:, :2])
+    return np.asarray(np.einsum("aj,ajp->ap", direction, by_parameters[:, :2]))
 
 
 def radius_error(stated: Probe, probe: Probe, radius_mm: float) -> RadiusError:
@@ -171,6 +171,6 @@ def weak_directions(probe: Probe, unsure: Float, radius_mm: float) -> tuple[Weak
     for k in np.argsort(moved)[::-1]:
         large = np.flatnonzero(np.abs(direction[:, k]) > 0.3 * np.where(sigma > 0, sigma, np.inf))
         change = {probe.parameter_names[i]: float(direction[i, k]) for i in large}
-        share = np.linalg.norm(np.linalg.lstsq(unsure, direction[:, k], rcond=None)[0])
-        out.append(WeakDirection(change, float(moved[k]), float(min(share, 1.0))))
+        share = float(np.linalg.norm(np.linalg.lstsq(unsure, direction[:, k], rcond=None)[0]))
+        out.append(WeakDirection(change, float(moved[k]), min(share, 1.0)))
     return tuple(out)

@@ -58,7 +58,7 @@ class BoreRings:
 def bore_rings(
     rings: RingSamples, index: Int, T_pc: Float, probe: Probe, gauge: Gauge, parameters: GaugeParameters
 ) -> BoreRings:
-    """Return the bins of all rings, frames (F,) at ``index``, as the poses (N, 4, 4) and the probe place them."""
+    """Return the bins of all rings, in frames (F,) ``index``, as poses (N, 4, 4) and probe place them."""
     uv = rings.pixels()
     xyz_p = transform(T_pc[index][:, None], probe.triangulate(np.where(rings.valid[..., None], uv, np.nan)))
     distance, azimuth = xyz_p[..., 2], np.arctan2(xyz_p[..., 1], xyz_p[..., 0])
@@ -91,13 +91,16 @@ def _condensed(
     lowest, highest = np.where(seen, section, 99).min(2), np.where(seen, section, -1).max(2)
     keep = (seen.sum(2) >= _LEAST_SHARE * size) & (lowest == highest)
     share = (weight / np.maximum(total, 1e-12)[..., None])[keep]
-    mean = [np.sum(share * np.nan_to_num(x[:, cut].astype(float)).reshape(shape)[keep], 1)
-            for x in (rings.radius_px, np.broadcast_to(rings.azimuth_rad, use.shape), distance_mm)]  # fmt: skip
+    image_azimuth = np.broadcast_to(rings.azimuth_rad, use.shape)
+    radius, azimuth, distance = (
+        np.sum(share * np.nan_to_num(x[:, cut].astype(float)).reshape(shape)[keep], 1)
+        for x in (rings.radius_px, image_azimuth, distance_mm)
+    )
     middle = np.where(seen, azimuth_rad[:, cut].reshape(shape), np.nan)[keep]
     around = np.nanmax(middle, 1) * gauge.radius_mm[lowest[keep]]
-    outward = np.stack([np.cos(mean[1]), np.sin(mean[1])], -1)
+    outward = np.stack([np.cos(azimuth), np.sin(azimuth)], -1)
     frame = np.broadcast_to(index[:, None], keep.shape)[keep]
     return BoreRings(
-        frame, rings.centre_px + mean[0][:, None] * outward, outward, 1 / np.sqrt(total[keep]),
-        lowest[keep], gauge.radius_mm[lowest[keep]], np.stack([mean[2], around], -1), left_out,
+        frame, rings.centre_px + radius[:, None] * outward, outward, 1 / np.sqrt(total[keep]),
+        lowest[keep], gauge.radius_mm[lowest[keep]], np.stack([distance, around], -1), left_out,
     )  # fmt: skip

@@ -18,7 +18,7 @@ _SOFT = 5.0
 
 
 def smooth_rows(state: Unknowns, time_s: Float, sigma: Float) -> Rows:
-    """Third divided differences of position and turn over each four neighbouring frames are 0 ± ``sigma`` (6,)."""
+    """Hold third divided differences of position and turn of neighbouring frames to 0 ± ``sigma`` (6,)."""
     first = np.arange(max(len(time_s) - 3, 0))
     frame = first[:, None] + np.arange(4)
     coefficient = _third_difference(time_s[frame])
@@ -43,7 +43,7 @@ def learned_sigma(T_pc: Float, known: Int) -> Float:
     window = known[np.arange(len(known) - 3)[:, None] + np.arange(4)]
     third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _poses(T_pc[window]))
     stride = float(np.median(np.diff(known)))
-    return np.maximum(1.4826 * np.median(np.abs(third), 0) / stride**2.5, _FLOOR)
+    return np.asarray(np.maximum(1.4826 * np.median(np.abs(third), 0) / stride**2.5, _FLOOR))
 
 
 def _poses(T_pc: Float) -> Float:

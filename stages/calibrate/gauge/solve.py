@@ -1,4 +1,4 @@
-"""From first poses to the final adjustment: smoothness learned, outliers outvoted, the sheet's model chosen."""
+"""From first poses to the final adjustment: smoothness, outliers, and the sheet's model."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def first_unknowns(
     """Return the state to start from: the stated probe and a perfect gauge."""
     offset = 0.0
     if measured.encoder is not None:
-        reading = np.interp(measured.time_s, *measured.encoder)
+        reading = np.interp(measured.time_s, measured.encoder.time_s, measured.encoder.distance_mm)
         offset = float(np.median(T_pc[posed, 2, 3] - reading[posed]))
     unsure = prior_directions(probe, SheetModel.PLAIN, parameters)
     return Unknowns(

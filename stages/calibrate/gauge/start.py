@@ -1,4 +1,4 @@
-"""First poses: Perspective-n-Point on the fiducials of each lit frame, outvoting fiducials that do not fit."""
+"""First poses: Perspective-n-Point on the fiducials of each lit frame, outvoting those that do not fit."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FirstPose:
 def first_pose(
     sighting: Sighting, gauge: Gauge, camera: Camera, random: np.random.Generator
 ) -> FirstPose | None:
-    """Return the pose that most fiducials of a frame agree on; None when fewer than three or half of them do."""
+    """Return the pose that most fiducials agree on; None when fewer than three or half of them do."""
     count = len(sighting.marker)
     if count < LEAST_MARKERS:
         return None
@@ -90,7 +90,8 @@ def _tried(camera: Camera, uv: Float, xyz_p: Float, draw: NDArray[np.int64]) -> 
     )
     if not solved or not (np.isfinite(turn).all() and np.isfinite(shift).all()):
         return None
-    T_pc = inverse(from_parts(rotation_from_vector(turn[:, 0]), shift[:, 0]))
+    T_cp = from_parts(rotation_from_vector(np.asarray(turn[:, 0], float)), np.asarray(shift[:, 0], float))
+    T_pc = inverse(T_cp)
     return FirstPose(T_pc, _fits(camera, uv, xyz_p, T_pc))
 
 

@@ -30,8 +30,8 @@ class SheetModel(StrEnum):
 class Layout:
     """Where each global unknown lies in the border.
 
-    First the encoder's scale, offset and delay, then the radii of the bores, then the shift of each fiducial's
-    four edges, then the instrument.
+    First the encoder's scale, offset and delay, then the radii of the bores, then the shift of each
+    fiducial's four edges, then the instrument.
     """
 
     bores: int

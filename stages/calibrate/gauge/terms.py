@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import inverse, skew, transform
+from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
@@ -30,7 +31,7 @@ class Equations:
 
 
 def edge_equations(state: Unknowns, edges: Edges) -> Equations:
-    """A border's image passes through where it was measured; each edge may be a little off its place."""
+    """Lead each border's image through where it was measured; an edge may be a little off its place."""
     T = state.T_pc[edges.frame]
     xyz_p = edges.xyz_p + state.edge_mm[edges.marker, edges.side][:, None] * edges.outward_p
     xyz_c = transform(inverse(T), xyz_p)
@@ -52,7 +53,7 @@ def edge_equations(state: Unknowns, edges: Edges) -> Equations:
 
 
 def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
-    """A triangulated ring point lies on the bore of its section."""
+    """Hold each triangulated ring point to the bore of its section."""
     T = state.T_pc[rings.frame]
     xyz_c = state.probe.triangulate(rings.uv)
     by_pixel, by_parameters = state.probe.triangulate_jacobian(rings.uv)
@@ -81,14 +82,17 @@ def wall_cells(wall_mm: Float, size_mm: float = 10.0) -> Int:
 
 
 def encoder_equations(
-    state: Unknowns, time_s: Float, encoder: tuple[Float, Float], parameters: GaugeParameters
+    state: Unknowns, time_s: Float, encoder: Encoder, parameters: GaugeParameters
 ) -> tuple[Rows, Rows]:
-    """Distance is scale × reading a delay ago + offset + slip, and slip hardly changes between frames."""
+    """Equate distance with scale × reading a delay ago + offset + slip, which hardly changes."""
     count = len(time_s)
     scale, offset, delay = state.encoder
     at_time = time_s - delay
-    reading = np.interp(at_time, *encoder)
-    speed = (np.interp(at_time + _STEP_S, *encoder) - np.interp(at_time - _STEP_S, *encoder)) / (2 * _STEP_S)
+    reading = np.interp(at_time, encoder.time_s, encoder.distance_mm)
+    speed = (
+        np.interp(at_time + _STEP_S, encoder.time_s, encoder.distance_mm)
+        - np.interp(at_time - _STEP_S, encoder.time_s, encoder.distance_mm)
+    ) / (2 * _STEP_S)
     by_frame = np.zeros((count, 1, BLOCK))
     by_frame[:, 0, 2], by_frame[:, 0, 6] = 1, -1
     by_border = np.zeros((count, state.border_size))
@@ -107,7 +111,7 @@ def encoder_equations(
 
 
 def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:
-    """The slip starts at zero; without an encoder it stays there."""
+    """Start the slip at zero; without an encoder keep it there."""
     frame = np.arange(1 if with_encoder else len(state.slip))
     by_frame = np.zeros((len(frame), 1, BLOCK))
     by_frame[:, 0, 6] = 1
@@ -116,7 +120,7 @@ def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:
 
 
 def prior_rows(state: Unknowns, radius_sigma_mm: float, parameters: GaugeParameters) -> Rows:
-    """What is believed of the global numbers beforehand."""
+    """Hold the global numbers to what is believed of them beforehand."""
     at = state.layout
     value = np.concatenate(
         [state.encoder - [1.0, 0.0, 0.0], state.bore_mm, state.edge_mm.ravel(), state.instrument]
@@ -152,4 +156,4 @@ def frame_spread(frame: Int, in_sigma: Float) -> Float:
     numbers, place = np.unique(frame, return_inverse=True)
     spread = np.array([1.4826 * np.median(np.abs(in_sigma[place == k])) for k in range(len(numbers))])
     typical = np.median(spread) if len(spread) else 1.0
-    return np.maximum(np.maximum(spread, typical), 1e-3)[place]
+    return np.asarray(np.maximum(np.maximum(spread, typical), 1e-3)[place])
