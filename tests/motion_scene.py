@@ -74,7 +74,7 @@ def displaced(state: State, random: np.random.Generator, size: float = 1.0) -> S
 
 
 def _bent(state: State) -> State:
-    bend = np.linspace(0, 0.5, state.knots) ** 2
+    bend = np.linspace(0, 0.4, state.knots) ** 2
     border = np.zeros(state.border_size)
     border[GLOBALS : GLOBALS + 2 * state.knots] = np.concatenate([bend, -0.5 * bend])
     return state.step(np.zeros((len(state.T_pc), 7)), border, np.zeros_like(state.xyz_p))

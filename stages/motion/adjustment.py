@@ -91,6 +91,7 @@ def assembled(state: State, measured: Measurements, parameters: MotionParameters
     system = BorderedSystem(len(state.T_pc), state.border_size, reach)
     rows: list[Rows] = [terms.origin_rows(state), terms.ring_rows(state, measured.rings)]
     rows.append(terms.smooth_rows(state, measured.time_s, measured.smooth_sigma))
+    rows.append(terms.turn_rows(state, parameters.turn_sigma_rad))
     if measured.encoder is None:
         rows.append(terms.no_slip_rows(state))
     else:

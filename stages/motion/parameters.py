@@ -53,6 +53,9 @@ class MotionParameters(Parameters):
     match_bias_px: float = Field(
         0.1, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
     )
+    turn_sigma_rad: float = Field(
+        0.1, gt=0, le=1, description="1 σ, rad, of a turn from frame to frame where no texture shows it"
+    )
     iterations: int = Field(4, ge=2, le=50, description="Gauss-Newton steps of the joint adjustment")
     max_track_frames: int = Field(
         240, ge=20, le=2000, description="longest span of frames, over which one landmark is followed"

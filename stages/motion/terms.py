@@ -14,6 +14,7 @@ from stages.motion.state import GLOBALS, EncoderReadings, State
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+_VIEW_RAD = 0.2  # 1 σ of the angle between the first camera and the pipe
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,21 @@ def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
     )  # fmt: skip
 
 
+def turn_rows(state: State, sigma_rad: float) -> Rows:
+    """The camera hardly turns from frame to frame: all that is known of it where no texture shows it."""
+    n = len(state.T_pc)
+    rotation = state.T_pc[:, :3, :3]
+    residual = vector_from_rotation(np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:])
+    pair = np.stack([np.arange(n - 1), np.arange(1, n)], -1)
+    by_frame = np.zeros((n - 1, 3, 2, BLOCK))
+    for i in range(3):
+        by_frame[:, i, 0, 3 + i], by_frame[:, i, 1, 3 + i] = -1, 1
+    return Rows(
+        np.repeat(pair, 3, 0), by_frame.reshape(-1, 2, BLOCK), np.zeros((3 * (n - 1), state.border_size)),
+        residual.reshape(-1), np.full(3 * (n - 1), sigma_rad**-2.0),
+    )  # fmt: skip
+
+
 def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -> tuple[Rows, Rows]:
     """Distance = scale × encoder + slip, and slip hardly changes from frame to frame."""
     n = len(encoder.distance_mm)
@@ -136,16 +152,18 @@ def border_rows(state: State, bend_sigma: float, encoder_sigma: float, radius_si
     size, knots = state.border_size, state.knots
     third = np.diff(np.eye(knots), 3, axis=0)
     second = np.diff(np.eye(knots), 2, axis=0)
+    slope = np.diff(np.eye(knots), axis=0)[:1]
     h2 = state.knot_mm**2
+    stiff = ((third, bend_sigma * h2), (second, 100 * bend_sigma * h2), (slope, _VIEW_RAD * state.knot_mm))
     blocks, residual, sigma = [], [], []
     for part in range(2):
         at = GLOBALS + part * knots
-        for rows, bend in ((third, bend_sigma), (second, 100 * bend_sigma)):
+        for rows, limit in stiff:
             block = np.zeros((len(rows), size))
             block[:, at : at + knots] = rows
             blocks.append(block)
             residual.append(rows @ state.curve[part])
-            sigma.append(np.full(len(rows), bend * h2))
+            sigma.append(np.full(len(rows), limit))
     unsure = len(state.instrument)
     own = np.r_[0:GLOBALS, size - unsure : size]
     blocks.append(np.eye(size)[own])

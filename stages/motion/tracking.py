@@ -22,7 +22,8 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 Image = NDArray[np.uint8]
 _FEWEST = 12
-_FEWEST_FOUND = 0.3
+_FEWEST_ALIKE = 0.4
+_ALIKE_PX = 1.5
 _MOST_MISSES = 8
 
 
@@ -69,9 +70,15 @@ class _Found:
     sigma: Float
 
     @property
-    def share(self) -> float:
-        """Return the share of landmarks found."""
-        return float(self.good.mean()) if self.good.size else 0.0
+    def alike(self) -> float:
+        """Return the share of landmarks in view that were found and moved like the next one around.
+
+        Noise is matched too, wherever it fits best by chance; but then no two landmarks move alike.
+        """
+        in_view = int(np.isfinite(self.at[:, 0]).sum())
+        around = np.argsort(self.at[self.good, 1], kind="stable")
+        apart = np.abs(np.diff(self.offset[self.good][around], axis=0)).max(1, initial=0.0)
+        return float(np.sum(apart < _ALIKE_PX)) / max(in_view, 1)
 
 
 class TextureTracker:
@@ -94,10 +101,12 @@ class TextureTracker:
         """Track one frame from its predicted pose and return the better one (4, 4)."""
         strip = unroll(image, self._camera, T_pc, self._grid, self._blocked)
         found = self._search(strip, frame)
-        if found.share < _FEWEST_FOUND and self._last is not None:
-            T_pc = self._shifted(T_pc, _displacement(self._last, strip))
-            strip = unroll(image, self._camera, T_pc, self._grid, self._blocked)
-            found = self._search(strip, frame)
+        if found.alike < _FEWEST_ALIKE and self._last is not None:
+            T_moved = self._shifted(T_pc, _displacement(self._last, strip))
+            other = unroll(image, self._camera, T_moved, self._grid, self._blocked)
+            found_there = self._search(other, frame)
+            if found_there.alike > max(found.alike, _FEWEST_ALIKE):
+                T_pc, strip, found = T_moved, other, found_there
         drift, lost = self._note(found, strip, frame)
         T_better = self._shifted(T_pc, drift)
         self._grow(strip, frame, drift)
@@ -142,11 +151,11 @@ class TextureTracker:
         missing = ~good & np.isfinite(found.at[:, 0])
         m.misses[found.landmark] = np.where(good, 0, m.misses[found.landmark] + missing)
         m.retired[found.landmark] |= m.misses[found.landmark] > _MOST_MISSES
+        if len(index) < _FEWEST or found.alike < _FEWEST_ALIKE:
+            return np.zeros(2), True
         at = found.at[good]
         sigma = np.maximum(found.sigma[good], 0.02) * self._px_per_strip(strip, at)
         self._rows.append((index, np.full(len(index), frame), strip.pixel(at[:, 0], at[:, 1]), sigma))
-        if len(index) < _FEWEST:
-            return np.zeros(2), True
         drift = np.median(found.offset[good], 0)
         m.offset[index] += found.offset[good] - drift
         return drift, False

@@ -73,6 +73,10 @@ def test_no_slip_rows(given) -> None:
     check_rows(terms.no_slip_rows, given[1], 1e-6)
 
 
+def test_turn_rows(given) -> None:
+    check_rows(lambda s: terms.turn_rows(s, 0.1), given[1], 1e-9, frame_atol=0.1 / 60)
+
+
 def test_border_rows(given) -> None:
     check_rows(lambda s: terms.border_rows(s, 2e-3, 0.002, 5.0), given[1], 1e-5)
 

@@ -136,6 +136,7 @@ def all_residuals(step: Float, at: State, given: Scene, parameters: MotionParame
     moved = state.T_pc[0, :3, 3] - at.T_pc[0, :3, 3]
     out[0] = np.concatenate([moved / 1e-4, step[3:6] / 1e-6])
     out.append(plain[2].residual / parameters.encoder_slip_sigma_mm)
+    out.append(terms.turn_rows(state, parameters.turn_sigma_rad).residual / parameters.turn_sigma_rad)
     out.append(terms.ring_rows(state, measured.rings).residual / measured.rings.sigma_mm)
     smooth = terms.smooth_rows(state, measured.time_s, measured.smooth_sigma).residual
     out.append((smooth.reshape(-1, 6) / measured.smooth_sigma).ravel())

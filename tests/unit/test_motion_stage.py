@@ -1,0 +1,111 @@
+"""The whole motion stage on drawn recordings: pose within σ, and nothing found where nothing can be seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Trajectory
+from pipeline.errors import UnusableError
+from pipeline.stage import quiet_context
+from stages.motion import MotionParameters, estimate_motion
+from tests.drawn_run import DrawnRun, drawn_run, without_encoder
+
+Float = NDArray[np.float64]
+STEP = 0.8
+PARAMETERS = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
+
+
+def estimated(run: DrawnRun) -> Trajectory:
+    return estimate_motion(run.recording, run.probe, run.rings, run.points, PARAMETERS, quiet_context())
+
+
+def errors(got: Trajectory, run: DrawnRun) -> tuple[Float, Float, Float]:
+    """Return distance (mm) and roll (rad) errors since the first frame, and their 1 σ (N, 2)."""
+    z = got.T_pc[:, 2, 3] - run.T_pc[:, 2, 3]
+    roll = roll_of(got.T_pc) - roll_of(run.T_pc)
+    return z - z[0], roll - roll[0], np.sqrt(np.diagonal(got.covariance, axis1=1, axis2=2)[:, [2, 5]])
+
+
+def roll_of(T: Float) -> Float:
+    return np.unwrap(np.arctan2(T[:, 1, 0], T[:, 0, 0]))
+
+
+@pytest.fixture(scope="module")
+def steady() -> DrawnRun:
+    k = np.arange(36)
+    return drawn_run(STEP * k, 0.004 * k)
+
+
+@pytest.mark.parametrize("encoder", [True, False])
+def test_pose_lies_within_its_sigma(steady: DrawnRun, encoder: bool) -> None:
+    run = steady if encoder else without_encoder(steady)
+    got = estimated(run)
+    z, roll, sigma = errors(got, run)
+    assert abs(z[-1]) < 3 * sigma[-1, 0] + 0.02
+    assert abs(roll[-1]) < 3 * sigma[-1, 1] + 1e-3
+    assert sigma[-1, 0] < 0.02 * STEP * 36
+    assert got.radius_mm == pytest.approx(50, abs=0.05)
+    assert np.isfinite(got.encoder_scale) == encoder
+    assert got.events == ()
+
+
+def test_distance_0_and_roll_0_are_the_first_camera(steady: DrawnRun) -> None:
+    got = estimated(steady)
+    assert got.T_pc[0, 2, 3] == pytest.approx(0, abs=0.005)  # z is square to a pipe that bends a little
+    assert roll_of(got.T_pc)[0] == pytest.approx(0, abs=1e-3)
+    np.testing.assert_allclose(
+        got.T_pc[:, :3, :3] @ np.swapaxes(got.T_pc[:, :3, :3], 1, 2),
+        np.tile(np.eye(3), (36, 1, 1)),
+        atol=1e-9,
+    )
+
+
+def test_same_recording_same_bytes(steady: DrawnRun) -> None:
+    first, second = estimated(steady), estimated(steady)
+    assert first.T_pc.tobytes() == second.T_pc.tobytes()
+    assert first.covariance.tobytes() == second.covariance.tobytes()
+
+
+def test_stop_and_reversal_are_followed_without_encoder() -> None:
+    step = np.concatenate([np.full(14, STEP), np.zeros(28), np.full(14, -STEP), np.full(8, STEP)])
+    step = np.convolve(np.pad(step, 4, mode="edge"), np.hanning(11)[1:-1] / 5, mode="valid")  # no jerks
+    run = drawn_run(np.concatenate([[0], np.cumsum(step)]), np.zeros(len(step) + 1), encoder=False)
+    got = estimated(run)
+    z, _, sigma = errors(got, run)
+    assert np.abs(z).max() < 0.1, (np.round(z, 2), np.round(sigma[:, 0], 3))
+    assert {"stop", "reversal"} <= {e.kind for e in got.events}
+
+
+def test_roll_is_not_invented_on_a_plain_wall(steady: DrawnRun) -> None:
+    k = np.arange(36)
+    run = drawn_run(STEP * k, 0.004 * k, contrast=0.0)
+    got = estimated(run)
+    _, _, sigma = errors(got, run)
+    known = errors(estimated(steady), steady)[2]
+    found = roll_of(got.T_pc)
+    assert abs(found[-1] - found[0]) < sigma[-1, 1], "there is nothing to see it by"
+    assert sigma[-1, 1] > 10 * known[-1, 1]
+    assert sigma[-1, 1] > sigma[4, 1]
+    assert abs(found[-1] - found[0] - 0.004 * 35) < 3 * sigma[-1, 1]
+
+
+def test_a_stationary_probe_yields_no_distance() -> None:
+    run = drawn_run(np.zeros(24), np.zeros(24), encoder=False)
+    got = estimated(run)
+    assert np.ptp(got.T_pc[:, 2, 3]) < 0.1
+    assert "stop" in {e.kind for e in got.events}
+
+
+def test_neither_texture_nor_encoder_is_refused() -> None:
+    run = drawn_run(STEP * np.arange(24), np.zeros(24), contrast=0.0, encoder=False)
+    with pytest.raises(UnusableError, match="no encoder"):
+        estimated(run)
+
+
+def test_no_rings_are_refused(steady: DrawnRun) -> None:
+    blind = np.full_like(steady.points.xyz_c, np.nan)
+    points = type(steady.points)(**{**vars(steady.points), "xyz_c": blind})
+    with pytest.raises(UnusableError, match="0 laser frames"):
+        estimate_motion(steady.recording, steady.probe, steady.rings, points, PARAMETERS, quiet_context())
