@@ -122,7 +122,7 @@ def rings_on_wall(
     sigma_px: float = 0.05,
     azimuths: int = 180,
 ) -> RingSamples:
-    """Return where the sheet z = baseline meets the wall r(s, ψ) about z, along image azimuths, with noise."""
+    """Return where the sheet z = baseline meets the wall r(s, ψ), along image azimuths, with noise."""
     azimuth = np.linspace(-np.pi, np.pi, azimuths, endpoint=False)
     outward = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], -1)
     radius = np.empty((len(frames), azimuths), np.float32)

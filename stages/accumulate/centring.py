@@ -1,4 +1,4 @@
-"""Rings centred on the pipe's own axis: what is left of each ring's pose error across the pipe is taken out."""
+"""Rings centred on the pipe's own axis: what is left of their pose errors across the pipe is taken out."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def centred(samples: WallSamples) -> WallSamples:
     """Return the samples with each ring shifted across the pipe so that its sound wall has no first harmonic.
 
     The radius is counted from the pipe's own axis, so a first harmonic of a whole ring is no shape but a pose
-    error. It is found with Geman-McClure weights beside mean and ovality, so that a dent or a deposit does not
-    pull the ring (S. Geman, D. McClure, 1987), and its course over the rings is smoothed, so that a ring
+    error. It is found with Geman-McClure weights beside mean and ovality, so that a dent or a deposit does
+    not pull the ring (S. Geman, D. McClure, 1987), and its course over the rings is smoothed, so that a ring
     that lies across a weld keeps its shape. Rings seen over less than half of the circle count as 0.
     """
     shift = _slow(_first_harmonic(samples))

@@ -138,7 +138,7 @@ def _excess_of(size: Float, sigma: Float) -> float:
     """Return by how much residuals (M,) of two coordinates exceed their σ: for Rayleigh's median, 1."""
     if not len(size):
         return 1.0
-    return max(float(np.median(size / sigma)) / np.sqrt(2 * np.log(2)), 0.3)
+    return max(float(np.median(size / sigma) / np.sqrt(2 * np.log(2))), 0.3)
 
 
 def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
