@@ -97,7 +97,7 @@ def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
 
 
 def turn_rows(state: State, sigma_rad: float) -> Rows:
-    """Turns from frame to frame are small: all that is known of them where no texture shows them."""
+    """Return small turns from frame to frame: all that is known of them where no texture shows them."""
     n = len(state.T_pc)
     rotation = state.T_pc[:, :3, :3]
     residual = vector_from_rotation(np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:])
