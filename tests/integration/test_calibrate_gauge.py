@@ -1,0 +1,73 @@
+"""``boresight calibrate`` on an open gauge run whose sheet is tilted unknown to its probe file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.commands.calibrate import calibrate, gauge_parameters
+from pipeline.errors import InputError
+from pipeline.instrument.probe_file import read_probe
+from tests.shared_data import shared
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("calibration")
+    calibrate(shared("recordings", "open-2-gauge"), folder)
+    return folder
+
+
+def test_hidden_tilt_is_found(calibration: Path) -> None:
+    name, (tilt_deg, toward_deg) = json.loads(shared("recordings", "open-2-gauge", "truth.json").read_text())[
+        "effects"
+    ][0]
+    assert name == "laser_tilt"
+    true = tilt_deg * np.array([np.cos(np.radians(toward_deg)), np.sin(np.radians(toward_deg))])
+    probe = read_probe(calibration / "probe.yaml")
+    found = np.degrees([probe.laser.tilt_x, probe.laser.tilt_y])
+    assert np.linalg.norm(found - true) < 0.01
+    assert probe.calibrated_from == "open-2-gauge"
+
+
+def test_probe_file_carries_a_smaller_covariance(calibration: Path) -> None:
+    stated = read_probe(shared("recordings", "open-2-gauge", "probe.yaml"))
+    found = read_probe(calibration / "probe.yaml")
+    names = list(found.parameter_names)
+    for name in ("fx", "cx", "cy", "k1", "k2", "k3", "baseline_mm", "tilt_x", "tilt_y"):
+        k = names.index(name)
+        assert 0 < found.covariance[k, k] < stated.covariance[k, k]
+    cx, tilt = names.index("cx"), names.index("tilt_x")
+    c = found.covariance
+    assert abs(c[cx, tilt]) > 0.5 * np.sqrt(c[cx, cx] * c[tilt, tilt])
+
+
+def test_document_and_page_say_what_moved(calibration: Path) -> None:
+    document = json.loads((calibration / "calibration.json").read_text("utf-8"))
+    moved = {p["name"]: p["change_in_stated_sigma"] for p in document["parameters"]}
+    assert moved["tilt_x"] > 30
+    assert abs(moved["cx"]) < 4
+    assert document["radius_error"][0]["before_largest_mm"] > 0.9
+    assert document["radius_error"][0]["sigma_mm"] < 0.01
+    assert document["outvoted"] == {"fiducials": [], "rings": []}
+    page = (calibration / "calibration.html").read_text("utf-8")
+    assert "open-2-gauge" in page
+    assert page.count("data:image/png;base64,") == 4
+    assert "http" not in page.replace("http-equiv", "")
+
+
+def test_unknown_parameter_is_refused() -> None:
+    with pytest.raises(InputError, match="'tilt' is no parameter"):
+        gauge_parameters(["tilt=3"])
+    with pytest.raises(InputError, match="tilt_prior_deg"):
+        gauge_parameters(["tilt_prior_deg=-1"])
+    assert gauge_parameters(["tilt_prior_deg=1", "ring_bins=120"]).tilt_prior_deg == 1.0
+
+
+def test_inspection_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it is not a gauge run"):
+        calibrate(shared("recordings", "open-2-field"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

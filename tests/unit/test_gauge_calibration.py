@@ -1,0 +1,306 @@
+"""Gauge calibration on made runs: estimates, derivatives, outvoting, choice of the sheet, refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from scipy.special import erf
+from threadpoolctl import threadpool_limits
+
+from pipeline.errors import InputError, UnusableError
+from pipeline.geometry.rigid import inverse, transform
+from pipeline.recording.base import BoreSection, Illumination, Image, Planes, Recording
+from stages.calibrate.gauge import premises
+from stages.calibrate.gauge.detect import Sighting, find_fiducials
+from stages.calibrate.gauge.edges import fit_steps
+from stages.calibrate.gauge.geometry import Gauge, gauge_of
+from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.calibrate.gauge.poses import posed_frames
+from stages.calibrate.gauge.solve import RingSource, first_unknowns
+from stages.calibrate.gauge.start import first_pose
+from stages.calibrate.gauge.state import SheetModel, Unknowns
+from stages.calibrate.gauge.terms import Equations, edge_equations, ring_equations
+from tests.gauge_runs import GaugeRun, calibrated, driven, facts, in_sigma, made_run, stated_probe
+
+USUAL = GaugeParameters.model_validate({"ring_bins": 120})
+
+
+@pytest.fixture(autouse=True)
+def _one_thread() -> Iterator[None]:
+    with threadpool_limits(1):
+        yield
+
+
+@pytest.fixture(scope="module")
+def run() -> GaugeRun:
+    return made_run(1)
+
+
+# --- edges
+
+
+def test_edge_is_found_where_it_is_and_as_well_as_it_says() -> None:
+    random = np.random.default_rng(3)
+    t = np.broadcast_to(np.linspace(-4, 4, 21), (400, 21)).copy()
+    place = random.uniform(-1, 1, 400)
+    step = 0.5 * (1 + erf((t - place[:, None]) / 0.8 / np.sqrt(2)))
+    grey = (20 + 90 * step) * (1 + 0.03 * t) + random.normal(0, 1.0, t.shape)
+    found, sigma = fit_steps(t, grey)
+    error = (found - place)[np.isfinite(found)]
+    assert len(error) > 390
+    assert abs(error.mean()) < 4 * error.std() / np.sqrt(len(error))
+    # beside noise, σ holds a floor for what blur leaves
+    noise = np.sqrt(np.nanmedian(sigma) ** 2 - 0.03**2)
+    assert 0.8 < error.std() / noise < 1.25
+
+
+def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None:
+    t = np.broadcast_to(np.linspace(-4, 4, 21), (2, 21)).copy()
+    flat = np.full((1, 21), 60.0) + np.random.default_rng(0).normal(0, 1, (1, 21))
+    falling = 60 - 40 * (t[:1] > 0)
+    assert np.isnan(fit_steps(t, np.concatenate([flat, falling]))[0]).all()
+
+
+# --- derivatives
+
+
+def _unknowns(run: GaugeRun) -> tuple[Unknowns, RingSource]:
+    from stages.calibrate.gauge.adjust import Measurements
+    from stages.calibrate.gauge.poses import poses_of_all_frames
+    from stages.calibrate.gauge.smooth import LOOSE
+
+    T_pc = poses_of_all_frames(run.recording, run.posed, run.rings, run.stated)
+    source = RingSource(run.rings, run.rings.frame, run.gauge)
+    rings = source.on_bore(T_pc, run.stated, USUAL)
+    measured = Measurements(run.edges, rings, run.recording.frames.time_s, None, 0.003, LOOSE)
+    return first_unknowns(T_pc, run.posed.index, run.gauge, measured, run.stated, USUAL), source
+
+
+@pytest.mark.parametrize("kind", ["edges", "rings"])
+def test_derivatives_are_those_of_finite_differences(run: GaugeRun, kind: str) -> None:
+    state, source = _unknowns(run)
+    on_bore = source.on_bore(state.T_pc, run.stated, USUAL)
+
+    def equations(at: Unknowns) -> Equations:
+        return edge_equations(at, run.edges) if kind == "edges" else ring_equations(at, on_bore)
+
+    frames, border = np.zeros((len(state.T_pc), 7)), np.zeros(state.border_size)
+    rows = equations(state).rows
+    for unknown in (0, 2, 3, 4):
+        step = frames.copy()
+        step[:, unknown] = 1e-5
+        slope = (equations(state.step(step, border)).rows.residual - rows.residual) / 1e-5
+        assert np.allclose(slope, rows.by_frame[:, 0, unknown], rtol=2e-3, atol=2e-3 * np.abs(slope).max())
+    at = state.layout
+    for unknown in (*range(3, 6), at.marker.start + 5, *range(at.instrument.start, at.size)):
+        change = border.copy()
+        change[unknown] = 1e-4
+        slope = (equations(state.step(frames, change)).rows.residual - rows.residual) / 1e-4
+        scale = max(np.abs(slope).max(), 1e-9)
+        assert np.allclose(slope, rows.by_border[:, unknown], rtol=5e-3, atol=5e-3 * scale)
+
+
+# --- estimates
+
+
+def test_drawn_probes_are_found_within_their_own_sigma() -> None:
+    drawn = [list(in_sigma(r, calibrated(r)).values()) for r in (made_run(seed) for seed in (1, 2, 3))]
+    # 30 correlated numbers: a wrong σ or a bias by its double would show
+    assert np.mean(np.abs(drawn) < 1.96) > 0.8
+    assert 0.3 < np.sqrt(np.mean(np.square(drawn))) < 1.6
+
+
+def test_stated_probe_is_off_and_the_result_says_by_how_much(run: GaugeRun) -> None:
+    result = calibrated(run)
+    names = result.probe.parameter_names
+    k = [names.index(n) for n in ("tilt_x", "tilt_y")]
+    assert np.linalg.norm((run.true.parameters - run.stated.parameters)[k]) > 20 * 1e-4
+    assert np.linalg.norm((run.true.parameters - result.probe.parameters)[k]) < 1.7e-4
+    widest = max(result.radii, key=lambda r: r.radius_mm)
+    assert np.abs(widest.before_mm).max() > 20 * widest.sigma_mm.max()
+    assert result.sheet is SheetModel.PLAIN
+    assert result.encoder[0] == pytest.approx(1.001, abs=4 * result.encoder_sigma[0])
+
+
+def test_decentring_is_taken_in_when_it_is_there(run: GaugeRun) -> None:
+    from tests.gauge_runs import rings_of
+
+    laser = replace(run.true.laser, decentre_x_mm=0.15, decentre_y_mm=-0.1)
+    true = replace(run.true, laser=laser)
+    T_pc = driven_as(run)
+    index = run.recording.frames.of(Illumination.LASER)
+    rings = rings_of(T_pc, index, true, run.gauge, np.random.default_rng(5))
+    result = calibrated(replace(run, rings=rings, true=true))
+    assert result.sheet is SheetModel.DECENTRED
+    assert max(map(abs, in_sigma(replace(run, true=true), result).values())) < 4
+
+
+def driven_as(run: GaugeRun) -> np.ndarray:
+    """Return the true poses of run 1: the drive is drawn after the probe."""
+    random = np.random.default_rng(1)
+    stated = stated_probe()
+    random.multivariate_normal(stated.parameters, stated.covariance)
+    random.normal(size=4)
+    random.normal(0, 1, 3)
+    return driven(len(run.recording.frames.frame), random)
+
+
+# --- outvoting
+
+
+def test_one_wrong_ring_in_five_is_outvoted_and_named(run: GaugeRun) -> None:
+    wrong = np.arange(2, len(run.rings.frame), 5)
+    radius = run.rings.radius_px.copy()
+    radius[wrong] += (4 * np.cos(3 * run.rings.azimuth_rad) + 3).astype(np.float32)
+    broken = replace(run, rings=replace(run.rings, radius_px=radius))
+    result = calibrated(broken)
+    on_bore = np.intersect1d(run.rings.frame[wrong], np.unique(calibrated(run).measured.rings.frame))
+    assert set(on_bore) <= set(result.wrong_rings) <= set(run.rings.frame[wrong])
+    assert max(map(abs, in_sigma(broken, result).values())) < 4
+
+
+def test_fiducial_off_its_place_is_left_out_and_named(run: GaugeRun) -> None:
+    moved = run.edges.marker == 12
+    edges = replace(run.edges, xyz_p=run.edges.xyz_p + 0.6 * moved[:, None] * np.array([0, 0, 1.0]))
+    result = calibrated(replace(run, edges=edges))
+    assert result.wrong_fiducials.tolist() == [12]
+    assert max(map(abs, in_sigma(run, result).values())) < 4
+
+
+def _sightings(gauge: Gauge, seen: Gauge | None = None, least: int = 20) -> list[Sighting]:
+    """Return corners of ``seen`` as the stated camera sees them, called by the names of ``gauge``."""
+    seen = seen or gauge
+    camera, out = stated_probe().camera, []
+    centre = np.array([m.distance_mm for m in gauge.fiducials.markers])
+    for k, T_pc in enumerate(driven(least, np.random.default_rng(0))):
+        marker = np.flatnonzero((centre > T_pc[2, 3] + 15) & (centre < T_pc[2, 3] + 60))
+        uv = camera.project(transform(inverse(T_pc), seen.corners(marker))).uv
+        out.append(Sighting(k, marker, uv, np.zeros(0, np.int64)))
+    return out
+
+
+def _posed(sightings: Sequence[Sighting], gauge: Gauge, run: GaugeRun):  # type: ignore[no-untyped-def]
+    random = np.random.default_rng(0)
+    poses = [first_pose(s, gauge, stated_probe().camera, random) for s in sightings]
+    return posed_frames(run.recording, sightings, poses)
+
+
+def test_one_swapped_pair_among_fifty_fiducials_is_outvoted(run: GaugeRun) -> None:
+    markers = list(run.gauge.fiducials.markers)
+    markers[3], markers[5] = replace(markers[5], id=3), replace(markers[3], id=5)
+    swapped = replace(run.gauge, fiducials=replace(run.gauge.fiducials, markers=tuple(markers)))
+    posed = _posed(_sightings(swapped, run.gauge), swapped, run)
+    assert swapped.ids[premises.outvoted_fiducials(posed, swapped)].tolist() == [3, 5]
+    assert premises.outvoted_fiducials(_posed(_sightings(run.gauge), run.gauge, run), run.gauge).size == 0
+
+
+# --- refusals
+
+
+def _with_fiducials(gauge: Gauge, **changes: object) -> Gauge:
+    return replace(gauge, fiducials=replace(gauge.fiducials, **changes))  # type: ignore[arg-type]
+
+
+def test_fiducials_of_another_size_are_refused(run: GaugeRun) -> None:
+    larger = _with_fiducials(run.gauge, size_mm=10.0)
+    sightings = _sightings(larger, run.gauge)
+    posed = _posed(sightings, larger, run)
+    with pytest.raises(UnusableError, match=r"measure (8\.9|9\.0|9\.1)\d* mm where .* says 10 mm"):
+        premises.require_poses(posed, sightings, larger, stated_probe().camera, USUAL)
+    right = _sightings(run.gauge)
+    premises.require_poses(_posed(right, run.gauge, run), right, run.gauge, stated_probe().camera, USUAL)
+
+
+def test_mirrored_places_are_refused(run: GaugeRun) -> None:
+    markers = tuple(replace(m, azimuth_deg=-m.azimuth_deg) for m in run.gauge.fiducials.markers)
+    mirrored = _with_fiducials(run.gauge, markers=markers)
+    sightings = _sightings(mirrored, run.gauge)
+    posed = posed_frames(
+        run.recording, sightings,
+        [first_pose(s, mirrored, stated_probe().camera, np.random.default_rng(0)) for s in sightings],
+    )  # fmt: skip
+    with pytest.raises(UnusableError, match="mirrored, swapped or placed otherwise"):
+        premises.require_poses(posed, sightings, mirrored, stated_probe().camera, USUAL)
+
+
+def test_bores_in_the_wrong_order_are_refused(run: GaugeRun) -> None:
+    state, _ = _unknowns(run)
+    other = gauge_of(
+        replace(facts(), bore=tuple(BoreSection(42.0, d) for d in (101.6, 70.0, 84.0))), run.gauge.fiducials
+    )
+    source = RingSource(run.rings, run.rings.frame, other)
+
+    def error(of: RingSource) -> tuple[np.ndarray, np.ndarray]:
+        rings = of.on_bore(state.T_pc, run.stated, USUAL)
+        xyz_p = transform(state.T_pc[rings.frame], run.stated.triangulate(rings.uv))
+        return rings.section, np.hypot(xyz_p[:, 0], xyz_p[:, 1]) - rings.radius_mm
+
+    with pytest.raises(UnusableError, match=r"section 2 .* measures 8.* where .* says 70 mm"):
+        premises.require_bores(other, *error(source))
+    premises.require_bores(run.gauge, *error(RingSource(run.rings, run.rings.frame, run.gauge)))
+
+
+def test_camera_that_stays_on_the_axis_is_refused(run: GaugeRun) -> None:
+    T_pc = driven_as(run)
+    premises.require_offset(T_pc, USUAL)
+    T_pc[:, :2, 3] *= 0.05
+    with pytest.raises(UnusableError, match="weak direction is a tilt of the sheet"):
+        premises.require_offset(T_pc, USUAL)
+
+
+def test_inspection_is_no_gauge_run(run: GaugeRun) -> None:
+    with pytest.raises(InputError, match="describes no bore"):
+        premises.require_gauge(replace(run.recording, pipe=replace(facts(), bore=())))
+    twice = replace(facts().fiducials, markers=facts().fiducials.markers[:1] * 2)
+    with pytest.raises(InputError, match="lists fiducial 0 twice"):
+        premises.require_gauge(replace(run.recording, pipe=replace(facts(), fiducials=twice)))
+
+
+def test_uncertain_radius_is_refused_by_name() -> None:
+    premises.require_determined(0.003, "cx with tilt_x", USUAL)
+    with pytest.raises(UnusableError, match="weak direction is cx with tilt_x"):
+        premises.require_determined(0.2, "cx with tilt_x", USUAL)
+
+
+class Pictures:
+    """The same picture in every frame."""
+
+    def __init__(self, image: Image) -> None:
+        self._image = image
+        self.image_size = (image.shape[1], image.shape[0])
+
+    def read(self, frames: Sequence[int], planes: Planes) -> Iterator[tuple[int, Image | None]]:
+        yield from ((int(f), self._image) for f in frames)
+
+
+def _picture(dictionary: int, numbers: Sequence[int]) -> Image:
+    image = np.full((420, 700), 255, np.uint8)
+    known = cv2.aruco.getPredefinedDictionary(dictionary)
+    for k, number in enumerate(numbers):
+        row, column = divmod(k, 3)
+        marker = cv2.aruco.generateImageMarker(known, number, 120)
+        image[60 + 180 * row : 180 + 180 * row, 60 + 200 * column : 180 + 200 * column] = marker
+    return image
+
+
+@pytest.mark.parametrize(
+    ("image", "said"),
+    [
+        (_picture(cv2.aruco.DICT_5X5_100, range(6)), "DICT_5X5_1000 are seen instead of DICT_4X4"),
+        (np.ascontiguousarray(_picture(cv2.aruco.DICT_4X4_100, range(6))[:, ::-1]), "mirrored"),
+        (_picture(cv2.aruco.DICT_4X4_100, range(80, 86)), "other numbers are seen: 80, 81"),
+        (np.full((420, 700), 90, np.uint8), "in only 0 of 30 lit frames$|in only 0 of 30 lit frames\n"),
+    ],
+)
+def test_fiducials_that_are_not_seen_are_refused_with_the_likely_cause(
+    run: GaugeRun, image: Image, said: str
+) -> None:
+    recording: Recording = replace(run.recording, source=Pictures(image))
+    lit = recording.frames.of(Illumination.LED)
+    sightings = [s for s, _ in find_fiducials(recording.read(lit, "grey"), run.gauge)]
+    with pytest.raises(UnusableError, match=said):
+        premises.require_fiducials(recording, run.gauge, sightings, USUAL)
