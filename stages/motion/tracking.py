@@ -126,7 +126,8 @@ class TextureTracker:
         xyz = self._grid.wall(self._map.row, self._map.column)[keep]
         return Tracks(
             renumber[landmark[use]][order], frame[use][order], uv[use][order], sigma[use][order], xyz,
-            np.array([p[0] for p in self._poses]), np.array([p[1] for p in self._poses]).reshape(-1, 4, 4),
+            np.array([p[0] for p in self._poses], np.int64),
+            np.array([p[1] for p in self._poses]).reshape(-1, 4, 4),
             np.array([p[2] for p in self._poses], bool),
         )  # fmt: skip
 
