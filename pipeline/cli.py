@@ -39,6 +39,7 @@ _ATTACHED = (
     _Attached("error-budget", "Every source of error, its share in the radius, and what dominates."),
     _Attached("calibrate", "Find camera and laser sheet, with covariance, from a gauge run."),
     _Attached("calibrate-camera", "Calibrate a camera from pictures of boards."),
+    _Attached("calibrate-laser", "Find the laser plane from pictures of a board with the line across it."),
     _Attached("verify", "Compare a run with a known bore, a reference model or truth: a certificate."),
 )
 

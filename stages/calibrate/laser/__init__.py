@@ -1,0 +1,1 @@
+"""The laser plane from pictures of a board with the laser line across it."""

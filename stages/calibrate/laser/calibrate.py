@@ -1,0 +1,157 @@
+"""The laser plane from board pictures: board pose, line on the board, plane through all lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import UnusableError
+from pipeline.geometry.rigid import transform
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.calibration import BoardView, rms
+from pipeline.instrument.laser_plane import NAME, LaserPlane
+from pipeline.stage import Context
+from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
+from stages.calibrate.boards.start import pose
+from stages.calibrate.laser.line import measure_line, patch_around
+from stages.calibrate.laser.parameters import LaserPlaneParameters
+from stages.calibrate.laser.plane import fit_plane_robustly
+from stages.rings.colour import excess_weights, mix
+
+Float = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class LaserPicture:
+    """A colour picture (H, W, 3), BGR, of a board crossed by the laser line, and the board found in it."""
+
+    image: Image
+    view: BoardView
+
+
+@dataclass(frozen=True)
+class BoardLine:
+    """The laser line on one board.
+
+    Attributes
+    ----------
+    name : str
+        Of the picture.
+    T_cb : (4, 4)
+        Board to camera, mm.
+    pose_rms_px : float
+        Root mean square distance of the board's corners from their projection.
+    xyz_c : (N, 3)
+        Points of the line, mm in C; N is 0 where no line is seen.
+    """
+
+    name: str
+    T_cb: Float
+    pose_rms_px: float
+    xyz_c: Float
+
+
+@dataclass(frozen=True)
+class LaserCalibration:
+    """A laser plane, the lines it was fitted to, and the pictures not used with reasons."""
+
+    plane: LaserPlane
+    lines: tuple[BoardLine, ...]
+    rejected: tuple[tuple[str, str], ...]
+
+
+def calibrate_laser_plane(
+    pictures: Sequence[LaserPicture], camera: Camera, parameters: LaserPlaneParameters, context: Context
+) -> LaserCalibration:
+    """Return the laser plane that lines on boards of several poses lie in.
+
+    Raises
+    ------
+    UnusableError
+        When too few pictures show a line, or their lines do not span a plane.
+    """
+    lines, rejected = [], []
+    for done, picture in enumerate(pictures, start=1):
+        line = line_on_board(picture, camera, parameters)
+        problem = _problem(line, parameters)
+        lines += [] if problem else [line]
+        rejected += [(line.name, problem)] if problem else []
+        context.progress(done, len(pictures))
+    context.report("rejected: pictures without a usable laser line", len(rejected), "pictures")
+    _refuse_too_few(lines, rejected, parameters)
+    group = np.repeat(np.arange(len(lines)), [len(line.xyz_c) for line in lines])
+    xyz_c = np.concatenate([line.xyz_c for line in lines])
+    _refuse_one_line(xyz_c, parameters)
+    plane = fit_plane_robustly(xyz_c, group)
+    _refuse_undetermined(plane, parameters)
+    return LaserCalibration(plane, tuple(lines), tuple(rejected))
+
+
+def line_on_board(picture: LaserPicture, camera: Camera, parameters: LaserPlaneParameters) -> BoardLine:
+    """Return the laser line where it crosses the board of one picture."""
+    view = picture.view
+    corners = Corners.of([view])
+    first = Estimate(camera, pose(view, camera)[None], np.zeros(3))
+    posed = solve(first, corners, POSES_ONLY, parameters.huber_px)
+    T_cb, square_mm = posed.T_cb[0], _square_mm(view)
+    patch = patch_around(view.xyz_b, view.uv, T_cb, parameters.margin_squares * square_mm)
+    excess = mix(picture.image, excess_weights(parameters.wavelength_nm))
+    xy_b = measure_line(excess, camera, patch, parameters)
+    xyz_b = np.concatenate([xy_b, np.zeros((len(xy_b), 1))], 1)
+    return BoardLine(view.name, T_cb, rms(posed.residuals(corners)), transform(T_cb, xyz_b))
+
+
+def _square_mm(view: BoardView) -> float:
+    """Return the edge of a square: the shortest step between corners along x."""
+    step = np.diff(np.unique(view.xyz_b[:, 0]))
+    return float(step.min())
+
+
+def _problem(line: BoardLine, parameters: LaserPlaneParameters) -> str:
+    """Return why a line cannot be used, or nothing."""
+    if not line.pose_rms_px <= parameters.largest_pose_rms_px:
+        return f"the camera explains the board's corners only to {line.pose_rms_px:.2f} px"
+    if len(line.xyz_c) < parameters.least_points:
+        return f"the laser line is seen at {len(line.xyz_c)} places on the board"
+    return ""
+
+
+def _refuse_too_few(
+    lines: Sequence[BoardLine], rejected: Sequence[tuple[str, str]], parameters: LaserPlaneParameters
+) -> None:
+    if len(lines) < parameters.least_pictures:
+        reasons = "; ".join(f"{name}: {problem}" for name, problem in rejected)
+        raise UnusableError(
+            NAME,
+            f"{len(lines)} pictures show the laser line on a board" + (f" ({reasons})" if reasons else ""),
+            limit=f"at least {parameters.least_pictures}",
+            hint="check the laser's wavelength and the margin; light the board so that line and squares show",
+        )
+
+
+def _refuse_one_line(xyz_c: Float, parameters: LaserPlaneParameters) -> None:
+    """Raise when the lines are nearly one: the plane of a board that was not moved holds them as well."""
+    along, across = np.linalg.svd(xyz_c - xyz_c.mean(0), compute_uv=False)[:2] / np.sqrt(len(xyz_c))
+    if not across >= parameters.least_spread * along:
+        raise UnusableError(
+            NAME,
+            f"the laser lines nearly coincide: spread {across:.2f} mm across, {along:.1f} mm along",
+            limit=f"across at least {parameters.least_spread:g} of along",
+            hint="hold the board at different distances and tilts",
+        )
+
+
+def _refuse_undetermined(plane: LaserPlane, parameters: LaserPlaneParameters) -> None:
+    sigma_deg = float(np.rad2deg(plane.tilt_sigma_rad))
+    if not sigma_deg <= parameters.largest_tilt_sigma_deg:
+        raise UnusableError(
+            NAME,
+            f"the lines leave the laser plane's direction uncertain by {sigma_deg:.2f}° (1 σ)",
+            limit=f"{parameters.largest_tilt_sigma_deg:g}°",
+            hint="hold the board at different distances and tilts, so that the lines are not all parallel "
+            "and close together",
+        )

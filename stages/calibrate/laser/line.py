@@ -1,0 +1,179 @@
+"""The laser line on a board of known pose, measured in the board's plane.
+
+On a plane board the laser plane draws a straight line, whatever the camera. So the board is looked at
+straight on (the picture resampled on a grid in its plane), the line found by consensus of its brightest
+points, and measured by fitting a Gaussian on a constant background across it, in the picture itself.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.rigid import transform
+from pipeline.instrument.camera.base import Camera
+from stages.calibrate.laser.parameters import LaserPlaneParameters
+from stages.calibrate.laser.peaks import fit_peaks
+
+Float = NDArray[np.float64]
+Image32 = NDArray[np.float32]
+
+_MOST_CANDIDATES, _DRAWS = 4000, 400
+_LINE_PX, _STATION_PX, _PROFILE_STEP_PX = 2.0, 1.0, 0.5
+_OUTLIER_SIGMAS, _MAD_TO_SIGMA = 3.0, 1.4826
+_LARGEST_GRID = 4000
+_OUTSIDE = -1e3
+
+
+class BoardPatch(NamedTuple):
+    """The part of a board's plane that is looked at.
+
+    ``T_cb`` (4, 4), corners ``low_mm`` and ``high_mm`` (2,) in B, ``mm_per_px`` of the picture there.
+    """
+
+    T_cb: Float
+    low_mm: Float
+    high_mm: Float
+    mm_per_px: float
+
+
+class StraightLine(NamedTuple):
+    """Points ``origin`` + t · ``direction`` in the board's plane, mm, t from ``start`` to ``stop``."""
+
+    origin: Float
+    direction: Float
+    start: float
+    stop: float
+
+    @property
+    def across(self) -> Float:
+        """(2,) unit vector square to the line."""
+        return np.array([-self.direction[1], self.direction[0]])
+
+
+def patch_around(xyz_b: Float, uv: Float, T_cb: Float, margin_mm: float) -> BoardPatch:
+    """Return the patch that holds the corners (N, 3), seen at ``uv`` (N, 2), and a margin around them."""
+    low, high = xyz_b[:, :2].min(0), xyz_b[:, :2].max(0)
+    hull = cv2.convexHull(uv.astype(np.float32))
+    mm_per_px = float(np.sqrt(np.prod(high - low) / max(cv2.contourArea(hull), 1.0)))
+    return BoardPatch(T_cb, low - margin_mm, high + margin_mm, mm_per_px)
+
+
+def measure_line(
+    excess: Image32, camera: Camera, patch: BoardPatch, parameters: LaserPlaneParameters
+) -> Float:
+    """Return the laser line's points (N, 2), mm in the board's plane; N is 0 where no line is seen.
+
+    Parameters
+    ----------
+    excess : (H, W)
+        How much of the laser's colour each pixel has beyond grey, grey levels.
+    """
+    candidates, height = _candidates(excess, camera, patch, parameters)
+    line = _consensus(candidates, height, _LINE_PX * patch.mm_per_px)
+    if line is None:
+        return np.zeros((0, 2))
+    stations = _stations(line, patch)
+    step_mm = _PROFILE_STEP_PX * patch.mm_per_px
+    offset_mm = step_mm * _window(parameters)
+    profiles = _sample(excess, camera, patch, stations[:, None] + offset_mm[:, None] * line.across)
+    peak = fit_peaks(profiles, parameters.least_contrast)
+    points = stations + step_mm * peak[:, None] * line.across
+    return _straight(points[np.isfinite(peak)])
+
+
+def _candidates(
+    excess: Image32, camera: Camera, patch: BoardPatch, parameters: LaserPlaneParameters
+) -> tuple[Float, Float]:
+    """Return the board points (K, 2) that stand out most from around them, and their heights (K,)."""
+    step = max(patch.mm_per_px, float(np.max(patch.high_mm - patch.low_mm)) / _LARGEST_GRID)
+    columns, rows = (np.arange(a, b, step) for a, b in zip(patch.low_mm, patch.high_mm, strict=True))
+    grid = np.stack(np.meshgrid(columns, rows), -1)
+    face = _sample(excess, camera, patch, grid)
+    seen = np.isfinite(face)
+    if not seen.any():
+        return np.zeros((0, 2)), np.zeros(0)
+    raised = _raised(np.where(seen, face, np.median(face[seen])), parameters.window_px)
+    noise = _MAD_TO_SIGMA * float(np.median(np.abs(raised[seen])))
+    stands_out = seen & (raised > max(parameters.least_contrast * noise, 1.0)) & _ridge(raised)
+    height = raised[stands_out]
+    best = np.argsort(-height, kind="stable")[:_MOST_CANDIDATES]
+    return grid[stands_out][best], height[best].astype(float)
+
+
+def _raised(face: Float, window_px: float) -> Float:
+    """Return a picture smoothed by a pixel, minus what is there on a wider scale."""
+    single = face.astype(np.float32)
+    fine, coarse = (cv2.GaussianBlur(single, (0, 0), s) for s in (1.0, window_px))
+    return np.asarray(fine - coarse, np.float64)
+
+
+def _ridge(raised: Float) -> NDArray[np.bool_]:
+    """Return where a picture is highest along its row or its column among neighbours."""
+    highest = np.zeros(raised.shape, bool)
+    for kernel in (np.ones((1, 3), np.uint8), np.ones((3, 1), np.uint8)):
+        highest |= raised >= cv2.dilate(raised, kernel)
+    return highest
+
+
+def _consensus(points: Float, height: Float, tolerance_mm: float) -> StraightLine | None:
+    """Return the straight line that most height of points (K, 2) agrees with (RANSAC, fixed draws)."""
+    if len(points) < 2:
+        return None
+    random = np.random.default_rng(0)
+    pair = random.choice(len(points), (_DRAWS, 2), p=height / height.sum())
+    direction = points[pair[:, 1]] - points[pair[:, 0]]
+    length = np.linalg.norm(direction, axis=1)
+    pair, direction = pair[length > 0], direction[length > 0] / length[length > 0, None]
+    if not len(pair):
+        return None
+    across = np.stack([-direction[:, 1], direction[:, 0]], 1)
+    distance = np.abs(across @ points.T - np.sum(across * points[pair[:, 0]], 1)[:, None])
+    best = int(np.argmax((distance < tolerance_mm) @ height))
+    inlier = distance[best] < tolerance_mm
+    return _line_through(points[inlier], height[inlier])
+
+
+def _line_through(points: Float, weight: Float) -> StraightLine:
+    origin = weight @ points / weight.sum()
+    centred = points - origin
+    direction = np.linalg.eigh((centred * weight[:, None]).T @ centred)[1][:, 1]
+    along = centred @ direction
+    return StraightLine(origin, direction, float(along.min()), float(along.max()))
+
+
+def _stations(line: StraightLine, patch: BoardPatch) -> Float:
+    """Return (S, 2) points along the line, a pixel apart, no farther than a line is seen."""
+    along = np.arange(line.start, line.stop, _STATION_PX * patch.mm_per_px)
+    return np.asarray(line.origin + along[:, None] * line.direction)
+
+
+def _window(parameters: LaserPlaneParameters) -> Float:
+    half = int(np.ceil(parameters.window_px / _PROFILE_STEP_PX))
+    return np.arange(-half, half + 1, dtype=float)
+
+
+def _sample(excess: Image32, camera: Camera, patch: BoardPatch, xy_b: Float) -> Float:
+    """Return the picture's values at board points (..., 2), NaN outside of the picture."""
+    xyz_b = np.concatenate([xy_b, np.zeros_like(xy_b[..., :1])], -1)
+    uv, valid = camera.project(transform(patch.T_cb, xyz_b.reshape(-1, 3)))
+    height, width = excess.shape
+    inside = valid & np.all((np.nan_to_num(uv, nan=-1) >= 0) & (uv <= [width - 1, height - 1]), -1)
+    where = np.where(inside[:, None], uv, _OUTSIDE).reshape(*xy_b.shape[:2], 2).astype(np.float32)
+    value = cv2.remap(excess, where[..., 0], where[..., 1], cv2.INTER_LINEAR)
+    return np.where(inside.reshape(xy_b.shape[:2]), value, np.nan)
+
+
+def _straight(points: Float) -> Float:
+    """Return the points (N, 2) without those that are off their own straight line."""
+    for _ in range(5):
+        if len(points) < 3:
+            return points
+        line = _line_through(points, np.ones(len(points)))
+        distance = np.abs((points - line.origin) @ line.across)
+        limit = _OUTLIER_SIGMAS * _MAD_TO_SIGMA * float(np.median(distance))
+        points = points[distance <= max(limit, 1e-9)]
+    return points
