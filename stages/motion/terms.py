@@ -14,6 +14,7 @@ from stages.motion.state import GLOBALS, EncoderReadings, State
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+_FINEST_WALL_MM = 0.02
 _VIEW_RAD = 0.2  # 1 σ of the angle between the first camera and the pipe
 
 
@@ -41,6 +42,14 @@ class RingBins:
 def cauchy(residual_over_sigma: Float, scale: float = 2.5) -> Float:
     """Return the Cauchy weight of residuals in σ."""
     return np.asarray(1 / (1 + (residual_over_sigma / scale) ** 2))
+
+
+def redescending(residual_over_spread: Float, scale: float = 2.5) -> Float:
+    """Return the Geman-McClure weight: relief such as a weld hardly counts.
+
+    The instrument's derivatives change with radius, so relief left in would be explained by the lens.
+    """
+    return np.asarray(1 / (1 + (residual_over_spread / scale) ** 2) ** 2)
 
 
 def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
@@ -72,7 +81,8 @@ def ring_rows(state: State, rings: RingBins) -> Rows:
     by_border[:, first : first + unsure] = np.einsum("mj,mjq->mq", normal_c, rings.by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
     by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
-    weight = cauchy(residual / rings.sigma_mm) / rings.sigma_mm**2
+    spread = max(1.4826 * float(np.median(np.abs(residual))), _FINEST_WALL_MM) if residual.size else 1.0
+    weight = redescending(residual / spread) / rings.sigma_mm**2
     return Rows(rings.frame[:, None], by_frame, by_border, residual, weight)
 
 
