@@ -11,7 +11,12 @@ from tests.shared_data import shared
 @pytest.mark.parametrize(
     ("image", "own", "other", "limit_px"),
     [
+        ("Pro1.jpg", "Real1", "Real2old", 0.4),
         ("Pro2.jpg", "Real1", "Real2old", 0.4),
+        ("recon_0001.jpg", "Real2old", "Real1", 0.5),
+        ("testr26_1.jpg", "Real2old", "Real1", 0.5),
+        ("testr28.jpg", "Real2old", "Real1", 0.5),
+        ("testr30.jpg", "Real2old", "Real1", 0.5),
         ("testr28_1.jpg", "Real2old", "Real1", 0.5),
         ("testr32_1_2.jpg", "Real2old", "Real1", 0.5),
     ],

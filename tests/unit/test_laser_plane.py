@@ -4,10 +4,13 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.commands.calibrate_laser import with_plane
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.laser_plane import LaserPlane
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.stage import quiet_context
 from stages.calibrate.boards.detect import detect
 from stages.calibrate.boards.targets import Chessboard
@@ -80,6 +83,20 @@ def test_covariance_without_groups_would_be_too_small():
     points, group = _plane_points(np.random.default_rng(3), 12, 40, picture_mm=0.1)
     apart = fit_plane(points, np.arange(len(points)))
     assert fit_plane(points, group).tilt_sigma_rad > 2 * apart.tilt_sigma_rad
+
+
+def test_probe_takes_the_plane_with_its_covariance(tmp_path):
+    points, group = _plane_points(np.random.default_rng(8))
+    plane = fit_plane(points, group)
+    names = (*CAMERA.parameter_names, *LaserSheet.PARAMETER_NAMES)
+    stated = Probe(CAMERA, LaserSheet(45.0), np.eye(len(names)))
+    write_probe(with_plane(stated, CAMERA, plane, 532.0), tmp_path / "probe.yaml")
+    probe = read_probe(tmp_path / "probe.yaml")
+    assert probe.laser.parameters[:3] == pytest.approx([50, 0.2, -0.1], abs=0.02)
+    assert probe.laser.wavelength_nm == 532
+    place = np.ix_(*[[names.index(n) for n in ("baseline_mm", "tilt_x", "tilt_y")]] * 2)
+    assert np.allclose(probe.covariance[place], plane.sheet_covariance())
+    assert np.count_nonzero(probe.covariance) == 9
 
 
 def test_plane_beside_the_axis_is_no_sheet():
