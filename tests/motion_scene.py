@@ -58,7 +58,7 @@ def scene(
     tracks = _tracks(truth, instrument, noise, random)
     rings = _rings(truth, noise, random, unsure.shape[1])
     distance = t[:, 2] - t[0, 2] + noise * ENCODER_SIGMA_MM * random.standard_normal(frames)
-    readings = EncoderReadings(distance, ENCODER_SIGMA_MM) if encoder else None
+    readings = EncoderReadings(distance, ENCODER_SIGMA_MM, np.ones(len(distance), bool)) if encoder else None
     sigma = np.array([0.05] * 3 + [1e-3] * 3)
     return Scene(truth, Measurements(tracks, rings, k / 30, readings, instrument, unsure, sigma))
 

@@ -195,7 +195,7 @@ def _regress(  # type: ignore[no-untyped-def]
             out_radius[i, a], out_sigma[i, a] = _line_at(
                 d, kernel, radius[a, first:last], variance[a, first:last], width
             )
-            out_count[i, a] = np.where(np.abs(d) <= width, count[a, first:last], 0).sum()
+            out_count[i, a] = np.where(np.abs(d) <= 3.0 * width, count[a, first:last], 0).sum()
             out_misalignment[i, a] = (weight * misalignment[a, first:last]).sum() / weight.sum()
 
 

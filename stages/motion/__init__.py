@@ -15,6 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from pipeline.stage import Context, Stage
 from stages.motion.adjustment import MATCH_BIASES, Estimate, Measurements, adjust, third_difference_sigma
+from stages.motion.encoder import encoder_at_frames, not_contradicted
 from stages.motion.events import find_events
 from stages.motion.output import in_pipe_frame
 from stages.motion.parameters import MotionParameters
@@ -53,11 +54,12 @@ def estimate_motion(
         When neither rings nor texture and encoder determine the motion.
     """
     centre_c, radius_mm = _pipe_in_rings(points)
-    encoder = _encoder_at_frames(recording, parameters.encoder_sigma_mm)
     grid = _strip_grid(radius_mm, parameters)
+    encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
     all_centres = at_all_frames(_index_of(recording, points.frame), centre_c, len(recording.frames.frame))
     predictor = Predictor(recording.frames.time_s, encoder, all_centres)
     tracks = _tracked(recording, probe, grid, predictor, parameters, context)
+    encoder = not_contradicted(encoder, tracks, context)
     _require_distance(tracks, encoder)
     unsure = probe.principal_uncertainties()
     bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
@@ -82,20 +84,6 @@ def _pipe_in_rings(points: RingPoints) -> tuple[Float, float]:
             hint="check exposure and that the laser is on; see the rejected ring samples by reason",
         )
     return centre_c, float(np.nanmedian(radius))
-
-
-def _encoder_at_frames(recording: Recording, sigma_mm: float) -> EncoderReadings | None:
-    """Return the encoder's distance at the frames' times, relative to the first, or None.
-
-    Its smallest step is its quantum q, which adds q²/12 to the readings' variance.
-    """
-    if recording.encoder is None:
-        return None
-    time_s, distance_mm = recording.encoder.time_s, recording.encoder.distance_mm
-    at_frames = np.interp(recording.frames.time_s, time_s, distance_mm)
-    step = np.abs(np.diff(distance_mm))
-    quantum = float(step[step > 1e-9].min()) if np.any(step > 1e-9) else 0.0
-    return EncoderReadings(at_frames - at_frames[0], float(np.hypot(sigma_mm, quantum / np.sqrt(12))))
 
 
 def _strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:

@@ -20,6 +20,7 @@ from stages.motion.tracking import Tracks
 Float = NDArray[np.float64]
 _CONVERGED_MM = 1e-3
 MATCH_BIASES = 2
+_THETA_SPAN = 0.35  # half the range of polar angles tracked, rad
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,9 @@ def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
     """
     theta = np.arctan2(np.hypot(xyz_c[:, 0], xyz_c[:, 1]), xyz_c[:, 2])
     radial = from_centre_px / np.maximum(np.linalg.norm(from_centre_px, axis=1), 1.0)[:, None]
-    return np.asarray(radial[:, :, None] * np.stack([np.ones_like(theta), theta - 1.0], -1)[:, None, :])
+    return np.asarray(
+        radial[:, :, None] * np.stack([np.ones_like(theta), (theta - 1.0) / 0.35], -1)[:, None, :]
+    )
 
 
 def third_difference_sigma(state: State, lit: NDArray[np.int64]) -> Float:

@@ -48,10 +48,13 @@ class MotionParameters(Parameters):
         description="1 σ, mm, of the encoder's creep from frame to frame; slips may be far larger",
     )
     alike: float = Field(
-        30.0, ge=1, le=10000, description="number of neighbouring observations of a landmark that err alike"
+        15.0, ge=1, le=10000, description="number of neighbouring observations of a landmark that err alike"
+    )
+    most_observations: int = Field(
+        16, ge=3, le=1000, description="observations of one landmark that enter the adjustment"
     )
     match_bias_px: float = Field(
-        0.1, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
+        0.3, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
     )
     turn_sigma_rad: float = Field(
         0.1, gt=0, le=1, description="1 σ, rad, of a turn from frame to frame where no texture shows it"

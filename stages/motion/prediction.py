@@ -29,7 +29,7 @@ class Predictor:
 
     def __init__(self, time_s: Float, encoder: EncoderReadings | None, centre_c: Float) -> None:
         self._time, self._centre = time_s, centre_c
-        self._encoder = None if encoder is None else encoder.distance_mm
+        self._encoder = encoder
         self._known: list[tuple[int, float, float]] = []
 
     def learn(self, frame: int, T_pc: Float) -> None:
@@ -51,13 +51,14 @@ class Predictor:
         before, z_before, roll_before = self._known[0]
         ratio = (self._time[frame] - self._time[last]) / max(self._time[last] - self._time[before], 1e-9)
         turn = (roll - roll_before + np.pi) % (2 * np.pi) - np.pi
-        if self._encoder is not None:
-            return z + float(self._encoder[frame] - self._encoder[last]), roll + turn * ratio
+        if self._encoder is not None and self._encoder.known[[last, frame]].all():
+            advance = self._encoder.distance_mm[frame] - self._encoder.distance_mm[last]
+            return z + float(advance), roll + turn * ratio
         return z + (z - z_before) * ratio, roll + turn * ratio
 
     def between(self, frames: Int, T_pc: Float, count: int) -> Float:
         """Return first guesses (count, 4, 4) of all poses from those of the tracked ``frames``."""
-        z = self._encoder if self._encoder is not None else np.zeros(count)
+        z = self._encoder.distance_mm if self._encoder is not None else np.zeros(count)
         roll = np.zeros(count)
         if len(frames):
             near = np.arange(count)

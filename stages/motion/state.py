@@ -104,10 +104,11 @@ def moved(T_pc: Float, step: Float) -> Float:
 
 @dataclass(frozen=True)
 class EncoderReadings:
-    """Encoder distance at all frames (N,), mm, and the 1 σ of one reading, mm."""
+    """Encoder distance at all frames (N,), mm, the 1 σ of one reading, mm, and where it is known (N,)."""
 
     distance_mm: Float
     sigma_mm: float
+    known: NDArray[np.bool_]
 
 
 def straight_start(

@@ -132,7 +132,7 @@ def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -
     by_border = np.zeros((n, state.border_size))
     by_border[:, 3] = -encoder.distance_mm
     residual = s - scale * encoder.distance_mm - state.slip
-    reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, np.full(n, encoder.sigma_mm**-2.0))
+    reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, encoder.known / encoder.sigma_mm**2)
     pair = np.stack([np.arange(n - 1), np.arange(1, n)], -1)
     by_pair = np.zeros((n - 1, 2, BLOCK))
     by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1

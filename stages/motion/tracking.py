@@ -20,6 +20,7 @@ from stages.motion.strip import Strip, StripGrid, unroll
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 Image = NDArray[np.uint8]
 _FEWEST = 12
 _FEWEST_ALIKE = 0.4
@@ -119,8 +120,9 @@ class TextureTracker:
         none = np.zeros(0, np.int64)
         self._rows.append((none, none, np.zeros((0, 2)), np.zeros(0)))
         landmark, frame, uv, sigma = (np.concatenate(c) for c in zip(*self._rows, strict=True))
-        keep = np.bincount(landmark, minlength=len(self._map.row)) >= 3
-        use = keep[landmark]
+        count = np.bincount(landmark, minlength=len(self._map.row))
+        keep = count >= 3
+        use = keep[landmark] & _thinned(landmark, frame, count, self._parameters.most_observations)
         renumber = np.cumsum(keep) - 1
         order = np.lexsort((frame[use], landmark[use]))
         xyz = self._grid.wall(self._map.row, self._map.column)[keep]
@@ -201,6 +203,19 @@ class TextureTracker:
         out = step @ T_pc
         out[2, 3] = T_pc[2, 3] - drift[0] * self._grid.step_mm
         return np.asarray(out)
+
+
+def _thinned(landmark: Int, frame: Int, count: Int, most: int) -> Mask:
+    """Return (M,) which observations to keep: at most ``most`` of each landmark, spread evenly.
+
+    Neighbouring observations err alike, so the rest would cost memory and tell nothing.
+    """
+    order = np.lexsort((frame, landmark))
+    rank = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+    share = np.minimum(most / np.maximum(count[landmark[order]], 1), 1.0)
+    keep = np.zeros(len(order), bool)
+    keep[order] = np.floor((rank + 1) * share) > np.floor(rank * share)
+    return keep
 
 
 def _displacement(before: Strip, now: Strip) -> Float:
