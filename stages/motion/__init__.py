@@ -15,7 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from pipeline.stage import Context, Stage
 from stages.motion.adjustment import MATCH_BIASES, Estimate, Measurements, adjust, third_difference_sigma
-from stages.motion.encoder import encoder_at_frames, not_contradicted
+from stages.motion.encoder import contradicted, encoder_at_frames
 from stages.motion.events import find_events
 from stages.motion.output import in_pipe_frame
 from stages.motion.parameters import MotionParameters
@@ -59,7 +59,9 @@ def estimate_motion(
     all_centres = at_all_frames(_index_of(recording, points.frame), centre_c, len(recording.frames.frame))
     predictor = Predictor(recording.frames.time_s, encoder, all_centres)
     tracks = _tracked(recording, probe, grid, predictor, parameters, context)
-    encoder = not_contradicted(encoder, tracks, context)
+    if encoder is not None and contradicted(encoder, tracks, context):
+        encoder, predictor = None, Predictor(recording.frames.time_s, None, all_centres)
+        tracks = _tracked(recording, probe, grid, predictor, parameters, context)
     _require_distance(tracks, encoder)
     unsure = probe.principal_uncertainties()
     bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)

@@ -24,7 +24,7 @@ def encoder_at_frames(
 ) -> EncoderReadings | None:
     """Return the encoder's distance at the frames' times, relative to the first, or None.
 
-    Its smallest step is its quantum q, which adds q²/12 to the readings' variance. Frames outside its time
+    Its quantum q adds q²/12 to the readings' variance. Frames outside its time
     are not known; jumps are taken out. An encoder that covers too little, or that usually advances from
     frame to frame by more than the wall in view (``farthest_mm``), is left out. All of it is reported.
     """
@@ -40,30 +40,27 @@ def encoder_at_frames(
         context.report("encoder left out", "it does not fit the frames")
         context.logger.warning("the encoder does not fit the frames and is left out")
         return None
-    step = np.abs(np.diff(encoder.distance_mm))
-    quantum = float(step[step > 1e-9].min()) if np.any(step > 1e-9) else 0.0
-    return EncoderReadings(at_frames, float(np.hypot(sigma_mm, quantum / np.sqrt(12))), known)
+    sigma = float(np.hypot(sigma_mm, _quantum(encoder.distance_mm) / np.sqrt(12)))
+    return EncoderReadings(at_frames, sigma, known)
 
 
-def not_contradicted(
-    encoder: EncoderReadings | None, tracks: Tracks, context: Context
-) -> EncoderReadings | None:
-    """Return the encoder, or None where the wall's texture says that the probe moved otherwise."""
-    if encoder is None or len(tracks.frames) < 2:
-        return encoder
+def contradicted(encoder: EncoderReadings, tracks: Tracks, context: Context) -> bool:
+    """Return whether the wall's texture says that the probe moved otherwise; reported if so."""
+    if len(tracks.frames) < 2:
+        return False
     followed = ~tracks.lost[1:] & ~tracks.lost[:-1]
     by_wall = np.diff(tracks.T_pc[:, 2, 3])
     by_encoder = np.diff(encoder.distance_mm[tracks.frames])
     off = np.abs(by_encoder - by_wall) > np.maximum(_DIFFERENCE_MM, _CONTRADICTED * np.abs(by_wall))
     judged = followed & encoder.known[tracks.frames][1:]
     if judged.sum() < _LEAST_STEPS or off[judged].mean() < _CONTRADICTED:
-        return encoder
+        return False
     context.report("encoder left out", "the wall's texture contradicts it")
     context.logger.warning(
         "the encoder is left out: in %d of %d steps the wall's texture shows another motion",
         int(off[judged].sum()), int(judged.sum()),
     )  # fmt: skip
-    return None
+    return True
 
 
 def _without_jumps(distance_mm: Float) -> tuple[Float, int]:
@@ -71,6 +68,13 @@ def _without_jumps(distance_mm: Float) -> tuple[Float, int]:
     step = np.diff(distance_mm)
     jump = np.abs(step) > max(_JUMP_TIMES * _usual(step), _JUMP_MM)
     return np.concatenate([[0.0], np.cumsum(np.where(jump, 0.0, step))]), int(jump.sum())
+
+
+def _quantum(distance_mm: Float) -> float:
+    """Return the finest unit of the readings: the smallest step, or difference of two steps, mm."""
+    sizes = np.unique(np.round(np.abs(np.diff(distance_mm)), 6))
+    units = np.concatenate([sizes, np.diff(sizes)])
+    return float(units[units > 0].min()) if np.any(units > 0) else 0.0
 
 
 def _usual(step: Float) -> float:

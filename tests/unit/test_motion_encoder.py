@@ -1,0 +1,93 @@
+"""An encoder is believed only where it covers the frames and the wall's texture does not contradict it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from pipeline.recording.base import Encoder, FrameTable
+from pipeline.stage import quiet_context
+from stages.motion.encoder import contradicted, encoder_at_frames
+from stages.motion.state import EncoderReadings
+from stages.motion.tracking import Tracks
+
+RATE = 30.0
+SPEED = 18.0
+FRAMES = 60
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What of a recording the encoder needs."""
+
+    frames: FrameTable
+    encoder: Encoder | None
+
+
+def recorded(time_s: np.ndarray, distance_mm: np.ndarray) -> Recorded:
+    frame = np.arange(FRAMES)
+    return Recorded(FrameTable(frame, frame / RATE, np.full(FRAMES, "led")), Encoder(time_s, distance_mm))
+
+
+def clean() -> tuple[np.ndarray, np.ndarray]:
+    time_s = np.arange(0, FRAMES / RATE + 0.1, 0.01)
+    return time_s, np.round(SPEED * time_s / 0.05) * 0.05
+
+
+def readings(time_s: np.ndarray, distance_mm: np.ndarray) -> EncoderReadings | None:
+    return encoder_at_frames(recorded(time_s, distance_mm), 0.0, 60.0, quiet_context())  # type: ignore[arg-type]
+
+
+def tracked(z: np.ndarray) -> Tracks:
+    T_pc = np.tile(np.eye(4), (len(z), 1, 1))
+    T_pc[:, 2, 3] = z
+    none = np.zeros(0, np.int64)
+    return Tracks(
+        none, none, np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.arange(len(z)), T_pc,
+        np.zeros(len(z), bool),
+    )  # fmt: skip
+
+
+def test_sigma_is_that_of_the_quantum() -> None:
+    found = readings(*clean())
+    assert found is not None
+    assert found.sigma_mm == pytest.approx(0.05 / np.sqrt(12))
+    assert found.known.all()
+    np.testing.assert_allclose(found.distance_mm, SPEED * np.arange(FRAMES) / RATE, atol=0.05)
+
+
+def test_jump_is_taken_out() -> None:
+    time_s, distance = clean()
+    found = readings(time_s, distance + 40.0 * (time_s > 1))
+    assert found is not None
+    np.testing.assert_allclose(np.diff(found.distance_mm).max(), SPEED / RATE, atol=0.06)
+    assert found.distance_mm[-1] == pytest.approx(SPEED * (FRAMES - 1) / RATE, abs=1.0)
+
+
+def test_frames_after_its_end_are_not_known() -> None:
+    time_s, distance = clean()
+    found = readings(time_s[time_s < 1], distance[time_s < 1])
+    assert found is not None
+    assert found.known[: int(0.9 * RATE)].all()
+    assert not found.known[int(1.1 * RATE) :].any()
+
+
+@pytest.mark.parametrize(("late_s", "scale"), [(100.0, 1.0), (0.0, 1e6)])
+def test_encoder_of_another_clock_or_unit_is_left_out(late_s: float, scale: float) -> None:
+    time_s, distance = clean()
+    assert readings(time_s + late_s, distance * scale) is None
+
+
+def test_texture_contradicts_a_reversed_or_stuck_encoder_but_not_a_true_one() -> None:
+    z = SPEED * np.arange(FRAMES) / RATE * 1.002
+    true = EncoderReadings(z / 1.002, 0.015, np.ones(FRAMES, bool))
+    for distance, expected in ((true.distance_mm, False), (-true.distance_mm, True), (0 * z, True)):
+        said = EncoderReadings(distance, 0.015, true.known)
+        assert contradicted(said, tracked(z), quiet_context()) is expected
+
+
+def test_texture_lost_in_most_frames_contradicts_nothing() -> None:
+    z = SPEED * np.arange(FRAMES) / RATE
+    tracks = tracked(0 * z)
+    tracks.lost[2:] = True
+    assert not contradicted(EncoderReadings(z, 0.015, np.ones(FRAMES, bool)), tracks, quiet_context())
