@@ -156,10 +156,11 @@ def all_residuals(step: Float, at: State, given: Scene, parameters: MotionParame
 def test_optimum_is_that_of_a_dense_levenberg_marquardt(monkeypatch: pytest.MonkeyPatch) -> None:
     """With unit weights both minimise the same sum of squares."""
     given = scene(7, 9, noise=1.0, seed=3)
-    parameters = MotionParameters(iterations=25, alike=1.0, match_bias_px=0.1)
+    parameters = MotionParameters(iterations=25, alike=1.0)
     unit = lambda x, scale=2.5: np.ones_like(x)  # noqa: E731
     monkeypatch.setattr("stages.motion.terms.cauchy", unit)
     monkeypatch.setattr("stages.motion.adjustment.cauchy", unit)
+    monkeypatch.setattr("stages.motion.terms.redescending", unit)
     monkeypatch.setattr("stages.motion.adjustment._excess_of", lambda size, sigma: 1.0)
     start = displaced(given.truth, np.random.default_rng(0))
     estimate = adjust(start, given.measured, parameters)
