@@ -9,6 +9,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+_DAMPING = 1e-4  # 1/mm²: a landmark that nothing holds any more keeps its place
+
 
 @numba.njit(cache=True)
 def add_rows(frame, by_frame, by_border, residual, weight, band, border, corner, right, right_border):  # type: ignore[no-untyped-def]
@@ -75,6 +77,8 @@ def add_landmarks(  # type: ignore[no-untyped-def]
                 weight[m], frame[m] * 7, by_pose[m], by_point[m], by_instrument[m], residual[m], first,
                 band, border, corner, right, right_border, h, g, side, cross[m - start[k]],
             )  # fmt: skip
+        if np.linalg.det(h) < _DAMPING**3:
+            h += _DAMPING * np.eye(3)
         hi = np.linalg.inv(h)
         inverse[k], right_point[k] = hi, g
         solved_side = side @ hi
