@@ -19,6 +19,7 @@ from stages.motion.tridiagonal import BlockTridiagonal
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 BLOCK = 7
+_DAMPING = 1e-5
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,17 @@ class BorderedSystem:
         numpy.linalg.LinAlgError
             When some unknown is not determined.
         """
-        band = BlockTridiagonal.of_band(self._band)
+        try:
+            return self._factor(0.0)
+        except np.linalg.LinAlgError:
+            # Rounding can make a weakly held direction negative: a shorter step is as good.
+            return self._factor(_DAMPING)
+
+    def _factor(self, damping: float) -> Factor:
+        """Return the factors with the frames' own information raised by a relative ``damping``."""
+        damped = self._band.copy() if damping else self._band
+        damped[0] = damped[0] * (1 + damping)
+        band = BlockTridiagonal.of_band(damped)
         solved = band.solve(self._border)
         corner = cho_factor(self._corner - self._border.T @ solved)
         return Factor(band, self._border, solved, corner, self._right, self._right_border)
