@@ -47,12 +47,13 @@ def _first_harmonic(samples: WallSamples) -> Float:
     design = np.stack([np.cos(psi), np.sin(psi), np.ones_like(psi), np.cos(2 * psi), np.sin(2 * psi)], -1)
     usable = samples.valid.mean(1) > _FEWEST
     weight = samples.valid.astype(float)
+    ridge = 1e-6 * np.eye(design.shape[-1])  # a ring torn apart keeps a finite shape
     shape = np.zeros((len(psi), design.shape[-1]))
     for _ in range(_ITERATIONS):
         weighted = design * weight[..., None]
         normal = np.swapaxes(weighted, 1, 2) @ design
         right = np.einsum("fai,fa->fi", weighted, radius)
-        shape[usable] = np.linalg.solve(normal[usable], right[usable][..., None])[..., 0]
+        shape[usable] = np.linalg.solve(normal[usable] + ridge, right[usable][..., None])[..., 0]
         error = radius - np.einsum("fai,fi->fa", design, shape)
         spread = 1.4826 * np.nanmedian(np.where(samples.valid, np.abs(error), np.nan)[usable], axis=1)
         scale = np.full(len(psi), np.inf)

@@ -30,6 +30,7 @@ __all__ = ["MOTION", "MotionParameters", "estimate_motion"]
 Float = NDArray[np.float64]
 _LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
 _MARGIN_MM = 20.0
+_LARGEST_CHANGE = 0.1
 _BLUE, _RED = 0, 2
 _YELLOW_NM = 575.0
 
@@ -70,6 +71,7 @@ def estimate_motion(
     T_pc = predictor.between(tracks.frames, tracks.T_pc, len(recording.frames.frame))
     start = _first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
     estimate = _adjusted(start, measured, parameters)
+    _require_convergence(estimate, radius_mm)
     trajectory = in_pipe_frame(estimate, recording.frames, measured)
     events = find_events(recording.frames, trajectory, tracks, estimate.state.slip, encoder is not None)
     _report(context, estimate, tracks, trajectory)
@@ -164,6 +166,18 @@ def _adjusted(start: State, measured: Measurements, parameters: MotionParameters
             f"the motion is not determined by this recording ({error})",
             hint="record more lit frames or rings, or give an encoder",
         ) from error
+
+
+def _require_convergence(estimate: Estimate, radius_mm: float) -> None:
+    """Refuse an estimate that ran away from the pipe that the rings show."""
+    found = float(estimate.state.globals[0])
+    if not abs(found - radius_mm) < _LARGEST_CHANGE * radius_mm:
+        raise UnusableError(
+            "motion",
+            f"the joint estimate does not converge: radius {found:.4g} mm, rings {radius_mm:.4g} mm",
+            limit=f"{100 * _LARGEST_CHANGE:.0f} % of change",
+            hint="cut the recording where the pictures jump, and process the parts",
+        )
 
 
 def _report(context: Context, estimate: Estimate, tracks: Tracks, trajectory: Trajectory) -> None:

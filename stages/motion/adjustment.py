@@ -80,7 +80,9 @@ def adjust(state: State, measured: Measurements, parameters: MotionParameters) -
         factor = system.factor()
         frames, border = factor.step()
         points = landmark_steps(landmarks, inverse_information, right, frames, border)
-        state = state.step(frames, border, points)
+        # A step longer than the pipe is wide is no longer linear.
+        part = min(1.0, state.nominal_radius_mm / max(float(np.abs(frames[:, :3]).max()), 1e-9))
+        state = state.step(part * frames, part * border, part * points)
         if np.abs(frames[:, :3]).max() < _CONVERGED_MM:
             break
     return Estimate(state, factor, reprojection)
