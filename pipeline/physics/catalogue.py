@@ -1,0 +1,42 @@
+"""All known effects by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from pipeline.errors import InputError
+from pipeline.physics.camera import CAMERA_EFFECTS
+from pipeline.physics.effect import Effect
+from pipeline.physics.laser import LASER_EFFECTS
+from pipeline.physics.photometric import PHOTOMETRIC_EFFECTS
+from pipeline.physics.pose import POSE_EFFECTS
+from pipeline.physics.window import WINDOW_EFFECTS
+
+EFFECTS: Mapping[str, Effect] = MappingProxyType({
+    effect.name: effect
+    for effect in (*LASER_EFFECTS, *CAMERA_EFFECTS, *WINDOW_EFFECTS, *POSE_EFFECTS, *PHOTOMETRIC_EFFECTS)
+})  # fmt: skip
+
+# What one kind of recording may not split, from the shared physics notes.
+CLASSES: tuple[tuple[str, ...], ...] = (
+    ("laser_cone", "focal_scale", "pupil_shift", "dome_axial"),
+    ("baseline", "outside_index", "vignetting", "encoder_scale"),
+    ("laser_tilt", "principal_point", "sensor_tilt"),
+    ("beam_decentre", "dome_lateral"),
+    ("sheet_waviness", "pixel_aspect", "ovality"),
+    ("baseline_drift", "focal_drift"),
+)
+
+
+def effect(name: str) -> Effect:
+    """Return the effect of that name.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
+    if name not in EFFECTS:
+        raise InputError("effect", f"{name!r} is not known", expected=", ".join(EFFECTS))
+    return EFFECTS[name]

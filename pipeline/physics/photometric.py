@@ -1,0 +1,104 @@
+"""Effects on the line's light: they move its centroid or change its profile."""
+
+from pipeline.physics.effect import Channel, Effect, FixedTo, Quantity
+
+PHOTOMETRIC_EFFECTS = (
+    Effect(
+        "albedo_bias", "photometric",
+        (Quantity("line_sigma_mm", "mm", 0.3, 0.0, 2.0, "1 σ of the line's width on the wall, true"),),
+        None, None, FixedTo.PIPE, Channel.RING, "static",
+        "δr = −(r/l) σ_z² ∂_z ln A", 0.042,
+        ("slope_bias",), "regression on ∂ ln A; a second line width",
+    ),
+    Effect(
+        "slope_bias", "photometric",
+        (Quantity("gloss", "", 0.5, 0.0, 1.0, "share of the reflectance that is a glossy lobe"),),
+        None, None, FixedTo.PIPE, Channel.PROFILE, "static",
+        "δr = −(r/l) σ_z² ∂_z ln BRDF; a glint where the axial slope is i/2", 0.1,
+        ("albedo_bias",), "the bead seen from its other side; skewness, saturation at beads",
+    ),
+    Effect(
+        "subsurface", "photometric",
+        (Quantity("transport_mm", "mm", 0.3, 0.0, 3.0, "mean way of light within the wall"),),
+        0, None, FixedTo.PIPE, Channel.PROFILE, "static",
+        "one-sided exponential tail; bias about the transport length", 0.3,
+        ("line_skew",), "the tail of the profile, another wavelength",
+    ),
+    Effect(
+        "ghost_ring", "photometric",
+        (Quantity("relative", "", 0.1, 0.0, 1.0, "height of the ghost over that of the line"),),
+        None, None, FixedTo.LASER, Channel.PROFILE, "static",
+        "bounced across the bore: apart by tilt −4 r φ cos(ψ − ψ₀), cone 2 r ε₀, even m 2 r ε_m, odd m 4 r ε_m",
+        None, ("tube_ghost", "line_skew"), "its separation grows with the bore",
+    ),
+    Effect(
+        "tube_ghost", "photometric",
+        (
+            Quantity("relative", "", 0.002, 0.0, 0.5, "height of the copy over that of the line"),
+            Quantity("separation_mm", "mm", 1.1, -5.0, 5.0, "axial distance 2 t tan i′ of the copy"),
+        ),
+        0, None, FixedTo.LASER, Channel.PROFILE, "static",
+        "a faint copy of the line at constant spacing", None,
+        ("ghost_ring",), "constant over azimuth and bore",
+    ),
+    Effect(
+        "line_skew", "photometric",
+        (Quantity("skewness", "", 0.3, -2.0, 2.0, "skewness of the sheet's own profile"),),
+        0, 1.0, FixedTo.LASER, Channel.PROFILE, "static",
+        "δr of the peak about (r/l) σ × skewness", None,
+        ("subsurface",), "a second line width",
+    ),
+    Effect(
+        "speckle", "photometric",
+        (Quantity("contrast", "", 0.3, 0.0, 1.0, "speckle contrast C"),),
+        None, None, FixedTo.PIPE, Channel.RING, "static",
+        "σ_r = (S/√(l² + r²)) C λ/(2π sin u)", 0.03,
+        (), "it is the noise floor: near-white in a frame, fixed to the wall",
+    ),
+    Effect(
+        "saturation", "photometric",
+        (Quantity("exposure_gain", "", 1.6, 1.0, 20.0, "line's peak over full scale"),),
+        0, None, FixedTo.CAMERA, Channel.PROFILE, "static",
+        "clipping an asymmetric profile shifts it; bloom along columns", None,
+        ("gamma",), "a step of exposure",
+    ),
+    Effect(
+        "gamma", "photometric",
+        (Quantity("exponent", "", 0.8, 0.2, 3.0, "grey = light to this power; 1 is linear"),),
+        0, None, FixedTo.CAMERA, Channel.PROFILE, "static",
+        "I^γ on a skewed profile; width ∝ 1/√γ", None,
+        ("saturation",), "a step of exposure",
+    ),
+    Effect(
+        "vignetting", "photometric",
+        (Quantity("falloff", "", 0.5, 0.0, 5.0, "light falls as cos^k θ beyond the stated, exponent k"),),
+        0, None, FixedTo.CAMERA, Channel.PROFILE, "static",
+        "δr = −(S/f) σ_px² ∂ ln V/∂ρ", 0.008,
+        ("baseline",), "regression on the line's width",
+    ),
+    Effect(
+        "ambient_light", "photometric",
+        (Quantity("relative", "", 0.1, 0.0, 1.0, "stray light over the line's height, most at openings"),),
+        None, None, FixedTo.PIPE, Channel.PROFILE, "static",
+        "δρ = (2/3) b′W³ / (Aσ√2π + 2bW)", None,
+        (), "frames with the laser off",
+    ),
+    Effect(
+        "fixed_pattern", "photometric",
+        (Quantity("relative", "", 0.02, 0.0, 0.5, "1 σ of the pixels' gain"),),
+        None, None, FixedTo.CAMERA, Channel.RING, "static",
+        "fixed in (x, y), hit when the ring passes", None,
+        ("dust",), "stacking in the sensor's frame",
+    ),
+    Effect(
+        "dust", "photometric",
+        (
+            Quantity("attenuation", "", 0.5, 0.0, 1.0, "light lost in the spot's middle"),
+            Quantity("azimuth_deg", "deg", 60.0, -360.0, 360.0, "where around the ring"),
+            Quantity("width_deg", "deg", 4.0, 0.2, 60.0, "1 σ of the spot around the ring"),
+        ),
+        None, None, FixedTo.CAMERA, Channel.PROFILE, "static",
+        "light attenuated at a place fixed in C, or in passing", None,
+        ("fixed_pattern",), "the brightness of the line",
+    ),
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""Left-out physics: found, named, sized, confirmed."""

@@ -1,0 +1,143 @@
+"""What an effect must tell: by how much it moves each kind of measurement.
+
+An effect has *amplitudes*, in which predictions are linear near zero (Cartesian where the effect has a
+direction), and a *shape* (frequency, time constant, order) that is searched on a grid. All predictions are
+true minus stated: where the measurement is found, less where the stated instrument would find it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.probe import Probe
+
+Float = NDArray[np.float64]
+Shape = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ImagePoints:
+    """Points of the wall as the stated instrument sees them.
+
+    Attributes
+    ----------
+    probe : Probe
+    frame : (M,) int
+    time_s : (M,)
+        Since the first frame.
+    uv : (M, 2)
+    xyz_c : (M, 3)
+        The wall point in C, mm.
+    normal_c : (M, 3)
+        Unit normal of the wall, outward, in C.
+    along_c : (M, 3)
+        Unit direction of the pipe's distance, in C.
+    velocity_px : (M, 2)
+        Motion of the point's image while the camera moves, px/s: of a wall point for texture, of the
+        line for rings.
+    speed_mm_s : (M,)
+        Of the camera along the pipe.
+    on_line : bool
+        True for the laser's line, false for texture and fiducials.
+    line_width_px : (M,)
+        1 σ of the line's profile; NaN off the line.
+    """
+
+    probe: Probe
+    frame: NDArray[np.int64]
+    time_s: Float
+    uv: Float
+    xyz_c: Float
+    normal_c: Float
+    along_c: Float
+    velocity_px: Float
+    speed_mm_s: Float
+    on_line: bool
+    line_width_px: Float
+
+    @property
+    def theta(self) -> Float:
+        """(M,) polar angle from the optical axis, rad."""
+        return np.asarray(np.arctan2(np.hypot(self.xyz_c[:, 0], self.xyz_c[:, 1]), self.xyz_c[:, 2]))
+
+    @property
+    def azimuth_rad(self) -> Float:
+        """(M,) azimuth ψ in C, rad."""
+        return np.asarray(np.arctan2(self.xyz_c[:, 1], self.xyz_c[:, 0]))
+
+    @property
+    def outward(self) -> Float:
+        """(M, 2) unit direction of the image radius."""
+        away = self.uv - self.probe.camera.centre_px
+        return np.asarray(away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None])
+
+
+@dataclass(frozen=True)
+class Travel:
+    """What the camera did against what the encoder read, at the frames' times.
+
+    Attributes
+    ----------
+    time_s, distance_mm, speed_mm_s, reading_mm : (N,)
+    """
+
+    time_s: Float
+    distance_mm: Float
+    speed_mm_s: Float
+    reading_mm: Float
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """One linear amplitude: its name, unit, and how large it may plausibly be (1 σ)."""
+
+    name: str
+    unit: str
+    plausible: float
+
+
+class EffectModel(ABC):
+    """The prediction of one effect of the catalogue.
+
+    A prediction that an effect does not make is zero. ``amplitude`` is (Q,), in the order of
+    `amplitudes`; ``shape`` is one of `shapes`.
+    """
+
+    name: str
+    amplitudes: tuple[Amplitude, ...]
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return the shapes to be searched; one empty shape when there is nothing to search."""
+        return ((),)
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return (M, 2) by which the image of every wall point moves, line or texture alike."""
+        return np.zeros((len(points.uv), 2))
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return (M,) by which the sheet lies farther along the optical axis at each line point."""
+        return np.zeros(len(points.uv))
+
+    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return (M,) by which the line's centroid moves outward for photometric reasons."""
+        return np.zeros(len(points.uv))
+
+    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return (M,) by which the wall itself lies farther out (pipe effects)."""
+        return np.zeros(len(points.uv))
+
+    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
+        """Return (N,) by which the encoder reads too much."""
+        return np.zeros(len(travel.time_s))
+
+    @abstractmethod
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the catalogue's quantities, such as magnitude and direction, by name."""
+
+    @abstractmethod
+    def statement(self, shape: Shape, amplitude: Float) -> str:
+        """Return the effect in a plain sentence with its size."""
