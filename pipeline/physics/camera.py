@@ -36,7 +36,7 @@ CAMERA_EFFECTS = (
     ),
     Effect(
         "pixel_aspect", "camera",
-        (Quantity("relative", "", 1e-3, -0.02, 0.02, "true over stated width to height of a pixel, less one"),),
+        (Quantity("relative", "", 1e-3, -0.02, 0.02, "true over stated ratio of pixel sides, less one"),),
         2, 1.88, FixedTo.CAMERA, Channel.RING, "static",
         "δr = S (a/2) θ cos 2ψ", 0.081,
         ("sheet_waviness", "ovality"), "roll, several diameters, texture",

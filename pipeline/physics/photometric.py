@@ -28,7 +28,7 @@ PHOTOMETRIC_EFFECTS = (
         "ghost_ring", "photometric",
         (Quantity("relative", "", 0.1, 0.0, 1.0, "height of the ghost over that of the line"),),
         None, None, FixedTo.LASER, Channel.PROFILE, "static",
-        "bounced across the bore: apart by tilt −4 r φ cos(ψ − ψ₀), cone 2 r ε₀, even m 2 r ε_m, odd m 4 r ε_m",
+        "bounced across the bore, apart by tilt −4 r φ cos(ψ − ψ₀), cone 2 r ε₀, m even 2 r ε_m, odd 4 r ε_m",
         None, ("tube_ghost", "line_skew"), "its separation grows with the bore",
     ),
     Effect(

@@ -30,7 +30,7 @@ WINDOW_EFFECTS = (
     ),
     Effect(
         "dome_axial", "window",
-        (Quantity("offset_mm", "mm", 0.5, -5.0, 5.0, "axial offset of a dome (index 1.5, 2 mm, radius 14 mm)"),),
+        (Quantity("offset_mm", "mm", 0.5, -5.0, 5.0, "axial offset of a glass dome, 2 mm, radius 14 mm"),),
         0, 1.72, FixedTo.CAMERA, Channel.RING, "static",
         "δr = S (n−1) t d sin θ / (n ρ²)", 0.217,
         ("focal_scale", "laser_cone", "pupil_shift"), "several diameters",
