@@ -1,0 +1,1 @@
+"""Drill: diagnoses of recordings with concealed effects, held against what was concealed."""

@@ -1,0 +1,199 @@
+"""How good diagnoses are: rates with their intervals, sizes, probabilities, and the confusion of names."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.physics.catalogue import EFFECTS
+from stages.diagnose.drill.answer import Answer, Concealed, NamedEffect
+
+_95 = 1.959964
+_FOUND = ("named", "class", "unexplained")
+NOTHING = "nothing"
+_PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 1.0001)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One recording with what it conceals and what was said of it.
+
+    Attributes
+    ----------
+    name : str
+    concealed : tuple of Concealed
+    answer : Answer
+    left_out : tuple of str
+        Effects that the library had to do without.
+    """
+
+    name: str
+    concealed: tuple[Concealed, ...]
+    answer: Answer
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def truth(self) -> frozenset[str]:
+        """Names of what is concealed."""
+        return frozenset(c.name for c in self.concealed)
+
+    @property
+    def said(self) -> frozenset[str]:
+        """Names that the answer gives with confidence."""
+        given = self.answer.effects if self.answer.verdict == "named" else ()
+        return frozenset(e.name for e in given)
+
+    @property
+    def found(self) -> bool:
+        """Whether the answer says that something was left out."""
+        return self.answer.verdict in _FOUND
+
+    @property
+    def exact(self) -> bool:
+        """Whether all that is concealed, and nothing else, is named."""
+        return bool(self.said) and self.said == self.truth
+
+    @property
+    def misnamed(self) -> bool:
+        """Whether a name is given that is not concealed."""
+        return bool(self.said - self.truth)
+
+    @property
+    def contained(self) -> bool:
+        """Whether the answer, name or class, contains all that is concealed."""
+        return self.truth <= self.said | frozenset(self.answer.members)
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share of trials with its 95 % interval (E. B. Wilson, 1927)."""
+
+    count: int
+    of: int
+
+    @property
+    def share(self) -> float:
+        """Share; NaN of none."""
+        return self.count / self.of if self.of else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval."""
+        if not self.of:
+            return 0.0, 1.0
+        z2 = _95**2 / self.of
+        middle = (self.share + z2 / 2) / (1 + z2)
+        half = _95 * np.sqrt(self.share * (1 - self.share) / self.of + z2 / (4 * self.of)) / (1 + z2)
+        return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
+
+
+def rate(hits: Iterable[bool]) -> Rate:
+    """Return the share of true among ``hits``."""
+    listed = list(hits)
+    return Rate(sum(listed), len(listed))
+
+
+@dataclass(frozen=True)
+class Scores:
+    """All rates of a drill; each over the trials that it concerns."""
+
+    false_alarms: Rate
+    detected: Rate
+    channel_right: Rate
+    fixed_to_right: Rate
+    time_right: Rate
+    named_exactly: Rate
+    contained: Rate
+    misnamed: Rate
+    pairs_named: Rate
+    unknown_owned: Rate
+    unknown_misnamed: Rate
+    size_in_95: Rate
+    size_bias_sigma: float
+    heldout_removed: float
+
+
+def score(trials: Iterable[Trial]) -> Scores:
+    """Score diagnoses against what was concealed."""
+    listed = list(trials)
+    null = [t for t in listed if not t.concealed]
+    known = [t for t in listed if t.concealed and not t.truth & set(t.left_out)]
+    unknown = [t for t in listed if t.truth & set(t.left_out)]
+    single = [t for t in known if len(t.concealed) == 1]
+    found = [t for t in single if t.found]
+    z = [s for t in known for s in size_errors(t)]
+    removed = [r for t in known if (r := heldout_removed(t.answer)) is not None]
+    return Scores(
+        false_alarms=rate(t.found for t in null),
+        detected=rate(t.found for t in known),
+        channel_right=rate(_located(t, "channel") for t in found),
+        fixed_to_right=rate(_located(t, "fixed_to") for t in found),
+        time_right=rate(_located(t, "time") for t in found),
+        named_exactly=rate(t.exact for t in single),
+        contained=rate(t.contained for t in single if t.found),
+        misnamed=rate(t.misnamed for t in [*null, *known]),
+        pairs_named=rate(t.exact for t in known if len(t.concealed) > 1),
+        unknown_owned=rate(owned(t) for t in unknown),
+        unknown_misnamed=rate(t.misnamed for t in unknown),
+        size_in_95=rate(abs(s) < _95 for s in z),
+        size_bias_sigma=float(np.mean(z)) if z else float("nan"),
+        heldout_removed=float(np.median(removed)) if removed else float("nan"),
+    )
+
+
+def owned(trial: Trial) -> bool:
+    """Whether an effect outside the library is called unexplained, or a class of its likes."""
+    likes = {like for name in trial.truth for like in EFFECTS[name].alike}
+    of_its_class = trial.answer.verdict == "class" and bool(likes & set(trial.answer.members))
+    return trial.answer.verdict in ("unexplained", "not_identifiable") or of_its_class
+
+
+def size_errors(trial: Trial) -> list[float]:
+    """Return (estimate − truth) / σ of the first quantity of every effect that is rightly named."""
+    truth = {c.name: c for c in trial.concealed}
+    given = trial.answer.effects if trial.answer.verdict == "named" else ()
+    errors = (_size_error(e, truth[e.name]) for e in given if e.name in truth)
+    return [e for e in errors if e is not None]
+
+
+def heldout_removed(answer: Answer) -> float | None:
+    """Return the share of the held-out discrepancy above the noise floor that the model removes."""
+    fit = answer.fit
+    if fit is None or fit.heldout_before <= 1.05 * fit.noise_floor:
+        return None
+    above = fit.heldout_before**2 - fit.noise_floor**2
+    return float((fit.heldout_before**2 - fit.heldout_after**2) / above)
+
+
+def confusion(trials: Iterable[Trial]) -> Counter[tuple[str, str]]:
+    """Count (concealed, said); a class or other verdict stands in brackets."""
+    return Counter((_joined(t.truth), _joined(t.said) if t.said else f"({t.answer.verdict})") for t in trials)
+
+
+def calibration(trials: Iterable[Trial]) -> list[tuple[float, Rate]]:
+    """Return for each bin of probability its mean and how often the names given with it were right."""
+    pairs = [(e.probability, e.name in t.truth) for t in trials for e in t.answer.effects]
+    bins = pairwise(_PROBABILITIES)
+    inside = ([(p, hit) for p, hit in pairs if low <= p < high] for low, high in bins)
+    return [(float(np.mean([p for p, _ in part])), rate(h for _, h in part)) for part in inside if part]
+
+
+def _located(trial: Trial, what: str) -> bool:
+    effect = EFFECTS[next(iter(trial.truth))]
+    wanted = {"channel": effect.channel.value, "fixed_to": effect.fixed_to.value, "time": effect.time}[what]
+    return trial.answer.location is not None and getattr(trial.answer.location, what) == wanted
+
+
+def _size_error(named: NamedEffect, truth: Concealed) -> float | None:
+    first = EFFECTS[truth.name].quantities[0].name
+    if first not in named.parameters or not truth.values or not named.parameters[first].sd > 0:
+        return None
+    return (named.parameters[first].value - truth.values[0]) / named.parameters[first].sd
+
+
+def _joined(names: frozenset[str]) -> str:
+    return " + ".join(sorted(names)) or NOTHING
