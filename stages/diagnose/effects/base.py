@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.instrument.probe import Probe
+from pipeline.physics.catalogue import effect
 
 Float = NDArray[np.float64]
 Shape = tuple[float, ...]
@@ -45,6 +47,11 @@ class ImagePoints:
         True for the laser's line, false for texture and fiducials.
     line_width_px : (M,)
         1 σ of the line's profile; NaN off the line.
+    wall_azimuth_rad, distance_mm : (M,), optional
+        Azimuth and distance of the wall point in P; without them P is taken to have the camera's roll, and
+        effects that follow the distance predict nothing.
+    albedo_slope_per_mm : (M,), optional
+        ∂ ln A of the wall's albedo along the pipe; without it the albedo moves no line.
     """
 
     probe: Probe
@@ -58,18 +65,31 @@ class ImagePoints:
     speed_mm_s: Float
     on_line: bool
     line_width_px: Float
+    wall_azimuth_rad: Float | None = None
+    distance_mm: Float | None = None
+    albedo_slope_per_mm: Float | None = None
 
-    @property
+    @cached_property
     def theta(self) -> Float:
         """(M,) polar angle from the optical axis, rad."""
         return np.asarray(np.arctan2(np.hypot(self.xyz_c[:, 0], self.xyz_c[:, 1]), self.xyz_c[:, 2]))
 
-    @property
+    @cached_property
     def azimuth_rad(self) -> Float:
         """(M,) azimuth ψ in C, rad."""
         return np.asarray(np.arctan2(self.xyz_c[:, 1], self.xyz_c[:, 0]))
 
-    @property
+    @cached_property
+    def radius_mm(self) -> Float:
+        """(M,) distance from the optical axis."""
+        return np.asarray(np.hypot(self.xyz_c[:, 0], self.xyz_c[:, 1]))
+
+    @cached_property
+    def azimuth_p_rad(self) -> Float:
+        """(M,) azimuth in P as far as it is known."""
+        return self.azimuth_rad if self.wall_azimuth_rad is None else self.wall_azimuth_rad
+
+    @cached_property
     def outward(self) -> Float:
         """(M, 2) unit direction of the image radius."""
         away = self.uv - self.probe.camera.centre_px
@@ -141,3 +161,14 @@ class EffectModel(ABC):
     @abstractmethod
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return the effect in a plain sentence with its size."""
+
+    def equation(self, shape: Shape, amplitude: Float) -> str:
+        """Return the catalogue's law with the numbers to put into it."""
+        numbers = (f"{name} = {value:.5g}" for name, value in self.quantities(shape, amplitude).items())
+        return f"{effect(self.name).law}, {', '.join(numbers)}"
+
+    def possible(self, shape: Shape, amplitude: Float) -> bool:
+        """Return whether every quantity lies within the catalogue's range."""
+        ranges = {q.name: (q.low, q.high) for q in effect(self.name).quantities}
+        found = self.quantities(shape, amplitude)
+        return all(low <= found[name] <= high for name, (low, high) in ranges.items() if name in found)
