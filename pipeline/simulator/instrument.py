@@ -1,0 +1,188 @@
+"""The true instrument of a scene: what the stated probe is plus everything that makes it differ.
+
+Light is counted in full scales of the sensor: 1 is the grey level at which it clips.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Shutter
+from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.window import Window
+
+Float = NDArray[np.float64]
+Bgr = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class TrueCamera:
+    """A camera of one of the pipeline's models, and what that model leaves out.
+
+    Attributes
+    ----------
+    model : Camera
+        Central camera.
+    aspect : float
+        Ratio of pixel sides less one: u is stretched by 1 + aspect/2, v shrunk by as much, about the centre.
+    decentring : (float, float)
+        (p cos ψ₀, p sin ψ₀) of Brown's decentring in normalised image coordinates m = θ (cos ψ, sin ψ):
+        a point moves by p (|m|² + 2 m mᵀ) towards ψ₀, 3 f p θ² in radius on that side.
+    pupil_shift_mm : float
+        ε of the entrance pupil's way along the axis, E(θ) = ε (θ / sin θ − 1), forward positive.
+    locking_px : float
+        Amplitude a by which a line at image radius ρ appears at ρ + a sin 2πρ.
+    windows : tuple of Window
+        Refracting surfaces between camera and wall, in the order in which a viewing ray meets them.
+    """
+
+    model: Camera
+    aspect: float = 0.0
+    decentring: tuple[float, float] = (0.0, 0.0)
+    pupil_shift_mm: float = 0.0
+    locking_px: float = 0.0
+    windows: tuple[Window, ...] = ()
+
+
+@dataclass(frozen=True)
+class SheetWave:
+    """One wave of a sheet's elevation: cosine and sine amplitude, rad, of ``order`` waves around it."""
+
+    order: int
+    cos_rad: float
+    sin_rad: float
+
+
+@dataclass(frozen=True)
+class TrueLaser:
+    """The laser sheet as it is.
+
+    Attributes
+    ----------
+    sheet : LaserSheet
+        Tilt, cone, decentre, waves up to the fourth. Its ``line_sigma_mm`` is not used: see ``profile``.
+    waves : tuple of SheetWave
+        Further waves of any order.
+    profile : LineProfile
+        Light across the sheet.
+    power_mm : float
+        Line's light integrated across the sheet, full scales × mm, on a white wall 50 mm from the axis that
+        the sheet meets squarely; falls with 1/distance.
+    brightness : (float, float)
+        Relative first harmonic (cos, sin) of the power around the ring.
+    colour_bgr : Bgr
+        Share of each channel; the largest is 1.
+    ghost_relative : float
+        Share of the line's light that a wall reflects as a mirror, to be seen across the bore.
+    speckle_contrast : float
+    speckle_grain_mm : float
+        Size of the cells of the wall over which speckle is constant.
+    windows : tuple of Window
+        Refracting surfaces between laser and wall.
+    """
+
+    sheet: LaserSheet
+    waves: tuple[SheetWave, ...] = ()
+    profile: LineProfile = LineProfile()
+    power_mm: float = 0.6
+    brightness: tuple[float, float] = (0.0, 0.0)
+    colour_bgr: Bgr = (0.35, 1.0, 0.15)
+    ghost_relative: float = 0.0
+    speckle_contrast: float = 0.0
+    speckle_grain_mm: float = 0.05
+    windows: tuple[Window, ...] = ()
+
+
+@dataclass(frozen=True)
+class LedRing:
+    """LEDs on a circle about the camera, facing forward.
+
+    Attributes
+    ----------
+    leds, radius_mm, z_mm
+        Number, circle's radius and plane in C.
+    level : float
+        Light of the whole ring, full scales, on a white wall that faces it squarely from 50 mm.
+    lobe : float
+        Exponent m of the emission cos^m about the forward direction.
+    colour_bgr : Bgr
+    """
+
+    leds: int = 8
+    radius_mm: float = 11.0
+    z_mm: float = -1.0
+    level: float = 2.0
+    lobe: float = 1.0
+    colour_bgr: Bgr = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Dust:
+    """A spot on the front glass that takes away ``attenuation`` of the light; place and 1 σ in pixels."""
+
+    attenuation: float
+    centre_px: tuple[float, float]
+    sigma_px: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class TrueSensor:
+    """From light to grey levels.
+
+    Attributes
+    ----------
+    full_well_e : float
+        Electrons at which the sensor clips.
+    read_noise_e : float
+    black_level : float
+        Grey level without light, of 255.
+    gamma : float
+        Grey = 255 · light^gamma.
+    psf_sigma_px : float
+        1 σ of the lens' blur.
+    veil_relative, veil_sigma_px : float
+        Share of the light spread widely by glare, and 1 σ of that spread.
+    vignetting : float
+        Exponent k of the fall-off cos^k(θ/2), natural and mechanical.
+    ambient : float
+        Stray light on the wall, full scales on white, where the laser is on.
+    fixed_pattern : float
+        1 σ of the pixels' relative gain.
+    dust : tuple of Dust
+    """
+
+    full_well_e: float = 10000.0
+    read_noise_e: float = 15.0
+    black_level: float = 0.0
+    gamma: float = 1.0
+    psf_sigma_px: float = 0.7
+    veil_relative: float = 0.0
+    veil_sigma_px: float = 60.0
+    vignetting: float = 0.0
+    ambient: float = 0.0
+    fixed_pattern: float = 0.0
+    dust: tuple[Dust, ...] = ()
+
+
+@dataclass(frozen=True)
+class TrueInstrument:
+    """The whole true instrument at one moment."""
+
+    camera: TrueCamera
+    laser: TrueLaser
+    light: LedRing = LedRing()
+    sensor: TrueSensor = TrueSensor()
+    shutter: Shutter = field(default_factory=Shutter)
+
+
+class Change(Protocol):
+    """What happens to the instrument with time: a drift, a rocking."""
+
+    def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
+        """Return the instrument as it is at ``time_s`` given what it would be without this change."""

@@ -1,0 +1,152 @@
+"""The camera's true way along the pipe, continuous in time, and the odometer that reports it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from pipeline.artefacts import PipeAxis
+from pipeline.geometry.axis import frames_at
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from pipeline.recording.base import Encoder
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Wave:
+    """A sinusoid amplitude · sin(2π frequency · t + phase)."""
+
+    amplitude: float
+    frequency_hz: float
+    phase_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A smooth function of time: a cubic spline through knots plus waves; constant before and after.
+
+    Attributes
+    ----------
+    time_s : (K,)
+        Increasing; one knot alone makes a constant.
+    value : (K,)
+    waves : tuple of Wave
+    """
+
+    time_s: Float
+    value: Float
+    waves: tuple[Wave, ...] = ()
+
+    def at(self, time_s: Float) -> Float:
+        """Return the value (...) at times (...)."""
+        t = np.asarray(time_s, float)
+        inside = np.clip(t, self.time_s[0], self.time_s[-1])
+        if len(self.time_s) == 1:
+            smooth = np.full(t.shape, self.value[0])
+        else:
+            smooth = CubicSpline(self.time_s, self.value, bc_type="natural")(inside)
+        for w in self.waves:
+            smooth = smooth + w.amplitude * np.sin(2 * np.pi * w.frequency_hz * t + w.phase_rad)
+        return np.asarray(smooth)
+
+
+def constant(value: float) -> Signal:
+    """Return a signal that stays."""
+    return Signal(np.zeros(1), np.array([value]))
+
+
+_ZERO = constant(0.0)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where the camera is, as seen from the pipe's axis.
+
+    Attributes
+    ----------
+    distance_mm : Signal
+        Distance along the axis.
+    x_mm, y_mm : Signal
+        Off the axis, in the section there.
+    yaw_rad, pitch_rad, roll_rad : Signal
+        The camera's axis leans by yaw towards +x and by pitch towards −y (rotation vector (pitch, yaw, 0) in
+        the section's frame), after a roll about its own axis.
+    """
+
+    distance_mm: Signal
+    x_mm: Signal = _ZERO
+    y_mm: Signal = _ZERO
+    yaw_rad: Signal = _ZERO
+    pitch_rad: Signal = _ZERO
+    roll_rad: Signal = _ZERO
+
+    def pose(self, time_s: Float, axis: PipeAxis) -> Float:
+        """Return ``T_pc`` (..., 4, 4) at times (...)."""
+        t = np.asarray(time_s, float)
+        origin, R_pa = frames_at(axis, self.distance_mm.at(t))
+        zero = np.zeros(t.shape)
+        lean = rotation_from_vector(np.stack([self.pitch_rad.at(t), self.yaw_rad.at(t), zero], -1))
+        turn = rotation_from_vector(np.stack([zero, zero, self.roll_rad.at(t)], -1))
+        aside = R_pa[..., :, 0] * self.x_mm.at(t)[..., None] + R_pa[..., :, 1] * self.y_mm.at(t)[..., None]
+        return from_parts(R_pa @ lean @ turn, origin + aside)
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A slip at ``time_s`` by which the reading gains ``slip_mm``."""
+
+    time_s: float
+    slip_mm: float
+
+
+@dataclass(frozen=True)
+class Odometer:
+    """Cable or wheel encoder.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Readings a second of its own clock.
+    quantum_mm : float
+        Step of its counter.
+    scale : float
+        Reading over true distance, less one.
+    backlash_mm : float
+        Play b: the reading is s − (b/2) sgn v, turning over within the play at a reversal.
+    delay_s : float
+        τ by which readings come late: the one at camera time t tells of t − τ, so visual − encoder = v τ.
+    slips : tuple of Slip
+    """
+
+    rate_hz: float = 100.0
+    quantum_mm: float = 0.05
+    scale: float = 0.0
+    backlash_mm: float = 0.0
+    delay_s: float = 0.0
+    slips: tuple[Slip, ...] = ()
+
+    def readings(self, motion: Motion, until_s: float) -> Encoder:
+        """Return the readings from 0 to ``until_s`` of its own clock; the first reading is 0."""
+        clock = np.arange(0.0, until_s, 1.0 / self.rate_hz)
+        happened = clock - self.delay_s
+        way = motion.distance_mm.at(happened)
+        counted = self._with_play(way) * (1 + self.scale)
+        for slip in self.slips:
+            counted = counted + np.where(happened >= slip.time_s, slip.slip_mm, 0.0)
+        counted = counted - counted[0]
+        if self.quantum_mm > 0:
+            counted = self.quantum_mm * np.rint(counted / self.quantum_mm)
+        return Encoder(clock, counted)
+
+    def _with_play(self, way_mm: Float) -> Float:
+        """Return the wheel's way: it stays while the cable moves within the play."""
+        half, at = 0.5 * self.backlash_mm, np.empty_like(way_mm)
+        state = way_mm[0]
+        for i, way in enumerate(way_mm.tolist()):
+            state = min(max(state, way - half), way + half)
+            at[i] = state
+        return at

@@ -1,0 +1,160 @@
+"""A scene file: the instrument, the pipe, the motion, the lights and the sensor of a recording to render."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+from pydantic import Field, ValidationError
+
+from pipeline.errors import InputError
+from pipeline.simulator.wall.description import Pipe
+from pipeline.stage import Parameters
+from pipeline.yaml_file import read_yaml
+
+Bgr = tuple[float, float, float]
+Pattern = Literal["laser", "led", "both"]
+
+
+class LaserScene(Parameters):
+    """Light of the laser."""
+
+    peak: float = Field(0.9, gt=0, le=50, description="line's mean peak over full scale before blur")
+    colour_bgr: Bgr = Field((0.35, 1.0, 0.15), description="share of each channel")
+    skewness: float = Field(0.0, ge=-1.9, le=1.9, description="skewness of the sheet's own profile")
+    ghost: float = Field(
+        0.0, ge=0, le=1, description="share of the line that the wall mirrors across the bore"
+    )
+    speckle: float = Field(0.1, ge=0, le=1, description="speckle contrast")
+    speckle_grain_mm: float = Field(0.05, gt=0, le=2, description="size of a speckle on the wall, mm")
+
+
+class LightScene(Parameters):
+    """Light of the LEDs."""
+
+    level: float = Field(0.6, gt=0, le=50, description="brightest wall on the axis' side over full scale")
+    lobe: float = Field(1.0, ge=0, le=20, description="exponent of the emission cos^m")
+    colour_bgr: Bgr = Field((1.0, 1.0, 1.0), description="share of each channel")
+
+
+class SensorScene(Parameters):
+    """From light to grey levels."""
+
+    full_well_e: float = Field(10000.0, gt=10, description="electrons at which a pixel clips")
+    read_noise_e: float = Field(15.0, ge=0, description="read noise, 1 σ, electrons")
+    black_level: float = Field(0.0, ge=0, le=100, description="grey level without light")
+    gamma: float = Field(1.0, ge=0.2, le=3, description="grey = light to this power")
+    psf_sigma_px: float = Field(0.7, ge=0, le=10, description="1 σ of the lens' blur, px")
+    veil: float = Field(0.0, ge=0, le=0.5, description="share of the light spread by glare")
+    veil_sigma_px: float = Field(60.0, gt=1, le=1000, description="1 σ of that spread, px")
+    vignetting: float = Field(0.0, ge=0, le=10, description="exponent of the fall-off cos^k(θ/2)")
+    fixed_pattern: float = Field(0.0, ge=0, le=0.5, description="1 σ of the pixels' gain")
+
+
+class WaveScene(Parameters):
+    """One sinusoid of a motion."""
+
+    amplitude: float = Field(description="in the unit of what moves")
+    period_s: float = Field(gt=0, description="s")
+    phase_deg: float = Field(0.0, description="deg")
+
+
+class SwayScene(Parameters):
+    """A value that sways about a mean."""
+
+    mean: float = Field(0.0, description="mean")
+    trend_per_s: float = Field(0.0, description="steady change")
+    waves: tuple[WaveScene, ...] = Field((), description="sinusoids added")
+
+
+class LegScene(Parameters):
+    """A stretch of the way at one speed; a dwell has speed 0."""
+
+    duration_s: float = Field(gt=0, description="s")
+    speed_mm_s: float = Field(description="mm/s, backward negative")
+
+
+class MotionScene(Parameters):
+    """The camera's way: legs of speed along the axis, joined smoothly, and how it sways."""
+
+    start_mm: float = Field(0.0, description="distance at the first frame")
+    legs: tuple[LegScene, ...] = Field(min_length=1, description="in order")
+    easing_s: float = Field(0.2, gt=0, le=10, description="over which speeds run into each other")
+    x_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
+    y_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
+    yaw_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
+    pitch_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
+    roll_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
+
+
+class OdometerScene(Parameters):
+    """The encoder."""
+
+    rate_hz: float = Field(100.0, gt=0.1, le=1e5, description="readings a second")
+    quantum_mm: float = Field(0.05, ge=0, le=100, description="step of its counter")
+    scale: float = Field(0.0, ge=-0.2, le=0.2, description="reading over true distance, less one")
+
+
+class Rendering(Parameters):
+    """How finely a frame is computed."""
+
+    line_samples: int = Field(4, ge=1, le=16, description="samples a pixel and side where the line is")
+    wall_samples: int = Field(1, ge=1, le=8, description="samples a pixel and side elsewhere")
+    time_samples: int = Field(1, ge=1, le=64, description="moments within an exposure")
+
+
+class Scene(Parameters):
+    """Everything that a rendered recording depends on."""
+
+    name: str = Field(min_length=1, description="name of the recording")
+    summary: str = Field("", description="what it is for, one sentence")
+    kind: Literal["inspection", "gauge"] = Field("inspection", description="kind of run")
+    seed: int = Field(0, ge=0, description="of everything random")
+    frames: int = Field(gt=0, le=1_000_000, description="number of frames")
+    frame_rate: float = Field(30.0, gt=0, le=10_000, description="1/s")
+    pattern: tuple[Pattern, ...] = Field(("laser", "led"), min_length=1, description="illumination, repeated")
+    probe: dict[str, Any] = Field(description="what is stated of the instrument, as in probe.yaml")
+    truth: Literal["stated", "drawn"] = Field(
+        "drawn", description="is the true instrument as stated, or drawn"
+    )
+    laser: LaserScene = Field(default_factory=lambda: LaserScene.model_validate({}))
+    light: LightScene = Field(default_factory=lambda: LightScene.model_validate({}))
+    sensor: SensorScene = Field(default_factory=lambda: SensorScene.model_validate({}))
+    pipe: Pipe
+    motion: MotionScene
+    odometer: OdometerScene | None = Field(default_factory=lambda: OdometerScene.model_validate({}))
+    effects: dict[str, dict[str, float] | None] = Field(default_factory=dict, description="switched on")
+    rendering: Rendering = Field(default_factory=lambda: Rendering.model_validate({}))
+    codec: Literal["h264", "ffv1", "png"] = Field("h264", description="how frames are stored")
+    quality: int = Field(14, ge=0, le=51, description="constant rate factor of H.264")
+
+
+def read_scene(file: Path) -> Scene:
+    """Read a scene file.
+
+    Raises
+    ------
+    InputError
+        At the key that is unknown, missing, mistyped or out of range.
+    """
+    return scene_from(dict(read_yaml(file).values), file)
+
+
+def scene_from(values: dict[str, Any], file: Path) -> Scene:
+    """Return the scene of a mapping; ``file`` is named in complaints. See `read_scene`."""
+    try:
+        return Scene.model_validate_json(json.dumps(values))
+    except TypeError as error:
+        raise InputError(file, f"holds what a scene cannot: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise InputError(file, f"{place}: {first['msg']}", place=f"key {place}") from error
+
+
+def write_scene(scene: Scene, file: Path) -> None:
+    """Write a scene that `read_scene` reads back."""
+    values = scene.model_dump(mode="json", exclude_defaults=True)
+    file.write_text(yaml.safe_dump(values, sort_keys=False, allow_unicode=True, width=100), "utf-8")

@@ -1,0 +1,74 @@
+"""The truth of a scene: all that a recording is rendered from, and what it is told apart from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.probe import Probe
+from pipeline.recording.base import Encoder, FrameTable, PipeFacts
+from pipeline.simulator.instrument import Change, TrueInstrument
+from pipeline.simulator.motion import Motion, Odometer
+from pipeline.simulator.scene import Rendering
+from pipeline.simulator.wall.base import Wall
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SceneTruth:
+    """A scene worked out; an effect is a pure function from one to another.
+
+    Attributes
+    ----------
+    name, kind, seed
+        As in the scene.
+    stated : Probe
+        What probe.yaml will say.
+    instrument : TrueInstrument
+        The true one, apart from what changes with time.
+    changes : tuple of Change
+        Applied in order: see `instrument_at`.
+    wall : Wall
+    facts : PipeFacts
+        What recording.yaml will say of the pipe.
+    motion : Motion
+    odometer : Odometer or None
+    frames : FrameTable
+        Numbers, times at the middle of the exposure (of the middle row), illumination.
+    frame_rate : float
+    rendering : Rendering
+    """
+
+    name: str
+    kind: str
+    seed: int
+    stated: Probe
+    instrument: TrueInstrument
+    wall: Wall
+    facts: PipeFacts
+    motion: Motion
+    odometer: Odometer | None
+    frames: FrameTable
+    frame_rate: float
+    rendering: Rendering
+    changes: tuple[Change, ...] = ()
+
+    def instrument_at(self, time_s: float) -> TrueInstrument:
+        """Return the instrument as it is at a time."""
+        instrument = self.instrument
+        for change in self.changes:
+            instrument = change(instrument, time_s)
+        return instrument
+
+    def poses(self) -> Float:
+        """Return true ``T_pc`` (N, 4, 4) at the frames' times."""
+        return self.motion.pose(self.frames.time_s, self.wall.axis)
+
+    def encoder(self) -> Encoder | None:
+        """Return the readings of the odometer until the last frame, or None without one."""
+        if self.odometer is None:
+            return None
+        return self.odometer.readings(self.motion, float(self.frames.time_s[-1]) + 2.0 / self.frame_rate)
