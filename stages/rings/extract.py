@@ -76,7 +76,8 @@ def _laser_traces(
     recording: Recording, frames: Int, sectors: Sectors
 ) -> Iterator[tuple[int, RingTrace | None]]:
     """Trace frames lit by the laser alone, in the luma plane."""
-    clip_level, trace = _learn_clip_level(recording, frames[:_LEARNING_FRAMES], sectors), None
+    trace = _first_trace(recording, frames[:_LEARNING_FRAMES], sectors)
+    clip_level = np.inf if trace is None else trace.response.clip_level
     for frame, image in recording.read(frames, "grey"):
         trace = None if image is None else trace_ring(image, sectors, clip_level, trace)
         yield frame, trace
@@ -108,14 +109,17 @@ def _first_weights(bgr: NDArray[np.uint8], sectors: Sectors, probe: Probe) -> Fl
     return weights if trace is None else discriminant_weights(bgr, sectors, trace, weights)
 
 
-def _learn_clip_level(recording: Recording, frames: Int, sectors: Sectors) -> float:
-    """Learn at which grey level the line clips from the first of ``frames`` that shows a ring."""
+def _first_trace(recording: Recording, frames: Int, sectors: Sectors) -> RingTrace | None:
+    """Return the ring of the first of ``frames`` that shows one, with the grey level at which it clips."""
     for frame in frames:
         grey, bgr = _single(recording, frame, "grey"), _single(recording, frame, "bgr")
         trace = None if grey is None or bgr is None else trace_ring(grey, sectors, np.inf)
-        if trace is not None and grey is not None and bgr is not None:
-            return clip_level_of(grey, bgr, sectors.pixels_near(trace.radius_everywhere(), 0, trace.width_px))
-    return np.inf
+        if trace is None or grey is None or bgr is None:
+            continue
+        line = sectors.pixels_near(trace.radius_everywhere(), 0, trace.width_px)
+        clips = trace.response._replace(clip_level=clip_level_of(grey, bgr, line))
+        return replace(trace, response=noise_response(grey, sectors, trace.fit, clips))
+    return None
 
 
 def _single(recording: Recording, frame: int, planes: Planes) -> NDArray[np.uint8] | None:
