@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,29 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 
+@dataclass(frozen=True)
+class MeasuredRun:
+    """A gauge run measured, before any adjustment.
+
+    Attributes
+    ----------
+    start : Unknowns
+        First poses, the stated probe and a perfect gauge.
+    measured : Measurements
+    source : RingSource
+    posed : (K,) int
+        Places in the recording of the frames whose fiducials gave a pose.
+    wrong_fiducials : (J,) int
+        Places of fiducials that most frames outvote.
+    """
+
+    start: Unknowns
+    measured: Measurements
+    source: RingSource
+    posed: Int
+    wrong_fiducials: Int
+
+
 def calibrate_gauge(
     recording: Recording, rings: RingSamples, probe: Probe, parameters: GaugeParameters, context: Context
 ) -> GaugeCalibration:
@@ -43,19 +66,10 @@ def calibrate_gauge(
     UnusableError
         When fiducials or rings contradict the gauge's description, or cannot determine the instrument.
     """
-    gauge = premises.require_gauge(recording)
-    posed = _posed(recording, gauge, probe, parameters, context)
-    wrong = premises.outvoted_fiducials(posed, gauge)
-    T_pc = poses_of_all_frames(recording, posed, rings, probe)
-    premises.require_offset(T_pc, parameters)
-    source = RingSource(rings, frame_index(recording, rings.frame), gauge)
-    _require_bores(source, T_pc, probe, parameters)
-    edges = _edges(recording, posed, wrong, gauge, probe, parameters)
-    on_bore = source.on_bore(T_pc, probe, parameters)
-    time_s, encoder = recording.frames.time_s, recording.encoder
-    measured = Measurements(edges, on_bore, time_s, encoder, gauge.radius_sigma_mm, LOOSE)
-    start = first_unknowns(T_pc, posed.index, gauge, measured, probe, parameters)
-    finding = _solved(start, measured, source, posed, parameters)
+    run = measure_gauge(recording, rings, probe, parameters, context)
+    premises.require_offset(run.start.T_pc, parameters)
+    gauge, wrong = run.source.gauge, run.wrong_fiducials
+    finding = _solved(run, parameters)
     numbers = np.union1d(gauge.ids[wrong], gauge.ids[finding.wrong_fiducials])
     finding = replace(
         finding, wrong_fiducials=numbers, wrong_rings=recording.frames.frame[finding.wrong_rings]
@@ -77,17 +91,37 @@ def _posed(
     return posed
 
 
-def _solved(
-    start: Unknowns,
-    measured: Measurements,
-    source: RingSource,
-    posed: PosedFrames,
-    parameters: GaugeParameters,
-) -> Finding:
+def measure_gauge(
+    recording: Recording, rings: RingSamples, probe: Probe, parameters: GaugeParameters, context: Context
+) -> MeasuredRun:
+    """Return first poses and all that an adjustment is fed with.
+
+    Raises
+    ------
+    InputError
+        When the recording describes no gauge.
+    UnusableError
+        When fiducials or rings contradict the gauge's description.
+    """
+    gauge = premises.require_gauge(recording)
+    posed = _posed(recording, gauge, probe, parameters, context)
+    wrong = premises.outvoted_fiducials(posed, gauge)
+    T_pc = poses_of_all_frames(recording, posed, rings, probe)
+    source = RingSource(rings, frame_index(recording, rings.frame), gauge)
+    _require_bores(source, T_pc, probe, parameters)
+    edges = _edges(recording, posed, wrong, gauge, probe, parameters)
+    on_bore = source.on_bore(T_pc, probe, parameters)
+    time_s, encoder = recording.frames.time_s, recording.encoder
+    measured = Measurements(edges, on_bore, time_s, encoder, gauge.radius_sigma_mm, LOOSE)
+    start = first_unknowns(T_pc, posed.index, gauge, measured, probe, parameters)
+    return MeasuredRun(start, measured, source, posed.index, wrong)
+
+
+def _solved(run: MeasuredRun, parameters: GaugeParameters) -> Finding:
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
-            return solve(start, measured, source, posed.index, parameters)
+            return solve(run.start, run.measured, run.source, run.posed, parameters)
     except np.linalg.LinAlgError as error:
         raise UnusableError("calibrate", f"the run does not determine the instrument ({error})") from error
 
