@@ -1,0 +1,112 @@
+"""What the wall reflects: procedural texture at many scales, stains, and what defects and welds leave."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.simulator.wall.defects import imprint, reach_mm
+from pipeline.simulator.wall.description import Pipe, Surface, Tint, Weld
+from pipeline.simulator.wall.grid import Grid, window, wrapped
+from pipeline.simulator.wall.noise import Float32, above_share, field
+from pipeline.simulator.wall.relief import branch_cover, coarse_field, rust_field, weld_across
+from pipeline.simulator.wall.seeds import Seeds
+
+Float = NDArray[np.float64]
+_RUST: Tint = (0.40, 0.19, 0.09)
+_LIME: Tint = (0.66, 0.64, 0.58)
+_BLOT: Tint = (0.11, 0.11, 0.12)
+_HOLE: Tint = (0.02, 0.02, 0.02)
+_HEAT: Tint = (0.20, 0.17, 0.19)
+_BEAD: Tint = (0.50, 0.50, 0.49)
+_DARKEST, _BRIGHTEST = 0.01, 0.95
+# Finest texture in one frame over the bore's radius (shared notes, "Scales": 0.085 to 0.133 mm at 50.8 mm).
+FINEST_OVER_RADIUS = 0.0022
+
+
+def paint(grid: Grid, pipe: Pipe, seeds: Seeds) -> Float32:
+    """Return the albedo (S, A, 3), linear reflectance in red, green, blue, of all but fiducials."""
+    return stain(bare_wall(grid, pipe.surface, seeds), grid, pipe, seeds)
+
+
+def stain(albedo: Float32, grid: Grid, pipe: Pipe, seeds: Seeds) -> Float32:
+    """Return the albedo (S, A, 3) with rust, lime, streaks and what welds, defects and branches leave."""
+    _stain_surface(albedo, grid, pipe.surface, seeds)
+    for k, weld in enumerate(pipe.welds):
+        _stain_weld(albedo, grid, weld, seeds.of("weld", k))
+    for k, defect in enumerate(pipe.defects):
+        part = window(grid, defect.distance_mm, np.radians(defect.azimuth_deg), *reach_mm(defect))
+        marked = imprint(defect, seeds.of("defect", k), part.along_mm, part.around_mm)
+        _cover_window(albedo, part.place, marked.cover, marked.colour)
+    for branch in pipe.branches:
+        part = window(grid, branch.distance_mm, np.radians(branch.azimuth_deg), *[branch.diameter_mm] * 2)
+        cover = branch_cover(branch, part.along_mm, part.around_mm)
+        _cover_window(albedo, part.place, cover, _HOLE)
+    return np.clip(albedo, _DARKEST, _BRIGHTEST, out=albedo)
+
+
+def bare_wall(grid: Grid, surface: Surface, seeds: Seeds) -> Float32:
+    """Return the mottled wall (S, A, 3) before any stain: the same relative texture in all colours."""
+    grey = grain(grid, surface, seeds)
+    if surface.mottle > 0:
+        longest = surface.mottle_longest_mm
+        grey += surface.mottle * field(grid, seeds.of("mottle"), longest_mm=longest, slope=0.7)
+    # a relative texture must not turn negative: its logarithm is what is Gaussian
+    shade = surface.albedo * np.exp(grey - grey.var() / 2)
+    return np.asarray(shade[..., None] * np.array(surface.tint, np.float32), np.float32)
+
+
+def grain(grid: Grid, surface: Surface, seeds: Seeds) -> Float32:
+    """Return the finest texture (S, A), relative: what a frame just resolves, and twice as coarse."""
+    if surface.grain == 0:
+        return np.zeros(grid.shape, np.float32)
+    wave = surface.grain_mm or 4 * FINEST_OVER_RADIUS * grid.radius_mm
+    fine = field(grid, seeds.of("grain"), longest_mm=3 * wave, shortest_mm=wave / 2, slope=0.0)
+    return np.asarray(surface.grain * fine, np.float32)
+
+
+def _stain_surface(albedo: Float32, grid: Grid, surface: Surface, seeds: Seeds) -> None:
+    texture = albedo[..., 1] / surface.albedo
+    if surface.rust > 0:
+        place = rust_field(grid, surface.rust_patch_mm, seeds)
+        _cover(albedo, above_share(place, surface.rust, 0.5), _RUST, texture)
+    if surface.lime > 0:
+        place = coarse_field(grid, seeds.of("lime"), surface.rust_patch_mm / 2)
+        _cover(albedo, 0.8 * above_share(place, surface.lime, 0.4), _LIME, texture)
+    if surface.spots > 0:
+        place = field(grid, seeds.of("spots"), longest_mm=surface.mottle_longest_mm / 2, slope=0.8)
+        _cover(albedo, above_share(place, surface.spots, 0.05), _BLOT, texture)
+    if surface.streaks > 0:
+        lines = field(grid, seeds.of("streaks"), longest_mm=8.0, shortest_mm=0.5, slope=0.6, stretch=12.0)
+        albedo *= (1 - surface.streaks * np.clip(lines, 0, 1.5) / 1.5)[..., None]
+    if surface.seam_deg is not None:
+        off = wrapped(grid.azimuth_rad - np.radians(surface.seam_deg)) * grid.radius_mm
+        albedo *= (1 - 0.6 * np.exp(-((off / 0.5) ** 2))).astype(np.float32)[None, :, None]
+
+
+def _stain_weld(albedo: Float32, grid: Grid, weld: Weld, random: np.random.Generator) -> None:
+    half = weld.width_mm / 2
+    across, _ = weld_across(grid, weld, random)
+    rows = np.flatnonzero(np.abs(grid.distance_mm - weld.distance_mm) <= 2 * half + 3 * weld.heat_mm)
+    part, off = albedo[rows], half * np.abs(across[rows])
+    heat = 0.7 * np.exp(-((np.maximum(off - half, 0) / max(weld.heat_mm, 0.1)) ** 2))
+    texture = part[..., 1] / max(float(part[..., 1].mean()), 1e-6)
+    _cover(part, heat, _HEAT, texture)
+    _cover(part, np.clip((half - off) / 0.3, 0, 1), _BEAD, texture)
+    albedo[rows] = part
+
+
+def _cover(albedo: Float32, share: Float | Float32, colour: Tint, texture: Float32) -> None:
+    """Lay a colour, with the wall's own texture, over a share of every cell."""
+    share = np.asarray(share, np.float32)
+    for channel, value in enumerate(colour):
+        albedo[..., channel] += share * (np.float32(value) * texture - albedo[..., channel])
+
+
+def _cover_window(albedo: Float32, place: tuple[NDArray[np.int64], ...], share: Float, colour: Tint) -> None:
+    part = albedo[place]
+    if part.size == 0:
+        return
+    texture = part[..., 1] / max(float(part[..., 1].mean()), 1e-6)
+    _cover(part, share, colour, texture)
+    albedo[place] = part

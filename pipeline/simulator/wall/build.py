@@ -1,0 +1,108 @@
+"""The wall of a scene: shape, relief, reflectance and axis put together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import PipeAxis
+from pipeline.geometry.axis import straight_axis
+from pipeline.geometry.rigid import rotation_from_vector
+from pipeline.simulator.wall.albedo import FINEST_OVER_RADIUS, paint, stain
+from pipeline.simulator.wall.base import Wall
+from pipeline.simulator.wall.description import Bend, Pipe
+from pipeline.simulator.wall.fiducials import paint_fiducials, require_room
+from pipeline.simulator.wall.grid import Grid, grid_over
+from pipeline.simulator.wall.noise import Float32
+from pipeline.simulator.wall.photograph import lay_photograph
+from pipeline.simulator.wall.relief import add_relief
+from pipeline.simulator.wall.seeds import Seeds
+from pipeline.simulator.wall.shape import axis_curvature, base_radius
+
+Float = NDArray[np.float64]
+_AXIS_STEP_MM = 0.25
+
+
+def build_wall(pipe: Pipe, seed: int, folder: Path) -> Wall:
+    """Return the wall of a pipe.
+
+    Parameters
+    ----------
+    pipe : Pipe
+    seed : int
+        Of everything random about it; the same seed gives the same wall.
+    folder : Path
+        In which a photograph is looked for.
+
+    Raises
+    ------
+    InputError
+        When fiducials have no room, or a photograph cannot be read.
+    """
+    seeds = Seeds(seed)
+    span, radius = (pipe.from_mm, pipe.to_mm), pipe.diameter_mm / 2
+    shape = grid_over(span, radius, pipe.cell_mm)
+    texture = grid_over(span, radius, texel_mm(pipe))
+    radius_mm = add_relief(base_radius(shape, pipe), shape, pipe, seeds)
+    albedo = albedo_of(texture, pipe, seeds, folder)
+    axis = bent_axis(span, pipe.bends) if pipe.bends else straight_axis(*span)
+    return Wall(
+        axis=axis,
+        shape=shape.cells,
+        radius_mm=np.asarray(radius_mm, np.float32),
+        texture=texture.cells,
+        albedo_bgr=np.ascontiguousarray(albedo[..., ::-1]),
+        gloss=pipe.surface.gloss,
+    )
+
+
+def texel_mm(pipe: Pipe) -> float:
+    """Return the cell of the albedo, mm: as stated, or the finest that one frame shows of this bore."""
+    return pipe.texel_mm or round(FINEST_OVER_RADIUS * pipe.diameter_mm / 2, 4)
+
+
+def albedo_of(grid: Grid, pipe: Pipe, seeds: Seeds, folder: Path) -> Float32:
+    """Return the albedo (S, A, 3) in red, green, blue, fiducials and all."""
+    if pipe.photograph is None:
+        albedo = paint(grid, pipe, seeds)
+    else:
+        albedo = stain(lay_photograph(grid, pipe.photograph, folder), grid, pipe, seeds)
+    if pipe.fiducials is not None:
+        require_room(pipe, pipe.fiducials)
+        paint_fiducials(albedo, grid, pipe, pipe.fiducials)
+    return albedo
+
+
+def bent_axis(span_mm: tuple[float, float], bends: Sequence[Bend]) -> PipeAxis:
+    """Return the axis of a pipe with bends, at distance 0 in the origin of P and along its z.
+
+    The section's frame is carried along without twist: with tangent t and section axes x, y, the change of t
+    per distance is κ_x x + κ_y y (R. L. Bishop, "There is more than one way to frame a curve", 1975). Over
+    each step the axis is an exact arc.
+    """
+    first, last = (int(np.floor(span_mm[0] / _AXIS_STEP_MM)), int(np.ceil(span_mm[1] / _AXIS_STEP_MM)))
+    distance = np.asarray(np.arange(min(first, 0), max(last, 0) + 1) * _AXIS_STEP_MM, np.float64)
+    start = int(np.flatnonzero(distance == 0)[0])
+    middle = np.asarray(distance[:-1] + _AXIS_STEP_MM / 2, np.float64)
+    ahead = _carried(axis_curvature(middle[start:], bends), _AXIS_STEP_MM)
+    behind = _carried(axis_curvature(middle[:start][::-1], bends), -_AXIS_STEP_MM)
+    origin, rotation = (np.concatenate([b[:0:-1], a]) for a, b in zip(ahead, behind, strict=True))
+    return PipeAxis(distance, origin, rotation)
+
+
+def _carried(curvature: Float, step_mm: float) -> tuple[Float, Float]:
+    """Return points (K + 1, 3) and frames (K + 1, 3, 3) carried on over K steps of one curvature each."""
+    turn = np.stack([-curvature[:, 1], curvature[:, 0], np.zeros(len(curvature))], -1) * step_mm
+    half = rotation_from_vector(turn / 2)
+    angle = np.linalg.norm(turn, axis=1)
+    chord = step_mm * np.sinc(angle / (2 * np.pi))
+    origin, rotation = np.zeros((len(turn) + 1, 3)), np.empty((len(turn) + 1, 3, 3))
+    rotation[0] = np.eye(3)
+    for k in range(len(turn)):
+        to_middle = rotation[k] @ half[k]
+        origin[k + 1] = origin[k] + chord[k] * to_middle[:, 2]
+        rotation[k + 1] = to_middle @ half[k]
+    return origin, rotation
