@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.calibrate.gauge.state import Unknowns
 from stages.motion.bordered import BLOCK, Rows
-from stages.motion.terms import cauchy
+from stages.motion.robust import Cauchy
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -26,10 +26,10 @@ def smooth_rows(state: Unknowns, time_s: Float, sigma: Float) -> Rows:
     by_frame = np.zeros((len(first), 6, 4, BLOCK))
     for i in range(6):
         by_frame[:, i, :, i] = coefficient
-    weight = cauchy(residual / sigma, _SOFT) / sigma**2
+    every = np.broadcast_to(sigma, residual.shape).ravel()
     none = np.zeros((6 * len(first), state.border_size))
     return Rows(
-        np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK), none, residual.ravel(), weight.ravel()
+        np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK), none, residual.ravel(), every, Cauchy(_SOFT)
     )
 
 

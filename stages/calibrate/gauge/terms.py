@@ -14,11 +14,12 @@ from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.motion.bordered import BLOCK, Rows
-from stages.motion.terms import cauchy
+from stages.motion.robust import Cauchy
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 _STEP_S = 1e-3
+_ORIGIN_SIGMA_MM = 1e-3
 
 
 @dataclass(frozen=True)
@@ -99,15 +100,13 @@ def encoder_equations(
     by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), scale * speed], -1)
     residual = state.T_pc[:, 2, 3] - scale * reading - offset - state.slip
     sigma = parameters.encoder_sigma_mm
-    readings = Rows(
-        np.arange(count)[:, None], by_frame, by_border, residual, cauchy(residual / sigma) / sigma**2
-    )
+    readings = Rows(np.arange(count)[:, None], by_frame, by_border, residual, np.full(count, sigma), Cauchy())
     pair = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
     by_pair = np.zeros((count - 1, 2, BLOCK))
     by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
-    change, slip_sigma = np.diff(state.slip), parameters.encoder_slip_sigma_mm
-    weight = cauchy(change / slip_sigma) / slip_sigma**2
-    return readings, Rows(pair, by_pair, np.zeros((count - 1, state.border_size)), change, weight)
+    slip_sigma = np.full(count - 1, parameters.encoder_slip_sigma_mm)
+    none = np.zeros((count - 1, state.border_size))
+    return readings, Rows(pair, by_pair, none, np.diff(state.slip), slip_sigma, Cauchy())
 
 
 def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:
@@ -116,7 +115,7 @@ def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:
     by_frame = np.zeros((len(frame), 1, BLOCK))
     by_frame[:, 0, 6] = 1
     none = np.zeros((len(frame), state.border_size))
-    return Rows(frame[:, None], by_frame, none, state.slip[frame], np.full(len(frame), 1e6))
+    return Rows(frame[:, None], by_frame, none, state.slip[frame], np.full(len(frame), _ORIGIN_SIGMA_MM))
 
 
 def prior_rows(state: Unknowns, radius_sigma_mm: float, parameters: GaugeParameters) -> Rows:
@@ -130,7 +129,7 @@ def prior_rows(state: Unknowns, radius_sigma_mm: float, parameters: GaugeParamet
     sigma[at.bore] = max(radius_sigma_mm, 1e-5)
     sigma[at.marker] = parameters.placement_sigma_mm
     none = np.zeros((at.size, 0), np.int64)
-    return Rows(none, np.zeros((at.size, 0, BLOCK)), np.eye(at.size), value, sigma**-2)
+    return Rows(none, np.zeros((at.size, 0, BLOCK)), np.eye(at.size), value, sigma)
 
 
 def _bore_radius(state: Unknowns, rings: BoreRings) -> Float:
@@ -145,10 +144,10 @@ def _weighted(
     for part in (residual, by_frame, by_border):
         part[bad] = 0.0
     in_sigma = residual / np.where(np.isfinite(sigma), sigma, 1.0)
-    spread = frame_spread(frame, in_sigma)
-    scaled = in_sigma / spread
-    weight = np.where(bad, 0.0, cauchy(scaled) / np.where(np.isfinite(sigma), sigma * spread, 1.0) ** 2)
-    return Equations(Rows(frame[:, None], by_frame, by_border, residual, weight), in_sigma, cluster)
+    believed = np.where(bad | ~np.isfinite(sigma), np.inf, sigma * frame_spread(frame, in_sigma))
+    return Equations(
+        Rows(frame[:, None], by_frame, by_border, residual, believed, Cauchy()), in_sigma, cluster
+    )
 
 
 def frame_spread(frame: Int, in_sigma: Float) -> Float:
