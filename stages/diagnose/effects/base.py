@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
+from stages.diagnose.effects.ring_geometry import RingGeometry, ring_geometry
 
 Float = NDArray[np.float64]
 Shape = tuple[float, ...]
@@ -78,6 +79,16 @@ class ImagePoints:
     def azimuth_rad(self) -> Float:
         """(M,) azimuth ψ in C, rad."""
         return np.asarray(np.arctan2(self.xyz_c[:, 1], self.xyz_c[:, 0]))
+
+    @cached_property
+    def projected_uv(self) -> Float:
+        """(M, 2) image of the points by the stated camera."""
+        return np.asarray(self.probe.camera.project(self.xyz_c).uv)
+
+    @cached_property
+    def ring(self) -> RingGeometry:
+        """The laser's line at these points."""
+        return ring_geometry(self.probe, self.xyz_c, self.normal_c, self.uv)
 
     @cached_property
     def radius_mm(self) -> Float:

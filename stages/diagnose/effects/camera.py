@@ -1,0 +1,203 @@
+"""Effects of the camera: they move the image of every wall point, on the line or off it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.instrument.camera.base import Camera
+from stages.diagnose.effects.base import EffectModel, Float, ImagePoints, Shape
+from stages.diagnose.effects.kinds import Directed, Drifting, Scalar, along_x_and_y, one
+from stages.diagnose.effects.laser import Baseline
+
+_NEAR_AXIS = 1e-4
+_STEPS = 6
+
+
+class PrincipalPoint(Directed):
+    """The optical axis meets the image elsewhere."""
+
+    name = "principal_point"
+    amplitudes = along_x_and_y(name, 0.5)
+    words = "The optical axis meets the image {shift_px:.3f} px off its stated place, toward {direction_deg:.1f}°."
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the same shift everywhere."""
+        return np.tile(np.asarray(amplitude, float), (len(points.uv), 1))
+
+
+class FocalScale(Scalar):
+    """The whole image is larger."""
+
+    name = "focal_scale"
+    amplitudes = one(name, 1e-3)
+    words = "The focal length is {relative:+.3%} off: the image is that much larger than stated."
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return κ (uv − centre)."""
+        return np.asarray(amplitude[0] * (points.uv - points.probe.camera.centre_px))
+
+
+class RadialDistortion(Scalar):
+    """The image radius has k f θ³ more."""
+
+    name = "radial_distortion"
+    amplitudes = one(name, 1e-3)
+    words = "The lens distorts by k = {k:+.2e} of θ³ beyond the stated."
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return f k θ³ outward."""
+        focal = focal_px(points.probe.camera)
+        return np.asarray(amplitude[0] * (points.theta**3)[:, None] * focal * _heading(points))
+
+
+class SensorTilt(Directed):
+    """Brown's decentring on the angle: a sensor that is not square to the axis, or decentred lenses."""
+
+    name = "sensor_tilt"
+    amplitudes = along_x_and_y(name, 5e-4)
+    words = (
+        "The sensor is tilted or the lenses are decentred: p = {p:.2e} beyond the stated, toward "
+        "{direction_deg:.1f}°."
+    )
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return f θ² (p + 2 (p · u) u) with u the azimuth's direction: 3 f p θ² on the crest."""
+        heading, p = _heading(points), np.asarray(amplitude, float)
+        pull = p + 2 * (heading @ p)[:, None] * heading
+        return np.asarray((points.theta**2)[:, None] * focal_px(points.probe.camera) * pull)
+
+
+class PixelAspect(Scalar):
+    """Pixels are not square as stated: wider images by √(1 + a), lower ones by the same."""
+
+    name = "pixel_aspect"
+    amplitudes = one(name, 1e-3)
+    words = "The image is {relative:+.3%} wider against its height than stated."
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return (√(1+a) − 1) x and (1/√(1+a) − 1) y."""
+        widen = np.sqrt(1 + amplitude[0])
+        stretch = np.array([widen - 1, 1 / widen - 1])
+        return np.asarray(stretch * (points.uv - points.probe.camera.centre_px))
+
+
+class PupilShift(Scalar):
+    """The entrance pupil moves along the axis with the field angle, by E = ε (θ/sin θ − 1) forward."""
+
+    name = "pupil_shift"
+    amplitudes = one(name, 0.3)
+    words = (
+        "The lens's entrance pupil moves forward with the angle, by {shift_mm:+.3f} mm × (θ/sin θ − 1) "
+        "beyond the stated."
+    )
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the image from the moved viewpoint, less that from the stated one."""
+        seen, theta = points.xyz_c.copy(), points.theta
+        for _ in range(_STEPS):
+            seen[:, 2] = points.xyz_c[:, 2] - amplitude[0] * (1 / np.sinc(theta / np.pi) - 1)
+            theta = np.arctan2(points.radius_mm, seen[:, 2])
+        return image_shift(points, seen)
+
+
+class RollingShutter(Scalar):
+    """Rows are exposed one after another; a row's time counts from the middle row's."""
+
+    name = "rolling_shutter"
+    amplitudes = one(name, 0.01)
+    words = "The shutter is rolling: the last row is exposed {readout_s:.4f} s after the first."
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the motion from the middle row's time to the row's own."""
+        height = points.probe.camera.image_size[1]
+        row_s = amplitude[0] * ((points.uv[:, 1] + 0.5) / height - 0.5)
+        return np.asarray(row_s[:, None] * points.velocity_px)
+
+
+class MotionBlur(Scalar):
+    """A longer exposure from the same start: the image is that of half the exposure later."""
+
+    name = "motion_blur"
+    amplitudes = one(name, 0.005)
+    words = "The exposure is {exposure_s:+.4f} s longer than stated and blurs what moves."
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return half an exposure's motion."""
+        return np.asarray(0.5 * amplitude[0] * points.velocity_px)
+
+
+class BaselineDrift(Drifting):
+    """The baseline grows while the probe warms up."""
+
+    name = "baseline_drift"
+    static = Baseline()
+    amplitudes = one(name, 0.05)
+    words = "The baseline drifts by {drift_mm:+.3f} mm in the end, with a time constant of {time_s:.1f} s."
+
+
+class FocalDrift(Drifting):
+    """The focal length grows while the probe warms up."""
+
+    name = "focal_drift"
+    static = FocalScale()
+    amplitudes = one(name, 1e-3)
+    words = "The focal length drifts by {relative:+.3%} in the end, with a time constant of {time_s:.1f} s."
+
+
+class CentreDrift(Drifting):
+    """The optical axis wanders while the probe warms up."""
+
+    name = "centre_drift"
+    static = PrincipalPoint()
+    amplitudes = along_x_and_y(name, 0.5)
+    words = (
+        "The optical axis drifts by {shift_px:.3f} px toward {direction_deg:.1f}° in the end, with a time "
+        "constant of {time_s:.1f} s."
+    )
+
+
+class PixelLocking(Scalar):
+    """The line is found off by a sine of the fraction of a pixel it lies at."""
+
+    name = "pixel_locking"
+    amplitudes = one(name, 0.02)
+    words = (
+        "The line is found off by {amplitude_px:+.3f} px × sin 2πρ, with the fraction of its image radius ρ."
+    )
+
+    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return a sin 2πρ."""
+        rho = np.linalg.norm(points.uv - points.probe.camera.centre_px, axis=1)
+        return np.asarray(amplitude[0] * np.sin(2 * np.pi * rho))
+
+
+def image_shift(points: ImagePoints, seen_c: Float) -> Float:
+    """Return (M, 2) by which the image moves when the points are seen as though they were at ``seen_c``."""
+    camera = points.probe.camera
+    return np.asarray(camera.project(seen_c).uv - points.projected_uv)
+
+
+def focal_px(camera: Camera) -> Float:
+    """Return (2,) px per rad along u and v at the axis."""
+    towards = np.array([[_NEAR_AXIS, 0, 1.0], [0, _NEAR_AXIS, 1.0]])
+    return np.asarray(np.diag(camera.project(towards).uv - camera.centre_px) / _NEAR_AXIS)
+
+
+def _heading(points: ImagePoints) -> Float:
+    return np.stack([np.cos(points.azimuth_rad), np.sin(points.azimuth_rad)], axis=1)
+
+
+CAMERA_MODELS: tuple[EffectModel, ...] = (
+    PrincipalPoint(),
+    FocalScale(),
+    RadialDistortion(),
+    SensorTilt(),
+    PixelAspect(),
+    PupilShift(),
+    RollingShutter(),
+    MotionBlur(),
+    BaselineDrift(),
+    FocalDrift(),
+    CentreDrift(),
+    PixelLocking(),
+)

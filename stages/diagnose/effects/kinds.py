@@ -1,0 +1,141 @@
+"""What effects have in common: one signed size, a size with a direction, and behaviour in time."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+import numpy as np
+
+from pipeline.physics.catalogue import effect
+from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
+
+
+class Worded(EffectModel):
+    """An effect whose statement is a sentence with its quantities put in."""
+
+    words: str
+
+    def statement(self, shape: Shape, amplitude: Float) -> str:
+        """Return the effect in a plain sentence with its size."""
+        return self.words.format(**self.quantities(shape, amplitude))
+
+
+class Scalar(Worded):
+    """An effect whose one amplitude is the catalogue's first quantity itself."""
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the size by its catalogue name."""
+        return {effect(self.name).quantities[0].name: float(amplitude[0])}
+
+
+class Directed(Worded):
+    """An effect with a size and an azimuth ψ₀; amplitudes are its parts along x and y."""
+
+    order: int = 1
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return size and direction of the crest by their catalogue names."""
+        return {
+            effect(self.name).quantities[0].name: float(np.hypot(*amplitude)),
+            "direction_deg": float(np.degrees(np.arctan2(amplitude[1], amplitude[0])) / self.order),
+        }
+
+
+class Drifting(Worded):
+    """A static effect that comes up as 1 − exp(−t/t₀); the shape is t₀ in s."""
+
+    static: EffectModel
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return time constants from a tenth of the recording, below which a step is left, to a straight line."""
+        return tuple((duration_s * part,) for part in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4))
+
+    def course(self, time_s: Float, shape: Shape) -> Float:
+        """Return (M,) the part of the final size that is reached."""
+        return np.asarray(-np.expm1(-time_s / shape[0]))
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the static shift as far as it has come up."""
+        static = self.static.image_shift_px(points, (), amplitude)
+        return np.asarray(self.course(points.time_s, shape)[:, None] * static)
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the static shift as far as it has come up."""
+        return np.asarray(
+            self.course(points.time_s, shape) * self.static.sheet_shift_mm(points, (), amplitude)
+        )
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the final size and the time constant."""
+        _, *following = self.static.quantities((), amplitude).items()
+        first = next(iter(self.static.quantities((), amplitude).values()))
+        return {effect(self.name).quantities[0].name: first, **dict(following), "time_s": shape[0]}
+
+
+class Periodic(Worded):
+    """A directed effect at one frequency; amplitudes are (x, y) of its sine, then of its cosine.
+
+    The frequency found is the lowest of all that look the same in these frames, |f − k · frame rate|.
+    """
+
+    @abstractmethod
+    def moved_px(self, points: ImagePoints, size: Float) -> Float:
+        """Return (M, 2) the image's shift for sizes (M, 2) along x and y at each point's time."""
+
+    @abstractmethod
+    def moved_mm(self, points: ImagePoints, size: Float) -> Float:
+        """Return (M,) the sheet's shift for sizes (M, 2) along x and y at each point's time."""
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return frequencies half a resolution cell apart, up to half the frame rate."""
+        step = 0.5 / duration_s
+        return tuple((float(f),) for f in np.arange(2 * step, frame_rate / 2 + step / 2, step))
+
+    def size_at(self, time_s: Float, shape: Shape, amplitude: Float) -> Float:
+        """Return (M, 2) size along x and y at the times (M,)."""
+        phase = 2 * np.pi * shape[0] * time_s
+        return np.asarray(np.outer(np.sin(phase), amplitude[:2]) + np.outer(np.cos(phase), amplitude[2:]))
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the shift at each point's time."""
+        return self.moved_px(points, self.size_at(points.time_s, shape, amplitude))
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the shift at each point's time."""
+        return self.moved_mm(points, self.size_at(points.time_s, shape, amplitude))
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return half the longer axis of the ellipse that is run through, its direction and the frequency."""
+        axes, size, _ = np.linalg.svd(np.asarray(amplitude).reshape(2, 2).T)
+        return {
+            effect(self.name).quantities[0].name: float(size[0]),
+            "frequency_hz": shape[0],
+            "direction_deg": float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))),
+        }
+
+
+def one(name: str, plausible: float) -> tuple[Amplitude]:
+    """Return the amplitude of a `Scalar` effect: the catalogue's first quantity."""
+    size = effect(name).quantities[0]
+    return (Amplitude(size.name, size.unit, plausible),)
+
+
+def along_x_and_y(name: str, plausible: float) -> tuple[Amplitude, Amplitude]:
+    """Return the amplitudes of a `Directed` effect: the catalogue's first quantity along x and along y."""
+    size = effect(name).quantities[0]
+    return (
+        Amplitude(f"{size.name} along x", size.unit, plausible),
+        Amplitude(f"{size.name} along y", size.unit, plausible),
+    )
+
+
+def sine_and_cosine(name: str, plausible: float) -> tuple[Amplitude, ...]:
+    """Return the amplitudes of a `Periodic` effect: the size along x and y of its sine, then of its cosine."""
+    size = effect(name).quantities[0]
+    parts = [f"{wave} along {axis}" for wave in ("sine", "cosine") for axis in "xy"]
+    return tuple(Amplitude(f"{size.name}, {part}", size.unit, plausible) for part in parts)
+
+
+def cosine(azimuth_rad: Float, amplitude: Float, order: int = 1) -> Float:
+    """Return (M,) a cos m(ψ − ψ₀) with (a cos mψ₀, a sin mψ₀) = ``amplitude`` (2,)."""
+    return np.asarray(amplitude[0] * np.cos(order * azimuth_rad) + amplitude[1] * np.sin(order * azimuth_rad))

@@ -1,0 +1,139 @@
+"""Effects of the laser sheet: they move the line along the wall and leave texture where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
+from stages.diagnose.effects.kinds import (
+    Directed,
+    Periodic,
+    Scalar,
+    along_x_and_y,
+    cosine,
+    one,
+    sine_and_cosine,
+)
+
+_ORDERS = (2, 3, 4, 5, 6)
+
+
+class LaserTilt(Directed):
+    """The sheet leans forward by tan φ per mm toward ψ₀."""
+
+    name = "laser_tilt"
+    amplitudes = along_x_and_y(name, 0.1)
+    words = (
+        "The laser sheet is tilted by {tilt_deg:.3f}° more than stated, leaning forward toward azimuth "
+        "{direction_deg:.1f}°."
+    )
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return q tan φ cos(ψ − ψ₀)."""
+        tilt = np.radians(amplitude)
+        stretch = np.tan(np.hypot(*tilt)) / max(float(np.hypot(*tilt)), 1e-300)
+        return np.asarray(points.radius_mm * cosine(points.azimuth_rad, tilt * stretch))
+
+
+class LaserCone(Scalar):
+    """The sheet is a cone whose rays rise by ε₀."""
+
+    name = "laser_cone"
+    amplitudes = one(name, 0.1)
+    words = (
+        "The laser's rays rise forward by {cone_deg:+.3f}° more than stated, all round: the sheet is a cone."
+    )
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return q (tan(ε + ε₀) − tan ε) with the stated elevation ε."""
+        stated = points.probe.laser.cone_rad
+        steeper = np.tan(stated + np.radians(amplitude[0])) - np.tan(stated)
+        return np.asarray(points.radius_mm * steeper)
+
+
+class Baseline(Scalar):
+    """The sheet stands farther from the camera."""
+
+    name = "baseline"
+    amplitudes = one(name, 0.1)
+    words = "The laser sheet stands {baseline_mm:+.3f} mm farther from the camera than stated."
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return δl."""
+        return np.full(len(points.uv), float(amplitude[0]))
+
+
+class BeamDecentre(Directed):
+    """The sheet's rays leave the axis at heights that vary once around."""
+
+    name = "beam_decentre"
+    amplitudes = along_x_and_y(name, 0.05)
+    words = (
+        "The laser's rays leave its axis {height_mm:.3f} mm higher toward azimuth {direction_deg:.1f}° and as much "
+        "lower on the other side: the beam is decentred on its cone."
+    )
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return h cos(ψ − ψ₀)."""
+        return cosine(points.azimuth_rad, amplitude)
+
+
+class SheetWaviness(EffectModel):
+    """The sheet's rays rise and fall m times around the ring; the shape is m."""
+
+    name = "sheet_waviness"
+    amplitudes = (Amplitude("cosine", "mrad", 0.3), Amplitude("sine", "mrad", 0.3))
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return the orders."""
+        return tuple((float(m),) for m in _ORDERS)
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return q ε_m cos m(ψ − ψ_m)."""
+        wave = cosine(points.azimuth_rad, 1e-3 * np.asarray(amplitude), int(shape[0]))
+        return np.asarray(points.radius_mm * wave)
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return amplitude, order and direction of a crest."""
+        crest = np.degrees(np.arctan2(amplitude[1], amplitude[0])) / shape[0]
+        return {
+            "amplitude_mrad": float(np.hypot(*amplitude)),
+            "order": shape[0],
+            "direction_deg": float(crest),
+        }
+
+    def statement(self, shape: Shape, amplitude: Float) -> str:
+        """Return the effect in a plain sentence with its size."""
+        return (
+            "The laser sheet is wavy: its rays rise and fall by {amplitude_mrad:.2f} mrad {order:.0f} times "
+            "around the ring, with a crest at azimuth {direction_deg:.1f}°."
+        ).format(**self.quantities(shape, amplitude))
+
+
+class LaserRocking(Periodic):
+    """The sheet's tilt swings at one frequency."""
+
+    name = "laser_rocking"
+    amplitudes = sine_and_cosine(name, 1.0)
+    words = (
+        "The laser sheet rocks by ±{amplitude_mrad:.2f} mrad at {frequency_hz:.2f} Hz (or an alias of it) toward "
+        "azimuth {direction_deg:.1f}°."
+    )
+
+    def moved_px(self, points: ImagePoints, size: Float) -> Float:
+        """Return none."""
+        return np.zeros((len(points.uv), 2))
+
+    def moved_mm(self, points: ImagePoints, size: Float) -> Float:
+        """Return q φ(t) cos(ψ − ψ₀) for tilts in mrad."""
+        return np.asarray(1e-3 * np.sum(size * points.xyz_c[:, :2], axis=1))
+
+
+LASER_MODELS: tuple[EffectModel, ...] = (
+    LaserTilt(),
+    LaserCone(),
+    Baseline(),
+    BeamDecentre(),
+    SheetWaviness(),
+    LaserRocking(),
+)

@@ -1,0 +1,147 @@
+"""Effects of the pose, the pipe and the odometer."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.diagnose.effects.base import EffectModel, Float, ImagePoints, Shape, Travel
+from stages.diagnose.effects.camera import image_shift
+from stages.diagnose.effects.kinds import (
+    Directed,
+    Periodic,
+    Scalar,
+    Worded,
+    along_x_and_y,
+    cosine,
+    one,
+    sine_and_cosine,
+)
+
+_SLIP_TIMES = 64
+
+
+class PipeBend(Directed):
+    """The pipe's axis is curved: the wall ahead has moved aside by the sagitta."""
+
+    name = "pipe_bend"
+    amplitudes = along_x_and_y(name, 4e-4)
+    words = "The pipe bends with a curvature of {curvature_per_mm:.2e} per mm toward azimuth {direction_deg:.1f}° of P."
+
+    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the sagitta L²/8ρ of a chord twice the way ahead, along the wall's normal."""
+        ahead = np.sum(points.xyz_c * points.along_c, axis=1)
+        return np.asarray(ahead**2 / 2 * cosine(points.azimuth_p_rad, amplitude))
+
+
+class Ovality(Directed):
+    """The pipe's section is an oval that keeps its azimuth in P."""
+
+    name = "ovality"
+    order = 2
+    amplitudes = along_x_and_y(name, 0.1)
+    words = "The pipe is oval: its radius varies by ±{amplitude_mm:.3f} mm, longest at azimuth {direction_deg:.1f}° of P."
+
+    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return a₂ cos 2(ψ − ψ₀)."""
+        return cosine(points.azimuth_p_rad, amplitude, self.order)
+
+
+class ProbeVibration(Periodic):
+    """The camera swings across the pipe at one frequency; a pose in every frame absorbs nearly all of it."""
+
+    name = "probe_vibration"
+    amplitudes = sine_and_cosine(name, 0.2)
+    words = (
+        "The probe vibrates across the pipe by ±{amplitude_mm:.3f} mm at {frequency_hz:.2f} Hz (or an alias of it) "
+        "toward azimuth {direction_deg:.1f}°."
+    )
+
+    def moved_px(self, points: ImagePoints, size: Float) -> Float:
+        """Return the image from the displaced camera, less that from the stated place."""
+        seen = points.xyz_c.copy()
+        seen[:, :2] -= size
+        return image_shift(points, seen)
+
+    def moved_mm(self, points: ImagePoints, size: Float) -> Float:
+        """Return none: the sheet swings with the camera."""
+        return np.zeros(len(points.uv))
+
+
+class EncoderScale(Scalar):
+    """The encoder's wheel is smaller than stated."""
+
+    name = "encoder_scale"
+    amplitudes = one(name, 0.005)
+    words = "The encoder reads {relative:+.3%} too much of every distance."
+
+    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
+        """Return κ s."""
+        return np.asarray(amplitude[0] * travel.distance_mm)
+
+
+class EncoderSlip(Worded):
+    """The encoder's wheel slips once; the shape is the time."""
+
+    name = "encoder_slip"
+    amplitudes = one(name, 2.0)
+    words = "The encoder's wheel slips after {time_s:.2f} s and its reading gains {slip_mm:+.2f} mm."
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return times within the recording, no closer than frames are."""
+        count = int(min(_SLIP_TIMES, max(duration_s * frame_rate, 2)))
+        return tuple((float(t),) for t in duration_s * np.arange(1, count) / count)
+
+    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
+        """Return the gain at all later times."""
+        return np.asarray(amplitude[0] * (travel.time_s > shape[0]))
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the gain and when it comes."""
+        return {"slip_mm": float(amplitude[0]), "time_s": shape[0]}
+
+
+class EncoderBacklash(Scalar):
+    """The wheel has play: after a reversal the reading waits until the play is taken up."""
+
+    name = "encoder_backlash"
+    amplitudes = one(name, 0.3)
+    words = "The encoder has {backlash_mm:.2f} mm of play at a reversal."
+
+    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
+        """Return −(b/2) sgn v, coming over while the play is taken up."""
+        half = abs(float(amplitude[0])) / 2
+        lag = np.zeros(len(travel.distance_mm))
+        steps = np.diff(travel.distance_mm)
+        moving = steps[np.nonzero(steps)]
+        behind = -half * float(np.sign(moving[0])) if moving.size else 0.0
+        lag[:1] = behind
+        for k, step in enumerate(steps):
+            behind = min(max(behind - step, -half), half)
+            lag[k + 1] = behind
+        return np.asarray(np.sign(amplitude[0]) * lag)
+
+
+class TimeOffset(Scalar):
+    """The encoder tells where the probe was a little earlier."""
+
+    name = "time_offset"
+    amplitudes = one(name, 0.02)
+    words = "The encoder's clock is {delay_s:+.4f} s behind the camera's."
+
+    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
+        """Return s(t − τ) − s(t), so that visual − encoder = v τ; speed held beyond the ends."""
+        earlier = travel.time_s - amplitude[0]
+        held = np.clip(earlier, travel.time_s[0], travel.time_s[-1])
+        beyond = (earlier - held) * np.interp(held, travel.time_s, travel.speed_mm_s)
+        return np.asarray(np.interp(held, travel.time_s, travel.distance_mm) + beyond - travel.distance_mm)
+
+
+POSE_MODELS: tuple[EffectModel, ...] = (
+    PipeBend(),
+    Ovality(),
+    ProbeVibration(),
+    EncoderScale(),
+    EncoderSlip(),
+    EncoderBacklash(),
+    TimeOffset(),
+)
