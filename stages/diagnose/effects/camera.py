@@ -18,7 +18,9 @@ class PrincipalPoint(Directed):
 
     name = "principal_point"
     amplitudes = along_x_and_y(name, 0.5)
-    words = "The optical axis meets the image {shift_px:.3f} px off its stated place, toward {direction_deg:.1f}°."
+    words = (
+        "The optical axis meets the image {shift_px:.3f} px off the stated place, at {direction_deg:.1f}°."
+    )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the same shift everywhere."""
