@@ -1,0 +1,106 @@
+"""Effects of the pipe's shape, the probe's motion and the odometer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.artefacts import PipeAxis
+from pipeline.errors import InputError
+from pipeline.simulator.effects.parts import cartesian, require_odometer, with_odometer
+from pipeline.simulator.motion import Signal, Slip, Wave
+from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.wall.base import Wall
+
+# Sagitta by which the axis' polyline may cut its arc, mm.
+_SAGITTA_MM = 1e-4
+
+
+def pipe_bend(truth: SceneTruth, curvature_per_mm: float, direction_deg: float) -> SceneTruth:
+    """Bend the whole pipe to an arc that touches the z-axis of P at distance 0.
+
+    Raises
+    ------
+    InputError
+        When the scene's pipe is bent already.
+    """
+    wall = truth.wall
+    if not np.allclose(wall.axis.R_pa, np.eye(3), atol=1e-12):
+        raise InputError("scene", "pipe_bend bends a straight pipe, and this one is bent", place="pipe.bends")
+    if curvature_per_mm == 0:
+        return truth
+    return replace(truth, wall=replace(wall, axis=_arc(wall, curvature_per_mm, direction_deg)))
+
+
+def ovality(truth: SceneTruth, amplitude_mm: float, direction_deg: float) -> SceneTruth:
+    """Add a second harmonic to the pipe's radius, largest towards ``direction_deg`` in P."""
+    wall = truth.wall
+    wave = np.cos(2 * (wall.shape.azimuth_rad - math.radians(direction_deg)))
+    radius = (wall.radius_mm + amplitude_mm * wave[None, :]).astype(np.float32)
+    return replace(truth, wall=replace(wall, radius_mm=radius))
+
+
+def probe_vibration(
+    truth: SceneTruth, amplitude_mm: float, frequency_hz: float, direction_deg: float
+) -> SceneTruth:
+    """Shake the camera across the axis, along a direction of the pipe's section."""
+    start = float(truth.frames.time_s[0])
+    x, y = cartesian(amplitude_mm, direction_deg)
+    phase = -2 * math.pi * frequency_hz * start
+    motion = replace(
+        truth.motion,
+        x_mm=_with_wave(truth.motion.x_mm, Wave(x, frequency_hz, phase)),
+        y_mm=_with_wave(truth.motion.y_mm, Wave(y, frequency_hz, phase)),
+    )
+    return replace(truth, motion=motion)
+
+
+def encoder_scale(truth: SceneTruth, relative: float) -> SceneTruth:
+    """Let the encoder count too much by a share."""
+    scale = require_odometer(truth, "encoder_scale").scale
+    return with_odometer(truth, "encoder_scale", scale=(1 + scale) * (1 + relative) - 1)
+
+
+def encoder_slip(truth: SceneTruth, slip_mm: float, time_s: float) -> SceneTruth:
+    """Let the reading gain a distance at a moment after the first frame."""
+    odometer = require_odometer(truth, "encoder_slip")
+    slip = Slip(float(truth.frames.time_s[0]) + time_s, slip_mm)
+    return with_odometer(truth, "encoder_slip", slips=(*odometer.slips, slip))
+
+
+def encoder_backlash(truth: SceneTruth, backlash_mm: float) -> SceneTruth:
+    """Give the encoder play, which it runs through at a reversal."""
+    before = require_odometer(truth, "encoder_backlash").backlash_mm
+    return with_odometer(truth, "encoder_backlash", backlash_mm=before + backlash_mm)
+
+
+def time_offset(truth: SceneTruth, delay_s: float) -> SceneTruth:
+    """Let the encoder tell late."""
+    before = require_odometer(truth, "time_offset").delay_s
+    return with_odometer(truth, "time_offset", delay_s=before + delay_s)
+
+
+def _with_wave(signal: Signal, wave: Wave) -> Signal:
+    return replace(signal, waves=(*signal.waves, wave))
+
+
+def _arc(wall: Wall, curvature_per_mm: float, direction_deg: float) -> PipeAxis:
+    """Return the arc as an axis over all distances of the wall, its frames turned about its normal."""
+    grid = wall.shape.distance_mm
+    low, high = min(grid[0], wall.axis.distance_mm[0]), max(grid[-1], wall.axis.distance_mm[-1])
+    count = math.ceil((high - low) / math.sqrt(8 * _SAGITTA_MM / curvature_per_mm)) + 1
+    distance = np.linspace(low, high, max(count, 3))
+    turn = curvature_per_mm * distance
+    toward = np.array([*cartesian(1.0, direction_deg), 0.0])
+    forward = np.array([0.0, 0.0, 1.0])
+    origin = (np.sin(turn)[:, None] * forward + (1 - np.cos(turn))[:, None] * toward) / curvature_per_mm
+    tangent = np.cos(turn)[:, None] * forward + np.sin(turn)[:, None] * toward
+    inward = np.cos(turn)[:, None] * toward - np.sin(turn)[:, None] * forward
+    aside = np.array([-toward[1], toward[0], 0.0])
+    R_pa = np.empty((len(distance), 3, 3))
+    for column, axis in enumerate(np.eye(3)[:2]):
+        R_pa[:, :, column] = (axis @ toward) * inward + (axis @ aside) * aside
+    R_pa[:, :, 2] = tangent
+    return PipeAxis(distance, origin, R_pa)

@@ -1,0 +1,192 @@
+"""An effect switched on: its name and its quantities, as text, as YAML and as truth lists it.
+
+The text is ``NAME`` alone for the typical size, or ``NAME=VALUE`` followed by any of
+
+==========  ===========================================  ============================
+``@40``     a direction or azimuth, deg                  ``laser_tilt=0.6@40``
+``x3``      an order                                     ``sheet_waviness=0.3x3@30``
+``/40s``    any other quantity, told by its unit         ``baseline_drift=0.05/40s``
+==========  ===========================================  ============================
+
+in any order, as in ``laser_rocking=1@40/5.3Hz``. What is left out is the catalogue's typical size.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.errors import InputError
+from pipeline.physics.catalogue import EFFECTS, effect
+from pipeline.physics.effect import Effect, Quantity
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_SIZE = re.compile(rf"(?P<value>{_NUMBER})(?P<unit>[a-zA-Z]*?)(?=[@/]|x[-+.\d]|$)")
+_PART = re.compile(rf"(?P<mark>[@x/])(?P<value>{_NUMBER})(?P<unit>[a-zA-Z]*?)(?=[@/]|x[-+.\d]|$)")
+
+
+@dataclass(frozen=True)
+class Switch:
+    """An effect and how large it is.
+
+    Attributes
+    ----------
+    name : str
+        Of the catalogue.
+    values : tuple of float
+        The catalogue's quantities, in its order and units.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a wrong number of values, or a value out of the catalogue's range.
+    """
+
+    name: str
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        quantities = effect(self.name).quantities
+        if len(self.values) != len(quantities):
+            raise _refusal(self.name, self.name, f"{len(self.values)} values given for {len(quantities)}")
+        for quantity, value in zip(quantities, self.values, strict=True):
+            _require_range(self.name, quantity, value)
+
+    @property
+    def effect(self) -> Effect:
+        """Its entry in the catalogue."""
+        return EFFECTS[self.name]
+
+    @property
+    def quantities(self) -> dict[str, float]:
+        """Values by the name of their quantity."""
+        return {q.name: v for q, v in zip(self.effect.quantities, self.values, strict=True)}
+
+    @property
+    def text(self) -> str:
+        """The switch as `parse_switch` reads it."""
+        size, *others = zip(self.effect.quantities, self.values, strict=True)
+        return f"{self.name}={size[1]!r}" + "".join(_part_text(q, v) for q, v in others)
+
+    @property
+    def truth(self) -> list[object]:
+        """``[name, [values...]]``, as the truth of a recording lists it."""
+        return [self.name, list(self.values)]
+
+
+def typical_switch(name: str) -> Switch:
+    """Return an effect at its typical size."""
+    return Switch(name, tuple(q.typical for q in effect(name).quantities))
+
+
+def parse_switch(text: str) -> Switch:
+    """Return the switch that a text of ``--with`` describes.
+
+    Raises
+    ------
+    InputError
+        Naming the quantities that the effect takes, their units and ranges.
+    """
+    name, equals, sizes = text.partition("=")
+    quantities = effect(name).quantities
+    values = {q.name: q.typical for q in quantities}
+    if equals:
+        _read_sizes(name, text, sizes, values)
+    return Switch(name, tuple(values.values()))
+
+
+def parse_switches(texts: Sequence[str]) -> tuple[Switch, ...]:
+    """Return the switches of several texts; no effect may be given twice."""
+    switches = tuple(parse_switch(text) for text in texts)
+    names = [switch.name for switch in switches]
+    for name in names:
+        if names.count(name) > 1:
+            raise _refusal(name, name, "is given twice")
+    return switches
+
+
+def switches_from_mapping(effects: object, file: Path | str) -> tuple[Switch, ...]:
+    """Return the switches of a scene file's ``effects``: name to {quantity: value}, or to nothing.
+
+    Raises
+    ------
+    InputError
+        For anything else, naming ``file``.
+    """
+    if not isinstance(effects, Mapping):
+        raise InputError(file, "is no mapping", place="effects", expected="effect: {quantity: value}")
+    return tuple(_from_mapping(str(name), sizes, file) for name, sizes in effects.items())
+
+
+def _from_mapping(name: str, sizes: object, file: Path | str) -> Switch:
+    values = {q.name: q.typical for q in effect(name).quantities}
+    given = {} if sizes is None else sizes
+    if not isinstance(given, Mapping):
+        raise _refusal(name, f"effects.{name}", "is no mapping", file)
+    for key, value in given.items():
+        if key not in values:
+            raise _refusal(name, f"effects.{name}", f"has no quantity {key!r}", file)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise _refusal(name, f"effects.{name}.{key}", f"{value!r} is no number", file)
+        values[key] = float(value)
+    return Switch(name, tuple(values.values()))
+
+
+def _read_sizes(name: str, text: str, sizes: str, values: dict[str, float]) -> None:
+    """Put the sizes of a text into ``values``."""
+    quantities = effect(name).quantities
+    first = _SIZE.match(sizes)
+    if first is None or first["unit"] not in ("", quantities[0].unit):
+        raise _refusal(name, text, f"{sizes!r} does not begin with a size")
+    values[quantities[0].name] = float(first["value"])
+    position, seen = first.end(), {quantities[0].name}
+    while position < len(sizes):
+        part = _PART.match(sizes, position)
+        quantity = None if part is None else _meant(quantities[1:], part["mark"], part["unit"])
+        if part is None or quantity is None or quantity.name in seen:
+            raise _refusal(name, text, f"{sizes[position:]!r} is not understood")
+        values[quantity.name] = float(part["value"])
+        seen.add(quantity.name)
+        position = part.end()
+
+
+def _meant(quantities: Sequence[Quantity], mark: str, unit: str) -> Quantity | None:
+    for quantity in quantities:
+        wanted = {quantity.unit} if _mark(quantity) == "/" else {"", quantity.unit}
+        if _mark(quantity) == mark and unit in wanted:
+            return quantity
+    return None
+
+
+def _mark(quantity: Quantity) -> str:
+    return {"direction_deg": "@", "azimuth_deg": "@", "order": "x"}.get(quantity.name, "/")
+
+
+def _part_text(quantity: Quantity, value: float) -> str:
+    mark = _mark(quantity)
+    return f"{mark}{value!r}{quantity.unit if mark == '/' else ''}"
+
+
+def _require_range(name: str, quantity: Quantity, value: float) -> None:
+    whole = quantity.name != "order" or value == round(value)
+    if not (math.isfinite(value) and quantity.low <= value <= quantity.high and whole):
+        raise _refusal(name, quantity.name, f"{value:g} is out of range")
+
+
+def _refusal(name: str, place: str, problem: str, file: Path | str = "--with") -> InputError:
+    quantities = effect(name).quantities
+    form = name + "=" + "".join(_form(k, q) for k, q in enumerate(quantities))
+    sizes = "; ".join(
+        f"{q.name} {q.low:g} to {q.high:g} {q.unit}".rstrip() + f" ({q.meaning}; typical {q.typical:g})"
+        for q in quantities
+    )
+    return InputError(file, problem, place=place, expected=f"{form} with {sizes}")
+
+
+def _form(place: int, quantity: Quantity) -> str:
+    word = quantity.name.split("_")[0].upper()
+    mark = _mark(quantity) if place else ""
+    return f"{mark}{word}{quantity.unit if mark == '/' else ''}"
