@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
+from pipeline.recording.base import Marker
 from pipeline.simulator.wall.description import Fiducials, Pipe
 from pipeline.simulator.wall.grid import Grid, window
 from pipeline.simulator.wall.noise import Float32
@@ -17,15 +16,6 @@ from pipeline.simulator.wall.shape import bore_radius, step_distances
 Float = NDArray[np.float64]
 _BLACK, _WHITE = 0.055, 0.68
 _SAMPLES = 4
-
-
-@dataclass(frozen=True)
-class Marker:
-    """A fiducial: its number and the distance and azimuth of its centre."""
-
-    id: int
-    distance_mm: float
-    azimuth_deg: float
 
 
 def markers_of(fiducials: Fiducials) -> tuple[Marker, ...]:
