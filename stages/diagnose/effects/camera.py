@@ -163,9 +163,7 @@ class PixelLocking(Scalar):
 
     name = "pixel_locking"
     amplitudes = one(name, 0.02)
-    words = (
-        "The line is found off by {amplitude_px:+.3f} px × sin 2πρ, with the fraction of its image radius ρ."
-    )
+    words = "The line is found off by {amplitude_px:+.3f} px × sin 2πρ, with its image radius ρ in px."
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a sin 2πρ."""

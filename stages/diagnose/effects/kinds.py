@@ -47,7 +47,7 @@ class Drifting(Worded):
     static: EffectModel
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return time constants from a tenth of the recording, below which a step is left, to a straight line."""
+        """Return time constants from a step at the start to what is a straight line in this recording."""
         return tuple((duration_s * part,) for part in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4))
 
     def course(self, time_s: Float, shape: Shape) -> Float:
@@ -130,7 +130,7 @@ def along_x_and_y(name: str, plausible: float) -> tuple[Amplitude, Amplitude]:
 
 
 def sine_and_cosine(name: str, plausible: float) -> tuple[Amplitude, ...]:
-    """Return the amplitudes of a `Periodic` effect: the size along x and y of its sine, then of its cosine."""
+    """Return the amplitudes of a `Periodic` effect: size along x and y of its sine, then of its cosine."""
     size = effect(name).quantities[0]
     parts = [f"{wave} along {axis}" for wave in ("sine", "cosine") for axis in "xy"]
     return tuple(Amplitude(f"{size.name}, {part}", size.unit, plausible) for part in parts)

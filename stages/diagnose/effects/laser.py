@@ -69,8 +69,8 @@ class BeamDecentre(Directed):
     name = "beam_decentre"
     amplitudes = along_x_and_y(name, 0.05)
     words = (
-        "The laser's rays leave its axis {height_mm:.3f} mm higher toward azimuth {direction_deg:.1f}° and as much "
-        "lower on the other side: the beam is decentred on its cone."
+        "The laser's beam is decentred: its rays start {height_mm:.3f} mm farther forward toward azimuth "
+        "{direction_deg:.1f}° and as much back on the other side."
     )
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -116,8 +116,8 @@ class LaserRocking(Periodic):
     name = "laser_rocking"
     amplitudes = sine_and_cosine(name, 1.0)
     words = (
-        "The laser sheet rocks by ±{amplitude_mrad:.2f} mrad at {frequency_hz:.2f} Hz (or an alias of it) toward "
-        "azimuth {direction_deg:.1f}°."
+        "The laser sheet rocks by ±{amplitude_mrad:.2f} mrad at {frequency_hz:.2f} Hz (or an alias of it) "
+        "toward azimuth {direction_deg:.1f}°."
     )
 
     def moved_px(self, points: ImagePoints, size: Float) -> Float:

@@ -25,7 +25,10 @@ class PipeBend(Directed):
 
     name = "pipe_bend"
     amplitudes = along_x_and_y(name, 4e-4)
-    words = "The pipe bends with a curvature of {curvature_per_mm:.2e} per mm toward azimuth {direction_deg:.1f}° of P."
+    words = (
+        "The pipe bends with a curvature of {curvature_per_mm:.2e} per mm toward azimuth {direction_deg:.1f}° "
+        "of P."
+    )
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the sagitta L²/8ρ of a chord twice the way ahead, along the wall's normal."""
@@ -39,7 +42,10 @@ class Ovality(Directed):
     name = "ovality"
     order = 2
     amplitudes = along_x_and_y(name, 0.1)
-    words = "The pipe is oval: its radius varies by ±{amplitude_mm:.3f} mm, longest at azimuth {direction_deg:.1f}° of P."
+    words = (
+        "The pipe is oval: its radius varies by ±{amplitude_mm:.3f} mm, longest at azimuth "
+        "{direction_deg:.1f}° of P."
+    )
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a₂ cos 2(ψ − ψ₀)."""
@@ -52,8 +58,8 @@ class ProbeVibration(Periodic):
     name = "probe_vibration"
     amplitudes = sine_and_cosine(name, 0.2)
     words = (
-        "The probe vibrates across the pipe by ±{amplitude_mm:.3f} mm at {frequency_hz:.2f} Hz (or an alias of it) "
-        "toward azimuth {direction_deg:.1f}°."
+        "The probe vibrates across the pipe by ±{amplitude_mm:.3f} mm at {frequency_hz:.2f} Hz (or an alias "
+        "of it) toward azimuth {direction_deg:.1f}°."
     )
 
     def moved_px(self, points: ImagePoints, size: Float) -> Float:

@@ -15,8 +15,8 @@ _ROUNDS = 3
 def ring_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
     """Return (M,) by which the ring is found farther out along the image radius, at the same image azimuth.
 
-    The sheet's new line on the wall is followed in the half-plane of each point's azimuth; the image's shift is
-    taken there, and read along the radius with the ring's own inclination.
+    The sheet's new line on the wall is followed in the half-plane of each point's azimuth; the image's shift
+    is taken there, and read along the radius with the ring's own inclination.
     """
     ring = points.ring
     moved = points
@@ -60,7 +60,7 @@ def texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Fl
 
     def small(amplitude: Float) -> Float:
         wall = model.wall_shift_mm(points, shape, amplitude)
-        return model.image_shift_px(points, shape, amplitude) + wall[:, None] * per_wall
+        return np.asarray(model.image_shift_px(points, shape, amplitude) + wall[:, None] * per_wall)
 
     return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
 
