@@ -40,6 +40,7 @@ _ATTACHED = (
     _Attached("calibrate", "Find camera and laser sheet, with covariance, from a gauge run."),
     _Attached("calibrate-camera", "Calibrate a camera from pictures of boards."),
     _Attached("calibrate-laser", "Find the laser plane from pictures of a board with the line across it."),
+    _Attached("prove", "Conceal effects in recordings, diagnose them, open the truth, and score."),
     _Attached("verify", "Compare a run with a known bore, a reference model or truth: a certificate."),
 )
 
