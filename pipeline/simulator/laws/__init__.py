@@ -1,0 +1,1 @@
+"""The closed-form laws of the known effects, each held against the traced or rendered result."""
