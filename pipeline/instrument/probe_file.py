@@ -39,9 +39,13 @@ def read_probe(file: Path) -> Probe:
     InputError
         At the key that is missing, mistyped, not finite or out of range.
     """
-    document = read_yaml(file)
+    return probe_from(read_yaml(file))
+
+
+def probe_from(document: Section) -> Probe:
+    """Return the probe that a mapping with the keys of a probe file tells of; see `read_probe`."""
     document.refuse_unknown(_KEYS)
-    camera = camera_from_mapping(document.section("camera").values, file)
+    camera = camera_from_mapping(document.section("camera").values, document.file)
     laser = _laser(document.section("laser"))
     names = (*camera.parameter_names, *LaserSheet.PARAMETER_NAMES)
     stated = _optional(document, "standard_uncertainty")

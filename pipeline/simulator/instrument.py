@@ -149,7 +149,7 @@ class TrueSensor:
     veil_relative, veil_sigma_px : float
         Share of the light spread widely by glare, and 1 σ of that spread.
     vignetting : float
-        Exponent k of the fall-off cos^k(θ/2), natural and mechanical.
+        Exponent k of the fall-off cos^k θ; nothing is seen beyond 90° unless it is 0.
     ambient : float
         Stray light on the wall, full scales on white, where the laser is on.
     fixed_pattern : float

@@ -49,7 +49,7 @@ class SensorScene(Parameters):
     psf_sigma_px: float = Field(0.7, ge=0, le=10, description="1 σ of the lens' blur, px")
     veil: float = Field(0.0, ge=0, le=0.5, description="share of the light spread by glare")
     veil_sigma_px: float = Field(60.0, gt=1, le=1000, description="1 σ of that spread, px")
-    vignetting: float = Field(0.0, ge=0, le=10, description="exponent of the fall-off cos^k(θ/2)")
+    vignetting: float = Field(0.0, ge=0, le=10, description="exponent k of the fall-off cos^k θ")
     fixed_pattern: float = Field(0.0, ge=0, le=0.5, description="1 σ of the pixels' gain")
 
 

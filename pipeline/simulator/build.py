@@ -1,0 +1,136 @@
+"""Works a scene out: draws the true instrument, lays out the wall, sets the lights, switches effects on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import probe_from
+from pipeline.recording.base import FrameTable
+from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects.switch import switches_from_mapping
+from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueLaser, TrueSensor
+from pipeline.simulator.light import REFERENCE_MM
+from pipeline.simulator.motion import Odometer
+from pipeline.simulator.path import motion_of
+from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.scene import LightScene, Scene, SensorScene
+from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.wall.base import Wall
+from pipeline.simulator.wall.build import build_wall
+from pipeline.simulator.wall.facts import facts_of
+from pipeline.yaml_file import Section
+
+Float = NDArray[np.float64]
+_INSTRUMENT_STREAM = 1
+
+
+def build_truth(scene: Scene, file: Path) -> SceneTruth:
+    """Return the worked-out scene; ``file`` is where it was read from.
+
+    Raises
+    ------
+    InputError
+        When the probe or an effect is not well formed, or the wall cannot be laid out.
+    """
+    truth = plain_truth(scene, file)
+    return switch_on(truth, switches_from_mapping(scene.effects, file))
+
+
+def plain_truth(scene: Scene, file: Path) -> SceneTruth:
+    """Return the worked-out scene without its effects. See `build_truth`."""
+    stated = probe_from(Section(file, scene.probe, "probe"))
+    wall = build_wall(scene.pipe, scene.seed, file.parent)
+    time_s = np.arange(scene.frames) / scene.frame_rate
+    light = np.array([scene.pattern[k % len(scene.pattern)] for k in range(scene.frames)], np.str_)
+    return SceneTruth(
+        name=scene.name,
+        kind=scene.kind,
+        seed=scene.seed,
+        stated=stated,
+        instrument=true_instrument(scene, stated, wall),
+        wall=wall,
+        facts=facts_of(scene.pipe),
+        motion=motion_of(scene.motion, float(time_s[-1]) + 1.0),
+        odometer=_odometer(scene),
+        frames=FrameTable(np.arange(scene.frames), time_s, light),
+        frame_rate=scene.frame_rate,
+        rendering=scene.rendering,
+    )
+
+
+def true_instrument(scene: Scene, stated: Probe, wall: Wall) -> TrueInstrument:
+    """Return the true instrument: the stated one, or a draw from its stated uncertainty; lights set."""
+    probe = stated if scene.truth == "stated" else drawn(stated, scene.seed)
+    profile = LineProfile(stated.laser.line_sigma_mm, scene.laser.skewness)
+    laser = TrueLaser(
+        probe.laser,
+        profile=profile,
+        power_mm=_power(scene.laser.peak, profile, wall),
+        colour_bgr=scene.laser.colour_bgr,
+        ghost_relative=scene.laser.ghost,
+        speckle_contrast=scene.laser.speckle,
+        speckle_grain_mm=scene.laser.speckle_grain_mm,
+    )
+    light = _light(scene.light, stated, wall)
+    return TrueInstrument(TrueCamera(probe.camera), laser, light, _sensor(scene.sensor), stated.shutter)
+
+
+def drawn(stated: Probe, seed: int) -> Probe:
+    """Return a probe drawn from what is stated: normal, with the stated covariance."""
+    random = np.random.default_rng([seed, _INSTRUMENT_STREAM])
+    directions = stated.principal_uncertainties()
+    moved = directions @ random.standard_normal(directions.shape[1])
+    return stated.with_parameters(stated.parameters + moved, stated.covariance)
+
+
+def _power(peak: float, profile: LineProfile, wall: Wall) -> float:
+    """Return the power whose line peaks at ``peak`` on the mean wall at the mean radius."""
+    highest = float(profile.density(np.linspace(*profile.reach_mm(), 2001)).max())
+    return peak * _radius(wall) / (REFERENCE_MM * _albedo(wall) * highest)
+
+
+def _light(scene: LightScene, stated: Probe, wall: Wall) -> LedRing:
+    """Return LEDs under which the mean wall is ``level`` where it is brightest."""
+    lighting = stated.lighting
+    ring = LedRing(lighting.leds, lighting.radius_mm, lighting.z_mm, 1.0, scene.lobe, scene.colour_bgr)
+    ahead = np.linspace(1.0, 4.0 * _radius(wall), 400)
+    around = 2 * np.pi * (np.arange(ring.leds) + 0.5) / ring.leds
+    x = _radius(wall) - ring.radius_mm * np.cos(around)
+    y = ring.radius_mm * np.sin(around)
+    z = (ahead - ring.z_mm)[:, None]
+    d = np.sqrt(x**2 + y**2 + z**2)
+    lit = REFERENCE_MM**2 * np.mean((z / d) ** ring.lobe * np.clip(x, 0, None) / d**3, axis=1)
+    return replace(ring, level=scene.level / (_albedo(wall) * float(lit.max())))
+
+
+def _radius(wall: Wall) -> float:
+    return float(np.mean(wall.radius_mm))
+
+
+def _albedo(wall: Wall) -> float:
+    return float(np.mean(wall.albedo_bgr))
+
+
+def _sensor(scene: SensorScene) -> TrueSensor:
+    return TrueSensor(
+        full_well_e=scene.full_well_e,
+        read_noise_e=scene.read_noise_e,
+        black_level=scene.black_level,
+        gamma=scene.gamma,
+        psf_sigma_px=scene.psf_sigma_px,
+        veil_relative=scene.veil,
+        veil_sigma_px=scene.veil_sigma_px,
+        vignetting=scene.vignetting,
+        fixed_pattern=scene.fixed_pattern,
+    )
+
+
+def _odometer(scene: Scene) -> Odometer | None:
+    if scene.odometer is None:
+        return None
+    return Odometer(scene.odometer.rate_hz, scene.odometer.quantum_mm, scene.odometer.scale)

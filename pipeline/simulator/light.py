@@ -1,0 +1,195 @@
+"""Light that reaches each pixel: of the laser's line, and of the LEDs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from pipeline.simulator.rays import ray_at
+from pipeline.simulator.sheet import density_at, sheet_at
+from pipeline.simulator.surface import meet, normal_at, radius_at
+from pipeline.simulator.texture import albedo_at
+from pipeline.simulator.view import TILE_PX, to_pipe
+
+REFERENCE_MM = 50.0
+
+
+@njit(cache=True, nogil=True)
+def add_line(view, line, colour, gain, speckle, tiles, samples, v_from, v_to, image):  # type: ignore[no-untyped-def]
+    """Add a line's light to rows v_from … v_to of an image (H, W, 3), in the tiles that it may touch.
+
+    ``speckle`` is (contrast, grain in mm, seed).
+    """
+    work = np.empty(6), np.empty(6), np.empty(4), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
+    total, times = np.empty(3), view.pose.shape[1]
+    share = gain / (samples * samples * times)
+    for v in range(v_from, v_to):
+        for u in range(image.shape[1]):
+            if not tiles[v // TILE_PX, u // TILE_PX]:
+                continue
+            total[:] = 0.0
+            for n in range(samples * samples):
+                y = v + (n // samples + 0.5) / samples - 0.5
+                x = u + (n % samples + 0.5) / samples - 0.5
+                ray_at(view.rays, x, y, work[0])
+                for k in range(times):
+                    _line_light(view, line, speckle, v, k, samples, work, total)
+            for c in range(3):
+                image[v, u, c] += share * colour[c] * total[c]
+
+
+@njit(cache=True, nogil=True)
+def _line_light(view, line, speckle, row, k, samples, work, total):  # type: ignore[no-untyped-def]
+    c_ray, p_ray, hit, o, R, normal, albedo = work
+    if not (c_ray[5] > -0.5):
+        return
+    to_pipe(view, row, k, c_ray, p_ray)
+    if not meet(view.surface, p_ray, view.distance_mm, o, R, hit):
+        return
+    x, y, z = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4], c_ray[2] + hit[0] * c_ray[5]
+    q = np.sqrt(x * x + y * y)
+    moment = view.moment[min(row, view.moment.shape[0] - 1), k]
+    height, slope, weight = sheet_at(line.sheet, moment, np.arctan2(y, x))
+    steep = np.sqrt(1.0 + slope * slope)
+    density = density_at(line.profile, (z - height - q * slope) / steep)
+    if density <= 0.0:
+        return
+    normal_at(view.surface, hit, R, normal)
+    T = view.pose[min(row, view.pose.shape[0] - 1), k]
+    way = np.empty(3)
+    for a in range(3):
+        way[a] = (T[a, 0] * x / q + T[a, 1] * y / q + T[a, 2] * slope) / steep
+    square = -(normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2])
+    if square <= 0.0:
+        return
+    foot = hit[0] / (view.px_per_rad * samples)
+    albedo_at(view.texture, hit[1], hit[2], foot, albedo)
+    light = weight * density * square * REFERENCE_MM / q * _sheen(view.texture, normal, way, p_ray)
+    if speckle[0] > 0.0:
+        light *= _speckle(speckle, hit)
+    for c in range(3):
+        total[c] += light * albedo[c]
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _sheen(texture, normal, way, p_ray):  # type: ignore[no-untyped-def]
+    """Return what a partly glossy wall sends to the camera over what a dull one would (Blinn-Phong)."""
+    if texture.gloss <= 0.0:
+        return 1.0
+    a, b, c = -way[0] - p_ray[3], -way[1] - p_ray[4], -way[2] - p_ray[5]
+    size = np.sqrt(a * a + b * b + c * c) + 1e-12
+    cosine = max((a * normal[0] + b * normal[1] + c * normal[2]) / size, 0.0)
+    return 1.0 - texture.gloss + texture.gloss * (texture.lobe + 8.0) / 8.0 * cosine**texture.lobe
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _speckle(speckle, hit):  # type: ignore[no-untyped-def]
+    """Return the factor, mean 1, of the speckle cell that a hit lies in."""
+    contrast, grain, seed = speckle
+    i = np.uint64(np.int64(np.floor(hit[1] / grain)))
+    j = np.uint64(np.int64(np.floor(hit[2] * hit[3] / grain)))
+    h = hashed(i * np.uint64(0x9E3779B97F4A7C15) + j * np.uint64(0xC2B2AE3D27D4EB4F) + np.uint64(seed))
+    uniform = (np.float64(h >> np.uint64(11)) + 0.5) / 9007199254740992.0
+    return 1.0 - contrast - contrast * np.log(uniform)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def hashed(x):  # type: ignore[no-untyped-def]
+    """Return 64 well mixed bits of 64 bits (finaliser of splitmix64, Steele et al. 2014)."""
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+@njit(cache=True, nogil=True)
+def add_wall_light(view, leds, lobe, colour, level, ambient, samples, v_from, v_to, image):  # type: ignore[no-untyped-def]
+    """Add what LEDs at ``leds`` (L, 3) in C, and even stray light, make of the wall, to rows of an image."""
+    work = np.empty(6), np.empty(6), np.empty(4), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
+    total, times = np.empty(3), view.pose.shape[1]
+    share = 1.0 / (samples * samples * times)
+    for v in range(v_from, v_to):
+        for u in range(image.shape[1]):
+            total[:] = 0.0
+            for n in range(samples * samples):
+                y = v + (n // samples + 0.5) / samples - 0.5
+                x = u + (n % samples + 0.5) / samples - 0.5
+                ray_at(view.rays, x, y, work[0])
+                for k in range(times):
+                    _wall_light(view, leds, lobe, level, ambient, v, k, samples, work, total)
+            for c in range(3):
+                image[v, u, c] += share * colour[c] * total[c]
+
+
+@njit(cache=True, nogil=True)
+def _wall_light(view, leds, lobe, level, ambient, row, k, samples, work, total):  # type: ignore[no-untyped-def]
+    c_ray, p_ray, hit, o, R, normal, albedo = work
+    if not (c_ray[5] > -0.2):
+        return
+    to_pipe(view, row, k, c_ray, p_ray)
+    if not meet(view.surface, p_ray, view.distance_mm, o, R, hit):
+        return
+    normal_at(view.surface, hit, R, normal)
+    T = view.pose[min(row, view.pose.shape[0] - 1), k]
+    facing = -(p_ray[3] * normal[0] + p_ray[4] * normal[1] + p_ray[5] * normal[2])
+    if facing <= 0.0:
+        return
+    light = ambient
+    hidden = _may_hide(view.surface, hit, T, o, R)
+    way, at = np.empty(3), np.empty(3)
+    for n in range(leds.shape[0]):
+        d2 = 0.0
+        for a in range(3):
+            at[a] = T[a, 0] * leds[n, 0] + T[a, 1] * leds[n, 1] + T[a, 2] * leds[n, 2] + T[a, 3]
+            way[a] = p_ray[a] + hit[0] * p_ray[3 + a] - at[a]
+            d2 += way[a] * way[a]
+        d = np.sqrt(d2)
+        for a in range(3):
+            way[a] /= d
+        forward = T[0, 2] * way[0] + T[1, 2] * way[1] + T[2, 2] * way[2]
+        square = -(normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2])
+        if forward <= 0.0 or square <= 0.0:
+            continue
+        if hidden and _shaded(view.surface, hit, way, d, o, R):
+            continue
+        emitted = forward if lobe == 1.0 else forward**lobe
+        sheen = _sheen(view.texture, normal, way, p_ray)
+        light += level / leds.shape[0] * emitted * square * REFERENCE_MM**2 / d2 * sheen
+    albedo_at(view.texture, hit[1], hit[2], hit[0] / (view.px_per_rad * samples * max(facing, 0.05)), albedo)
+    for c in range(3):
+        total[c] += light * albedo[c]
+
+
+@njit(cache=True, nogil=True)
+def _may_hide(surface, hit, T, o, R):  # type: ignore[no-untyped-def]
+    """Tell whether the wall between a hit and the camera stands in far enough to hide the LEDs."""
+    along = R[0, 2] * (o[0] - T[0, 3]) + R[1, 2] * (o[1] - T[1, 3]) + R[2, 2] * (o[2] - T[2, 3])
+    if along <= 1.0:
+        return False
+    back = 0.5
+    while back < min(along, 64.0):
+        k = min(max(int(hit[1] - back - surface.from_mm), 0), surface.floor_mm.shape[0] - 1)
+        if surface.floor_mm[k] < hit[3] * (1.0 - back / along) + 11.0 * back / along:
+            return True
+        back *= 2.0
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _shaded(surface, hit, way, distance, o, R):  # type: ignore[no-untyped-def]
+    """Tell whether the wall stands between a hit and an LED; the section's frame is taken as straight."""
+    c, s = np.cos(hit[2]), np.sin(hit[2])
+    dx = -(R[0, 0] * way[0] + R[1, 0] * way[1] + R[2, 0] * way[2])
+    dy = -(R[0, 1] * way[0] + R[1, 1] * way[1] + R[2, 1] * way[2])
+    dz = -(R[0, 2] * way[0] + R[1, 2] * way[1] + R[2, 2] * way[2])
+    step = 0.3
+    back = step
+    while back < min(distance, 40.0):
+        x, y = hit[3] * c + back * dx, hit[3] * s + back * dy
+        rho = np.sqrt(x * x + y * y)
+        if rho < surface.least_mm:
+            return False
+        if radius_at(surface, hit[1] + back * dz, np.arctan2(y, x)) < rho - 0.01:
+            return True
+        step *= 1.25
+        back += step
+    return False

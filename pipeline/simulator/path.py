@@ -1,0 +1,52 @@
+"""The motion of a scene: legs of speed joined smoothly, and swaying."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.simulator.motion import Motion, Signal, Wave
+from pipeline.simulator.scene import MotionScene, SwayScene
+
+Float = NDArray[np.float64]
+_KNOTS_AN_EASING = 8
+_FINE = 16
+
+
+def motion_of(scene: MotionScene, until_s: float) -> Motion:
+    """Return the motion over 0 … ``until_s``; after the last leg the camera stands."""
+    return Motion(
+        distance_mm=_way(scene, until_s),
+        x_mm=_sway(scene.x_mm, until_s),
+        y_mm=_sway(scene.y_mm, until_s),
+        yaw_rad=_sway(scene.yaw_deg, until_s, math.radians(1)),
+        pitch_rad=_sway(scene.pitch_deg, until_s, math.radians(1)),
+        roll_rad=_sway(scene.roll_deg, until_s, math.radians(1)),
+    )
+
+
+def _way(scene: MotionScene, until_s: float) -> Signal:
+    """Return the distance: speeds averaged over the easing time, integrated twice exactly between fine steps."""
+    easing = scene.easing_s
+    fine = easing / (_KNOTS_AN_EASING * _FINE)
+    time = np.arange(-easing, until_s + easing + fine, fine)
+    ends = np.cumsum([leg.duration_s for leg in scene.legs])
+    speeds = np.array([leg.speed_mm_s for leg in scene.legs] + [0.0])
+    distance = np.concatenate([[0.0], np.cumsum(speeds[:-1] * np.diff(ends, prepend=0.0))])
+    sharp = np.interp(time, np.concatenate([[0.0], ends]), distance)
+    sharp = np.where(time < 0, speeds[0] * time, sharp)
+    window = np.hanning(2 * (_KNOTS_AN_EASING * _FINE // 2) + 3)
+    smooth = np.convolve(sharp, window / window.sum(), mode="same")
+    knots = (time >= -easing / 4) & (time <= until_s + easing / 4)
+    smooth = smooth - np.interp(0.0, time, smooth)
+    return Signal(time[knots][::_FINE], scene.start_mm + smooth[knots][::_FINE])
+
+
+def _sway(scene: SwayScene, until_s: float, unit: float = 1.0) -> Signal:
+    waves = tuple(
+        Wave(unit * w.amplitude, 1 / w.period_s, math.radians(w.phase_deg)) for w in scene.waves
+    )  # fmt: skip
+    ends = np.array([0.0, max(until_s, 1e-3)])
+    return Signal(ends, unit * (scene.mean + scene.trend_per_s * ends), waves)

@@ -1,0 +1,170 @@
+"""Renders frames of a worked-out scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.recording.base import Illumination
+from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueSensor
+from pipeline.simulator.light import add_line, add_wall_light
+from pipeline.simulator.rays import RayTable, ray_table
+from pipeline.simulator.sensor import exposed, shade_of, through_lens
+from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
+from pipeline.simulator.surface import Surface, surface_of
+from pipeline.simulator.texture import Texture, texture_of
+from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.view import Line, View, line_tiles
+from pipeline.simulator.workers import in_bands
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Image = NDArray[np.uint8]
+_SHEET_MOMENTS = 5
+_NEAR = 1e-4
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """Renders any frame of a scene, each on its own: the same scene and seed give the same bytes.
+
+    Attributes
+    ----------
+    truth : SceneTruth
+    surface, texture
+        Its wall as the kernels take it.
+    """
+
+    truth: SceneTruth
+    surface: Surface
+    texture: Texture
+
+    def frame(self, number: int) -> Image:
+        """Return frame ``number`` (H, W, 3), BGR."""
+        instrument = self.truth.instrument_at(self._time_s(number))
+        light = self.light(number)
+        shade = _shade(instrument.camera, instrument.sensor)
+        seen = through_lens(light, instrument.sensor, shade)
+        return exposed(seen, instrument.sensor, self.truth.seed, number)
+
+    def frames(self, numbers: Sequence[int]) -> Iterator[Image]:
+        """Yield several frames in order."""
+        return (self.frame(number) for number in numbers)
+
+    def light(self, number: int) -> Float32:
+        """Return the light (H, W, 3) that would reach each pixel through a perfect lens, in full scales."""
+        instrument = self.truth.instrument_at(self._time_s(number))
+        width, height = instrument.camera.model.image_size
+        light = np.zeros((height, width, 3), np.float32)
+        view = self.view(number, instrument)
+        kind = self.truth.frames.illumination[number]
+        if kind != Illumination.LED.value:
+            self._add_laser(number, view, instrument, light)
+        if kind != Illumination.LASER.value:
+            _add_leds(view, instrument.light, self.truth.rendering.wall_samples, light)
+        return light
+
+    def view(self, number: int, instrument: TrueInstrument) -> View:
+        """Return camera and wall at a frame."""
+        opened, span = self._opened(number, instrument)
+        axis = self.truth.wall.axis
+        pose = np.ascontiguousarray(self.truth.motion.pose(opened, axis)[..., :3, :])
+        moment = (opened - opened.min()) / max(span, 1e-9)
+        distance = float(self.truth.motion.distance_mm.at(np.array(self._time_s(number))))
+        table = _rays(instrument.camera)
+        return View(table, self.surface, self.texture, pose, moment, distance, _px_per_rad(table))
+
+    def _time_s(self, number: int) -> float:
+        return float(self.truth.frames.time_s[number])
+
+    def _opened(self, number: int, instrument: TrueInstrument) -> tuple[Float, float]:
+        """Return moments (rows or 1, T) within each row's exposure, and the span of them all, s."""
+        shutter, samples = instrument.shutter, self.truth.rendering.time_samples
+        within = ((np.arange(samples) + 0.5) / samples - 0.5) * shutter.exposure_s
+        height = instrument.camera.model.image_size[1]
+        late = np.zeros(1)
+        if shutter.kind == "rolling" and shutter.readout_s > 0:
+            late = ((np.arange(height) + 0.5) / height - 0.5) * shutter.readout_s
+        opened = self._time_s(number) + late[:, None] + within
+        return opened, float(np.ptp(opened))
+
+    def _add_laser(self, number: int, view: View, instrument: TrueInstrument, light: Float32) -> None:
+        laser, rendering = instrument.laser, self.truth.rendering
+        lines = self.lines(number, view, instrument)
+        speckle = (laser.speckle_contrast, laser.speckle_grain_mm, self.truth.seed)
+        tiles = line_tiles(view, lines, instrument.camera.model.image_size)
+        colour = np.array(laser.colour_bgr)
+        for line in lines:
+
+            def band(first: int, last: int, line: Line = line) -> None:
+                add_line(
+                    view, line, colour, 1.0, speckle, tiles, rendering.line_samples, first, last, light
+                )  # fmt: skip
+
+            in_bands(band, len(light))
+        if instrument.sensor.ambient > 0:
+            _add_wall(view, np.zeros((0, 3)), 1.0, np.ones(3), 0.0, instrument.sensor.ambient, 1, light)
+
+    def lines(self, number: int, view: View, instrument: TrueInstrument) -> tuple[Line, ...]:
+        """Return the laser's sheet and, where the wall mirrors, its bounce across the bore."""
+        opened, span = self._opened(number, instrument)
+        moments = np.linspace(opened.min(), opened.max(), _SHEET_MOMENTS if self.truth.changes else 1)
+        lasers = tuple(self.truth.instrument_at(float(t)).laser for t in moments)
+        profile = profile_table(instrument.laser.profile)
+        direct = Line(sheet_table(lasers), profile)
+        pose = np.vstack([view.pose[len(view.pose) // 2, 0], [0, 0, 0, 1]])
+        ghost = ghost_table(self.surface, instrument.laser, pose, view.distance_mm)
+        return (direct,) if ghost is None else (direct, Line(ghost, profile))
+
+
+def renderer_of(truth: SceneTruth) -> Renderer:
+    """Return the renderer of a scene."""
+    return Renderer(truth, surface_of(truth.wall), texture_of(truth.wall))
+
+
+@lru_cache(maxsize=4)
+def _rays(camera: TrueCamera) -> RayTable:
+    return ray_table(camera)
+
+
+@lru_cache(maxsize=2)
+def _shade(camera: TrueCamera, sensor: TrueSensor) -> Float32 | None:
+    """Return what vignetting and dust leave, from the table's rays scaled up."""
+    table = _rays(camera)
+    width, height = camera.model.image_size
+    u = ((np.arange(width) - table.first) / table.step).astype(np.float32)
+    v = ((np.arange(height) - table.first) / table.step).astype(np.float32)
+    cosine = cv2.remap(
+        table.node[..., 5].astype(np.float32), *map(np.ascontiguousarray, np.meshgrid(u, v)), cv2.INTER_LINEAR
+    )
+    return shade_of(sensor, np.asarray(np.nan_to_num(cosine, nan=-1.0), np.float32))
+
+
+def _px_per_rad(table: RayTable) -> float:
+    """Return pixels a radian near the centre."""
+    j = round((table.centre_u - table.first) / table.step)
+    i = round((table.centre_v - table.first) / table.step)
+    turn = np.arccos(np.clip(table.node[i, j, 3:] @ table.node[i, j + 1, 3:], -1, 1))
+    return float(table.step / max(turn, _NEAR))
+
+
+def _add_leds(view: View, light: LedRing, samples: int, image: Float32) -> None:
+    around = 2 * np.pi * (np.arange(light.leds) + 0.5) / light.leds
+    place = np.stack([light.radius_mm * np.cos(around), light.radius_mm * np.sin(around)], 1)
+    leds = np.concatenate([place, np.full((light.leds, 1), light.z_mm)], 1)
+    _add_wall(view, leds, light.lobe, np.array(light.colour_bgr), light.level, 0.0, samples, image)
+
+
+def _add_wall(
+    view: View, leds: Float, lobe: float, colour: Float, level: float, ambient: float, samples: int,
+    image: Float32,
+) -> None:  # fmt: skip
+    def band(first: int, last: int) -> None:
+        add_wall_light(view, leds, lobe, colour, level, ambient, samples, first, last, image)
+
+    in_bands(band, len(image))

@@ -1,0 +1,93 @@
+"""From the light at each pixel to grey levels: blur, glare, dust, noise, clipping, gamma, rounding."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from pipeline.simulator.instrument import TrueSensor
+from pipeline.simulator.light import hashed
+from pipeline.simulator.workers import in_bands
+
+Float32 = NDArray[np.float32]
+Image = NDArray[np.uint8]
+_VEIL_SHRINK = 8
+_QUANTILES = 1 << 16
+
+
+def through_lens(light: Float32, sensor: TrueSensor, shade: Float32 | None) -> Float32:
+    """Return light (H, W, 3) after vignetting and dust, glare and blur; ``shade`` (H, W) or None."""
+    seen = light if shade is None else light * shade[..., None]
+    if sensor.veil_relative > 0:
+        seen = (1 - sensor.veil_relative) * seen + sensor.veil_relative * _widely(seen, sensor.veil_sigma_px)
+    if sensor.psf_sigma_px > 0:
+        # at 6 σ the cut-off tail is below rounding
+        side = 2 * int(np.ceil(6 * sensor.psf_sigma_px)) + 1
+        seen = cv2.GaussianBlur(seen, (side, side), sensor.psf_sigma_px, borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(seen, np.float32)
+
+
+def shade_of(sensor: TrueSensor, cosine: Float32) -> Float32 | None:
+    """Return the share of light (H, W) that vignetting and dust leave, given cos θ; None where all."""
+    if sensor.vignetting == 0 and not sensor.dust:
+        return None
+    shade = np.clip(cosine, 0, 1) ** sensor.vignetting if sensor.vignetting else np.ones_like(cosine)
+    v, u = np.mgrid[: shade.shape[0], : shade.shape[1]].astype(np.float32)
+    for spot in sensor.dust:
+        (cu, cv), (su, sv) = spot.centre_px, spot.sigma_px
+        shade = shade * (1 - spot.attenuation * np.exp(-0.5 * (((u - cu) / su) ** 2 + ((v - cv) / sv) ** 2)))
+    return np.asarray(shade, np.float32)
+
+
+def exposed(light: Float32, sensor: TrueSensor, seed: int, frame: int) -> Image:
+    """Return grey levels (H, W, 3) of light in full scales; noise depends on seed, frame and pixel alone."""
+    out = np.empty(light.shape, np.uint8)
+    well, read, black = sensor.full_well_e, sensor.read_noise_e, sensor.black_level
+    draw = np.uint64(seed * 1_000_003 + frame + 1)
+    numbers = (well, read, black, sensor.gamma, sensor.fixed_pattern)
+
+    def band(first: int, last: int) -> None:
+        _expose(light, numbers, draw, np.uint64(seed), _normal_quantiles(), first, last, out)
+
+    in_bands(band, len(light))
+    return out
+
+
+def _widely(light: Float32, sigma_px: float) -> Float32:
+    """Return light blurred widely, by way of a smaller picture."""
+    size = light.shape[1] // _VEIL_SHRINK, light.shape[0] // _VEIL_SHRINK
+    small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+    small = cv2.GaussianBlur(small, (0, 0), sigma_px / _VEIL_SHRINK)
+    return np.asarray(cv2.resize(small, light.shape[1::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+@cache
+def _normal_quantiles() -> Float32:
+    return np.asarray(ndtri((np.arange(_QUANTILES) + 0.5) / _QUANTILES), np.float32)
+
+
+@njit(cache=True, nogil=True)
+def _expose(light, numbers, draw, seed, quantile, v_from, v_to, out):  # type: ignore[no-untyped-def]
+    well, read, black, gamma, pattern = numbers
+    columns, mask = light.shape[1], np.uint64(0xFFFF)
+    for v in range(v_from, v_to):
+        for u in range(columns):
+            pixel = np.uint64(v * columns + u + 1)
+            bits = hashed(draw * np.uint64(0x9E3779B97F4A7C15) + pixel * np.uint64(0xD1B54A32D192ED03))
+            gain = 1.0
+            if pattern > 0.0:
+                fixed = hashed(seed + pixel * np.uint64(0xA24BAED4963EE407))
+                gain += pattern * quantile[fixed & mask]
+            for c in range(3):
+                mean = light[v, u, c] * gain * well
+                drawn = quantile[(bits >> np.uint64(16 * c)) & mask]
+                electrons = mean + np.sqrt(max(mean, 0.0) + read * read) * drawn
+                share = min(max(electrons / well, 0.0), 1.0)
+                if gamma != 1.0:
+                    share = share**gamma
+                out[v, u, c] = np.uint8(black + (255.0 - black) * share + 0.5)

@@ -1,0 +1,174 @@
+"""Where the laser's light goes: its sheet as a table over azimuth, outside all windows, and its bounce."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipeline.simulator.instrument import TrueLaser
+from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.surface import Surface, meet, normal_at
+from pipeline.simulator.window import through
+
+Float = NDArray[np.float64]
+_NODES = 1440
+_PROFILE_NODES = 4001
+
+
+class SheetTable(NamedTuple):
+    """A surface of light z = height(ψ) + q · slope(ψ) in C, with its brightness, at (T, N) nodes.
+
+    Attributes
+    ----------
+    height, slope, weight : (T, N)
+        At T moments of an exposure and N azimuths −π + k 2π/N.
+    """
+
+    height: Float
+    slope: Float
+    weight: Float
+
+
+class ProfileTable(NamedTuple):
+    """Density of light, 1/mm, over heights from ``low`` in steps of ``step``."""
+
+    density: Float
+    low: float
+    step: float
+
+
+def profile_table(profile: LineProfile) -> ProfileTable:
+    """Return the profile tabled finely enough for linear interpolation."""
+    low, high = profile.reach_mm()
+    height = np.linspace(low, high, _PROFILE_NODES)
+    return ProfileTable(profile.density(height), low, float(height[1] - height[0]))
+
+
+def sheet_rays(laser: TrueLaser, azimuth_rad: Float) -> tuple[Float, Float]:
+    """Return origins and unit directions (N, 3) in C of the sheet's rays, outside all windows."""
+    slope = laser.sheet.slope(azimuth_rad)
+    for wave in laser.waves:
+        slope = slope + wave.cos_rad * np.cos(wave.order * azimuth_rad)
+        slope = slope + wave.sin_rad * np.sin(wave.order * azimuth_rad)
+    ray = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad), slope], -1)
+    origin = np.zeros_like(ray)
+    origin[..., 2] = laser.sheet.height(azimuth_rad)
+    return through(laser.windows, origin, ray / np.linalg.norm(ray, axis=-1, keepdims=True))
+
+
+def sheet_table(lasers: tuple[TrueLaser, ...]) -> SheetTable:
+    """Return the sheet at several moments."""
+    azimuth = -np.pi + 2 * np.pi * np.arange(_NODES) / _NODES
+    tables = [_tabled(*sheet_rays(laser, azimuth), _weight(laser, azimuth), azimuth) for laser in lasers]
+    return SheetTable(*(np.stack(part) for part in zip(*tables, strict=True)))
+
+
+def ghost_table(surface: Surface, laser: TrueLaser, T_pc: Float, distance_mm: float) -> SheetTable | None:
+    """Return the light that the wall mirrors across the bore, as the camera at ``T_pc`` (4, 4) meets it.
+
+    Each ray of the sheet is mirrored where it meets the wall; its way from there is the ghost's. Its weight
+    is the line's, by the share mirrored and by how rays crowd in azimuth. None where nothing is mirrored.
+    """
+    if laser.ghost_relative <= 0:
+        return None
+    azimuth = -np.pi + 2 * np.pi * np.arange(_NODES) / _NODES
+    origin, ray = sheet_rays(laser, azimuth)
+    R, t = T_pc[:3, :3], T_pc[:3, 3]
+    hits = _mirrored(surface, np.concatenate([origin @ R.T + t, ray @ R.T], 1), distance_mm)
+    second, onward = (hits[:, 3:6] - t) @ R, (hits[:, 6:9]) @ R
+    final = np.unwrap(np.arctan2(second[:, 1], second[:, 0]))
+    crowding = np.clip(np.abs(2 * np.pi / _NODES / np.gradient(final)), 0.0, 4.0)
+    weight = laser.ghost_relative * _weight(laser, azimuth) * crowding
+    along, across = onward[:, 2], np.hypot(onward[:, 0], onward[:, 1])
+    q = np.hypot(second[:, 0], second[:, 1])
+    slope = along / np.maximum(across, 1e-6)
+    return _resampled(final, second[:, 2] - q * slope, slope, weight, azimuth)
+
+
+def _weight(laser: TrueLaser, azimuth: Float) -> Float:
+    cos, sin = laser.brightness
+    return np.asarray(laser.power_mm * (1 + cos * np.cos(azimuth) + sin * np.sin(azimuth)))
+
+
+def _tabled(origin: Float, ray: Float, weight: Float, azimuth: Float) -> tuple[Float, Float, Float]:
+    """Return height, slope and weight over azimuth of rays that leave the axis nearly radially."""
+    across = np.hypot(ray[:, 0], ray[:, 1])
+    slope = ray[:, 2] / across
+    height = origin[:, 2] - slope * np.hypot(origin[:, 0], origin[:, 1])
+    final = np.arctan2(ray[:, 1], ray[:, 0])
+    turned = azimuth + np.angle(np.exp(1j * (final - azimuth)))
+    parts = (np.interp(azimuth, turned, part, period=2 * np.pi) for part in (height, slope, weight))
+    height, slope, weight = parts
+    return height, slope, weight
+
+
+def _resampled(final: Float, height: Float, slope: Float, weight: Float, azimuth: Float) -> SheetTable:
+    known = np.isfinite(final) & np.isfinite(height)
+    if not known.any():
+        return SheetTable(*(np.zeros((1, _NODES)) for _ in range(3)))
+    parts = [
+        np.interp(azimuth, final[known], part[known], period=2 * np.pi)[None]
+        for part in (height, slope, weight)
+    ]
+    return SheetTable(*parts)
+
+
+@njit(cache=True, nogil=True)
+def _mirrored(surface, rays, s):  # type: ignore[no-untyped-def]
+    """Return first hit, second hit and direction between them (N, 9) of rays (N, 6) mirrored at the wall."""
+    out = np.full((rays.shape[0], 9), np.nan)
+    o, R, hit, normal, ray = np.empty(3), np.empty((3, 3)), np.empty(4), np.empty(3), np.empty(6)
+    for n in range(rays.shape[0]):
+        ray[:] = rays[n]
+        if not np.isfinite(ray.sum()) or not meet(surface, ray, s, o, R, hit):
+            continue
+        normal_at(surface, hit, R, normal)
+        sink = 2.0 * (ray[3] * normal[0] + ray[4] * normal[1] + ray[5] * normal[2])
+        for k in range(3):
+            out[n, k] = ray[k] + hit[0] * ray[3 + k]
+            ray[3 + k] -= sink * normal[k]
+            ray[k] = out[n, k] + 0.02 * normal[k]
+        if not meet(surface, ray, hit[1], o, R, hit):
+            continue
+        for k in range(3):
+            out[n, 3 + k] = ray[k] + hit[0] * ray[3 + k]
+            out[n, 6 + k] = ray[3 + k]
+    return out
+
+
+@njit(cache=True, nogil=True, inline="always")
+def sheet_at(table, moment, azimuth):  # type: ignore[no-untyped-def]
+    """Return height, slope and weight at a moment (0 to 1 of the table's span) and an azimuth."""
+    times, nodes = table.height.shape
+    x = (azimuth + np.pi) * nodes / (2.0 * np.pi)
+    j = int(x)
+    wx = x - j
+    j0, j1 = j % nodes, (j + 1) % nodes
+    y = moment * (times - 1)
+    i0 = min(int(y), times - 1)
+    i1 = min(i0 + 1, times - 1)
+    wy = y - i0
+    height = _mix(table.height, i0, i1, j0, j1, wx, wy)
+    slope = _mix(table.slope, i0, i1, j0, j1, wx, wy)
+    return height, slope, _mix(table.weight, i0, i1, j0, j1, wx, wy)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _mix(values, i0, i1, j0, j1, wx, wy):  # type: ignore[no-untyped-def]
+    upper = (1.0 - wx) * values[i0, j0] + wx * values[i0, j1]
+    if wy == 0.0:
+        return upper
+    return (1.0 - wy) * upper + wy * ((1.0 - wx) * values[i1, j0] + wx * values[i1, j1])
+
+
+@njit(cache=True, nogil=True, inline="always")
+def density_at(table, height):  # type: ignore[no-untyped-def]
+    """Return the density of light at a height above the sheet; 0 outside the table."""
+    x = (height - table.low) / table.step
+    if not (x >= 0.0 and x < table.density.shape[0] - 1):
+        return 0.0
+    j = int(x)
+    return (1.0 - (x - j)) * table.density[j] + (x - j) * table.density[j + 1]

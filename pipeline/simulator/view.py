@@ -1,0 +1,107 @@
+"""What a frame's kernels need: rays, poses within the exposure, wall, light; and which tiles hold the line."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from pipeline.simulator.rays import RayTable, ray_at
+from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
+from pipeline.simulator.surface import Surface, meet
+from pipeline.simulator.texture import Texture
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+TILE_PX = 8
+
+
+class View(NamedTuple):
+    """Camera and wall at one frame.
+
+    Attributes
+    ----------
+    rays : RayTable
+    surface : Surface
+    texture : Texture
+    pose : (rows or 1, T, 3, 4)
+        ``T_pc`` at T moments within each row's exposure; one row of poses where all rows see the same.
+    moment : (rows or 1, T)
+        When that is, 0 to 1 of the frame's span from the first row's opening to the last row's closing.
+    distance_mm : float
+        Of the camera, to start the search for hits.
+    px_per_rad : float
+        Near the axis, for the footprint of a pixel on the wall.
+    """
+
+    rays: RayTable
+    surface: Surface
+    texture: Texture
+    pose: Float
+    moment: Float
+    distance_mm: float
+    px_per_rad: float
+
+
+class Line(NamedTuple):
+    """A sheet of light and the profile across it."""
+
+    sheet: SheetTable
+    profile: ProfileTable
+
+
+def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Mask:
+    """Return which tiles (rows, columns) of the picture a line may touch."""
+    rows, columns = -(-size[1] // TILE_PX), -(-size[0] // TILE_PX)
+    touched = np.zeros((rows, columns), bool)
+    for line in lines:
+        low = line.profile.low
+        high = low + line.profile.step * (len(line.profile.density) - 1)
+        for k in range(view.pose.shape[1]):
+            height = _heights(view, line.sheet, k, rows + 1, columns + 1)
+            touched |= _crossed(height, low, high)
+    return np.asarray(binary_dilation(touched, np.ones((3, 3), bool)))
+
+
+def _crossed(height: Float, low: float, high: float) -> Mask:
+    """Return the tiles between whose corners the height above the sheet comes into the profile's reach."""
+    corner = np.stack([height[:-1, :-1], height[:-1, 1:], height[1:, :-1], height[1:, 1:]])
+    finite = np.isfinite(corner)
+    least = np.where(finite, corner, np.inf).min(0)
+    most = np.where(finite, corner, -np.inf).max(0)
+    room = np.clip(0.75 * np.where(finite.any(0), most - least, 0.0), 0.0, None)
+    return np.asarray(finite.any(0) & (least - room < high) & (most + room > low))
+
+
+@njit(cache=True, nogil=True)
+def _heights(view, sheet, k, rows, columns):  # type: ignore[no-untyped-def]
+    """Return the wall's height above the sheet (rows, columns) at the tiles' corners; NaN without a wall."""
+    out = np.full((rows, columns), np.nan)
+    c_ray, p_ray, hit = np.empty(6), np.empty(6), np.empty(4)
+    o, R = np.empty(3), np.empty((3, 3))
+    for i in range(rows):
+        for j in range(columns):
+            ray_at(view.rays, j * TILE_PX - 0.5, i * TILE_PX - 0.5, c_ray)
+            # light goes a little backward at most: rays far behind cannot see the line
+            if not (c_ray[5] > -0.5):
+                continue
+            to_pipe(view, i * TILE_PX, k, c_ray, p_ray)
+            if not meet(view.surface, p_ray, view.distance_mm, o, R, hit):
+                continue
+            x, y = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4]
+            z = c_ray[2] + hit[0] * c_ray[5]
+            height, slope, _ = sheet_at(sheet, 0.5, np.arctan2(y, x))
+            out[i, j] = z - height - np.sqrt(x * x + y * y) * slope
+    return out
+
+
+@njit(cache=True, nogil=True)
+def to_pipe(view, row, k, c_ray, p_ray):  # type: ignore[no-untyped-def]
+    """Write a ray of C, seen in a row at moment k of its exposure, in P."""
+    T = view.pose[min(row, view.pose.shape[0] - 1), k]
+    for a in range(3):
+        p_ray[a] = T[a, 0] * c_ray[0] + T[a, 1] * c_ray[1] + T[a, 2] * c_ray[2] + T[a, 3]
+        p_ray[3 + a] = T[a, 0] * c_ray[3] + T[a, 1] * c_ray[4] + T[a, 2] * c_ray[5]
