@@ -9,11 +9,25 @@ from pipeline.physics.catalogue import effect
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.camera import CAMERA_MODELS
 from stages.diagnose.effects.laser import LASER_MODELS
+from stages.diagnose.effects.photometric import PHOTOMETRIC_MODELS
 from stages.diagnose.effects.pose import POSE_MODELS
+from stages.diagnose.effects.window import WINDOW_MODELS
 
-LIBRARY: Mapping[str, EffectModel] = MappingProxyType(
-    {model.name: model for model in (*LASER_MODELS, *CAMERA_MODELS, *POSE_MODELS)}
-)
+_MODELS = (*LASER_MODELS, *CAMERA_MODELS, *WINDOW_MODELS, *POSE_MODELS, *PHOTOMETRIC_MODELS)
+LIBRARY: Mapping[str, EffectModel] = MappingProxyType({model.name: model for model in _MODELS})
+
+# Effects of the catalogue that move no position in a way that can be told beforehand, and why.
+NOT_PREDICTED: Mapping[str, str] = MappingProxyType({
+    "slope_bias": "needs the wall's slope and gloss at every point: told by the profile's skewness and glints",
+    "ghost_ring": "a second peak, which a profile shows; the pull on the line's centre depends on the estimator",
+    "tube_ghost": "a second peak, which a profile shows; the pull on the line's centre depends on the estimator",
+    "speckle": "random: it is the noise floor",
+    "saturation": "shifts only a skewed profile, by its skewness: told by the flat top of the profile",
+    "gamma": "shifts only a skewed profile, by its skewness: told by the width of the profile",
+    "ambient_light": "needs the stray light's slope at every point: told by the profile's floor",
+    "fixed_pattern": "random from pixel to pixel: told by stacking residuals in the sensor's frame",
+    "dust": "takes light away from a stretch of the ring: told by the line's brightness",
+})  # fmt: skip
 
 
 def without(names: Collection[str]) -> Mapping[str, EffectModel]:

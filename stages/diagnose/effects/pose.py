@@ -26,8 +26,8 @@ class PipeBend(Directed):
     name = "pipe_bend"
     amplitudes = along_x_and_y(name, 4e-4)
     words = (
-        "The pipe bends with a curvature of {curvature_per_mm:.2e} per mm toward azimuth {direction_deg:.1f}° "
-        "of P."
+        "The pipe bends with a curvature of {curvature_per_mm:.2e} per mm toward azimuth "
+        "{direction_deg:.1f}° of P."
     )
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
