@@ -32,10 +32,8 @@ def alike(first: str, second: str) -> bool:
 
 
 def record_next(names: Sequence[str]) -> str:
-    """Return a sentence on what to record so that these effects can be told apart, or the one be confirmed."""
-    wanted: dict[str, None] = {}
-    for name in names:
-        wanted.update(dict.fromkeys(_recordings(effect(name).told_apart_by)))
+    """Return a sentence on what to record so that these effects can be told apart, or one confirmed."""
+    wanted = _without_repeats([part for name in names for part in _recordings(effect(name).told_apart_by)])
     if not wanted:
         return ""
     purpose = f"confirm {_words(names)}" if len(names) == 1 else f"tell {_words(names)} apart"
@@ -45,6 +43,11 @@ def record_next(names: Sequence[str]) -> str:
 def _recordings(told_apart_by: str) -> list[str]:
     parts = re.split(r"[,;]\s*(?![^()]*\))", told_apart_by)
     return [part.removeprefix("or ").strip() for part in parts if part.strip()]
+
+
+def _without_repeats(parts: Sequence[str]) -> list[str]:
+    """Return each part once, and none that another says at more length."""
+    return [p for p in dict.fromkeys(parts) if not any(other.startswith(f"{p} ") for other in parts)]
 
 
 def _words(names: Sequence[str]) -> str:

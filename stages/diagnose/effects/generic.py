@@ -27,7 +27,7 @@ class Moves(StrEnum):
 
 @dataclass(frozen=True)
 class GenericTerm(Nameless):
-    """One harmonic with one power of the radius (line) or of the angle θ (image); the shape is that of t / 10 s."""
+    """One harmonic with one power of the radius (line) or of θ (image); the shape is the power of time."""
 
     name: str
     moves: Moves
@@ -67,7 +67,7 @@ class GenericTerm(Nameless):
 
 
 def smooth_columns(points: ImagePoints) -> Float:
-    """Return (M, 72) columns of the generic line terms, constant and linear in time, for points on the line."""
+    """Return (M, 72) columns of the generic line terms, constant and linear in time, for line points."""
     terms = [term for term in GENERIC if term.moves is Moves.LINE]
     return np.concatenate([columns(t, points, s) for t in terms for s in t.shapes(0.0, 0.0)], axis=-1)
 

@@ -18,9 +18,9 @@ LIBRARY: Mapping[str, EffectModel] = MappingProxyType({model.name: model for mod
 
 # Effects of the catalogue that move no position in a way that can be told beforehand, and why.
 NOT_PREDICTED: Mapping[str, str] = MappingProxyType({
-    "slope_bias": "needs the wall's slope and gloss at every point: told by the profile's skewness and glints",
-    "ghost_ring": "a second peak, which a profile shows; the pull on the line's centre depends on the estimator",
-    "tube_ghost": "a second peak, which a profile shows; the pull on the line's centre depends on the estimator",
+    "slope_bias": "needs the wall's slope and gloss everywhere: told by the profile's skewness and glints",
+    "ghost_ring": "a second peak, which a profile shows; its pull on the line depends on the estimator",
+    "tube_ghost": "a second peak, which a profile shows; its pull on the line depends on the estimator",
     "speckle": "random: it is the noise floor",
     "saturation": "shifts only a skewed profile, by its skewness: told by the flat top of the profile",
     "gamma": "shifts only a skewed profile, by its skewness: told by the width of the profile",

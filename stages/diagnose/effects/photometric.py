@@ -14,8 +14,8 @@ class AlbedoBias(Worded):
     name = "albedo_bias"
     amplitudes = (Amplitude("line_sigma_mm squared", "mm²", 0.05),)
     words = (
-        "The line, {line_sigma_mm:.3f} mm wide (1 σ) on the wall, is drawn toward brighter wall by σ² times the "
-        "slope of the albedo's logarithm."
+        "The line, {line_sigma_mm:.3f} mm wide (1 σ) on the wall, is drawn toward brighter wall by σ² times "
+        "the slope of the albedo's logarithm."
     )
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:

@@ -1,7 +1,7 @@
 """Effects of windows and media between the probe and the wall.
 
-Rays are followed in the half-plane of their azimuth: a coaxial tube is met at the angle i from its normal, with
-tan i = z/q for a straight ray, and every layer of thickness b and relative index n lets the ray climb by
+Rays are followed in the half-plane of their azimuth: a coaxial tube is met at the angle i from its normal,
+with tan i = z/q for a straight ray, and every layer of thickness b and relative index n lets the ray climb by
 b tan i′, sin i′ = sin i / n, instead of b tan i.
 """
 
@@ -37,7 +37,9 @@ class TubeWedge(Directed):
 
     name = "tube_wedge"
     amplitudes = along_x_and_y(name, 0.1)
-    words = "The glass tube is {wedge_mm:.3f} mm thicker toward azimuth {direction_deg:.1f}° and thinner opposite."
+    words = (
+        "The glass tube is {wedge_mm:.3f} mm thicker toward azimuth {direction_deg:.1f}°, thinner opposite."
+    )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through glass of thickness δt cos(ψ − ψ₀), less that without."""
@@ -93,7 +95,9 @@ class DomeLateral(Directed):
 
     name = "dome_lateral"
     amplitudes = along_x_and_y(name, 0.2)
-    words = "The glass dome's centre is {offset_mm:.3f} mm off the optical axis toward azimuth {direction_deg:.1f}°."
+    words = (
+        "The glass dome's centre is {offset_mm:.3f} mm beside the axis, toward azimuth {direction_deg:.1f}°."
+    )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the dome whose centre is beside the axis, less that without."""
