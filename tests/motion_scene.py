@@ -12,7 +12,7 @@ from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, t
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from stages.motion.adjustment import MATCH_BIASES, Measurements
+from stages.motion.equations import MATCH_BIASES, Measurements
 from stages.motion.state import GLOBALS, EncoderReadings, State, straight_start
 from stages.motion.terms import RingBins
 from stages.motion.tracking import Tracks

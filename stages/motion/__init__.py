@@ -14,10 +14,11 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from pipeline.stage import Context, Stage
-from stages.motion.adjustment import MATCH_BIASES, Estimate, Measurements, adjust, third_difference_sigma
+from stages.motion.adjustment import adjust, third_difference_sigma
 from stages.motion.encoder import contradicted, encoder_at_frames
+from stages.motion.equations import MATCH_BIASES, Measurements
 from stages.motion.events import find_events
-from stages.motion.output import in_pipe_frame
+from stages.motion.output import Estimate, in_pipe_frame
 from stages.motion.parameters import MotionParameters
 from stages.motion.prediction import Predictor
 from stages.motion.sections import at_all_frames, ring_bins, ring_centres
@@ -31,6 +32,7 @@ Float = NDArray[np.float64]
 _LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
 _MARGIN_MM = 20.0
 _LARGEST_CHANGE = 0.1
+_ROUGHLY, _CLOSELY = 1e-2, 1e-5
 _BLUE, _RED = 0, 2
 _YELLOW_NM = 575.0
 
@@ -71,7 +73,7 @@ def estimate_motion(
     T_pc = predictor.between(tracks.frames, tracks.T_pc, len(recording.frames.frame))
     start = _first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
     estimate = _adjusted(start, measured, parameters)
-    _require_convergence(estimate, radius_mm)
+    _require_convergence(estimate, radius_mm, context)
     trajectory = in_pipe_frame(estimate, recording.frames, measured)
     events = find_events(recording.frames, trajectory, tracks, estimate.state.slip, encoder is not None)
     _report(context, estimate, tracks, trajectory)
@@ -157,9 +159,10 @@ def _adjusted(start: State, measured: Measurements, parameters: MotionParameters
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
-            free = adjust(start, measured, parameters)
+            free = adjust(start, measured, parameters, _ROUGHLY)
             sigma = third_difference_sigma(free.state, measured.tracks.frames)
-            return adjust(free.state, replace(measured, smooth_sigma=sigma), parameters)
+            smooth = adjust(free.state, replace(measured, smooth_sigma=sigma), parameters, _CLOSELY)
+            return Estimate(smooth, smooth.equations.factor())
     except np.linalg.LinAlgError as error:
         raise UnusableError(
             "motion",
@@ -168,8 +171,11 @@ def _adjusted(start: State, measured: Measurements, parameters: MotionParameters
         ) from error
 
 
-def _require_convergence(estimate: Estimate, radius_mm: float) -> None:
-    """Refuse an estimate that ran away from the pipe that the rings show."""
+def _require_convergence(estimate: Estimate, radius_mm: float, context: Context) -> None:
+    """Refuse an estimate that ran away from the pipe that the rings show; say if it could still gain."""
+    context.report("steps of the joint adjustment", estimate.adjusted.trials, "")
+    if not estimate.adjusted.settled:
+        context.logger.warning("the joint adjustment has not settled after all its steps")
     found = float(estimate.state.globals[0])
     if not abs(found - radius_mm) < _LARGEST_CHANGE * radius_mm:
         raise UnusableError(
@@ -184,7 +190,7 @@ def _report(context: Context, estimate: Estimate, tracks: Tracks, trajectory: Tr
     context.report("landmarks", len(tracks.xyz), "")
     context.report("texture observations", len(tracks.uv), "")
     context.report("lit frames without enough texture", int(tracks.lost[1:].sum()), "frames")
-    context.report("median reprojection error", estimate.reprojection_px, "px")
+    context.report("median reprojection error", estimate.adjusted.equations.reprojection_px, "px")
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
     context.report("distance travelled", float(np.ptp(trajectory.T_pc[:, 2, 3])), "mm")

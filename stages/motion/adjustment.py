@@ -1,4 +1,8 @@
-"""The joint robust estimate of motion, landmarks and pipe."""
+"""The joint robust estimate of motion, landmarks and pipe, by Levenberg-Marquardt.
+
+D. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters", 1963; the control of the
+damping after H. Nielsen, "Damping parameter in Marquardt's method", IMM-REP-1999-05.
+"""
 
 from __future__ import annotations
 
@@ -7,154 +11,115 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.geometry.rigid import inverse, skew, transform, vector_from_rotation
-from pipeline.instrument.camera.base import Camera
-from pipeline.instrument.probe import Probe
-from stages.motion import terms
-from stages.motion.bordered import BorderedSystem, Factor, LandmarkRows, Rows, landmark_steps
+from pipeline.geometry.rigid import vector_from_rotation
+from stages.motion.bordered import Step
+from stages.motion.equations import Equations, Measurements, Scales, linearised, rescaled, scales_of
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import EncoderReadings, State
-from stages.motion.terms import RingBins, cauchy
-from stages.motion.tracking import Tracks
+from stages.motion.state import State
 
 Float = NDArray[np.float64]
-_CONVERGED_MM = 1e-3
-MATCH_BIASES = 2
-_THETA_SPAN = 0.35  # half the range of polar angles tracked, rad
+_DOUBTFUL = 0.5  # one σ of any combination of unknowns; derivatives leave out what may be as much
+_LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-12, 1e-7, 1e6
+_FIRST = Scales(3.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Measurements:
-    """All that the adjustment is fed with.
+class Adjusted:
+    """Where the adjustment ended.
 
     Attributes
     ----------
-    tracks : Tracks
-    rings : RingBins
-    time_s : (N,)
-    encoder : EncoderReadings or None
-    probe : Probe
-        As stated.
-    unsure : (P, Q)
-        Its principal uncertainties.
-    smooth_sigma : (6,)
-        1 σ of the pose's third difference from frame to frame, mm and rad.
+    state : State
+    equations : Equations
+        There.
+    trials : int
+        Steps tried.
+    settled : bool
+        Whether no step promises anything any more.
     """
 
-    tracks: Tracks
-    rings: RingBins
-    time_s: Float
-    encoder: EncoderReadings | None
-    probe: Probe
-    unsure: Float
-    smooth_sigma: Float
-
-    def camera_at(self, state: State) -> Camera:
-        """Return the camera with the corrections found so far."""
-        parameters = self.probe.parameters + self.unsure @ state.instrument[: self.unsure.shape[1]]
-        return self.probe.camera.with_parameters(parameters[: len(self.probe.camera.parameter_names)])
+    state: State
+    equations: Equations
+    trials: int
+    settled: bool
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """State at the optimum, the factorised equations there, and the texture's reprojection error, px."""
+class Damping:
+    """Relative damping of the steps, and how much it grows when the next one fails."""
 
-    state: State
-    factor: Factor
-    reprojection_px: float
+    value: float = _LEAST_DAMPING
+    growth: float = 8.0
+
+    @property
+    def slight(self) -> bool:
+        """Whether steps are those of Gauss-Newton, in weakly held directions too."""
+        return self.value <= _FIRST_DAMPING
+
+    @property
+    def spent(self) -> bool:
+        """Whether even the shortest steps failed."""
+        return self.value > _MOST_DAMPING
+
+    def believed(self, gain: float, enough: float) -> float:
+        """Return the promise below which a step that gained this share of it is the last."""
+        if gain <= 0:
+            return _DOUBTFUL
+        return enough if self.slight else 0.0
+
+    def after(self, gain: float) -> Damping:
+        """Return the damping after a step that gained this share of what it promised."""
+        if gain <= 0:
+            return Damping(max(self.value, _FIRST_DAMPING) * self.growth, 2 * self.growth)
+        return Damping(max(self.value * max(0.01, 1 - (2 * min(gain, 1) - 1) ** 3), _LEAST_DAMPING))
 
 
-def adjust(state: State, measured: Measurements, parameters: MotionParameters) -> Estimate:
-    """Minimise all residuals together by Gauss-Newton with Cauchy weights.
+def adjust(state: State, measured: Measurements, parameters: MotionParameters, enough: float) -> Adjusted:
+    """Minimise the robust cost of all residuals together, until a step promises less than this share of it.
+
+    A step is judged by the scales it was computed with and counts only if it lowers the cost; then the
+    residuals' scales are measured anew.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         When the motion is not determined.
     """
-    excess = 3.0
-    for _ in range(parameters.iterations):
-        landmarks, reprojection, excess = landmark_rows(state, measured, parameters, excess)
-        system = assembled(state, measured, parameters)
-        inverse_information, right = system.add_landmarks(landmarks)
-        factor = system.factor()
-        frames, border = factor.step()
-        points = landmark_steps(landmarks, inverse_information, right, frames, border)
-        # A step longer than the pipe is wide is no longer linear.
-        part = min(1.0, state.nominal_radius_mm / max(float(np.abs(frames[:, :3]).max()), 1e-9))
-        state = state.step(part * frames, part * border, part * points)
-        if np.abs(frames[:, :3]).max() < _CONVERGED_MM:
-            break
-    return Estimate(state, factor, reprojection)
+    equations, scales = _judged_anew(linearised(state, measured, parameters, _FIRST), measured, parameters)
+    damping = Damping()
+    for trial in range(1, parameters.iterations + 1):
+        step = _step(equations, damping)
+        if step is None:
+            damping = damping.after(0.0)
+            continue
+        promised = equations.decrease(step)
+        moved = state.step(step.frames, step.border, step.landmarks)
+        there = linearised(moved, measured, parameters, scales)
+        gain = (equations.cost - there.cost) / promised
+        if gain > 0:
+            state = moved
+            equations, scales = _judged_anew(there, measured, parameters)
+        if damping.spent or promised < damping.believed(gain, enough * equations.cost):
+            return Adjusted(state, equations, trial, True)
+        damping = damping.after(gain)
+    return Adjusted(state, equations, parameters.iterations, False)
 
 
-def assembled(state: State, measured: Measurements, parameters: MotionParameters) -> BorderedSystem:
-    """Return the system with every equation that has no landmark."""
-    reach = max(int(_span(measured.tracks)), 4)
-    system = BorderedSystem(len(state.T_pc), state.border_size, reach)
-    rows: list[Rows] = [terms.origin_rows(state), terms.ring_rows(state, measured.rings)]
-    rows.append(terms.smooth_rows(state, measured.time_s, measured.smooth_sigma))
-    rows.append(terms.turn_rows(state, parameters.turn_sigma_rad))
-    if measured.encoder is None:
-        rows.append(terms.no_slip_rows(state))
-    else:
-        rows.extend(terms.encoder_rows(state, measured.encoder, parameters.encoder_slip_sigma_mm))
-    encoder_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm
-    rows.append(terms.border_rows(state, parameters.axis_bend_sigma, encoder_sigma, radius_sigma_mm))
-    for row in rows:
-        system.add(row)
-    return system
+def _step(equations: Equations, damping: Damping) -> Step | None:
+    """Return the damped step, or None where rounding spoils the equations and damping may yet help."""
+    try:
+        return equations.step(damping.value)
+    except np.linalg.LinAlgError:
+        if damping.spent:
+            raise
+        return None
 
 
-def landmark_rows(
-    state: State, measured: Measurements, parameters: MotionParameters, excess: float
-) -> tuple[LandmarkRows, float, float]:
-    """Linearise the texture; return its equations, the robust reprojection error and its excess over σ."""
-    tracks, camera = measured.tracks, measured.camera_at(state)
-    T = state.T_pc[tracks.frame]
-    xyz_c = transform(inverse(T), state.xyz_p[tracks.landmark])
-    bias = _match_bias(xyz_c, tracks.uv - camera.centre_px) * parameters.match_bias_px
-    residual = camera.project(xyz_c).uv + bias @ state.instrument[-MATCH_BIASES:] - tracks.uv
-    by_c, by_parameters = camera.project_jacobian(xyz_c)
-    by_camera = by_parameters @ measured.unsure[: by_parameters.shape[2]]
-    by_instrument = np.concatenate([by_camera, bias], -1)
-    by_point = by_c @ np.swapaxes(T[:, :3, :3], 1, 2)
-    by_pose = np.concatenate([-by_point, by_c @ skew(xyz_c)], -1)
-    size = np.linalg.norm(residual, axis=1)
-    sigma = tracks.sigma_px * excess
-    weight = cauchy(size / sigma) / sigma**2
-    bad = ~np.isfinite(residual).all(1)
-    for part in (weight, residual, by_point, by_pose, by_instrument):
-        part[bad] = 0.0
-    s_residual, normal, by_border = terms.surface(state, state.xyz_p)
-    s_sigma = parameters.surface_sigma_mm
-    start = np.searchsorted(tracks.landmark, np.arange(len(state.xyz_p) + 1))
-    rows = LandmarkRows(
-        start, tracks.frame, by_pose, by_point, by_instrument, residual, weight,
-        normal, by_border, s_residual, cauchy(s_residual / s_sigma) / s_sigma**2,
-    )  # fmt: skip
-    reprojection = float(np.median(size[~bad])) if not bad.all() else 0.0
-    return rows, reprojection, _excess_of(size[~bad], tracks.sigma_px[~bad]) * np.sqrt(parameters.alike)
-
-
-def _excess_of(size: Float, sigma: Float) -> float:
-    """Return by how much residuals (M,) of two coordinates exceed their σ: for Rayleigh's median, 1."""
-    if not len(size):
-        return 1.0
-    return max(float(np.median(size / sigma) / np.sqrt(2 * np.log(2))), 0.3)
-
-
-def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
-    """Return (M, 2, 2) what matching may get wrong alike all round: radial, constant and linear in θ.
-
-    Light that falls off across a patch and blur that grows with distance shift matches along the radius; that
-    must not be taken for the lens.
-    """
-    theta = np.arctan2(np.hypot(xyz_c[:, 0], xyz_c[:, 1]), xyz_c[:, 2])
-    radial = from_centre_px / np.maximum(np.linalg.norm(from_centre_px, axis=1), 1.0)[:, None]
-    return np.asarray(
-        radial[:, :, None] * np.stack([np.ones_like(theta), (theta - 1.0) / 0.35], -1)[:, None, :]
-    )
+def _judged_anew(
+    equations: Equations, measured: Measurements, parameters: MotionParameters
+) -> tuple[Equations, Scales]:
+    scales = scales_of(equations, measured.tracks, parameters.alike)
+    return rescaled(equations, measured.tracks, scales), scales
 
 
 def third_difference_sigma(state: State, lit: NDArray[np.int64]) -> Float:
@@ -169,12 +134,3 @@ def third_difference_sigma(state: State, lit: NDArray[np.int64]) -> Float:
     third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), pose)
     stride = float(np.median(np.diff(lit)))
     return np.asarray(np.maximum(1.4826 * np.median(np.abs(third), 0) / stride**2, floor))
-
-
-def _span(tracks: Tracks) -> float:
-    """Return the longest span of frames of one landmark."""
-    if not len(tracks.frame):
-        return 0.0
-    start = np.flatnonzero(np.diff(tracks.landmark, prepend=-1))
-    end = np.append(start[1:], len(tracks.landmark)) - 1
-    return float(np.max(tracks.frame[end] - tracks.frame[start]))

@@ -7,24 +7,24 @@ of global numbers, and three for each landmark, which leave by the Schur complem
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from stages.motion.elimination import add_landmarks, add_rows
+from stages.motion.robust import Loss, Squares
 from stages.motion.tridiagonal import BlockTridiagonal
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 BLOCK = 7
-_DAMPING = 1e-5
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Scalar, weighted residual equations that touch some frames and the border, but no landmark.
+    """Scalar residual equations that touch some frames and the border, but no landmark.
 
     Attributes
     ----------
@@ -32,14 +32,32 @@ class Rows:
         The F frames of each equation.
     by_frame : (M, F, 7)
     by_border : (M, B)
-    residual, weight : (M,)
+    residual, sigma : (M,)
+    loss : Loss
     """
 
     frame: Int
     by_frame: Float
     by_border: Float
     residual: Float
-    weight: Float
+    sigma: Float
+    loss: Loss = field(default_factory=Squares)
+
+    @property
+    def weight(self) -> Float:
+        """Return the weights (M,)."""
+        return self.loss.weight(self.residual, self.sigma)
+
+    @property
+    def cost(self) -> float:
+        """Return the total cost."""
+        return float(np.sum(self.loss.cost(self.residual, self.sigma)))
+
+    def decrease(self, step: Step) -> float:
+        """Return by how much a step would lower the weighted squares, if the equations were linear."""
+        change = np.einsum("mfi,mfi->m", self.by_frame, step.frames[self.frame])
+        change += self.by_border @ step.border
+        return _decrease(self.residual, change, self.weight)
 
 
 @dataclass(frozen=True)
@@ -56,10 +74,13 @@ class LandmarkRows:
     by_instrument : (M, 2, Q)
         By the last Q numbers of the border.
     residual : (M, 2)
-    weight : (M,)
+    sigma : (M,)
+        Of each coordinate; the loss judges both together. Infinite where an observation has no ray.
     surface_by_point : (L, 3)
     surface_by_border : (L, B)
-    surface_residual, surface_weight : (L,)
+    surface_residual, surface_sigma : (L,)
+    loss : Loss
+        Of texture and surface.
     """
 
     start: Int
@@ -68,11 +89,64 @@ class LandmarkRows:
     by_point: Float
     by_instrument: Float
     residual: Float
-    weight: Float
+    sigma: Float
     surface_by_point: Float
     surface_by_border: Float
     surface_residual: Float
-    surface_weight: Float
+    surface_sigma: Float
+    loss: Loss = field(default_factory=Squares)
+
+    @property
+    def weight(self) -> Float:
+        """Return the weights (M,) of the observations."""
+        return self.loss.weight(np.linalg.norm(self.residual, axis=1), self.sigma)
+
+    @property
+    def surface_weight(self) -> Float:
+        """Return the weights (L,) of the surface equations."""
+        return self.loss.weight(self.surface_residual, self.surface_sigma)
+
+    @property
+    def cost(self) -> float:
+        """Return the total cost."""
+        texture = self.loss.cost(np.linalg.norm(self.residual, axis=1), self.sigma)
+        return float(np.sum(texture) + np.sum(self.loss.cost(self.surface_residual, self.surface_sigma)))
+
+    @property
+    def reach(self) -> int:
+        """Return the longest span of frames of one landmark."""
+        seen = np.flatnonzero(np.diff(self.start))
+        first, last = self.frame[self.start[seen]], self.frame[self.start[seen + 1] - 1]
+        return int(np.max(last - first, initial=0))
+
+    def decrease(self, step: Step) -> float:
+        """Return by how much a step would lower the weighted squares, if the equations were linear."""
+        landmark = np.repeat(np.arange(len(self.start) - 1), np.diff(self.start))
+        change = self.change_by_view(step.frames, step.border)
+        change += np.einsum("mij,mj->mi", self.by_point, step.landmarks[landmark])
+        relief = self.surface_by_border @ step.border
+        relief += np.einsum("lj,lj->l", self.surface_by_point, step.landmarks)
+        texture = _decrease(self.residual, change, self.weight[:, None])
+        return texture + _decrease(self.surface_residual, relief, self.surface_weight)
+
+    def change_by_view(self, frames: Float, border: Float) -> Float:
+        """Return the change (M, 2) of the residuals by a step of frames (N, 7) and border (B,)."""
+        instrument = border[len(border) - self.by_instrument.shape[2] :]
+        by_frames = np.einsum("mij,mj->mi", self.by_pose, frames[self.frame, :6])
+        return np.asarray(by_frames + self.by_instrument @ instrument)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the frames (N, 7), the border (B,) and the landmarks (L, 3)."""
+
+    frames: Float
+    border: Float
+    landmarks: Float
+
+
+def _decrease(residual: Float, change: Float, weight: Float) -> float:
+    return float(-np.sum(weight * change * (residual + 0.5 * change)))
 
 
 class BorderedSystem:
@@ -99,40 +173,37 @@ class BorderedSystem:
             self._band, self._border, self._corner, self._right, self._right_border,
         )  # fmt: skip
 
-    def add_landmarks(self, rows: LandmarkRows) -> tuple[Float, Float]:
-        """Add texture and eliminate its landmarks; return their inverse information and right sides."""
+    def add_landmarks(self, rows: LandmarkRows, damping: float = 0.0) -> tuple[Float, Float]:
+        """Add texture and eliminate its landmarks; return their inverse information and right sides.
+
+        The landmarks' own information is raised by a relative ``damping``.
+        """
         count = len(rows.start) - 1
         inverse, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
         add_landmarks(
             rows.start, rows.frame, rows.by_pose, rows.by_point, rows.by_instrument,
             rows.residual, rows.weight, rows.surface_by_point, rows.surface_by_border,
-            rows.surface_residual, rows.surface_weight,
+            rows.surface_residual, rows.surface_weight, damping,
             self._band, self._border, self._corner, self._right, self._right_border, inverse, right,
         )  # fmt: skip
         return inverse, right
 
-    def factor(self) -> Factor:
-        """Return the factorised system.
+    def factor(self, damping: float = 0.0) -> Factor:
+        """Return the factorised system, the diagonal raised by a relative ``damping``.
 
         Raises
         ------
         numpy.linalg.LinAlgError
             When some unknown is not determined.
         """
-        try:
-            return self._factor(0.0)
-        except np.linalg.LinAlgError:
-            # Rounding can make a weakly held direction negative: a shorter step is as good.
-            return self._factor(_DAMPING)
-
-    def _factor(self, damping: float) -> Factor:
-        """Return the factors with the frames' own information raised by a relative ``damping``."""
-        damped = self._band.copy() if damping else self._band
-        damped[0] = damped[0] * (1 + damping)
-        band = BlockTridiagonal.of_band(damped)
-        solved = band.solve(self._border)
-        corner = cho_factor(self._corner - self._border.T @ solved)
-        return Factor(band, self._border, solved, corner, self._right, self._right_border)
+        band, corner = self._band, self._corner
+        if damping:
+            band, corner = band.copy(), corner + damping * np.diag(np.diag(corner))
+            band[0] *= 1 + damping
+        tridiagonal = BlockTridiagonal.of_band(band)
+        solved = tridiagonal.solve(self._border)
+        left = cho_factor(corner - self._border.T @ solved)
+        return Factor(tridiagonal, self._border, solved, left, self._right, self._right_border)
 
 
 @dataclass(frozen=True)
@@ -172,9 +243,7 @@ def landmark_steps(
     rows: LandmarkRows, inverse: Float, right: Float, frame_step: Float, border_step: Float
 ) -> Float:
     """Return the steps (L, 3) of the eliminated landmarks."""
-    instrument = border_step[len(border_step) - rows.by_instrument.shape[2] :]
-    by_frames = np.einsum("mij,mj->mi", rows.by_pose, frame_step[rows.frame, :6])
-    moved = by_frames + rows.by_instrument @ instrument
+    moved = rows.change_by_view(frame_step, border_step)
     pull = np.einsum("mij,mi,m->mj", rows.by_point, moved, rows.weight)
     total = np.add.reduceat(pull, rows.start[:-1], axis=0) if len(pull) else np.zeros((0, 3))
     surface = rows.surface_weight * (rows.surface_by_border @ border_step)

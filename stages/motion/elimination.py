@@ -9,7 +9,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-_DAMPING = 1e-4  # 1/mm²: a landmark that nothing holds any more keeps its place
+_HOLD = 1e-4  # 1/mm²: a landmark that nothing holds any more keeps its place
 
 
 @numba.njit(cache=True)
@@ -55,10 +55,13 @@ def _add_to_corner(by_border, residual, w, corner, right_border):  # type: ignor
 @numba.njit(cache=True)
 def add_landmarks(  # type: ignore[no-untyped-def]
     start, frame, by_pose, by_point, by_instrument, residual, weight,
-    s_point, s_border, s_residual, s_weight,
+    s_point, s_border, s_residual, s_weight, damping,
     band, border, corner, right, right_border, inverse, right_point,
 ):  # fmt: skip
-    """Add texture and surface equations, and subtract what the landmarks take along when they leave."""
+    """Add texture and surface equations, and subtract what the landmarks take along when they leave.
+
+    ``damping`` raises the diagonal of each landmark's information.
+    """
     size = s_border.shape[1]
     first = size - by_instrument.shape[2]
     most = 0
@@ -77,8 +80,10 @@ def add_landmarks(  # type: ignore[no-untyped-def]
                 weight[m], frame[m] * 7, by_pose[m], by_point[m], by_instrument[m], residual[m], first,
                 band, border, corner, right, right_border, h, g, side, cross[m - start[k]],
             )  # fmt: skip
-        if np.linalg.det(h) < _DAMPING**3:
-            h += _DAMPING * np.eye(3)
+        for a in range(3):
+            h[a, a] *= 1.0 + damping
+        if np.linalg.det(h) < _HOLD**3:
+            h += _HOLD * np.eye(3)
         hi = np.linalg.inv(h)
         inverse[k], right_point[k] = hi, g
         solved_side = side @ hi

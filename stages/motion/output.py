@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,12 +11,27 @@ from pipeline.artefacts import PipeAxis, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
 from pipeline.recording.base import FrameTable
-from stages.motion.adjustment import Estimate, Measurements
-from stages.motion.state import GLOBALS
+from stages.motion.adjustment import Adjusted
+from stages.motion.bordered import Factor
+from stages.motion.equations import Measurements
+from stages.motion.state import GLOBALS, State
 
 Float = NDArray[np.float64]
 _COVARIANCES = 60
 _START_MM = 60.0
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The adjustment's end and the factorised equations there."""
+
+    adjusted: Adjusted
+    factor: Factor
+
+    @property
+    def state(self) -> State:
+        """Return the state at the optimum."""
+        return self.adjusted.state
 
 
 def in_pipe_frame(estimate: Estimate, frames: FrameTable, measured: Measurements) -> Trajectory:

@@ -59,7 +59,7 @@ class MotionParameters(Parameters):
     turn_sigma_rad: float = Field(
         0.1, gt=0, le=1, description="1 σ, rad, of a turn from frame to frame where no texture shows it"
     )
-    iterations: int = Field(4, ge=2, le=50, description="Gauss-Newton steps of the joint adjustment")
+    iterations: int = Field(60, ge=2, le=1000, description="most steps tried by the joint adjustment")
     max_track_frames: int = Field(
         240, ge=20, le=2000, description="longest span of frames, over which one landmark is followed"
     )

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation
 from stages.motion.bordered import BLOCK, Rows
+from stages.motion.robust import Cauchy, Loss, Squares
 from stages.motion.state import GLOBALS, EncoderReadings, State
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-_FINEST_WALL_MM = 0.02
 _VIEW_RAD = 0.2  # 1 σ of the angle between the first camera and the pipe
 
 
@@ -39,19 +39,6 @@ class RingBins:
     sigma_mm: Float
 
 
-def cauchy(residual_over_sigma: Float, scale: float = 2.5) -> Float:
-    """Return the Cauchy weight of residuals in σ."""
-    return np.asarray(1 / (1 + (residual_over_sigma / scale) ** 2))
-
-
-def redescending(residual_over_spread: Float, scale: float = 2.5) -> Float:
-    """Return the Geman-McClure weight: relief such as a weld hardly counts.
-
-    The instrument's derivatives change with radius, so relief left in would be explained by the lens.
-    """
-    return np.asarray(1 / (1 + (residual_over_spread / scale) ** 2) ** 2)
-
-
 def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
     """Return residual (M,) of points against the smooth pipe, its slope by point (M, 3) and border (M, B)."""
     s, psi, rho = to_pipe(state.axis, xyz_p)
@@ -69,7 +56,7 @@ def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
     return residual, gradient, np.concatenate([shape, *deflect, instrument], 1)
 
 
-def ring_rows(state: State, rings: RingBins) -> Rows:
+def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     """Every ring bin lies on the pipe's smooth surface."""
     T = state.T_pc[rings.frame]
     unsure = rings.by_instrument.shape[2]
@@ -81,9 +68,7 @@ def ring_rows(state: State, rings: RingBins) -> Rows:
     by_border[:, first : first + unsure] = np.einsum("mj,mjq->mq", normal_c, rings.by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
     by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
-    spread = max(1.4826 * float(np.median(np.abs(residual))), _FINEST_WALL_MM) if residual.size else 1.0
-    weight = redescending(residual / spread) / rings.sigma_mm**2
-    return Rows(rings.frame[:, None], by_frame, by_border, residual, weight)
+    return Rows(rings.frame[:, None], by_frame, by_border, residual, rings.sigma_mm, loss)
 
 
 def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
@@ -99,10 +84,9 @@ def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
     by_frame = np.zeros((n - 3, 6, 4, BLOCK))
     for i in range(6):
         by_frame[:, i, :, i] = coefficient
-    weight = cauchy(residual / sigma, 5.0) / sigma**2
     return Rows(
         np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK),
-        np.zeros((6 * (n - 3), state.border_size)), residual.reshape(-1), weight.reshape(-1),
+        np.zeros((6 * (n - 3), state.border_size)), residual.reshape(-1), np.tile(sigma, n - 3), Cauchy(5.0),
     )  # fmt: skip
 
 
@@ -117,7 +101,7 @@ def turn_rows(state: State, sigma_rad: float) -> Rows:
         by_frame[:, i, 0, 3 + i], by_frame[:, i, 1, 3 + i] = -1, 1
     return Rows(
         np.repeat(pair, 3, 0), by_frame.reshape(-1, 2, BLOCK), np.zeros((3 * (n - 1), state.border_size)),
-        residual.reshape(-1), np.full(3 * (n - 1), sigma_rad**-2.0),
+        residual.reshape(-1), np.full(3 * (n - 1), sigma_rad),
     )  # fmt: skip
 
 
@@ -132,13 +116,14 @@ def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -
     by_border = np.zeros((n, state.border_size))
     by_border[:, 3] = -encoder.distance_mm
     residual = s - scale * encoder.distance_mm - state.slip
-    reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, encoder.known / encoder.sigma_mm**2)
+    sigma = np.where(encoder.known, encoder.sigma_mm, np.inf)
+    reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, sigma)
     pair = np.stack([np.arange(n - 1), np.arange(1, n)], -1)
     by_pair = np.zeros((n - 1, 2, BLOCK))
     by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
-    change = np.diff(state.slip)
-    weight = cauchy(change / slip_sigma_mm) / slip_sigma_mm**2
-    return reading, Rows(pair, by_pair, np.zeros((n - 1, state.border_size)), change, weight)
+    none = np.zeros((n - 1, state.border_size))
+    creep = np.full(n - 1, slip_sigma_mm)
+    return reading, Rows(pair, by_pair, none, np.diff(state.slip), creep, Cauchy())
 
 
 def no_slip_rows(state: State) -> Rows:
@@ -153,37 +138,40 @@ def origin_rows(state: State) -> Rows:
     """Hold the first frame where it is: it defines the frame of the estimate."""
     by_frame = np.zeros((6, 1, BLOCK))
     by_frame[np.arange(6), 0, np.arange(6)] = 1
-    weight = np.array([1e-4] * 3 + [1e-6] * 3) ** -2.0
-    return Rows(np.zeros((6, 1), np.int64), by_frame, np.zeros((6, state.border_size)), np.zeros(6), weight)
+    sigma = np.array([1e-4] * 3 + [1e-6] * 3)
+    return Rows(np.zeros((6, 1), np.int64), by_frame, np.zeros((6, state.border_size)), np.zeros(6), sigma)
 
 
-def border_rows(state: State, bend_sigma: float, encoder_sigma: float, radius_sigma_mm: float) -> Rows:
-    """Priors of the global numbers: an axis that bends as little as it may, encoder scale, the instrument."""
-    size, knots = state.border_size, state.knots
+def axis_rows(state: State, bend_sigma: float) -> Rows:
+    """Return an axis that bends as little as it may."""
+    knots, h2 = state.knots, state.knot_mm**2
     third = np.diff(np.eye(knots), 3, axis=0)
     second = np.diff(np.eye(knots), 2, axis=0)
     slope = np.diff(np.eye(knots), axis=0)[:1]
-    h2 = state.knot_mm**2
-    stiff = ((third, bend_sigma * h2), (second, 100 * bend_sigma * h2), (slope, _VIEW_RAD * state.knot_mm))
-    blocks, residual, sigma = [], [], []
-    for part in range(2):
-        at = GLOBALS + part * knots
-        for rows, limit in stiff:
-            block = np.zeros((len(rows), size))
-            block[:, at : at + knots] = rows
-            blocks.append(block)
-            residual.append(rows @ state.curve[part])
-            sigma.append(np.full(len(rows), limit))
-    unsure = len(state.instrument)
-    own = np.r_[0:GLOBALS, size - unsure : size]
-    blocks.append(np.eye(size)[own])
+    sigma = (
+        [bend_sigma * h2] * len(third) + [100 * bend_sigma * h2] * len(second) + [_VIEW_RAD * state.knot_mm]
+    )
+    one = np.concatenate([third, second, slope])
+    by_border = np.zeros((2 * len(one), state.border_size))
+    by_border[: len(one), GLOBALS : GLOBALS + knots] = one
+    by_border[len(one) :, GLOBALS + knots : GLOBALS + 2 * knots] = one
+    residual = np.concatenate([one @ state.curve[0], one @ state.curve[1]])
+    return _border_only(by_border, residual, np.array(2 * sigma), Cauchy())
+
+
+def prior_rows(state: State, encoder_sigma: float, radius_sigma_mm: float) -> Rows:
+    """Return what is known of the global numbers beforehand: pipe, encoder scale and instrument."""
+    size, unsure = state.border_size, len(state.instrument)
     start = state.globals - np.array([state.nominal_radius_mm, 0.0, 0.0, 1.0])
-    residual.append(np.concatenate([start, state.instrument]))
-    sigma.append(np.array([radius_sigma_mm] * 3 + [encoder_sigma] + [1.0] * unsure))
-    r, s = np.concatenate(residual), np.concatenate(sigma)
-    soft = np.where(np.arange(len(r)) < len(r) - len(own), cauchy(r / s), 1.0)
-    none = np.zeros((len(r), 0), np.int64)
-    return Rows(none, np.zeros((len(r), 0, BLOCK)), np.concatenate(blocks), r, soft / s**2)
+    residual = np.concatenate([start, state.instrument])
+    sigma = np.array([radius_sigma_mm] * 3 + [encoder_sigma] + [1.0] * unsure)
+    return _border_only(np.eye(size)[np.r_[0:GLOBALS, size - unsure : size]], residual, sigma, Squares())
+
+
+def _border_only(by_border: Float, residual: Float, sigma: Float, loss: Loss) -> Rows:
+    count = len(residual)
+    none = np.zeros((count, 0), np.int64)
+    return Rows(none, np.zeros((count, 0, BLOCK)), by_border, residual, sigma, loss)
 
 
 def _third_difference(time_s: Float) -> Float:

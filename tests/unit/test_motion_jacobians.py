@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from stages.motion import terms
-from stages.motion.adjustment import landmark_rows
 from stages.motion.bordered import Rows
+from stages.motion.equations import landmark_rows
 from stages.motion.parameters import MotionParameters
+from stages.motion.robust import GemanMcClure
 from stages.motion.state import GLOBALS, State
 from tests.motion_scene import displaced, scene
 
@@ -59,7 +60,7 @@ def check_rows(
 def test_ring_rows(given) -> None:
     measured, state = given
     # The axis' frames turn a little with its deflection, which the derivative leaves out.
-    check_rows(lambda s: terms.ring_rows(s, measured.rings), state, 0.02, 2e-4)
+    check_rows(lambda s: terms.ring_rows(s, measured.rings, GemanMcClure(0.1)), state, 0.02, 2e-4)
 
 
 def test_encoder_rows(given) -> None:
@@ -77,8 +78,9 @@ def test_turn_rows(given) -> None:
     check_rows(lambda s: terms.turn_rows(s, 0.1), given[1], 1e-9, frame_atol=0.1 / 60)
 
 
-def test_border_rows(given) -> None:
-    check_rows(lambda s: terms.border_rows(s, 2e-3, 0.002, 5.0), given[1], 1e-5)
+def test_axis_and_prior_rows(given) -> None:
+    check_rows(lambda s: terms.axis_rows(s, 2e-3), given[1], 1e-5)
+    check_rows(lambda s: terms.prior_rows(s, 0.002, 5.0), given[1], 1e-5)
 
 
 def test_smooth_rows(given) -> None:
@@ -120,8 +122,8 @@ def test_surface_by_point_and_border(given) -> None:
 def test_landmark_rows(given) -> None:
     measured, state = given
     parameters = MotionParameters()
-    residual = lambda s: landmark_rows(s, measured, parameters, 1.0)[0].residual  # noqa: E731
-    rows = landmark_rows(state, measured, parameters, 1.0)[0]
+    residual = lambda s: landmark_rows(s, measured, parameters).residual  # noqa: E731
+    rows = landmark_rows(state, measured, parameters)
     for f in (1, 5):
         for i in range(6):
             wanted = slope(residual, state, frame=(f, i))
@@ -148,7 +150,10 @@ def test_a_landmark_behind_the_lens_is_left_out(given) -> None:
     step = np.zeros_like(state.xyz_p)
     step[0, 2] = -500.0
     moved = state.step(np.zeros((len(state.T_pc), 7)), np.zeros(state.border_size), step)
-    rows, reprojection, excess = landmark_rows(moved, measured, MotionParameters(), 1.0)
-    assert np.isfinite(reprojection)
-    assert np.isfinite(excess)
-    assert np.all(rows.weight[measured.tracks.landmark == 0] == 0)
+    rows = landmark_rows(moved, measured, MotionParameters())
+    astray = measured.tracks.landmark == 0
+    assert np.isfinite(rows.cost)
+    assert np.all(rows.by_pose[astray] == 0)
+    assert np.all(rows.by_point[astray] == 0)
+    stayed = landmark_rows(state, measured, MotionParameters())
+    assert rows.cost > stayed.cost, "or the adjustment would gain by losing landmarks"
