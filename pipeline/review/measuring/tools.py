@@ -1,0 +1,122 @@
+"""The measuring tools of the review: what an inspector reads off the wall, with 1 σ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import BoresightError
+from pipeline.findings import clock_of_azimuth
+from pipeline.review.decisions.replay import Outline
+from pipeline.review.measuring.outline import OutlineGauge
+from pipeline.review.measuring.wall import MeasuredWall
+
+Float = NDArray[np.float64]
+Tool = Literal["point", "distance", "area", "depth", "diameter"]
+_STEPS_PER_CELL = 2
+_NEEDED: dict[Tool, int] = {"point": 1, "distance": 2, "area": 3, "depth": 3, "diameter": 1}
+
+
+class NotSeenError(BoresightError):
+    """A measurement leads over wall that was not seen."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One number with its name, unit and 1 σ."""
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+
+
+def readings(wall: MeasuredWall, tool: Tool, points: Outline) -> tuple[Reading, ...]:
+    """Return what a tool reads at points (distance mm, azimuth rad).
+
+    Raises
+    ------
+    NotSeenError
+        Where the wall was not seen, or points are too few.
+    """
+    if len(points) < _NEEDED[tool]:
+        raise NotSeenError(f"{tool} needs {_NEEDED[tool]} points")
+    found = {"point": _point, "distance": _distance, "area": _area, "depth": _depth, "diameter": _diameter}
+    result = found[tool](wall, points)
+    if not all(np.isfinite(r.value) for r in result):
+        raise NotSeenError("the wall was not seen there")
+    return result
+
+
+def _point(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+    s, a = points[0]
+    radius, sigma, _ = wall.radius_at(s, a)
+    return (
+        Reading("radius", radius, sigma, "mm"),
+        Reading("distance", s, float(wall.step_mm / np.sqrt(12)), "mm"),
+        Reading(
+            "clock", float(clock_of_azimuth(a)), float(np.degrees(wall.step_rad) / 30 / np.sqrt(12)), "h"
+        ),
+    )
+
+
+def _distance(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+    """Along the wall between the points, over its relief, and straight through the bore."""
+    (s0, a0), (s1, a1) = points[0], points[1]
+    xyz, sigma = _line(wall, (s0, a0), (s1, a1))
+    along = np.linalg.norm(np.diff(xyz, axis=0), axis=1).sum()
+    chord = xyz[-1] - xyz[0]
+    straight = float(np.linalg.norm(chord))
+    unit = chord / max(straight, 1e-12)
+    outward = np.array([[np.cos(a), np.sin(a), 0.0] for a in (a0, a1)])
+    by_radius = np.array([-unit @ outward[0] * sigma[0], unit @ outward[1] * sigma[-1]])
+    place = wall.step_mm / np.sqrt(6)
+    return (
+        Reading("along the wall", float(along), float(np.hypot(place, np.mean(sigma) * abs(a1 - a0))), "mm"),
+        Reading("straight", straight, float(np.hypot(place, np.linalg.norm(by_radius))), "mm"),
+    )
+
+
+def _line(wall: MeasuredWall, start: tuple[float, float], end: tuple[float, float]) -> tuple[Float, Float]:
+    """Return points (N, 3) of the wall on the straight line of the flat view, and their σ (N,)."""
+    cells = max(abs(end[0] - start[0]) / wall.step_mm, abs(end[1] - start[1]) / wall.step_rad, 1)
+    t = np.linspace(0, 1, int(cells * _STEPS_PER_CELL) + 2)
+    s, a = (start[i] + t * (end[i] - start[i]) for i in (0, 1))
+    radius, sigma, _ = np.array([wall.radius_at(*at) for at in zip(s, a, strict=True)]).T
+    return np.stack([radius * np.cos(a), radius * np.sin(a), s], -1), sigma
+
+
+def _area(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+    """Area of the polygon on the wall as if it were smooth: cells times the local radius."""
+    point = np.asarray(points, float)
+    rows = wall.rows(point[:, 0].min(), point[:, 0].max())
+    radius = float(np.nanmedian(wall.radius_mm[rows]))
+    sigma = float(np.nanmedian(wall.sigma_mm[rows]))
+    flat = np.stack([point[:, 0], point[:, 1] * radius], -1).astype(np.float32)
+    area = float(cv2.contourArea(flat))
+    edge = float(cv2.arcLength(flat, closed=True))
+    placed = edge * wall.step_mm / np.sqrt(12 * max(edge / wall.step_mm, 1))
+    return (Reading("area", area, float(np.hypot(area * sigma / radius, placed)), "mm²"),)
+
+
+def _depth(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+    size = OutlineGauge(wall).measure(points)
+    return (Reading("depth", size.depth_mm, size.depth_sigma_mm, "mm"),)
+
+
+def _diameter(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+    """Through the axis at the point's azimuth, and the mean of the section."""
+    s, a = points[0]
+    (r0, sigma0, _), (r1, sigma1, _) = wall.radius_at(s, a), wall.radius_at(s, a + np.pi)
+    row = wall.row(s)
+    section, sigma = wall.radius_mm[row], wall.sigma_mm[row]
+    common = float(np.nanmedian(sigma))
+    return (
+        # What both ends share, the calibration, adds up; it does not average away.
+        Reading("diameter", r0 + r1, sigma0 + sigma1, "mm"),
+        Reading("mean diameter", 2 * float(np.nanmean(section)), 2 * common, "mm"),
+    )

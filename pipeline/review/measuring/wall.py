@@ -1,0 +1,89 @@
+"""The wall that is measured on: its radius over distance and azimuth, and points on it in space."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import InputError
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class MeasuredWall:
+    """Radius of the wall about the pipe's own axis.
+
+    Attributes
+    ----------
+    distance_mm : (S,)
+        Uniform.
+    azimuth_rad : (A,)
+        Uniform over the turn, first −π.
+    radius_mm, sigma_mm, sigma_random_mm : (S, A)
+        NaN where nothing was seen; σ in all, and its random part.
+    """
+
+    distance_mm: Float
+    azimuth_rad: Float
+    radius_mm: Float
+    sigma_mm: Float
+    sigma_random_mm: Float
+
+    @property
+    def step_mm(self) -> float:
+        """Distance between rows."""
+        return float(self.distance_mm[1] - self.distance_mm[0])
+
+    @property
+    def step_rad(self) -> float:
+        """Angle between columns."""
+        return float(2 * np.pi / len(self.azimuth_rad))
+
+    def rows(self, from_mm: float, to_mm: float) -> NDArray[np.int64]:
+        """Return the rows from one distance to another; at least the nearest."""
+        inside = np.flatnonzero((self.distance_mm >= from_mm) & (self.distance_mm <= to_mm))
+        return inside if len(inside) else np.array([self.row(from_mm)])
+
+    def row(self, distance_mm: float) -> int:
+        """Return the row nearest to a distance."""
+        return int(
+            np.clip(round((distance_mm - self.distance_mm[0]) / self.step_mm), 0, len(self.distance_mm) - 1)
+        )
+
+    def column(self, azimuth_rad: float) -> int:
+        """Return the column nearest to an azimuth."""
+        return round((azimuth_rad - self.azimuth_rad[0]) / self.step_rad) % len(self.azimuth_rad)
+
+    def radius_at(self, distance_mm: float, azimuth_rad: float) -> tuple[float, float, float]:
+        """Return radius, its σ, and its random σ at a point; NaN where nothing was seen."""
+        at = self.row(distance_mm), self.column(azimuth_rad)
+        return float(self.radius_mm[at]), float(self.sigma_mm[at]), float(self.sigma_random_mm[at])
+
+
+def read_wall(run: Path) -> MeasuredWall:
+    """Read the wall of a run folder.
+
+    Raises
+    ------
+    InputError
+        When radius_map.npz is missing or broken.
+    """
+    file = run / "radius_map.npz"
+    hint = "finish the run first: boresight run"
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            parts = {k: np.asarray(arrays[k], float) for k in MeasuredWall.__dataclass_fields__}
+    except OSError as error:
+        raise InputError(file, "cannot be read", expected="the radius map of a run", hint=hint) from error
+    except (KeyError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(file, f"is not a radius map: {error}", hint=hint) from error
+    wall = MeasuredWall(**parts)
+    if wall.radius_mm.shape != (len(wall.distance_mm), len(wall.azimuth_rad)) or len(wall.distance_mm) < 2:
+        raise InputError(file, f"holds a radius of shape {wall.radius_mm.shape}", hint=hint)
+    return wall
