@@ -41,6 +41,8 @@ _ATTACHED = (
     _Attached("calibrate-camera", "Calibrate a camera from pictures of boards."),
     _Attached("calibrate-laser", "Find the laser plane from pictures of a board with the line across it."),
     _Attached("prove", "Conceal effects in recordings, diagnose them, open the truth, and score."),
+    _Attached("simulate", "Render recordings from a scene, with their truth apart."),
+    _Attached("open-seal", "Verify that a truth is the one a recording was sealed with."),
     _Attached("verify", "Compare a run with a known bore, a reference model or truth: a certificate."),
 )
 

@@ -65,7 +65,8 @@ def plain_truth(scene: Scene, file: Path) -> SceneTruth:
 
 def true_instrument(scene: Scene, stated: Probe, wall: Wall) -> TrueInstrument:
     """Return the true instrument: the stated one, or a draw from its stated uncertainty; lights set."""
-    probe = stated if scene.truth == "stated" else drawn(stated, scene.seed)
+    seed = scene.seed if scene.probe_seed is None else scene.probe_seed
+    probe = stated if scene.truth == "stated" else drawn(stated, seed)
     profile = LineProfile(stated.laser.line_sigma_mm, scene.laser.skewness)
     laser = TrueLaser(
         probe.laser,

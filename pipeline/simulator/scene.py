@@ -112,6 +112,7 @@ class Scene(Parameters):
     summary: str = Field("", description="what it is for, one sentence")
     kind: Literal["inspection", "gauge"] = Field("inspection", description="kind of run")
     seed: int = Field(0, ge=0, description="of everything random")
+    probe_seed: int | None = Field(None, ge=0, description="of the true instrument's draw; absent: seed")
     frames: int = Field(gt=0, le=1_000_000, description="number of frames")
     frame_rate: float = Field(30.0, gt=0, le=10_000, description="1/s")
     pattern: tuple[Pattern, ...] = Field(("laser", "led"), min_length=1, description="illumination, repeated")

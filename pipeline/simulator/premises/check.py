@@ -1,0 +1,28 @@
+"""The checks before and after rendering."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.recording.folder import open_folder
+from pipeline.simulator.premises.base import Premise, require
+from pipeline.simulator.premises.pictures import chosen_frames, picture_premises
+from pipeline.simulator.render import Renderer
+from pipeline.simulator.scene import Scene
+from pipeline.simulator.truth import SceneTruth
+
+
+def require_scene(scene: Scene, renderer: Renderer) -> tuple[Premise, ...]:
+    """Return what holds of a scene before it is rendered; see `require`."""
+    truth = renderer.truth
+    pictures = {n: renderer.frame(n) for n in chosen_frames(truth)}
+    return require(picture_premises(truth, pictures))
+
+
+def require_recording(folder: Path, truth: SceneTruth) -> tuple[Premise, ...]:
+    """Return what holds of a recording as stored; see `require`."""
+    recording = open_folder(folder)
+    frames = chosen_frames(truth)
+    pictures = {n: image.copy() for n, image in recording.read(frames, "bgr") if image is not None}
+    lost = Premise("frames that cannot be read back", float(len(frames) - len(pictures)), 0.0, at_most=True)
+    return require([lost, *picture_premises(truth, pictures)])
