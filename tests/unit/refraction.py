@@ -11,7 +11,7 @@ Float = NDArray[np.float64]
 def through_cylinder(
     origin: Float, ray: Float, axis: Float, radius_mm: float, ratio: float
 ) -> tuple[Float, Float]:
-    """Rays (M, 3) from inside a cylinder about an axis through the origin; ``ratio``: index before over after."""
+    """Rays (M, 3) from inside a cylinder about an axis through the origin; ``ratio`` of indices."""
     axis = axis / np.linalg.norm(axis)
     flat_origin, flat_ray = _flat(origin, axis), _flat(ray, axis)
     reach = _leaving(flat_origin, flat_ray, radius_mm)

@@ -116,7 +116,7 @@ def test_a_typical_size_costs_what_the_catalogue_says(name):
     shape = CASES[name][0]
     error, azimuth = radius_error(name, shape, [effect.quantities[0].typical], 50.8)
     part, _ = harmonic_part(error, azimuth, effect.harmonic or 0)
-    # The catalogue gives magnitudes for most (the laws carry the sign, tested above), rounded to a micrometre,
+    # The catalogue gives magnitudes for most (signs are tested above), rounded to a micrometre,
     # to first order: 2 mm of glass and 0.5 mm of pupil shift are no longer small.
     assert abs(part) == pytest.approx(abs(effect.typical_mm), rel=0.04, abs=6e-4)
 

@@ -1,4 +1,4 @@
-"""Points of a round bore as an instrument sees them: the ring is found by bisection along the image radius."""
+"""Points of a round bore as an instrument sees them; rings are found by bisection along the image radius."""
 
 from __future__ import annotations
 

@@ -1,0 +1,285 @@
+"""The library: what it covers, what each effect leaves alone, linearity, words, decoys, classes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from pipeline.physics.catalogue import CLASSES, EFFECTS
+from stages.diagnose.classes import alike, class_of, classes_of, record_next
+from stages.diagnose.effects.base import Travel
+from stages.diagnose.effects.decoys import DECOYS
+from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns
+from stages.diagnose.effects.library import LIBRARY, NOT_PREDICTED, without
+from stages.diagnose.effects.predict import (
+    columns,
+    reading_columns,
+    ring_shift_px,
+    texture_columns,
+    texture_shift_px,
+)
+from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
+
+# What a position or reading effect leaves alone.
+LEAVES_TEXTURE = {
+    "laser_tilt", "laser_cone", "baseline", "beam_decentre", "sheet_waviness", "laser_rocking",
+    "baseline_drift", "pixel_locking", "albedo_bias", "subsurface", "line_skew", "vignetting",
+}  # fmt: skip
+READINGS = {"encoder_scale", "encoder_slip", "encoder_backlash", "time_offset"}
+BORE = Bore(42.0, (4.0, -7.0, 0.0), (0.03, -0.02, 1.0))
+
+
+def known_probe():
+    camera = KannalaBrandt((1600, 1200), (366.1, 366.1), (800.0, 600.0), (-0.0118, 0.0008, -0.0008, 0.0))
+    laser = LaserSheet(23.4, 3e-4, -2e-4, cone_rad=-2e-4)
+    return Probe(camera, laser, np.zeros((20, 20)))
+
+
+def line(count=72):
+    points = ring_points(known_probe(), BORE, count)
+    slope = 0.2 * np.sin(3 * points.azimuth_rad)
+    return replace(points, albedo_slope_per_mm=slope, distance_mm=np.full(count, 20.0))
+
+
+def texture():
+    points = texture_points(known_probe(), BORE)
+    return replace(points, distance_mm=np.full(len(points.uv), 37.0))
+
+
+def travel():
+    time = np.linspace(0, 8, 241)
+    distance = 20 * np.sin(2 * np.pi * time / 8)
+    return Travel(time, distance, 5 * np.pi * np.cos(2 * np.pi * time / 8), distance)
+
+
+def shape_of(model):
+    return model.shapes(8.0, 30.0)[0]
+
+
+def size_of(model, scale=1.0):
+    sizes = np.array([a.plausible for a in model.amplitudes])
+    return scale * sizes * np.linspace(1.0, 0.6, len(sizes))
+
+
+EVERY = [*LIBRARY.values(), *DECOYS, *GENERIC]
+NAMES = [m.name for m in EVERY]
+
+
+def test_every_effect_of_the_catalogue_is_predicted_or_said_not_to_be():
+    assert set(LIBRARY) | set(NOT_PREDICTED) == set(EFFECTS)
+    assert not set(LIBRARY) & set(NOT_PREDICTED)
+
+
+def test_names_are_unique():
+    assert len(set(NAMES)) == len(NAMES)
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_each_effect_moves_what_it_should_and_leaves_the_rest_alone(name):
+    model = LIBRARY[name]
+    size, shape = size_of(model), shape_of(model)
+    ring = np.abs(ring_shift_px(model, line(), shape, size)).max()
+    points = np.abs(texture_shift_px(model, texture(), shape, size)).max()
+    reading = np.abs(model.reading_shift_mm(travel(), shape, size)).max()
+    assert (ring > 1e-4) == (name not in READINGS)
+    assert (points > 1e-4) == (name not in READINGS | LEAVES_TEXTURE)
+    assert (reading > 1e-4) == (name in READINGS)
+
+
+@pytest.mark.parametrize("model", EVERY, ids=NAMES)
+def test_no_amplitude_is_no_effect(model):
+    shape, none = shape_of(model), np.zeros(len(model.amplitudes))
+    assert np.abs(ring_shift_px(model, line(), shape, none)).max() < 1e-9
+    assert np.abs(texture_shift_px(model, texture(), shape, none)).max() < 1e-9
+    assert not model.reading_shift_mm(travel(), shape, none).any()
+
+
+@pytest.mark.parametrize("model", EVERY, ids=NAMES)
+def test_columns_are_the_derivative_of_the_prediction(model):
+    shape, small = shape_of(model), size_of(model, 1e-3)
+    points, off_line = line(), texture()
+    ring, wall = columns(model, points, shape) @ small, texture_columns(model, off_line, shape) @ small
+    expected_ring = ring_shift_px(model, points, shape, small)
+    expected_wall = texture_shift_px(model, off_line, shape, small)
+    assert ring == pytest.approx(expected_ring, abs=max(3e-3 * np.abs(expected_ring).max(), 1e-7))
+    assert wall == pytest.approx(expected_wall, abs=max(3e-3 * np.abs(expected_wall).max(), 1e-7))
+
+
+@pytest.mark.parametrize("name", sorted(READINGS))
+def test_reading_columns_are_the_derivative_of_the_reading(name):
+    model = LIBRARY[name]
+    small = size_of(model, 1e-2)
+    found = reading_columns(model, travel(), shape_of(model)) @ small
+    expected = model.reading_shift_mm(travel(), shape_of(model), small)
+    # Play is taken up over the play's own length, so that frames just after a reversal are not linear in it.
+    assert np.median(np.abs(found - expected)) < 0.01 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", [n for n in LIBRARY if len(LIBRARY[n].amplitudes) > 1])
+def test_amplitudes_add_like_vectors(name):
+    model = LIBRARY[name]
+    shape, points = shape_of(model), line()
+    size = size_of(model, 0.1)
+    together = ring_shift_px(model, points, shape, size)
+    alone = sum(ring_shift_px(model, points, shape, size * part) for part in np.eye(len(size)))
+    assert together == pytest.approx(alone, abs=2e-3 * np.abs(together).max())
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_quantities_are_those_of_the_catalogue_within_its_range_and_in_the_words(name):
+    model = LIBRARY[name]
+    shape, size = shape_of(model), size_of(model)
+    found = model.quantities(shape, size)
+    known = {q.name for q in EFFECTS[name].quantities}
+    assert set(found) == known
+    assert model.possible(shape, size)
+    assert model.statement(shape, size).endswith(".")
+    assert all(quantity in model.equation(shape, size) for quantity in found)
+
+
+def test_a_size_outside_the_catalogues_range_is_not_possible():
+    assert not LIBRARY["laser_cone"].possible((), np.array([4.0]))
+    assert not LIBRARY["housing_glass"].possible((), np.array([-1.0]))
+    assert not LIBRARY["albedo_bias"].possible((), np.array([-0.1]))
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "amplitude", "direction"),
+    [
+        ("laser_tilt", (), [0.3, 0.4], np.degrees(np.arctan2(4, 3))),
+        ("sheet_waviness", (3.0,), [0.0, 0.5], 30.0),
+        ("ovality", (), [-0.1, 0.0], 90.0),
+    ],
+)
+def test_the_direction_is_that_of_a_crest(name, shape, amplitude, direction):
+    model = LIBRARY[name]
+    found = model.quantities(shape, np.array(amplitude))["direction_deg"]
+    assert found == pytest.approx(direction)
+    points = ring_points(plain_probe(), Bore(50.8))
+    moved = model.sheet_shift_mm(points, shape, np.array(amplitude)) + model.wall_shift_mm(
+        points, shape, np.array(amplitude)
+    )
+    crest = np.argmin(np.abs(points.azimuth_rad - np.radians(direction)))
+    assert moved[crest] == pytest.approx(moved.max(), rel=1e-3)
+
+
+def test_rocking_is_told_by_its_longer_axis():
+    along = np.array([np.cos(0.5), np.sin(0.5)])
+    amplitude = np.concatenate([3.0 * along, 4.0 * along])
+    found = LIBRARY["laser_rocking"].quantities((5.3,), amplitude)
+    assert found["amplitude_mrad"] == pytest.approx(5.0)
+    assert np.tan(np.radians(found["direction_deg"])) == pytest.approx(np.tan(0.5))
+    assert found["frequency_hz"] == 5.3
+
+
+def test_rocking_frequencies_reach_half_the_frame_rate_no_farther_apart_than_the_recording_resolves():
+    frequencies = np.array(LIBRARY["laser_rocking"].shapes(8.0, 30.0))[:, 0]
+    assert frequencies[0] <= 1 / 8.0
+    assert frequencies[-1] == pytest.approx(15.0, abs=1 / 16)
+    assert np.diff(frequencies).max() <= 0.5 / 8.0 + 1e-9
+
+
+def test_drifts_start_at_nothing_and_end_at_their_size():
+    model = LIBRARY["baseline_drift"]
+    points = replace(line(3), time_s=np.array([0.0, 2.0, 1e4]))
+    course = model.sheet_shift_mm(points, (2.0,), np.array([0.1]))
+    assert course == pytest.approx([0.0, 0.1 * (1 - np.exp(-1)), 0.1])
+
+
+def test_a_rolling_shutter_shows_lower_rows_later():
+    points = texture()
+    shift = LIBRARY["rolling_shutter"].image_shift_px(points, (), np.array([0.02]))
+    assert shift[:, 0] == pytest.approx(0.02 * (points.uv[:, 1] - 599.5) / 1200 * 30.0)
+
+
+def test_the_encoder_slips_lags_and_waits_at_a_reversal():
+    log = travel()
+    slip = LIBRARY["encoder_slip"].reading_shift_mm(log, (4.0,), np.array([3.0]))
+    assert set(slip[log.time_s <= 4.0]) == {0.0}
+    assert set(slip[log.time_s > 4.0]) == {3.0}
+    late = LIBRARY["time_offset"].reading_shift_mm(log, (), np.array([0.1]))
+    assert -late == pytest.approx(0.1 * log.speed_mm_s, abs=0.1)
+    play = LIBRARY["encoder_backlash"].reading_shift_mm(log, (), np.array([2.0]))
+    fast = np.abs(log.speed_mm_s) > 11.0
+    assert play[fast] == pytest.approx(-np.sign(log.speed_mm_s[fast]))
+    reading = log.distance_mm + play
+    waiting = np.abs(log.time_s - 2.05) < 0.05
+    assert np.ptp(reading[waiting]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_nothing_is_predicted_from_what_is_not_known_of_the_wall():
+    points = ring_points(known_probe(), BORE)
+    assert not ring_shift_px(LIBRARY["albedo_bias"], points, (), np.array([0.09])).any()
+    wall = next(d for d in DECOYS if d.name == "decoy_wall_1")
+    assert not ring_shift_px(wall, points, (), np.array([0.1, 0.1])).any()
+
+
+def test_ovality_stays_with_the_pipe_while_the_camera_rolls():
+    points = line()
+    rolled = replace(points, wall_azimuth_rad=points.azimuth_rad + 0.7)
+    shift = LIBRARY["ovality"].wall_shift_mm(rolled, (), np.array([0.1, 0.0]))
+    assert shift == pytest.approx(0.1 * np.cos(2 * (points.azimuth_rad + 0.7)))
+
+
+def test_the_library_without_some_knows_the_others():
+    fewer = without(["laser_tilt", "ghost_ring"])
+    assert set(LIBRARY) - set(fewer) == {"laser_tilt"}
+    with pytest.raises(InputError):
+        without(["laser_tlit"])
+
+
+def test_the_generic_basis_mimics_a_tilted_sheet_and_decoys_are_beyond_it():
+    rings = [
+        ring_points(plain_probe(), Bore(r), 90, time_s=t) for r, t in ((35.0, 1.0), (42.0, 4.0), (50.8, 9.0))
+    ]
+    basis = np.concatenate([smooth_columns(ring) for ring in rings])
+
+    def left(model):
+        column = np.concatenate([columns(model, ring, shape_of(model)) for ring in rings])[:, 0]
+        fitted = basis @ np.linalg.lstsq(basis, column, rcond=1e-12)[0]
+        return np.linalg.norm(column - fitted) / np.linalg.norm(column)
+
+    assert basis.shape == (270, 72)
+    assert left(LIBRARY["laser_tilt"]) < 1e-6
+    assert left(next(d for d in DECOYS if d.name == "decoy_rows_97")) > 0.5
+
+
+def test_generic_terms_move_either_the_line_or_the_whole_image():
+    points, wall = line(), texture()
+    for term in GENERIC:
+        size = np.full(len(term.amplitudes), 0.1)
+        assert ring_shift_px(term, points, (0.0,), size).any() or term.moves is Moves.AROUND
+        assert bool(texture_shift_px(term, wall, (0.0,), size).any()) == (term.moves is not Moves.LINE)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_is_in_its_own_class(name):
+    assert name in class_of(name)
+    assert set(class_of(name)) in ({name}, *map(set, CLASSES))
+
+
+def test_classes_join_in_the_catalogues_order():
+    joined = classes_of(["principal_point", "laser_cone"])
+    assert set(joined) == {*CLASSES[0], *CLASSES[2]}
+    assert list(joined) == [name for name in EFFECTS if name in joined]
+
+
+def test_likeness_goes_both_ways():
+    assert alike("laser_rocking", "probe_vibration")
+    assert alike("probe_vibration", "laser_rocking")
+    assert not alike("laser_tilt", "laser_cone")
+
+
+def test_what_to_record_next_names_each_recording_once():
+    sentence = record_next(["laser_tilt", "principal_point", "sensor_tilt"])
+    assert sentence.startswith("To tell laser_tilt, principal_point and sensor_tilt apart, record: ")
+    assert sentence.count("several diameters") == 1
+    assert "off-centre sweep of 8 mm" in sentence
+    assert (
+        record_next(["outside_index"])
+        == "To confirm outside_index, record: a log of pressure and temperature."
+    )
