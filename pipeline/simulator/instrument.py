@@ -89,7 +89,7 @@ class TrueLaser:
 
     sheet: LaserSheet
     waves: tuple[SheetWave, ...] = ()
-    profile: LineProfile = LineProfile()
+    profile: LineProfile = field(default_factory=LineProfile)
     power_mm: float = 0.6
     brightness: tuple[float, float] = (0.0, 0.0)
     colour_bgr: Bgr = (0.35, 1.0, 0.15)

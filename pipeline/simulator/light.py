@@ -3,29 +3,42 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pipeline.simulator.kernel import kernel, owner
 from pipeline.simulator.rays import ray_at
 from pipeline.simulator.sheet import density_at, sheet_at
 from pipeline.simulator.surface import meet, normal_at, radius_at
 from pipeline.simulator.texture import albedo_at
-from pipeline.simulator.view import TILE_PX, to_pipe
+from pipeline.simulator.view import TILE_PX, to_wall
 
 REFERENCE_MM = 50.0
+# The glossy lobe is left out where it is below e to the minus this.
+_NO_LOBE = 16.0
 
 
-@njit(cache=True, nogil=True)
+@owner
+def _work():  # type: ignore[no-untyped-def]
+    """Return room for a ray in C and W, a hit, its section, its normal, its reflectance, and two vectors."""
+    return (
+        np.empty(6), np.empty(6), np.empty(4), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3),
+        np.empty(3), np.empty(3),
+    )  # fmt: skip
+
+
+@owner
 def add_line(view, line, colour, gain, speckle, tiles, samples, v_from, v_to, image):  # type: ignore[no-untyped-def]
     """Add a line's light to rows v_from … v_to of an image (H, W, 3), in the tiles that it may touch.
 
     ``speckle`` is (contrast, grain in mm, seed).
     """
-    work = np.empty(6), np.empty(6), np.empty(4), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
+    work = _work()
     total, times = np.empty(3), view.pose.shape[1]
     share = gain / (samples * samples * times)
     for v in range(v_from, v_to):
         for u in range(image.shape[1]):
             if not tiles[v // TILE_PX, u // TILE_PX]:
+                continue
+            if not _near_line(view, line, u, v, times, work):
                 continue
             total[:] = 0.0
             for n in range(samples * samples):
@@ -38,13 +51,36 @@ def add_line(view, line, colour, gain, speckle, tiles, samples, v_from, v_to, im
                 image[v, u, c] += share * colour[c] * total[c]
 
 
-@njit(cache=True, nogil=True)
+@kernel
+def _near_line(view, line, u, v, times, work):  # type: ignore[no-untyped-def]
+    """Tell whether a pixel's middle comes as near to the line as any of its parts may, at some moment."""
+    c_ray, w_ray, hit, o, R, normal, _, _, _ = work
+    ray_at(view.rays, u, v, c_ray)
+    if not (c_ray[5] > -0.5):
+        return False
+    for k in range(times):
+        to_wall(view, v, k, c_ray, w_ray)
+        if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):
+            continue
+        x, y, z = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4], c_ray[2] + hit[0] * c_ray[5]
+        height, slope, _ = sheet_at(line.sheet, 0.5, np.arctan2(y, x))
+        above = z - height - np.sqrt(x * x + y * y) * slope
+        normal_at(view.surface, hit, R, normal)
+        facing = abs(w_ray[3] * normal[0] + w_ray[4] * normal[1] + w_ray[5] * normal[2])
+        room = 1.5 * hit[0] / (view.px_per_rad * max(facing, 0.02)) + line.wobble_mm
+        high = line.profile.low + line.profile.step * (line.profile.density.shape[0] - 1)
+        if above > line.profile.low - room and above < high + room:
+            return True
+    return False
+
+
+@kernel
 def _line_light(view, line, speckle, row, k, samples, work, total):  # type: ignore[no-untyped-def]
-    c_ray, p_ray, hit, o, R, normal, albedo = work
+    c_ray, w_ray, hit, o, R, normal, albedo, way, _ = work
     if not (c_ray[5] > -0.5):
         return
-    to_pipe(view, row, k, c_ray, p_ray)
-    if not meet(view.surface, p_ray, view.distance_mm, o, R, hit):
+    to_wall(view, row, k, c_ray, w_ray)
+    if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):
         return
     x, y, z = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4], c_ray[2] + hit[0] * c_ray[5]
     q = np.sqrt(x * x + y * y)
@@ -56,7 +92,6 @@ def _line_light(view, line, speckle, row, k, samples, work, total):  # type: ign
         return
     normal_at(view.surface, hit, R, normal)
     T = view.pose[min(row, view.pose.shape[0] - 1), k]
-    way = np.empty(3)
     for a in range(3):
         way[a] = (T[a, 0] * x / q + T[a, 1] * y / q + T[a, 2] * slope) / steep
     square = -(normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2])
@@ -64,25 +99,27 @@ def _line_light(view, line, speckle, row, k, samples, work, total):  # type: ign
         return
     foot = hit[0] / (view.px_per_rad * samples)
     albedo_at(view.texture, hit[1], hit[2], foot, albedo)
-    light = weight * density * square * REFERENCE_MM / q * _sheen(view.texture, normal, way, p_ray)
+    light = weight * density * square * REFERENCE_MM / q * _sheen(view.texture, normal, way, w_ray)
     if speckle[0] > 0.0:
         light *= _speckle(speckle, hit)
     for c in range(3):
         total[c] += light * albedo[c]
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _sheen(texture, normal, way, p_ray):  # type: ignore[no-untyped-def]
+@kernel
+def _sheen(texture, normal, way, w_ray):  # type: ignore[no-untyped-def]
     """Return what a partly glossy wall sends to the camera over what a dull one would (Blinn-Phong)."""
     if texture.gloss <= 0.0:
         return 1.0
-    a, b, c = -way[0] - p_ray[3], -way[1] - p_ray[4], -way[2] - p_ray[5]
+    a, b, c = -way[0] - w_ray[3], -way[1] - w_ray[4], -way[2] - w_ray[5]
     size = np.sqrt(a * a + b * b + c * c) + 1e-12
     cosine = max((a * normal[0] + b * normal[1] + c * normal[2]) / size, 0.0)
+    if texture.lobe * (1.0 - cosine) > _NO_LOBE:
+        return 1.0 - texture.gloss
     return 1.0 - texture.gloss + texture.gloss * (texture.lobe + 8.0) / 8.0 * cosine**texture.lobe
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def _speckle(speckle, hit):  # type: ignore[no-untyped-def]
     """Return the factor, mean 1, of the speckle cell that a hit lies in."""
     contrast, grain, seed = speckle
@@ -93,7 +130,7 @@ def _speckle(speckle, hit):  # type: ignore[no-untyped-def]
     return 1.0 - contrast - contrast * np.log(uniform)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def hashed(x):  # type: ignore[no-untyped-def]
     """Return 64 well mixed bits of 64 bits (finaliser of splitmix64, Steele et al. 2014)."""
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -101,10 +138,10 @@ def hashed(x):  # type: ignore[no-untyped-def]
     return x ^ (x >> np.uint64(31))
 
 
-@njit(cache=True, nogil=True)
+@owner
 def add_wall_light(view, leds, lobe, colour, level, ambient, samples, v_from, v_to, image):  # type: ignore[no-untyped-def]
     """Add what LEDs at ``leds`` (L, 3) in C, and even stray light, make of the wall, to rows of an image."""
-    work = np.empty(6), np.empty(6), np.empty(4), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
+    work = _work()
     total, times = np.empty(3), view.pose.shape[1]
     share = 1.0 / (samples * samples * times)
     for v in range(v_from, v_to):
@@ -120,27 +157,26 @@ def add_wall_light(view, leds, lobe, colour, level, ambient, samples, v_from, v_
                 image[v, u, c] += share * colour[c] * total[c]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _wall_light(view, leds, lobe, level, ambient, row, k, samples, work, total):  # type: ignore[no-untyped-def]
-    c_ray, p_ray, hit, o, R, normal, albedo = work
+    c_ray, w_ray, hit, o, R, normal, albedo, way, at = work
     if not (c_ray[5] > -0.2):
         return
-    to_pipe(view, row, k, c_ray, p_ray)
-    if not meet(view.surface, p_ray, view.distance_mm, o, R, hit):
+    to_wall(view, row, k, c_ray, w_ray)
+    if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):
         return
     normal_at(view.surface, hit, R, normal)
     T = view.pose[min(row, view.pose.shape[0] - 1), k]
-    facing = -(p_ray[3] * normal[0] + p_ray[4] * normal[1] + p_ray[5] * normal[2])
+    facing = -(w_ray[3] * normal[0] + w_ray[4] * normal[1] + w_ray[5] * normal[2])
     if facing <= 0.0:
         return
     light = ambient
     hidden = _may_hide(view.surface, hit, T, o, R)
-    way, at = np.empty(3), np.empty(3)
     for n in range(leds.shape[0]):
         d2 = 0.0
         for a in range(3):
             at[a] = T[a, 0] * leds[n, 0] + T[a, 1] * leds[n, 1] + T[a, 2] * leds[n, 2] + T[a, 3]
-            way[a] = p_ray[a] + hit[0] * p_ray[3 + a] - at[a]
+            way[a] = w_ray[a] + hit[0] * w_ray[3 + a] - at[a]
             d2 += way[a] * way[a]
         d = np.sqrt(d2)
         for a in range(3):
@@ -152,14 +188,14 @@ def _wall_light(view, leds, lobe, level, ambient, row, k, samples, work, total):
         if hidden and _shaded(view.surface, hit, way, d, o, R):
             continue
         emitted = forward if lobe == 1.0 else forward**lobe
-        sheen = _sheen(view.texture, normal, way, p_ray)
+        sheen = _sheen(view.texture, normal, way, w_ray)
         light += level / leds.shape[0] * emitted * square * REFERENCE_MM**2 / d2 * sheen
     albedo_at(view.texture, hit[1], hit[2], hit[0] / (view.px_per_rad * samples * max(facing, 0.05)), albedo)
     for c in range(3):
         total[c] += light * albedo[c]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _may_hide(surface, hit, T, o, R):  # type: ignore[no-untyped-def]
     """Tell whether the wall between a hit and the camera stands in far enough to hide the LEDs."""
     along = R[0, 2] * (o[0] - T[0, 3]) + R[1, 2] * (o[1] - T[1, 3]) + R[2, 2] * (o[2] - T[2, 3])
@@ -167,14 +203,14 @@ def _may_hide(surface, hit, T, o, R):  # type: ignore[no-untyped-def]
         return False
     back = 0.5
     while back < min(along, 64.0):
-        k = min(max(int(hit[1] - back - surface.from_mm), 0), surface.floor_mm.shape[0] - 1)
-        if surface.floor_mm[k] < hit[3] * (1.0 - back / along) + 11.0 * back / along:
+        k = min(max(int(hit[1] - back - surface.from_mm), 0), surface.floor_mm.shape[1] - 1)
+        if surface.floor_mm[0, k] < hit[3] * (1.0 - back / along) + 11.0 * back / along:
             return True
         back *= 2.0
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _shaded(surface, hit, way, distance, o, R):  # type: ignore[no-untyped-def]
     """Tell whether the wall stands between a hit and an LED; the section's frame is taken as straight."""
     c, s = np.cos(hit[2]), np.sin(hit[2])
@@ -188,7 +224,10 @@ def _shaded(surface, hit, way, distance, o, R):  # type: ignore[no-untyped-def]
         rho = np.sqrt(x * x + y * y)
         if rho < surface.least_mm:
             return False
-        if radius_at(surface, hit[1] + back * dz, np.arctan2(y, x)) < rho - 0.01:
+        if (
+            radius_at(surface.radius, surface.from_mm, surface.step_mm, hit[1] + back * dz, np.arctan2(y, x))
+            < rho - 0.01
+        ):
             return True
         step *= 1.25
         back += step

@@ -28,7 +28,7 @@ def motion_of(scene: MotionScene, until_s: float) -> Motion:
 
 
 def _way(scene: MotionScene, until_s: float) -> Signal:
-    """Return the distance: speeds averaged over the easing time, integrated twice exactly between fine steps."""
+    """Return the distance: speeds averaged over the easing time, and integrated."""
     easing = scene.easing_s
     fine = easing / (_KNOTS_AN_EASING * _FINE)
     time = np.arange(-easing, until_s + easing + fine, fine)

@@ -42,10 +42,10 @@ class LineProfile:
         return line + self.copy_relative * self._line(np.asarray(height_mm, float) - self.copy_mm)
 
     def reach_mm(self) -> tuple[float, float]:
-        """Return heights outside which the density is below 10⁻⁷ of the peak."""
+        """Return heights outside which the density is below 10⁻⁶ of the peak."""
         tail = 16 * abs(self._exponential_mm())
-        low = -6 * self.sigma_mm - (tail if self.skewness < 0 else 0.0)
-        high = 6 * self.sigma_mm + (tail if self.skewness > 0 else 0.0) + 16 * self.transport_mm
+        low = -5.4 * self.sigma_mm - (tail if self.skewness < 0 else 0.0)
+        high = 5.4 * self.sigma_mm + (tail if self.skewness > 0 else 0.0) + 16 * self.transport_mm
         moved = self.copy_mm if self.copy_relative else 0.0
         return low + min(moved, 0.0), high + max(moved, 0.0)
 

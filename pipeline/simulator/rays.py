@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.simulator.instrument import TrueCamera
+from pipeline.simulator.kernel import kernel
 from pipeline.simulator.window import through
 
 Float = NDArray[np.float64]
@@ -24,6 +24,8 @@ class RayTable(NamedTuple):
     ----------
     node : (rows, columns, 6)
         Origin, mm, and unit direction in C; NaN where no ray maps.
+    central : bool
+        All rays come from the origin of C.
     step : float
     first : float
         Pixel coordinate of the first node, u and v alike.
@@ -32,6 +34,7 @@ class RayTable(NamedTuple):
     """
 
     node: Float
+    central: bool
     step: float
     first: float
     centre_u: float
@@ -48,9 +51,9 @@ def ray_table(camera: TrueCamera) -> RayTable:
     origin, ray = viewing_rays(camera, np.stack(np.meshgrid(u, v), -1))
     centre = camera.model.centre_px
     node = np.ascontiguousarray(np.concatenate([origin, ray], -1))
-    return RayTable(
-        node, float(_STEP_PX), float(first), float(centre[0]), float(centre[1]), camera.locking_px
-    )
+    central = camera.pupil_shift_mm == 0 and not camera.windows
+    at = float(centre[0]), float(centre[1])
+    return RayTable(node, central, float(_STEP_PX), float(first), *at, camera.locking_px)
 
 
 def viewing_rays(camera: TrueCamera, uv: Float) -> tuple[Float, Float]:
@@ -86,39 +89,32 @@ def _focal_px(camera: TrueCamera) -> float:
     return float(np.linalg.norm(uv[0] - uv[1]) / 2e-6)
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _cubic(w, k):  # type: ignore[no-untyped-def]
-    """Weight of node k − 1 of four in Lagrange's cubic at fraction w between the middle two."""
-    if k == 0:
-        return -w * (w - 1.0) * (w - 2.0) / 6.0
-    if k == 1:
-        return (w + 1.0) * (w - 1.0) * (w - 2.0) / 2.0
-    if k == 2:
-        return -(w + 1.0) * w * (w - 2.0) / 2.0
-    return (w + 1.0) * w * (w - 1.0) / 6.0
-
-
-@njit(cache=True, nogil=True)
+@kernel
 def ray_at(table, u, v, out):  # type: ignore[no-untyped-def]
-    """Write origin and unit direction of pixel (u, v) to ``out`` (6,)."""
+    """Write origin and unit direction of pixel (u, v) to ``out`` (6,), by Lagrange's cubic both ways."""
     if table.locking != 0.0:
         du, dv = u - table.centre_u, v - table.centre_v
         rho = np.sqrt(du * du + dv * dv) + 1e-9
         back = table.locking * np.sin(2.0 * np.pi * rho) / rho
         u, v = u - back * du, v - back * dv
     x, y = (u - table.first) / table.step, (v - table.first) / table.step
-    i, j = int(np.floor(y)), int(np.floor(x))
-    i = min(max(i, 1), table.node.shape[0] - 3)
-    j = min(max(j, 1), table.node.shape[1] - 3)
-    wx, wy = x - j, y - i
-    for c in range(6):
-        out[c] = 0.0
-    for a in range(4):
-        wa = _cubic(wy, a)
-        for b in range(4):
-            w = wa * _cubic(wx, b)
-            for c in range(6):
-                out[c] += w * table.node[i - 1 + a, j - 1 + b, c]
-    size = np.sqrt(out[3] * out[3] + out[4] * out[4] + out[5] * out[5])
-    for c in range(3, 6):
-        out[c] /= size
+    i = min(max(int(np.floor(y)), 1), table.node.shape[0] - 3)
+    j = min(max(int(np.floor(x)), 1), table.node.shape[1] - 3)
+    w, h = x - j, y - i
+    w0, w1 = -w * (w - 1.0) * (w - 2.0) / 6.0, (w + 1.0) * (w - 1.0) * (w - 2.0) / 2.0
+    w2, w3 = -(w + 1.0) * w * (w - 2.0) / 2.0, (w + 1.0) * w * (w - 1.0) / 6.0
+    h0, h1 = -h * (h - 1.0) * (h - 2.0) / 6.0, (h + 1.0) * (h - 1.0) * (h - 2.0) / 2.0
+    h2, h3 = -(h + 1.0) * h * (h - 2.0) / 2.0, (h + 1.0) * h * (h - 1.0) / 6.0
+    n = table.node
+    for c in range(3 if table.central else 0, 6):
+        r0 = w0 * n[i - 1, j - 1, c] + w1 * n[i - 1, j, c] + w2 * n[i - 1, j + 1, c] + w3 * n[i - 1, j + 2, c]
+        r1 = w0 * n[i, j - 1, c] + w1 * n[i, j, c] + w2 * n[i, j + 1, c] + w3 * n[i, j + 2, c]
+        r2 = w0 * n[i + 1, j - 1, c] + w1 * n[i + 1, j, c] + w2 * n[i + 1, j + 1, c] + w3 * n[i + 1, j + 2, c]
+        r3 = w0 * n[i + 2, j - 1, c] + w1 * n[i + 2, j, c] + w2 * n[i + 2, j + 1, c] + w3 * n[i + 2, j + 2, c]
+        out[c] = h0 * r0 + h1 * r1 + h2 * r2 + h3 * r3
+    if table.central:
+        out[0], out[1], out[2] = 0.0, 0.0, 0.0
+    size = 1.0 / np.sqrt(out[3] * out[3] + out[4] * out[4] + out[5] * out[5])
+    out[3] *= size
+    out[4] *= size
+    out[5] *= size

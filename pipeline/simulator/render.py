@@ -19,7 +19,7 @@ from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
 from pipeline.simulator.surface import Surface, surface_of
 from pipeline.simulator.texture import Texture, texture_of
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.view import Line, View, line_tiles
+from pipeline.simulator.view import Line, View, line_of, line_tiles
 from pipeline.simulator.workers import in_bands
 
 Float = NDArray[np.float64]
@@ -72,8 +72,8 @@ class Renderer:
     def view(self, number: int, instrument: TrueInstrument) -> View:
         """Return camera and wall at a frame."""
         opened, span = self._opened(number, instrument)
-        axis = self.truth.wall.axis
-        pose = np.ascontiguousarray(self.truth.motion.pose(opened, axis)[..., :3, :])
+        T_wc = self.surface.T_wp @ self.truth.motion.pose(opened, self.truth.wall.axis)
+        pose = np.ascontiguousarray(T_wc[..., :3, :])
         moment = (opened - opened.min()) / max(span, 1e-9)
         distance = float(self.truth.motion.distance_mm.at(np.array(self._time_s(number))))
         table = _rays(instrument.camera)
@@ -112,14 +112,14 @@ class Renderer:
 
     def lines(self, number: int, view: View, instrument: TrueInstrument) -> tuple[Line, ...]:
         """Return the laser's sheet and, where the wall mirrors, its bounce across the bore."""
-        opened, span = self._opened(number, instrument)
+        opened = self._opened(number, instrument)[0]
         moments = np.linspace(opened.min(), opened.max(), _SHEET_MOMENTS if self.truth.changes else 1)
         lasers = tuple(self.truth.instrument_at(float(t)).laser for t in moments)
         profile = profile_table(instrument.laser.profile)
-        direct = Line(sheet_table(lasers), profile)
-        pose = np.vstack([view.pose[len(view.pose) // 2, 0], [0, 0, 0, 1]])
-        ghost = ghost_table(self.surface, instrument.laser, pose, view.distance_mm)
-        return (direct,) if ghost is None else (direct, Line(ghost, profile))
+        direct = line_of(sheet_table(lasers), profile, self.surface)
+        T_wc = view.pose[len(view.pose) // 2, view.pose.shape[1] // 2]
+        ghost = ghost_table(self.surface, instrument.laser, T_wc, view.distance_mm)
+        return (direct,) if ghost is None else (direct, line_of(ghost, profile, self.surface))
 
 
 def renderer_of(truth: SceneTruth) -> Renderer:

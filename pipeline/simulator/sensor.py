@@ -71,7 +71,7 @@ def _normal_quantiles() -> Float32:
     return np.asarray(ndtri((np.arange(_QUANTILES) + 0.5) / _QUANTILES), np.float32)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _expose(light, numbers, draw, seed, quantile, v_from, v_to, out):  # type: ignore[no-untyped-def]
     well, read, black, gamma, pattern = numbers
     columns, mask = light.shape[1], np.uint64(0xFFFF)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.simulator.instrument import TrueLaser
+from pipeline.simulator.kernel import kernel, owner
 from pipeline.simulator.profile import LineProfile
 from pipeline.simulator.surface import Surface, meet, normal_at
 from pipeline.simulator.window import through
@@ -66,8 +66,8 @@ def sheet_table(lasers: tuple[TrueLaser, ...]) -> SheetTable:
     return SheetTable(*(np.stack(part) for part in zip(*tables, strict=True)))
 
 
-def ghost_table(surface: Surface, laser: TrueLaser, T_pc: Float, distance_mm: float) -> SheetTable | None:
-    """Return the light that the wall mirrors across the bore, as the camera at ``T_pc`` (4, 4) meets it.
+def ghost_table(surface: Surface, laser: TrueLaser, T_wc: Float, distance_mm: float) -> SheetTable | None:
+    """Return the light that the wall mirrors across the bore, as the camera at ``T_wc`` (3, 4) meets it.
 
     Each ray of the sheet is mirrored where it meets the wall; its way from there is the ghost's. Its weight
     is the line's, by the share mirrored and by how rays crowd in azimuth. None where nothing is mirrored.
@@ -76,7 +76,7 @@ def ghost_table(surface: Surface, laser: TrueLaser, T_pc: Float, distance_mm: fl
         return None
     azimuth = -np.pi + 2 * np.pi * np.arange(_NODES) / _NODES
     origin, ray = sheet_rays(laser, azimuth)
-    R, t = T_pc[:3, :3], T_pc[:3, 3]
+    R, t = T_wc[:, :3], T_wc[:, 3]
     hits = _mirrored(surface, np.concatenate([origin @ R.T + t, ray @ R.T], 1), distance_mm)
     second, onward = (hits[:, 3:6] - t) @ R, (hits[:, 6:9]) @ R
     final = np.unwrap(np.arctan2(second[:, 1], second[:, 0]))
@@ -116,7 +116,7 @@ def _resampled(final: Float, height: Float, slope: Float, weight: Float, azimuth
     return SheetTable(*parts)
 
 
-@njit(cache=True, nogil=True)
+@owner
 def _mirrored(surface, rays, s):  # type: ignore[no-untyped-def]
     """Return first hit, second hit and direction between them (N, 9) of rays (N, 6) mirrored at the wall."""
     out = np.full((rays.shape[0], 9), np.nan)
@@ -139,7 +139,7 @@ def _mirrored(surface, rays, s):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def sheet_at(table, moment, azimuth):  # type: ignore[no-untyped-def]
     """Return height, slope and weight at a moment (0 to 1 of the table's span) and an azimuth."""
     times, nodes = table.height.shape
@@ -156,7 +156,7 @@ def sheet_at(table, moment, azimuth):  # type: ignore[no-untyped-def]
     return height, slope, _mix(table.weight, i0, i1, j0, j1, wx, wy)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def _mix(values, i0, i1, j0, j1, wx, wy):  # type: ignore[no-untyped-def]
     upper = (1.0 - wx) * values[i0, j0] + wx * values[i0, j1]
     if wy == 0.0:
@@ -164,7 +164,7 @@ def _mix(values, i0, i1, j0, j1, wx, wy):  # type: ignore[no-untyped-def]
     return (1.0 - wy) * upper + wy * ((1.0 - wx) * values[i1, j0] + wx * values[i1, j1])
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def density_at(table, height):  # type: ignore[no-untyped-def]
     """Return the density of light at a height above the sheet; 0 outside the table."""
     x = (height - table.low) / table.step

@@ -5,23 +5,28 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
+from pipeline.artefacts import PipeAxis
+from pipeline.geometry.rigid import from_parts, inverse
+from pipeline.simulator.kernel import kernel
 from pipeline.simulator.wall.base import Wall
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
-# A coarse step stays within the two millimetres that the floor looks ahead.
-_COARSE_MM = 1.9
-_FINE_MM = 0.3
+# Blocks that the two floors look ahead; a step of a ray stays within them.
+_NEAR_BLOCKS, _NEAR_STEP_MM = 2, 1.9
+_WIDE_BLOCKS, _WIDE_STEP_MM = 32, 31.9
+_FINE_MM, _LEAST_STEP_MM = 0.3, 0.004
 _FAR_MM = 2000.0
 _CLOSE_MM = 1e-7
 
 
 class Surface(NamedTuple):
-    """A wall laid out for the kernels.
+    """A wall laid out for the kernels, in a frame W of its own.
+
+    W is P for a bent pipe. For a straight one its z is the axis and its origin distance 0.
 
     Attributes
     ----------
@@ -29,12 +34,13 @@ class Surface(NamedTuple):
         One column more on each side, so that interpolation needs no wrapping.
     from_mm, step_mm : float
         Of the rows.
-    floor_mm : (blocks,)
-        Least radius within and next to every millimetre of distance.
+    floor_mm : (2, blocks)
+        Least radius about every millimetre of distance: within 2 mm, and within 32 mm.
     least_mm, most_mm : float
         Of all radii.
-    axis_s : (K,), axis_o : (K, 3), axis_R : (K, 3, 3)
-        The axis in P; its points are evenly spaced.
+    axis_s : (K,), axis_o : (K, 3), axis_turn : (K, 3, 3)
+        The axis in W; its points are evenly spaced. Two points: straight.
+    T_wp : (4, 4)
     """
 
     radius: Float32
@@ -45,7 +51,8 @@ class Surface(NamedTuple):
     most_mm: float
     axis_s: Float
     axis_o: Float
-    axis_R: Float
+    axis_turn: Float
+    T_wp: Float
 
 
 def surface_of(wall: Wall) -> Surface:
@@ -61,44 +68,48 @@ def surface_of(wall: Wall) -> Surface:
         np.asarray(wall.axis.distance_mm, float),
         np.ascontiguousarray(wall.axis.origin_p, float),
         np.ascontiguousarray(wall.axis.R_pa, float),
+        _own_frame(wall.axis),
     )
 
 
+def _own_frame(axis: PipeAxis) -> Float:
+    """Return ``T_wp``."""
+    if len(axis.distance_mm) > 2:
+        return np.eye(4)
+    R_pa = axis.R_pa[0]
+    return inverse(from_parts(R_pa, axis.origin_p[0] - axis.distance_mm[0] * R_pa[:, 2]))
+
+
 def _floor(wall: Wall) -> Float:
-    """Return the least radius of every millimetre, its neighbours included."""
+    """Return the least radius (2, blocks) near and less near every millimetre."""
     block = np.floor(wall.shape.step_mm * np.arange(wall.shape.rows)).astype(int)
     least = np.full(block[-1] + 1, np.inf)
     np.minimum.at(least, block, wall.radius_mm.min(1).astype(float))
     filled = np.minimum.accumulate(np.where(np.isfinite(least), least, np.inf))
     least = np.where(np.isfinite(least), least, filled)
-    return np.asarray(minimum_filter1d(least, 5, mode="nearest"))
+    reach = (2 * _NEAR_BLOCKS + 1, 2 * _WIDE_BLOCKS + 1)
+    return np.stack([minimum_filter1d(least, blocks, mode="nearest") for blocks in reach])
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _frame(surface, s, o, R):  # type: ignore[no-untyped-def]
+@kernel
+def _frame(axis_s, axis_o, axis_R, s, o, R):  # type: ignore[no-untyped-def]
     """Write the axis point and the section's frame at distance s; straight beyond the ends."""
-    count = surface.axis_s.shape[0]
-    if count == 2:
-        for a in range(3):
-            for b in range(3):
-                R[a, b] = surface.axis_R[0, a, b]
-            o[a] = surface.axis_o[0, a] + (s - surface.axis_s[0]) * R[a, 2]
-        return
-    span = (surface.axis_s[count - 1] - surface.axis_s[0]) / (count - 1)
-    w = (s - surface.axis_s[0]) / span
+    count = axis_s.shape[0]
+    span = (axis_s[count - 1] - axis_s[0]) / (count - 1)
+    w = (s - axis_s[0]) / span
     k = min(max(int(np.floor(w)), 0), count - 2)
     w -= k
     inside = min(max(w, 0.0), 1.0)
     for a in range(3):
         for b in range(3):
-            R[a, b] = (1.0 - inside) * surface.axis_R[k, a, b] + inside * surface.axis_R[k + 1, a, b]
+            R[a, b] = (1.0 - inside) * axis_R[k, a, b] + inside * axis_R[k + 1, a, b]
     _orthonormalise(R)
     beyond = (w - inside) * span
     for a in range(3):
-        o[a] = (1.0 - inside) * surface.axis_o[k, a] + inside * surface.axis_o[k + 1, a] + beyond * R[a, 2]
+        o[a] = (1.0 - inside) * axis_o[k, a] + inside * axis_o[k + 1, a] + beyond * R[a, 2]
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def _orthonormalise(R):  # type: ignore[no-untyped-def]
     size = np.sqrt(R[0, 2] ** 2 + R[1, 2] ** 2 + R[2, 2] ** 2)
     for a in range(3):
@@ -114,56 +125,50 @@ def _orthonormalise(R):  # type: ignore[no-untyped-def]
     R[2, 1] = R[0, 2] * R[1, 0] - R[1, 2] * R[0, 0]
 
 
-@njit(cache=True, nogil=True)
-def locate(surface, x, y, z, s, o, R):  # type: ignore[no-untyped-def]
-    """Return distance, and x and y off the axis in its section, of a point of P; s is a first guess.
+@kernel
+def locate(axis_s, axis_o, axis_R, x, y, z, s, o, R):  # type: ignore[no-untyped-def]
+    """Return distance, and x and y off the axis in its section, of a point of W; s is a first guess.
 
-    Leaves the section's axis point and frame in ``o`` and ``R``.
+    Leaves the section's axis point and frame in ``o`` and ``R``, unless the axis is straight.
     """
+    if axis_s.shape[0] == 2:
+        return z, x, y
     a, b = 0.0, 0.0
-    straight = surface.axis_s.shape[0] == 2
     for _ in range(30):
-        _frame(surface, s, o, R)
+        _frame(axis_s, axis_o, axis_R, s, o, R)
         dx, dy, dz = x - o[0], y - o[1], z - o[2]
         a = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz
         b = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz
         c = R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz
         s += c
-        if abs(c) < 1e-9 or straight:
+        if abs(c) < 1e-9:
             break
     return s, a, b
 
 
-@njit(cache=True, nogil=True)
-def radius_at(surface, s, psi):  # type: ignore[no-untyped-def]
+@kernel
+def radius_at(radius, from_mm, step_mm, s, psi):  # type: ignore[no-untyped-def]
     """Return the wall's radius at a distance and an azimuth, linear between samples."""
-    rows, columns = surface.radius.shape[0], surface.radius.shape[1] - 2
-    y = min(max((s - surface.from_mm) / surface.step_mm, 0.0), rows - 1.0)
+    rows, columns = radius.shape[0], radius.shape[1] - 2
+    y = min(max((s - from_mm) / step_mm, 0.0), rows - 1.0)
     i = min(int(y), rows - 2)
     x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
     x -= np.floor((x - 0.5) / columns) * columns
     j = min(max(int(x), 0), columns)
     wy, wx = y - i, x - j
-    r = surface.radius
-    upper = (1.0 - wx) * r[i, j] + wx * r[i, j + 1]
-    lower = (1.0 - wx) * r[i + 1, j] + wx * r[i + 1, j + 1]
+    upper = (1.0 - wx) * radius[i, j] + wx * radius[i, j + 1]
+    lower = (1.0 - wx) * radius[i + 1, j] + wx * radius[i + 1, j + 1]
     return (1.0 - wy) * upper + wy * lower
 
 
-@njit(cache=True, nogil=True)
-def _floor_at(surface, s):  # type: ignore[no-untyped-def]
-    k = int(s - surface.from_mm)
-    return surface.floor_mm[min(max(k, 0), surface.floor_mm.shape[0] - 1)]
-
-
-@njit(cache=True, nogil=True)
+@kernel
 def meet(surface, ray, s, o, R, hit):  # type: ignore[no-untyped-def]
     """Find where a ray from inside the pipe first meets the wall.
 
     Parameters
     ----------
     ray : (6,)
-        Origin and unit direction in P.
+        Origin and unit direction in W.
     s : float
         A guess of the origin's distance.
     o, R : (3,), (3, 3)
@@ -176,41 +181,61 @@ def meet(surface, ray, s, o, R, hit):  # type: ignore[no-untyped-def]
     bool
         False where the ray leaves without meeting the wall within two metres.
     """
-    way, low = 0.0, 0.0
-    s, a, b = locate(surface, ray[0], ray[1], ray[2], s, o, R)
-    if surface.axis_s.shape[0] == 2:
-        way = max(_to_cylinder(ray, o, R, surface.least_mm * 0.999), 0.0)
-    gap = 0.0
+    radius, floor, from_mm, step_mm = surface.radius, surface.floor_mm, surface.from_mm, surface.step_mm
+    axis_s, axis_o, axis_R = surface.axis_s, surface.axis_o, surface.axis_turn
+    way, low, gap, gap_low = 0.0, 0.0, 0.0, -1.0
+    if axis_s.shape[0] == 2:
+        s, way = ray[2], _to_cylinder(ray, surface.least_mm * 0.999)
+    last = floor.shape[1] - 1
     while way < _FAR_MM:
         s, a, b = locate(
-            surface, ray[0] + way * ray[3], ray[1] + way * ray[4], ray[2] + way * ray[5], s, o, R
+            axis_s,
+            axis_o,
+            axis_R,
+            ray[0] + way * ray[3],
+            ray[1] + way * ray[4],
+            ray[2] + way * ray[5],
+            s,
+            o,
+            R,
         )
         rho = np.sqrt(a * a + b * b)
-        floor = _floor_at(surface, s)
-        if rho < floor:
-            low = way
-            way += min(max(floor - rho, _FINE_MM), _COARSE_MM)
+        k = min(max(int(s - from_mm), 0), last)
+        near = floor[0, k] - rho
+        if near > 0.0:
+            wide = floor[1, k] - rho
+            low, gap_low = way, -1.0
+            way += max(min(wide, _WIDE_STEP_MM), min(max(near, _FINE_MM), _NEAR_STEP_MM))
             continue
-        gap = radius_at(surface, s, np.arctan2(b, a)) - rho
-        if gap <= 0.0:
+        psi = np.arctan2(b, a)
+        wall = radius_at(radius, from_mm, step_mm, s, psi)
+        gap = wall - rho
+        hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
+        if gap <= _CLOSE_MM:
             break
-        low = way
-        way += min(max(0.5 * gap, 0.02), _FINE_MM)
-    if way >= _FAR_MM or not way == way:
+        low, gap_low = way, gap
+        way += min(max(gap, _LEAST_STEP_MM), _FINE_MM)
+    if way >= _FAR_MM or np.isnan(way):
         return False
-    _refine(surface, ray, low, way, s, o, R, hit)
+    if gap < -_CLOSE_MM:
+        _refine(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, low, gap_low, way, gap, s, o, R, hit)
+    if axis_s.shape[0] == 2:
+        _straight_frame(hit[1], o, R)
     return True
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _to_cylinder(ray, o, R, radius):  # type: ignore[no-untyped-def]
-    """Return the way at which a ray reaches a radius about a straight axis; 0 if it starts beyond."""
-    px, py, dx, dy = 0.0, 0.0, 0.0, 0.0
-    for k in range(3):
-        px += R[k, 0] * (ray[k] - o[k])
-        py += R[k, 1] * (ray[k] - o[k])
-        dx += R[k, 0] * ray[3 + k]
-        dy += R[k, 1] * ray[3 + k]
+@kernel
+def _straight_frame(s, o, R):  # type: ignore[no-untyped-def]
+    o[0], o[1], o[2] = 0.0, 0.0, s
+    for a in range(3):
+        for b in range(3):
+            R[a, b] = 1.0 if a == b else 0.0
+
+
+@kernel
+def _to_cylinder(ray, radius):  # type: ignore[no-untyped-def]
+    """Return the way at which a ray reaches a radius about W's z; 0 if it starts beyond."""
+    px, py, dx, dy = ray[0], ray[1], ray[3], ray[4]
     a, b, c = dx * dx + dy * dy, px * dx + py * dy, px * px + py * py - radius * radius
     if c >= 0.0:
         return 0.0
@@ -219,27 +244,28 @@ def _to_cylinder(ray, o, R, radius):  # type: ignore[no-untyped-def]
     return (-b + np.sqrt(b * b - a * c)) / a
 
 
-@njit(cache=True, nogil=True)
-def _gap(surface, ray, way, s, o, R, hit):  # type: ignore[no-untyped-def]
-    s, a, b = locate(surface, ray[0] + way * ray[3], ray[1] + way * ray[4], ray[2] + way * ray[5], s, o, R)
+@kernel
+def _gap(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, way, s, o, R, hit):  # type: ignore[no-untyped-def]
+    s, a, b = locate(
+        axis_s, axis_o, axis_R, ray[0] + way * ray[3], ray[1] + way * ray[4], ray[2] + way * ray[5], s, o, R
+    )
     psi = np.arctan2(b, a)
-    radius = radius_at(surface, s, psi)
-    hit[0], hit[1], hit[2], hit[3] = way, s, psi, radius
-    return radius - np.sqrt(a * a + b * b)
+    wall = radius_at(radius, from_mm, step_mm, s, psi)
+    hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
+    return wall - np.sqrt(a * a + b * b)
 
 
-@njit(cache=True, nogil=True)
-def _refine(surface, ray, low, high, s, o, R, hit):  # type: ignore[no-untyped-def]
+@kernel
+def _refine(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, low, f_low, high, f_high, s, o, R, hit):  # type: ignore[no-untyped-def]
     """Close in on the crossing between two ways: regula falsi with the Illinois rule."""
-    f_low = _gap(surface, ray, low, s, o, R, hit)
-    f_high = _gap(surface, ray, high, s, o, R, hit)
     if f_low <= 0.0:
-        _gap(surface, ray, low, s, o, R, hit)
+        f_low = _gap(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, low, s, o, R, hit)
+    if f_low <= 0.0:
         return
     side = 0
     for _ in range(60):
         way = (low * f_high - high * f_low) / (f_high - f_low)
-        f = _gap(surface, ray, way, s, o, R, hit)
+        f = _gap(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, way, s, o, R, hit)
         if abs(f) < _CLOSE_MM or high - low < 1e-9:
             return
         if f > 0.0:
@@ -254,17 +280,22 @@ def _refine(surface, ray, low, high, s, o, R, hit):  # type: ignore[no-untyped-d
             side = -1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def normal_at(surface, hit, R, normal):  # type: ignore[no-untyped-def]
-    """Write the wall's inward unit normal in P at a hit, from differences over one cell each way.
+    """Write the wall's inward unit normal in W at a hit, from differences over one cell each way.
 
     The foreshortening of distance in a bend, 1 − κ r cos, is left out of the slope along the pipe.
     """
+    radius, from_mm, step_mm = surface.radius, surface.from_mm, surface.step_mm
     s, psi, r = hit[1], hit[2], hit[3]
-    ds = surface.step_mm
-    dp = 2.0 * np.pi / (surface.radius.shape[1] - 2)
-    along = (radius_at(surface, s + ds, psi) - radius_at(surface, s - ds, psi)) / (2.0 * ds)
-    around = (radius_at(surface, s, psi + dp) - radius_at(surface, s, psi - dp)) / (2.0 * dp * r)
+    ds = step_mm
+    dp = 2.0 * np.pi / (radius.shape[1] - 2)
+    along = (
+        radius_at(radius, from_mm, step_mm, s + ds, psi) - radius_at(radius, from_mm, step_mm, s - ds, psi)
+    ) / (2.0 * ds)
+    around = (
+        radius_at(radius, from_mm, step_mm, s, psi + dp) - radius_at(radius, from_mm, step_mm, s, psi - dp)
+    ) / (2.0 * dp * r)
     c, sn = np.cos(psi), np.sin(psi)
     size = np.sqrt(1.0 + along * along + around * around)
     x, y, z = -(c + around * sn) / size, -(sn - around * c) / size, along / size

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.simulator.kernel import kernel
 from pipeline.simulator.wall.base import Wall
 
 Float32 = NDArray[np.float32]
@@ -51,7 +51,7 @@ def texture_of(wall: Wall) -> Texture:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def albedo_at(texture, s, psi, footprint_mm, out):  # type: ignore[no-untyped-def]
     """Write the reflectance (3,) at a place, averaged over a footprint along the pipe."""
     level = 0.0
@@ -65,7 +65,7 @@ def albedo_at(texture, s, psi, footprint_mm, out):  # type: ignore[no-untyped-de
         _level_at(texture, k + 1, s, psi, w, False, out)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@kernel
 def _level_at(texture, k, s, psi, weight, fresh, out):  # type: ignore[no-untyped-def]
     """Add one level's reflectance, linear between its samples."""
     top, rows = texture.first[k], texture.first[k + 1] - texture.first[k]

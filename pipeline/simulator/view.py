@@ -1,14 +1,14 @@
-"""What a frame's kernels need: rays, poses within the exposure, wall, light; and which tiles hold the line."""
+"""What a frame's kernels need: rays, poses within the exposure, wall, light; which tiles hold the line."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from pipeline.simulator.kernel import kernel, owner
 from pipeline.simulator.rays import RayTable, ray_at
 from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
 from pipeline.simulator.surface import Surface, meet
@@ -28,7 +28,8 @@ class View(NamedTuple):
     surface : Surface
     texture : Texture
     pose : (rows or 1, T, 3, 4)
-        ``T_pc`` at T moments within each row's exposure; one row of poses where all rows see the same.
+        Camera in the surface's frame W at T moments within each row's exposure; one row of poses where all
+        rows see the same.
     moment : (rows or 1, T)
         When that is, 0 to 1 of the frame's span from the first row's opening to the last row's closing.
     distance_mm : float
@@ -47,10 +48,17 @@ class View(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A sheet of light and the profile across it."""
+    """A sheet of light, the profile across it, and how far the sheet moves during a frame, mm."""
 
     sheet: SheetTable
     profile: ProfileTable
+    wobble_mm: float
+
+
+def line_of(sheet: SheetTable, profile: ProfileTable, surface: Surface) -> Line:
+    """Return a sheet with its profile, and how far it moves at the widest wall."""
+    moved = np.ptp(sheet.height, axis=0) + surface.most_mm * np.ptp(sheet.slope, axis=0)
+    return Line(sheet, profile, float(moved.max()))
 
 
 def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Mask:
@@ -58,8 +66,8 @@ def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Ma
     rows, columns = -(-size[1] // TILE_PX), -(-size[0] // TILE_PX)
     touched = np.zeros((rows, columns), bool)
     for line in lines:
-        low = line.profile.low
-        high = low + line.profile.step * (len(line.profile.density) - 1)
+        low = line.profile.low - line.wobble_mm
+        high = line.profile.low + line.profile.step * (len(line.profile.density) - 1) + line.wobble_mm
         for k in range(view.pose.shape[1]):
             height = _heights(view, line.sheet, k, rows + 1, columns + 1)
             touched |= _crossed(height, low, high)
@@ -76,11 +84,11 @@ def _crossed(height: Float, low: float, high: float) -> Mask:
     return np.asarray(finite.any(0) & (least - room < high) & (most + room > low))
 
 
-@njit(cache=True, nogil=True)
+@owner
 def _heights(view, sheet, k, rows, columns):  # type: ignore[no-untyped-def]
     """Return the wall's height above the sheet (rows, columns) at the tiles' corners; NaN without a wall."""
     out = np.full((rows, columns), np.nan)
-    c_ray, p_ray, hit = np.empty(6), np.empty(6), np.empty(4)
+    c_ray, w_ray, hit = np.empty(6), np.empty(6), np.empty(4)
     o, R = np.empty(3), np.empty((3, 3))
     for i in range(rows):
         for j in range(columns):
@@ -88,8 +96,8 @@ def _heights(view, sheet, k, rows, columns):  # type: ignore[no-untyped-def]
             # light goes a little backward at most: rays far behind cannot see the line
             if not (c_ray[5] > -0.5):
                 continue
-            to_pipe(view, i * TILE_PX, k, c_ray, p_ray)
-            if not meet(view.surface, p_ray, view.distance_mm, o, R, hit):
+            to_wall(view, i * TILE_PX, k, c_ray, w_ray)
+            if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):
                 continue
             x, y = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4]
             z = c_ray[2] + hit[0] * c_ray[5]
@@ -98,10 +106,10 @@ def _heights(view, sheet, k, rows, columns):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, nogil=True)
-def to_pipe(view, row, k, c_ray, p_ray):  # type: ignore[no-untyped-def]
-    """Write a ray of C, seen in a row at moment k of its exposure, in P."""
+@kernel
+def to_wall(view, row, k, c_ray, w_ray):  # type: ignore[no-untyped-def]
+    """Write a ray of C, seen in a row at moment k of its exposure, in W."""
     T = view.pose[min(row, view.pose.shape[0] - 1), k]
     for a in range(3):
-        p_ray[a] = T[a, 0] * c_ray[0] + T[a, 1] * c_ray[1] + T[a, 2] * c_ray[2] + T[a, 3]
-        p_ray[3 + a] = T[a, 0] * c_ray[3] + T[a, 1] * c_ray[4] + T[a, 2] * c_ray[5]
+        w_ray[a] = T[a, 0] * c_ray[0] + T[a, 1] * c_ray[1] + T[a, 2] * c_ray[2] + T[a, 3]
+        w_ray[3 + a] = T[a, 0] * c_ray[3] + T[a, 1] * c_ray[4] + T[a, 2] * c_ray[5]
