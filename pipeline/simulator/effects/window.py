@@ -35,9 +35,9 @@ def tube_wedge(truth: SceneTruth, wedge_mm: float, direction_deg: float) -> Scen
 
 
 def tube_tilt(truth: SceneTruth, tilt_deg: float, direction_deg: float) -> SceneTruth:
-    """Tilt the tube that the probe was calibrated in, its front end going towards ``direction_deg``."""
+    """Tilt the tube that the probe was calibrated in: its outer normal leans forward at ``direction_deg``."""
     x, y = cartesian(math.sin(math.radians(tilt_deg)), direction_deg)
-    axis = (x, y, math.cos(math.radians(tilt_deg)))
+    axis = (-x, -y, math.cos(math.radians(tilt_deg)))
     inside = TUBE_OUTER_RADIUS_MM - TUBE_THICKNESS_MM
     leaning = (
         CylinderWindow(inside, GLASS_INDEX, axis_c=axis),

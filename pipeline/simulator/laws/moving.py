@@ -1,0 +1,156 @@
+"""Checks of the laws of time and pose: drifts, rocking, shutter, where the probe sits in the pipe."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects.switch import Switch, typical_switch
+from pipeline.simulator.laws.bench import FOCAL_PX, IMAGE_SIZE, bench_truth
+from pipeline.simulator.laws.check import Check
+from pipeline.simulator.laws.closed_form import baseline, focal_scale, principal_point, theta_of
+from pipeline.simulator.laws.harmonics import harmonic, strongest
+from pipeline.simulator.laws.radius import SHARE, effect_ring
+from pipeline.simulator.laws.trace import TracedRing, trace_ring
+from pipeline.simulator.motion import Motion, Signal, constant
+from pipeline.simulator.truth import SceneTruth
+
+Float = NDArray[np.float64]
+_RADIUS_MM = 50.8
+_OFF_CENTRE_MM, _YAW_DEG = 2.0, 5.0
+_SPEED_MM_S, _ALIASED_HZ = 15.0, 26.0
+
+
+def moving_checks() -> Iterator[Check]:
+    """Yield the checks."""
+    yield from _drifts()
+    yield _rocking()
+    yield from _rolling()
+    yield from _vibration()
+    yield from _off_centre()
+    yield from _yaw()
+
+
+def _drifts() -> Iterator[Check]:
+    """Static law × (1 − exp(−t/t₀)), at t = t₀."""
+    psi, gone = np.linspace(-np.pi, np.pi, 73)[:-1], -math.expm1(-1.0)
+    laws = (
+        ("baseline_drift", "✓", "−(r/l) δl (1 − exp(−t/t₀))", 0, baseline),
+        ("focal_drift", "✓", "S κ θ (1 − exp(−t/t₀))", 0, focal_scale),
+        ("centre_drift", "○", "(S/f) c c₁ (1 − exp(−t/t₀))", 1, principal_point),
+    )
+    for name, mark, text, order, law in laws:
+        switch = typical_switch(name)
+        static = law(_RADIUS_MM, psi, *switch.values[:-1])
+        ring = effect_ring(switch, _RADIUS_MM, switch.quantities["time_s"])
+        crest = np.exp(1j * order * math.radians(switch.quantities.get("direction_deg", 0.0)))
+        predicted = float((harmonic(psi, static, order) * crest.conjugate()).real) * gone
+        computed = float((harmonic(ring.azimuth_rad, ring.error_mm, order) * crest.conjugate()).real)
+        yield Check(
+            name, mark, text, "δr at t = t₀, 4 inch", predicted, computed, "mm", SHARE * abs(predicted),
+            (order, strongest(ring.azimuth_rad, ring.error_mm)),
+        )  # fmt: skip
+
+
+def _rocking() -> Check:
+    """The tilt's law, at the crest of the swing."""
+    switch = typical_switch("laser_rocking")
+    ring = effect_ring(switch, _RADIUS_MM, 0.25 / switch.quantities["frequency_hz"])
+    predicted = _RADIUS_MM**2 / 22.0 * 1e-3 * switch.values[0]
+    computed = abs(harmonic(ring.azimuth_rad, ring.error_mm, 1))
+    return Check(
+        "laser_rocking", "✓", "(r²/l) φ c₁ at one frequency", "δr at the crest, 1 mrad, 4 inch", predicted,
+        computed, "mm", SHARE * predicted, (1, strongest(ring.azimuth_rad, ring.error_mm)),
+    )  # fmt: skip
+
+
+def _rolling() -> Iterator[Check]:
+    """ė_x: (ė_x τ/2) sin 2ψ; ė_y: (ė_y τ/2)(1 − cos 2ψ); axial v τ sin ψ; τ = readout ρ₀/H."""
+    switch = typical_switch("rolling_shutter")
+    rate = 2 * math.pi * 5.3 * 0.2
+    rho = FOCAL_PX * theta_of(_RADIUS_MM)
+    size = rate * switch.values[0] * rho / IMAGE_SIZE[1] / 2
+    # the camera going one way is the ring going the other
+    sideways = trace_ring(switch_on(_moving(x_mm=_steady(-rate)), [switch]))
+    yield _shutter_check("(ė_x τ/2) sin 2ψ", "m2, sine part, ring going right", size, _part(sideways, 2).imag)
+    upright = trace_ring(switch_on(_moving(y_mm=_steady(-rate)), [switch]))
+    law = "(ė_y τ/2)(1 − cos 2ψ)"
+    yield _shutter_check(law, "m0, ring going down", size, _part(upright, 0).real)
+    yield _shutter_check(law, "m2, cosine part, ring going down", -size, _part(upright, 2).real)
+    forward = switch_on(_moving(distance_mm=_steady(_SPEED_MM_S)), [switch])
+    ring = trace_ring(forward)
+    late = ((ring.uv[:, 1] + 0.5) / IMAGE_SIZE[1] - 0.5) * switch.values[0]
+    along = forward.motion.distance_mm.at(late) - forward.motion.distance_mm.at(np.zeros(1))
+    axial = _SPEED_MM_S * switch.values[0] * rho / IMAGE_SIZE[1]
+    computed = harmonic(ring.azimuth_rad, along, 1).imag
+    yield _shutter_check("v τ sin ψ, axial", f"axial, {_SPEED_MM_S:g} mm/s", axial, computed)
+
+
+def _vibration() -> Iterator[Check]:
+    """A ring off by e(t); frames see it at |f − k · frame rate|."""
+    amplitude, frequency, direction = 0.2, _ALIASED_HZ, 40.0
+    switch = Switch("probe_vibration", (amplitude, frequency, direction))
+    truth = switch_on(bench_truth(_RADIUS_MM, frames=300), [switch])
+    ring = trace_ring(truth, 0.25 / frequency)
+    crest = np.exp(1j * math.radians(direction))
+    computed = float((harmonic(ring.azimuth_rad, ring.error_mm, 1) * crest.conjugate()).real)
+    law = "e(t) = a sin 2πft of the camera: −e c₁ on the ring"
+    yield Check("probe_vibration", "✓", law, "ring at the crest", -amplitude, computed, "mm", 0.004, (1, 1))
+    swing = truth.poses()[:, 0, 3]
+    seen = np.fft.rfftfreq(300, 1 / truth.frame_rate)[np.argmax(np.abs(np.fft.rfft(swing)))]
+    alias = abs(frequency - truth.frame_rate)
+    law = "seen at |f − k · frame rate|"
+    yield Check("probe_vibration", "✓", law, "26 Hz at 30 frames/s", alias, float(seen), "Hz", 0.1)
+
+
+def _off_centre() -> Iterator[Check]:
+    """e c₁ − (e²/4r)(1 − c₂)."""
+    ring = trace_ring(_moving(x_mm=constant(-_OFF_CENTRE_MM)))
+    e, second = _OFF_CENTRE_MM, _OFF_CENTRE_MM**2 / (4 * _RADIUS_MM)
+    law = "e c₁ − (e²/4r)(1 − c₂)"
+    for order, predicted in ((1, e), (0, -second), (2, second)):
+        of = f"m{order}, e = {e:g} mm, 4 inch"
+        tolerance = 2 * e * (e / _RADIUS_MM) ** (3 if order != 1 else 2)
+        yield Check("off-centre", "✓", law, of, predicted, _part(ring, order).real, "mm", tolerance)
+
+
+def _yaw() -> Iterator[Check]:
+    """(rβ²/4)(1 + c₂) about a centre that lies βl aside."""
+    beta = math.radians(_YAW_DEG)
+    truth = _moving(yaw_rad=constant(beta))
+    read = truth.stated.triangulate(trace_ring(truth).uv)[:, :2]
+    centre = 0.5 * (read.max(0) + read.min(0))
+    own = read - centre
+    psi, radius = np.arctan2(own[:, 1], own[:, 0]), np.linalg.norm(own, axis=1) - _RADIUS_MM
+    size, law = _RADIUS_MM * beta**2 / 4, "(rβ²/4)(1 + c₂), centre βl"
+    tolerance = 4 * size * beta**2
+    yield Check("probe yaw", "○", law, "centre, 5°", -22.0 * beta, float(centre[0]), "mm", 22 * beta**3)
+    yield Check("probe yaw", "○", law, "m0, 5°, 4 inch", size, harmonic(psi, radius, 0).real, "mm", tolerance)
+    yield Check("probe yaw", "○", law, "m2, 5°, 4 inch", size, harmonic(psi, radius, 2).real, "mm", tolerance)
+
+
+def _moving(
+    distance_mm: Signal | None = None, x_mm: Signal | None = None, y_mm: Signal | None = None,
+    yaw_rad: Signal | None = None,
+) -> SceneTruth:  # fmt: skip
+    still = constant(0.0)
+    motion = Motion(distance_mm or still, x_mm or still, y_mm or still, yaw_rad or still)
+    return replace(bench_truth(_RADIUS_MM), motion=motion)
+
+
+def _steady(rate: float) -> Signal:
+    """Return a value that changes steadily about 0 at time 0."""
+    return Signal(np.array([-1.0, 1.0]), np.array([-rate, rate]))
+
+
+def _part(ring: TracedRing, order: int) -> complex:
+    return harmonic(ring.azimuth_rad, ring.error_mm, order)
+
+
+def _shutter_check(law: str, of: str, predicted: float, computed: float) -> Check:
+    return Check("rolling_shutter", "✓", law, of, predicted, computed, "mm", SHARE * abs(predicted))
