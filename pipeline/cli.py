@@ -43,6 +43,7 @@ _ATTACHED = (
     _Attached("prove", "Conceal effects in recordings, diagnose them, open the truth, and score."),
     _Attached("simulate", "Render recordings from a scene, with their truth apart."),
     _Attached("open-seal", "Verify that a truth is the one a recording was sealed with."),
+    _Attached("review", "Go through a run in the browser: decide on each finding, measure, sign."),
     _Attached("verify", "Compare a run with a known bore, a reference model or truth: a certificate."),
 )
 

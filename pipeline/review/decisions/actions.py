@@ -99,6 +99,14 @@ class Comment(_Action):
     text: Annotated[str, Field(min_length=1, max_length=4000)]
 
 
+class Assume(_Action):
+    """What is taken for known of the pipe, for wall loss and strength."""
+
+    do: Literal["assume"] = "assume"
+    wall_thickness_mm: Annotated[float, Field(gt=0, le=1000)] | None = None
+    yield_mpa: Annotated[float, Field(gt=0, le=5000)] | None = None
+
+
 class Undo(_Action):
     """Take back the last action that still counts."""
 
@@ -111,7 +119,7 @@ class Redo(_Action):
     do: Literal["redo"] = "redo"
 
 
-Deed = Accept | Reject | Reopen | Reclassify | Redraw | Merge | Split | Add | Comment
+Deed = Accept | Reject | Reopen | Reclassify | Redraw | Merge | Split | Add | Comment | Assume
 Action = Deed | Undo | Redo
 _ACTION: TypeAdapter[Action] = TypeAdapter(Annotated[Action, Field(discriminator="do")])
 

@@ -58,7 +58,8 @@ class MeasuredWall:
 
     def column(self, azimuth_rad: float) -> int:
         """Return the column nearest to an azimuth."""
-        return round((azimuth_rad - self.azimuth_rad[0]) / self.step_rad) % len(self.azimuth_rad)
+        steps = round(float(azimuth_rad - self.azimuth_rad[0]) / self.step_rad)
+        return steps % len(self.azimuth_rad)
 
     def radius_at(self, distance_mm: float, azimuth_rad: float) -> tuple[float, float, float]:
         """Return radius, its σ, and its random σ at a point; NaN where nothing was seen."""

@@ -1,0 +1,66 @@
+"""``boresight review``: go through a run's findings in the browser, decide, measure, sign."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import webbrowser
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import uvicorn
+
+from pipeline.errors import InputError
+from pipeline.review.review import Review, open_review
+from pipeline.review.run_files import RunFiles
+from pipeline.review.server.app import application
+from pipeline.review.server.guard import Guard
+
+
+def review(
+    run: Annotated[Path, typer.Argument(help="folder of a finished run")],
+    port: Annotated[int, typer.Option(min=0, max=65535, help="port on 127.0.0.1; 0 takes a free one")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
+) -> None:
+    """Go through a run in the browser: decide on each finding, measure, sign, print.
+
+    The page is served on this machine only; nothing is sent anywhere. Decisions are kept in RUN/review.
+    """
+    opened = open_review(RunFiles(run.resolve()))
+    with as_file(files("pipeline.review").joinpath("page", "dist")) as page:
+        if not (page / "index.html").is_file():
+            raise InputError(page, "has no page", hint="install boresight whole")
+        serve(opened, page, port, browser)
+
+
+def serve(opened: Review, page: Path, port: int, browser: bool) -> None:
+    """Serve a review until interrupted.
+
+    Raises
+    ------
+    InputError
+        When the port is taken.
+    """
+    with _listening(port) as listener:
+        number = int(listener.getsockname()[1])
+        token = secrets.token_urlsafe(24)
+        address = f"http://127.0.0.1:{number}/?token={token}"
+        typer.echo(f"Review of {opened.files.path.name}: {address}\nStop with Ctrl-C.")
+        if browser:
+            webbrowser.open(address)
+        guarded = Guard(application(opened, page), token, number)
+        server = uvicorn.Server(uvicorn.Config(guarded, log_level="warning", server_header=False))
+        server.run(sockets=[listener])
+
+
+def _listening(port: int) -> socket.socket:
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind(("127.0.0.1", port))
+    except OSError as error:
+        listener.close()
+        raise InputError(f"port {port}", error.strerror or "is taken", hint="leave out --port") from error
+    return listener

@@ -1,0 +1,160 @@
+"""The review as plain data for the page; what is not known is None."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Trajectory
+from pipeline.findings import DefectKind
+from pipeline.model import Overlay, Overlays
+from pipeline.review.assessment import strength
+from pipeline.review.decisions.ledger import Entry
+from pipeline.review.decisions.replay import Finding
+from pipeline.review.measuring.wall import MeasuredWall
+from pipeline.review.review import State
+from pipeline.review.run_files import RunFiles
+
+Float = NDArray[np.float64]
+_LEGEND_STEPS = 64
+
+
+def run_document(files: RunFiles) -> dict[str, Any]:
+    """Return what does not change while the run stays as it is."""
+    record = files.record()
+    overlays = files.artefact(Overlays)
+    recording = files.recording()
+    pipe = recording.pipe if recording is not None else None
+    return {
+        "name": record["recording"]["name"],
+        "metrics": record["metrics"],
+        "numbers": [{"stage": s["name"], "numbers": s["numbers"]} for s in record["stages"]],
+        "warnings": record["reader_warnings"],
+        "program": record["program"],
+        "inputs": record["input_sha256"],
+        "has_recording": recording is not None,
+        "nominal_diameter_mm": 2 * overlays.nominal_radius_mm,
+        "wall_thickness_mm": pipe.wall_thickness_mm if pipe is not None else None,
+        "distance_mm": [float(overlays.distance_mm[0]), float(overlays.distance_mm[-1])],
+        "radius_mm": float(np.median(overlays.reference_radius_mm)),
+        "overlays": [_overlay(o) for o in overlays.pictures],
+        "defects": json.loads(files.defects_text()),
+        "kinds": [kind.value for kind in DefectKind],
+        "axis": _axis(files.artefact(Trajectory)),
+    }
+
+
+def state_document(state: State, files: RunFiles) -> dict[str, Any]:
+    """Return the findings as they stand, and what is known of the signature."""
+    bore = 2 * files.artefact(Overlays).nominal_radius_mm
+    return cleaned({
+        "revision": state.revision,
+        "findings": [_finding(f, state, bore) for f in state.findings],
+        "may_undo": state.may_undo,
+        "may_redo": state.may_redo,
+        "lost": [_entry(e) for e in state.lost],
+        "assumed": state.assumed.model_dump(exclude={"do"}),
+        "history": [_entry(e) for e in state.entries],
+        "sha256": state.sha256,
+        "signed": state.signed,
+        "signature": asdict(state.signature) if state.signature else None,
+    })  # fmt: skip
+
+
+def section_document(wall: MeasuredWall, overlays: Overlays, distance_mm: float) -> dict[str, Any]:
+    """Return the cross-section next to a distance, with the fitted pipe and the nominal circle."""
+    row = wall.row(distance_mm)
+    return cleaned({
+        "distance_mm": float(wall.distance_mm[row]),
+        "azimuth_rad": wall.azimuth_rad,
+        "radius_mm": wall.radius_mm[row],
+        "sigma_mm": wall.sigma_mm[row],
+        "fitted_mm": overlays.reference_radius_mm,
+        "nominal_mm": overlays.nominal_radius_mm,
+    })  # fmt: skip
+
+
+def profile_document(
+    wall: MeasuredWall, distance_mm: float, azimuth_rad: float, half_mm: float
+) -> dict[str, Any]:
+    """Return the radius along the pipe and around it through a point, less the median of each."""
+    rows = wall.rows(distance_mm - half_mm, distance_mm + half_mm)
+    column, row = wall.column(azimuth_rad), wall.row(distance_mm)
+    radius = float(np.nanmedian(wall.radius_mm[row]))
+    reach = max(int(half_mm / (radius * wall.step_rad)), 2)
+    columns = (column + np.arange(-reach, reach + 1)) % len(wall.azimuth_rad)
+    along, around = wall.radius_mm[rows, column], wall.radius_mm[row, columns]
+    return cleaned({
+        "along": {
+            "mm": wall.distance_mm[rows] - distance_mm,
+            "depth_mm": along - np.nanmedian(along),
+            "sigma_mm": wall.sigma_random_mm[rows, column],
+        },
+        "around": {
+            "mm": np.arange(-reach, reach + 1) * wall.step_rad * radius,
+            "depth_mm": around - np.nanmedian(around),
+            "sigma_mm": wall.sigma_random_mm[row, columns],
+        },
+    })  # fmt: skip
+
+
+def cleaned(tree: dict[str, Any]) -> dict[str, Any]:
+    """Return plain data fit for JSON: arrays as lists, None for what is no finite number."""
+    return {k: _plain(v) for k, v in tree.items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return cleaned(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _finding(finding: Finding, state: State, bore_mm: float) -> dict[str, Any]:
+    size, wall = finding.size, state.assumed.wall_thickness_mm
+    is_loss = DefectKind(finding.kind).is_metal_loss
+    loss = 100 * size.depth_mm / wall if wall and is_loss and size.depth_mm > 0 else None
+    remaining = None
+    if wall and state.assumed.yield_mpa and is_loss:
+        remaining = strength(
+            size.depth_mm, size.depth_sigma_mm, size.length_mm, bore_mm, wall, state.assumed.yield_mpa
+        )
+    return asdict(finding) | {
+        "wall_loss_percent": loss,
+        "wall_loss_sigma_percent": 100 * size.depth_sigma_mm / wall if loss is not None and wall else None,
+        "strength": asdict(remaining) if remaining else None,
+    }
+
+
+def _entry(entry: Entry) -> dict[str, Any]:
+    return {"id": entry.id, "who": entry.who, "at": entry.at, "action": entry.action.model_dump()}
+
+
+def _overlay(overlay: Overlay) -> dict[str, Any]:
+    at = np.linspace(1, 255, _LEGEND_STEPS).round().astype(int)
+    return {
+        "name": overlay.name,
+        "title": overlay.title,
+        "low_mm": overlay.low_mm,
+        "high_mm": overlay.high_mm,
+        "colours": [f"#{r:02x}{g:02x}{b:02x}" for b, g, r in overlay.palette_bgr[at]],
+    }
+
+
+def _axis(trajectory: Trajectory) -> dict[str, Any]:
+    axis = trajectory.axis
+    step = max(len(axis.distance_mm) // 2000, 1)
+    return {
+        "distance_mm": axis.distance_mm[::step].tolist(),
+        "origin_p": axis.origin_p[::step].tolist(),
+        "x_p": axis.R_pa[::step, :, 0].tolist(),
+        "y_p": axis.R_pa[::step, :, 1].tolist(),
+    }

@@ -1,0 +1,148 @@
+"""The recorded frames that show a spot of the wall, with the spot and the laser's ring marked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import RingSamples, Trajectory
+from pipeline.errors import BoresightError
+from pipeline.geometry.axis import from_pipe
+from pipeline.geometry.rigid import inverse, transform
+from pipeline.instrument.probe import Probe
+from pipeline.model import Overlays
+from pipeline.recording.base import Recording
+from pipeline.review.run_files import RunFiles
+
+Float = NDArray[np.float64]
+_QUALITY = 88
+# A wall spot is seen best well off the axis, where texture is largest, yet away from the picture's rim.
+_BEST_POLAR_RAD = 1.05
+
+
+_KEPT = 2
+
+
+class UnseenError(BoresightError):
+    """No frame shows the spot, or its pictures are gone."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A frame that shows a spot.
+
+    Attributes
+    ----------
+    frame : int
+    time_s : float
+    illumination : str
+    spot_px : (2,)
+    ring_px : (M, 2)
+        The line as measured in this frame; empty without laser.
+    """
+
+    frame: int
+    time_s: float
+    illumination: str
+    spot_px: Float
+    ring_px: Float
+
+
+@dataclass(frozen=True)
+class FrameFinder:
+    """Finds frames by what they show."""
+
+    recording: Recording
+    probe: Probe
+    trajectory: Trajectory
+    rings: RingSamples
+    radius_mm: float
+
+    def sights(self, distance_mm: float, azimuth_rad: float) -> tuple[Sight, ...]:
+        """Return the frame whose ring passes the spot, and the lit frame that shows it best.
+
+        Raises
+        ------
+        UnseenError
+            When no frame does.
+        """
+        axis = self.trajectory.axis
+        spot_p = from_pipe(axis, np.array([distance_mm]), np.array([azimuth_rad]), np.array([self.radius_mm]))
+        spot_c = transform(inverse(self.trajectory.T_pc), spot_p)
+        polar = np.arctan2(np.hypot(spot_c[:, 0], spot_c[:, 1]), spot_c[:, 2])
+        lit_by = self._illumination()
+        ahead = np.where(np.isin(lit_by, ["laser", "both"]), np.abs(self._off_sheet(spot_c)), np.inf)
+        lit = np.where(np.isin(lit_by, ["led", "both"]), np.abs(polar - _BEST_POLAR_RAD), np.inf)
+        best = {int(np.argmin(way)): None for way in (ahead, lit) if np.isfinite(way).any()}
+        found = tuple(s for k in best if (s := self._sight(k, spot_c[k], lit_by[k])) is not None)
+        if not found:
+            raise UnseenError("no frame shows this spot")
+        return found
+
+    def picture(self, frame: int) -> bytes:
+        """Return a frame as JPEG.
+
+        Raises
+        ------
+        UnseenError
+            When the recording has no such frame or it cannot be decoded.
+        """
+        if frame not in self.recording.frames.frame:
+            raise UnseenError(f"the recording has no frame {frame}")
+        _, image = next(iter(self.recording.read([frame], "bgr")))
+        if image is None:
+            raise UnseenError(f"frame {frame} cannot be decoded")
+        encoded, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        if not encoded:
+            raise UnseenError(f"frame {frame} cannot be encoded")
+        return jpeg.tobytes()
+
+    def _off_sheet(self, spot_c: Float) -> Float:
+        """Return how far (N,) the spot lies off the laser's sheet along the optical axis, mm."""
+        rho = np.hypot(spot_c[:, 0], spot_c[:, 1])
+        azimuth = np.arctan2(spot_c[:, 1], spot_c[:, 0])
+        laser = self.probe.laser
+        return np.asarray(spot_c[:, 2] - laser.height(azimuth) - rho * laser.slope(azimuth))
+
+    def _illumination(self) -> NDArray[np.str_]:
+        frames = self.recording.frames
+        return np.asarray(frames.illumination[np.searchsorted(frames.frame, self.trajectory.frame)])
+
+    def _sight(self, index: int, spot_c: Float, illumination: str) -> Sight | None:
+        uv, valid = self.probe.camera.project(spot_c[None])
+        width, height = self.probe.camera.image_size
+        inside = valid[0] and 0 <= uv[0, 0] < width and 0 <= uv[0, 1] < height
+        if not inside:
+            return None
+        frame = int(self.trajectory.frame[index])
+        return Sight(frame, float(self.trajectory.time_s[index]), str(illumination), uv[0], self._ring(frame))
+
+    def _ring(self, frame: int) -> Float:
+        row = np.flatnonzero(self.rings.frame == frame)
+        if not len(row):
+            return np.zeros((0, 2))
+        return np.asarray(self.rings.pixels()[row[0]][self.rings.valid[row[0]]])
+
+
+def finder_of(files: RunFiles) -> FrameFinder:
+    """Return the finder of a run, made again when the run was.
+
+    Raises
+    ------
+    UnseenError
+        When the recording or its probe is not where it was.
+    """
+    return _finder(files, files.version)
+
+
+@lru_cache(maxsize=_KEPT)
+def _finder(files: RunFiles, _version: int) -> FrameFinder:
+    recording, probe = files.recording(), files.probe()
+    if recording is None or probe is None:
+        raise UnseenError("the recording is not where it was when the run was made")
+    radius_mm = float(files.artefact(Overlays).nominal_radius_mm)
+    return FrameFinder(recording, probe, files.artefact(Trajectory), files.artefact(RingSamples), radius_mm)

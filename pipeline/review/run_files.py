@@ -1,0 +1,148 @@
+"""A finished run as the review reads it from its folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pipeline.artefacts import RingSamples, Trajectory, Wall
+from pipeline.errors import InputError
+from pipeline.findings import Sections
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import read_probe
+from pipeline.model import Overlays
+from pipeline.recording import open_recording
+from pipeline.recording.base import Recording
+from pipeline.review.decisions.replay import Finding, Measured
+from pipeline.run_folder import RunFolder
+
+_Artefact = TypeVar("_Artefact")
+_MAKERS: dict[type, str] = {
+    Overlays: "overlays", Trajectory: "motion", Wall: "accumulate", RingSamples: "rings",
+    Sections: "sections",
+}  # fmt: skip
+# What a signature binds: the results and the record of how they came about.
+_BOUND = ("run.json", "defects.json", "radius_map.npz", "unrolled.png", "model.glb", "sections.csv")
+
+
+@dataclass(frozen=True)
+class RunFiles:
+    """The folder of a completed run."""
+
+    path: Path
+
+    @property
+    def version(self) -> int:
+        """Changes whenever the run is computed again."""
+        file = self.path / "run.json"
+        return file.stat().st_mtime_ns if file.is_file() else 0
+
+    def record(self) -> dict[str, Any]:
+        """Return run.json.
+
+        Raises
+        ------
+        InputError
+            When it is missing, broken, or the run is not completed.
+        """
+        record = self._json("run.json")
+        if not isinstance(record, dict) or record.get("format") != 1:
+            raise InputError(self.path / "run.json", "is not the record of a run", expected="format 1")
+        if record.get("state") != "completed":
+            state = record.get("state")
+            raise InputError(self.path, f"the run is {state}, not completed", hint="finish it: boresight run")
+        return record
+
+    def artefact(self, kind: type[_Artefact]) -> _Artefact:
+        """Return what a stage made.
+
+        Raises
+        ------
+        InputError
+            When it is not there any more.
+        """
+        found: _Artefact = _artefact(self, kind, self.version)  # type: ignore[arg-type]
+        return found
+
+    def recording(self) -> Recording | None:
+        """Return the recording, None when it is not where it was any more."""
+        path = Path(self.record()["recording"]["path"])
+        return open_recording(path) if path.exists() else None
+
+    def probe(self) -> Probe | None:
+        """Return the probe as the run found it, None when its file is not there any more."""
+        path = Path(self.record()["probe"]["path"])
+        return read_probe(path).as_found_in(self.artefact(Trajectory)) if path.is_file() else None
+
+    def defects_text(self) -> str:
+        """Return defects.json as it stands."""
+        try:
+            return (self.path / "defects.json").read_text("utf-8")
+        except OSError as error:
+            raise InputError(self.path / "defects.json", error.strerror or "cannot be read") from error
+
+    def fingerprint(self) -> dict[str, str]:
+        """Return the SHA-256 of every file that a signature binds."""
+        present = (name for name in _BOUND if (self.path / name).is_file())
+        return {name: _hash_of(self.path / name) for name in present}
+
+    def _json(self, name: str) -> object:
+        file = self.path / name
+        try:
+            return json.loads(file.read_text("utf-8"))
+        except OSError as error:
+            hint = "give the folder of a finished run"
+            raise InputError(file, error.strerror or "cannot be read", hint=hint) from error
+        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+            raise InputError(file, f"is not JSON: {error}") from error
+
+
+@lru_cache(maxsize=16)
+def _artefact(files: RunFiles, kind: type, _version: int) -> Any:
+    stage = _MAKERS[kind]
+    key = next((s["key"] for s in files.record()["stages"] if s["name"] == stage), "")
+    stored = RunFolder(files.path).store.read(stage, key, kind) if key else None
+    if stored is None:
+        raise InputError(files.path, f"has no result of stage {stage}", hint="run it again: boresight run")
+    return stored.artefact
+
+
+def measured_findings(defects: str, file: Path) -> tuple[Finding, ...]:
+    """Return the findings that a defects.json lists, undecided.
+
+    Raises
+    ------
+    InputError
+        When it is not a list of defects.
+    """
+    try:
+        listed = json.loads(defects)
+        return tuple(_finding(entry) for entry in listed)
+    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+        raise InputError(file, f"is not a list of defects: {error!r}") from error
+
+
+def _finding(entry: dict[str, Any]) -> Finding:
+    outline = tuple((float(s), float(a)) for s, a in entry["outline"])
+    size = Measured(**{name: _number(entry[name]) for name in Measured.__dataclass_fields__})
+    number = int(entry["id"])
+    return Finding(str(number), str(entry["kind"]), outline, size, original=number)
+
+
+def _number(value: object) -> float:
+    return float("nan") if value is None else float(value)  # type: ignore[arg-type]
+
+
+def _hash_of(file: Path) -> str:
+    found = file.stat()
+    return _sha256(file, found.st_mtime_ns, found.st_size)
+
+
+@lru_cache(maxsize=64)
+def _sha256(file: Path, _changed: int, _size: int) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,0 +1,159 @@
+"""The addresses of the review's server: the page, the run, the review, tiles, frames, reports."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from pipeline.errors import BoresightError, InputError
+from pipeline.model import Overlays
+from pipeline.review import documents
+from pipeline.review.decisions.actions import action_of
+from pipeline.review.decisions.ledger import StaleError
+from pipeline.review.flat_tiles import PHOTO, FlatPicture, overlay_picture, photo_picture
+from pipeline.review.frames import UnseenError, finder_of
+from pipeline.review.measuring.tools import readings
+from pipeline.review.requests import Deed, Measuring, Signing, parsed
+from pipeline.review.review import Review
+
+_CONFLICT, _REFUSED, _MISSING = 409, 422, 404
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+@dataclass(frozen=True)
+class ReviewApp:
+    """Answers requests on one review; everything slow runs in a thread."""
+
+    review: Review
+    page: Path
+
+    def routes(self) -> list[Route | Mount]:
+        """Return all addresses."""
+        return [
+            Route("/", self._index),
+            Mount("/assets", StaticFiles(directory=self.page / "assets")),
+            Route("/api/run", self._answering(self._run)),
+            Route("/api/state", self._answering(self._state)),
+            Route("/api/actions", self._answering(self._act), methods=["POST"]),
+            Route("/api/sign", self._answering(self._sign), methods=["POST"]),
+            Route("/api/measure", self._answering(self._measure), methods=["POST"]),
+            Route("/api/section", self._answering(self._section)),
+            Route("/api/profile", self._answering(self._profile)),
+            Route("/api/sights", self._answering(self._sights)),
+            Route("/api/frames/{frame:int}.jpg", self._answering(self._frame)),
+            Route("/api/tiles/{layer:str}", self._answering(self._layer)),
+            Route(
+                "/api/tiles/{layer:str}/{level:int}/{column:int}/{row:int}.png", self._answering(self._tile)
+            ),
+            Route("/api/model.glb", self._model),
+        ]
+
+    def _answering(self, work: Callable[[Request, bytes], Response]) -> Handler:
+        """Return a handler that runs ``work`` in a thread and tells errors as JSON with their own code."""
+
+        async def handle(request: Request) -> Response:
+            body = await request.body()
+            try:
+                return await run_in_threadpool(work, request, body)
+            except BoresightError as error:
+                return JSONResponse({"error": str(error)}, _code_of(error))
+
+        return handle
+
+    async def _index(self, _: Request) -> Response:
+        return FileResponse(self.page / "index.html")
+
+    async def _model(self, _: Request) -> Response:
+        file = self.review.files.path / "model.glb"
+        if not file.is_file():
+            return JSONResponse({"error": "the run has no model"}, _MISSING)
+        return FileResponse(file, media_type="model/gltf-binary")
+
+    def _run(self, _: Request, __: bytes) -> Response:
+        return JSONResponse(documents.run_document(self.review.files))
+
+    def _state(self, _: Request, __: bytes) -> Response:
+        return JSONResponse(documents.state_document(self.review.state(), self.review.files))
+
+    def _act(self, _: Request, body: bytes) -> Response:
+        deed = parsed(Deed, body)
+        state = self.review.act(action_of(json.dumps(deed.action)), deed.who, deed.revision)
+        return JSONResponse(documents.state_document(state, self.review.files))
+
+    def _sign(self, _: Request, body: bytes) -> Response:
+        wish = parsed(Signing, body)
+        state = self.review.sign(wish.name, wish.standard, wish.remarks, wish.revision)
+        return JSONResponse(documents.state_document(state, self.review.files))
+
+    def _measure(self, _: Request, body: bytes) -> Response:
+        wish = parsed(Measuring, body)
+        found = readings(self.review.wall(), wish.tool, wish.points)
+        return JSONResponse(documents.cleaned({"readings": [vars(r) for r in found]}))
+
+    def _section(self, request: Request, _: bytes) -> Response:
+        overlays = self.review.files.artefact(Overlays)
+        at = _number(request, "distance")
+        return JSONResponse(documents.section_document(self.review.wall(), overlays, at))
+
+    def _profile(self, request: Request, _: bytes) -> Response:
+        at = _number(request, "distance"), _number(request, "azimuth"), _number(request, "half")
+        return JSONResponse(documents.profile_document(self.review.wall(), *at))
+
+    def _sights(self, request: Request, _: bytes) -> Response:
+        found = finder_of(self.review.files).sights(_number(request, "distance"), _number(request, "azimuth"))
+        return JSONResponse(documents.cleaned({"sights": [vars(s) for s in found]}))
+
+    def _frame(self, request: Request, _: bytes) -> Response:
+        jpeg = finder_of(self.review.files).picture(request.path_params["frame"])
+        return Response(jpeg, media_type="image/jpeg")
+
+    def _layer(self, request: Request, _: bytes) -> Response:
+        picture = self._picture(request.path_params["layer"])
+        height, width = picture.bgra.shape[:2]
+        return JSONResponse({
+            "levels": picture.levels, "width": width, "height": height,
+            "distance_mm": [picture.distance_from_mm, picture.distance_to_mm],
+        })  # fmt: skip
+
+    def _tile(self, request: Request, _: bytes) -> Response:
+        at: dict[str, Any] = request.path_params
+        picture = self._picture(at["layer"])
+        return Response(picture.tile(at["level"], at["column"], at["row"]), media_type="image/png")
+
+    def _picture(self, layer: str) -> FlatPicture:
+        files = self.review.files
+        return (
+            photo_picture(files.path) if layer == PHOTO else overlay_picture(files.artefact(Overlays), layer)
+        )
+
+
+def application(review: Review, page: Path) -> Starlette:
+    """Return the server's application, unguarded: see `pipeline.review.server.guard`."""
+    return Starlette(routes=ReviewApp(review, page).routes())
+
+
+def _number(request: Request, name: str) -> float:
+    text = request.query_params.get(name, "")
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise InputError("request", f"{name} is {text[:40]!r}", expected="a number") from error
+    if not abs(value) < 1e9:
+        raise InputError("request", f"{name} is {text[:40]!r}", expected="a number within reason")
+    return value
+
+
+def _code_of(error: BoresightError) -> int:
+    if isinstance(error, StaleError):
+        return _CONFLICT
+    return _MISSING if isinstance(error, UnseenError) else _REFUSED

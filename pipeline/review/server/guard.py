@@ -1,0 +1,107 @@
+"""Who may talk to the server: this machine's browser, with the token, on the page that the server gave."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+COOKIE = "boresight"
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self' blob:; worker-src 'self' blob:; font-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = {
+    "content-security-policy": _POLICY,
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-store",
+}
+_LARGEST_BODY = 1 << 20
+_CHANGING = ("POST", "PUT", "PATCH", "DELETE")
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Wraps an application: refuses foreign hosts, foreign pages, missing tokens and large bodies.
+
+    Attributes
+    ----------
+    app
+    token : str
+        Known to whoever started the server; the page's address carries it once, then a cookie does.
+    port : int
+    """
+
+    app: ASGIApp
+    token: str
+    port: int
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve a request, or refuse it with the reason."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        refusal = self._refusal(scope)
+        if refusal is not None:
+            await refusal(scope, receive, _with_headers(send))
+            return
+        await self.app(scope, receive, _with_headers(send))
+
+    def _refusal(self, scope: Scope) -> Response | None:
+        headers = Headers(scope=scope)
+        hosts = (f"127.0.0.1:{self.port}", f"localhost:{self.port}")
+        if headers.get("host", "") not in hosts:
+            return PlainTextResponse("this server answers to 127.0.0.1 only", 421)
+        if _token_in(scope) is not None:
+            return self._first_visit(scope)
+        if not self._same(_cookie(headers)):
+            return PlainTextResponse("open the address that boresight review printed", 403)
+        origins = tuple(f"http://{host}" for host in hosts)
+        if scope["method"] in _CHANGING and headers.get("origin", "") not in origins:
+            return PlainTextResponse("this page is not the server's own", 403)
+        if int(headers.get("content-length", "0") or 0) > _LARGEST_BODY:
+            return PlainTextResponse("too large", 413)
+        return None
+
+    def _first_visit(self, scope: Scope) -> Response:
+        """Put the token of the address into a cookie that scripts cannot read, and out of the address."""
+        if not self._same(_token_in(scope) or ""):
+            return PlainTextResponse("the token is not that of this server; it changes at every start", 403)
+        response = RedirectResponse(scope["path"], 303)
+        response.set_cookie(COOKIE, self.token, httponly=True, samesite="strict", path="/")
+        return response
+
+    def _same(self, token: str) -> bool:
+        return secrets.compare_digest(token.encode(), self.token.encode())
+
+
+def _token_in(scope: Scope) -> str | None:
+    found = parse_qs(scope["query_string"].decode("latin-1")).get("token")
+    return found[0] if found else None
+
+
+def _cookie(headers: Headers) -> str:
+    try:
+        jar: SimpleCookie = SimpleCookie(headers.get("cookie", ""))
+    except CookieError:
+        return ""
+    return jar[COOKIE].value if COOKIE in jar else ""
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            own = [(k.encode(), v.encode()) for k, v in HEADERS.items()]
+            message = {**message, "headers": [*message.get("headers", []), *own]}
+        await send(message)
+
+    return sending
