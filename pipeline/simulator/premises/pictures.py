@@ -15,7 +15,7 @@ from pipeline.simulator.truth import SceneTruth
 Float = NDArray[np.float64]
 Image = NDArray[np.uint8]
 _LEAST_PEAK, _LEAST_SHARE = 25.0, 0.85
-_MOST_CLIPPED_LINE, _MOST_CLIPPED_WALL = 0.9, 0.02
+_MOST_CLIPPED_LINE, _MOST_CLIPPED_WALL = 0.9, 0.05
 _LEAST_WALL, _LEAST_TEXTURE = 8.0, 1.0
 _LEAST_MARKERS, _LEAST_FRAMES_WITH = 3, 0.3
 _CLIPPED = 254
