@@ -9,14 +9,19 @@ Float = NDArray[np.float64]
 
 
 def through_cylinder(
-    origin: Float, ray: Float, axis: Float, radius_mm: float, ratio: float
+    origin: Float,
+    ray: Float,
+    axis: Float,
+    radius_mm: float,
+    ratio: float,
+    aside: tuple[float, ...] = (0, 0, 0),
 ) -> tuple[Float, Float]:
-    """Rays (M, 3) from inside a cylinder about an axis through the origin; ``ratio`` of indices."""
+    """Rays (M, 3) from inside a cylinder whose axis passes ``aside``; ``ratio``: index before over after."""
     axis = axis / np.linalg.norm(axis)
-    flat_origin, flat_ray = _flat(origin, axis), _flat(ray, axis)
+    flat_origin, flat_ray = _flat(origin - np.array(aside), axis), _flat(ray, axis)
     reach = _leaving(flat_origin, flat_ray, radius_mm)
     place = origin + reach[:, None] * ray
-    return place, _refract(ray, _flat(place, axis) / radius_mm, ratio)
+    return place, _refract(ray, _flat(place - np.array(aside), axis) / radius_mm, ratio)
 
 
 def through_sphere(

@@ -86,12 +86,12 @@ def moving_pupil(shift_mm):
 
 
 def tubes(*walls):
-    """Rays through cylinders (axis, radius, index before over after) one after another."""
+    """Rays through cylinders (axis, radius, index before over after, where the axis passes) in turn."""
 
     def sight(uv):
         place, ray = plain(uv)
-        for axis, radius_mm, ratio in walls:
-            place, ray = through_cylinder(place, ray, axis, radius_mm, ratio)
+        for wall in walls:
+            place, ray = through_cylinder(place, ray, *wall)
         return place, ray
 
     return sight
@@ -105,10 +105,6 @@ def dome(*centre):
         return through_sphere(place, ray, np.array(centre), 15.036, GLASS)
 
     return sight
-
-
-def glass_tube(axis):
-    return tubes((axis, 14.0, 1 / GLASS), (axis, 16.0, GLASS))
 
 
 def leaning(tilt_deg, toward_deg):
@@ -139,7 +135,7 @@ SIGHTS = {
     "sensor_tilt": (xy(2e-3, 20), decentred(*xy(2e-3, 20)), 6e-3),
     "pixel_aspect": ([0.004], camera(focal=(FOCAL_PX * ASPECT, FOCAL_PX / ASPECT)), 3e-3),
     "pupil_shift": ([1.0], moving_pupil(1.0), 1e-6),
-    "housing_glass": ([2.0], glass_tube(AXIS), 1e-6),
+    "housing_glass": ([2.0], tubes((AXIS, 13.0, 1 / GLASS), (AXIS, 15.0, GLASS)), 1e-6),
     "outside_index": ([0.333], tubes((AXIS, 15.0, 1 / 1.333)), 1e-6),
     "dome_axial": ([1.0], dome(0.0, 0.0, -1.0), 8e-3),
     "dome_lateral": (xy(1.0, 40), dome(*xy(1.0, 40), 0.0), 8e-3),
@@ -187,15 +183,39 @@ def test_texture_through_another_camera_or_window_is_found_where_it_is_predicted
     assert np.linalg.norm(missed, axis=1).max() < 3 * allowed * per_px
 
 
+# Effect: shape, amplitude, the true tube. Straight tubes have radii of 13 and 15 mm.
+TUBES = {
+    "tube_tilt": (
+        (0.0,),
+        xy(1.0, 40),
+        tubes((leaning(1.0, 40), 13.0, 1 / GLASS), (leaning(1.0, 40), 15.0, GLASS)),
+    ),
+    "tube_wedge": ((), xy(0.1, 40), tubes((AXIS, 13.0, 1 / GLASS), (AXIS, 15.0, GLASS, (*xy(0.1, 40), 0.0)))),
+}
+STRAIGHT = tubes((AXIS, 13.0, 1 / GLASS), (AXIS, 15.0, GLASS))
+
+
 @pytest.mark.parametrize("bore", BORES.values(), ids=list(BORES))
-def test_a_tilted_tube_shifts_the_ring_against_the_straight_one_as_predicted(bore):
+@pytest.mark.parametrize("name", TUBES)
+def test_a_faulty_tube_shifts_the_ring_against_the_straight_one_as_predicted(name, bore):
+    shape, amplitude, sight = TUBES[name]
     points = ring_points(plain_probe(), bore)
-    tilted, straight = (
-        outward_shift(on_plane(glass_tube(axis)), bore, points) for axis in (leaning(1.0, 40.0), AXIS)
-    )
-    predicted = ring_shift_px(LIBRARY["tube_tilt"], points, (0.0,), np.array(xy(1.0, 40.0)))
+    faulty, straight = (outward_shift(on_plane(tube), bore, points) for tube in (sight, STRAIGHT))
+    predicted = ring_shift_px(LIBRARY[name], points, shape, np.array(amplitude))
     # The prediction starts from rays without glass, which 2 mm of it bend by a few per cent.
-    assert predicted == pytest.approx(tilted - straight, abs=0.06 * np.abs(tilted - straight).max())
+    assert predicted == pytest.approx(faulty - straight, abs=0.06 * np.abs(faulty - straight).max())
+
+
+@pytest.mark.parametrize("name", TUBES)
+def test_a_faulty_tube_shifts_texture_along_and_around_as_predicted(name):
+    shape, amplitude, sight = TUBES[name]
+    points = texture_points(plain_probe(), Bore(50.8), 40.0)
+    shift = texture_shift_px(LIBRARY[name], points, shape, np.array(amplitude))
+    moved, still = on_plane(sight, 40.0)(points.uv), on_plane(STRAIGHT, 40.0)(points.uv)
+    # What a pixel sees moves by the opposite of what the image of a point does.
+    by_point = plain_probe().camera.project_jacobian(still).by_point
+    expected = -np.einsum("mij,mj->mi", by_point, moved - still)
+    assert shift == pytest.approx(expected, abs=0.04 * np.abs(expected).max())
 
 
 def test_a_tilted_tube_displaces_the_laser_as_predicted():

@@ -49,7 +49,7 @@ CASES = {
     "focal_drift": ((T0,), [1e-5], lambda r, a: s(r) * a * theta(r) * (1 - np.exp(-5 / T0))),
     "centre_drift": ((T0,), [1e-2], lambda r, a: s(r) / FOCAL_PX * a * (1 - np.exp(-5 / T0))),
     "housing_glass": ((), [1e-2], lambda r, a: -a * glass_loss(r)),
-    "tube_wedge": ((), [1e-2], lambda r, a: -a * glass_loss(r)),
+    "tube_wedge": ((), [1e-3], lambda r, a: -a * glass_loss(r)),
     "tube_tilt": (
         (0.0,),
         [1e-2],

@@ -29,11 +29,12 @@ class HousingGlass(Scalar):
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the tube, less that without."""
-        return _through_glass(points, np.full(len(points.uv), float(amplitude[0])))
+        layers = _layers(points, np.full(len(points.uv), float(amplitude[0])))
+        return _seen_under(points, points.azimuth_rad, _steepness(points, *layers, GLASS_INDEX))
 
 
 class TubeWedge(Directed):
-    """The tube is thicker on one side."""
+    """The tube's outer face is decentred: glass is thicker on one side, and a prism on the flanks."""
 
     name = "tube_wedge"
     amplitudes = along_x_and_y(name, 0.1)
@@ -42,8 +43,17 @@ class TubeWedge(Directed):
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image through glass of thickness δt cos(ψ − ψ₀), less that without."""
-        return _through_glass(points, cosine(points.azimuth_rad, amplitude))
+        """Return the image through glass of thickness δt cos(ψ − ψ₀), less that without.
+
+        Where the outer normal is turned by β around the tube, the ray leaves turned by
+        −(n cos i′ − cos i) β around it.
+        """
+        sine = np.sin(points.theta)
+        bent = np.sqrt(GLASS_INDEX**2 - 1 + sine**2) - sine
+        flank = cosine(points.azimuth_rad - np.pi / 2, amplitude) / _TUBE_RADIUS_MM
+        turn = bent * flank / sine * (1 - _TUBE_RADIUS_MM / points.radius_mm)
+        steep = _steepness(points, *_layers(points, cosine(points.azimuth_rad, amplitude)), GLASS_INDEX)
+        return _seen_under(points, points.azimuth_rad + turn, steep)
 
 
 class TubeTilt(Directed):
@@ -65,17 +75,20 @@ class TubeTilt(Directed):
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the leaning tube, less that through the straight one."""
-        lean = cosine(points.azimuth_rad, np.radians(amplitude))
-        climb = points.xyz_c[:, 2].copy()
+        straight = np.array([0.0, 0.0, 1.0])
+        lean = np.radians(amplitude)
+        leaning = np.array([-lean[0], -lean[1], 1.0]) / np.sqrt(1 + lean @ lean)
+        seen = points.xyz_c
         for _ in range(_STEPS):
-            incidence = np.arctan2(climb, points.radius_mm)
-            lost = (_displacement_mm(incidence - lean) - _displacement_mm(incidence)) / np.cos(incidence)
-            climb = points.xyz_c[:, 2] + lost
-        return image_shift(points, np.column_stack([points.xyz_c[:, :2], climb]))
+            ray = seen / np.linalg.norm(seen, axis=1)[:, None]
+            seen = points.xyz_c - _displacement_c(ray, leaning) + _displacement_c(ray, straight)
+        return image_shift(points, seen)
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the laser's displacement by the leaning glass."""
-        return shape[0] * _displacement_mm(cosine(points.azimuth_rad, np.radians(amplitude)))
+        sine = np.sin(cosine(points.azimuth_rad, np.radians(amplitude)))
+        glass = np.sqrt(GLASS_INDEX**2 - sine**2)
+        return np.asarray(shape[0] * _TUBE_THICKNESS_MM * sine * (1 - np.sqrt(1 - sine**2) / glass))
 
 
 class DomeAxial(Scalar):
@@ -115,34 +128,44 @@ class OutsideIndex(Scalar):
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the medium, less that without."""
-        inside = np.full(len(points.uv), _TUBE_RADIUS_MM)
-        outside = points.radius_mm - inside
-        return _through_layers(points, inside, outside, 1 + float(amplitude[0]))
+        plain, dense = _layers(points, points.radius_mm - _TUBE_RADIUS_MM)
+        steep = _steepness(points, plain, dense, 1 + float(amplitude[0]))
+        return _seen_under(points, points.azimuth_rad, steep)
 
 
-def _through_glass(points: ImagePoints, thickness_mm: Float) -> Float:
-    return _through_layers(points, points.radius_mm - thickness_mm, thickness_mm, GLASS_INDEX)
+def _layers(points: ImagePoints, dense_mm: Float) -> tuple[Float, Float]:
+    """Return the way (M,) across without the index, and that with it."""
+    return points.radius_mm - dense_mm, dense_mm
 
 
-def _through_layers(points: ImagePoints, plain_mm: Float, dense_mm: Float, index: float) -> Float:
-    """Return (M, 2) the image's shift where rays cross ``dense_mm`` of an index and ``plain_mm`` without.
-
-    Newton's method on z = plain · tan i + dense · tan i′.
-    """
+def _steepness(points: ImagePoints, plain_mm: Float, dense_mm: Float, index: float) -> Float:
+    """Return (M,) tan i at the lens, by Newton's method on z = plain · tan i + dense · tan i′."""
     z = points.xyz_c[:, 2]
     steep = z / points.radius_mm
     for _ in range(_STEPS):
         inside = index**2 * (1 + steep**2) - steep**2
         excess = plain_mm * steep + dense_mm * steep / np.sqrt(inside) - z
         steep = steep - excess / (plain_mm + dense_mm * index**2 / inside**1.5)
-    return image_shift(points, np.column_stack([points.xyz_c[:, :2], points.radius_mm * steep]))
+    return np.asarray(steep)
 
 
-def _displacement_mm(incidence_rad: Float) -> Float:
-    """Return (M,) parallel displacement of a ray by the tube's glass met at an incidence."""
-    sine = np.sin(incidence_rad)
-    glass = np.sqrt(GLASS_INDEX**2 - sine**2)
-    return np.asarray(_TUBE_THICKNESS_MM * sine * (1 - np.cos(incidence_rad) / glass))
+def _seen_under(points: ImagePoints, azimuth_rad: Float, steep: Float) -> Float:
+    """Return (M, 2) the image's shift where rays leave the lens at azimuths and with tan i (M,)."""
+    q = points.radius_mm
+    return image_shift(points, np.column_stack([q * np.cos(azimuth_rad), q * np.sin(azimuth_rad), q * steep]))
+
+
+def _displacement_c(ray_c: Float, axis_c: Float) -> Float:
+    """Return (M, 3) parallel displacement of rays from the viewpoint by a tube about an axis through it.
+
+    The ray stays in the plane of the axis, in which the tube's wall is a plane plate.
+    """
+    across = ray_c - (ray_c @ axis_c)[:, None] * axis_c
+    incidence = np.linalg.norm(across, axis=1)[:, None]
+    normal = across / incidence
+    glass = np.sqrt(1 - (1 - incidence**2) / GLASS_INDEX**2)
+    inside = ray_c / GLASS_INDEX + (glass - incidence / GLASS_INDEX) * normal
+    return np.asarray(_TUBE_THICKNESS_MM * (inside / glass - ray_c / incidence))
 
 
 def _through_dome(points: ImagePoints, centre_c: Float) -> Float:
