@@ -1,0 +1,1 @@
+"""Motion against encoder: scale, slips, play and delay, each with what the motion lets tell."""

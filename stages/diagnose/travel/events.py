@@ -1,0 +1,118 @@
+"""Single events between encoder and sight: slips of the wheel, stray pictures, missing frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from pipeline.recording.base import Encoder
+from stages.diagnose.travel.model import (
+    Event,
+    EventKind,
+    TravelFit,
+    candidate_columns,
+    fitted,
+    moment,
+)
+from stages.diagnose.travel.sight import Sight
+
+Float = NDArray[np.float64]
+_MOST = 8
+_ENTERS = 1e-4
+# A step needs pictures on both of its sides, else it is one stray picture.
+_SIDE = 3
+# Rivals whose χ² differ by less are not told apart.
+_APART = 9.0
+
+
+@dataclass(frozen=True)
+class StepFound:
+    """A step of the reading.
+
+    Attributes
+    ----------
+    place : int
+        Index in the `Sight` of the first picture after it.
+    time_s, gain_mm, sigma_mm : float
+    p_value : float
+        Over all moments at which it might have come.
+    rivals : tuple of EventKind
+        What explains it as well.
+    missing_s : float
+        Time of missing pictures that would explain it.
+    """
+
+    place: int
+    time_s: float
+    gain_mm: float
+    sigma_mm: float
+    p_value: float
+    rivals: tuple[EventKind, ...]
+    missing_s: float
+
+
+def with_events(sight: Sight, encoder: Encoder) -> TravelFit:
+    """Return the fit with the events that the readings ask for, the strongest first."""
+    fit = fitted(sight, encoder, (), None)
+    while len(fit.events) < _MOST:
+        event, score, count = _strongest(fit)
+        if chance(score, count, len(sight.time_s)) > _ENTERS:
+            break
+        fit = fitted(sight, encoder, (*fit.events, event), None)
+    return fit
+
+
+def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
+    """Return the steps among the fit's events, each judged with the others in place."""
+    return tuple(
+        _judged(fit, k, encoder) for k, event in enumerate(fit.events) if event.kind is not EventKind.OUTLIER
+    )
+
+
+def chance(score: float, count: int, measurements: int) -> float:
+    """Return the probability that the largest of ``count`` scores z² is so large by chance.
+
+    Medians of increments measure the noise about as well as a third of the measurements would.
+    """
+    one = 2 * student.sf(np.sqrt(max(score, 0.0)), max(measurements / 3, 3.0))
+    return float(min(1.0, count * one))
+
+
+def _strongest(fit: TravelFit) -> tuple[Event, float, int]:
+    sight = fit.sight
+    speed = np.gradient(sight.distance_mm, sight.time_s)
+    best, score, count = Event(EventKind.STEP, 0), 0.0, 0
+    for kind in (EventKind.STEP, EventKind.OUTLIER):
+        gain = fit.whitened.gain(candidate_columns(sight, kind, speed))[1]
+        if kind is EventKind.STEP:
+            gain[:_SIDE], gain[len(gain) - _SIDE + 1 :] = 0.0, 0.0
+        count += len(gain)
+        if gain.max(initial=0.0) > score:
+            best, score = Event(kind, int(np.argmax(gain))), float(gain.max())
+    return best, score, count
+
+
+def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
+    event, sight = fit.events[place_in_list], fit.sight
+    others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
+    without = fitted(sight, encoder, others, fit.noise)
+    speed = np.gradient(sight.distance_mm, sight.time_s)
+    score, size = {}, {}
+    for kind in EventKind:
+        value, gain = without.whitened.gain(candidate_columns(sight, kind, speed))
+        near = slice(max(event.place - 2, 0), event.place + 3)
+        size[kind], score[kind] = float(value[near][np.argmax(gain[near])]), float(gain[near].max())
+    rivals = tuple(k for k in EventKind if k is not event.kind and score[k] > score[event.kind] - _APART)
+    at = 4 + place_in_list
+    sigma = float(fit.sigma[at])
+    z2 = (fit.values[at] / sigma) ** 2 if np.isfinite(sigma) else 0.0
+    count = len(sight.time_s)
+    k = moment(sight, encoder, event.place)
+    time_s = (encoder.time_s[k] + encoder.time_s[k + 1]) / 2
+    return StepFound(
+        event.place, float(time_s), float(fit.values[at]), sigma,
+        chance(z2, 2 * count, count), rivals, size[EventKind.LOST_TIME],
+    )  # fmt: skip

@@ -1,0 +1,250 @@
+"""What motion against encoder, and the motion itself, say of left-out physics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import Channel
+from pipeline.recording.base import Encoder, Recording
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.evidence import Anomaly
+from stages.diagnose.travel.events import StepFound, steps_found, with_events
+from stages.diagnose.travel.lines import Line, find_lines
+from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, EventKind, TravelFit
+from stages.diagnose.travel.sight import Sight
+
+Float = NDArray[np.float64]
+_LEAST_FRAMES = 16
+_DETECTED = 5.0
+_INSEPARABLE = 0.95
+# A frame's time may be that of the exposure's begin, middle or end.
+_STAMP_SIGMA_S = 1e-3
+_QUANTUM_SHARE = 0.5
+_REPORTED = 1e-3
+_SHORTEST_MM = 20.0
+
+
+@dataclass(frozen=True)
+class TravelEstimate:
+    """One smooth effect between encoder and sight.
+
+    Attributes
+    ----------
+    effect, quantity, unit : str
+        Names of the catalogue.
+    value, sigma : float
+        All effects fitted together; σ infinite where this motion tells nothing of it.
+    stated_sigma : float
+        1 σ that the stated instrument leaves open anyway.
+    p_value : float
+        Of so much beyond the stated uncertainty.
+    detectable : float
+        Least size that would stand out here (5 σ), from motion and noise alone.
+    alike : tuple of (str, float)
+        Effects that this motion cannot tell from it, with the correlation of the estimates.
+    """
+
+    effect: str
+    quantity: str
+    unit: str
+    value: float
+    sigma: float
+    stated_sigma: float
+    p_value: float
+    detectable: float
+    alike: tuple[tuple[str, float], ...]
+
+    @property
+    def statement(self) -> str:
+        """Return the effect in a plain sentence with its size and uncertainty."""
+        return (
+            LIBRARY[self.effect].statement((), np.array([self.value])) + f" (± {self.sigma:.2g} {self.unit})"
+        )
+
+
+@dataclass(frozen=True)
+class TravelEvidence:
+    """Motion against encoder, and lines in the motion, of one recording.
+
+    Attributes
+    ----------
+    source : str
+        ``gauge`` or ``field``.
+    estimates : tuple of TravelEstimate
+    slips : tuple of StepFound
+        Steps that only a slip explains.
+    doubtful : tuple of StepFound
+        Steps that a stray picture or missing frames explain as well.
+    lines : tuple of Line
+    fit : TravelFit or None
+        None without a usable encoder.
+    anomalies : tuple of Anomaly
+    shortcomings : tuple of str
+        What this recording cannot tell, and why.
+    """
+
+    source: str
+    estimates: tuple[TravelEstimate, ...]
+    slips: tuple[StepFound, ...]
+    doubtful: tuple[StepFound, ...]
+    lines: tuple[Line, ...]
+    fit: TravelFit | None
+    anomalies: tuple[Anomaly, ...]
+    shortcomings: tuple[str, ...]
+
+    def estimate(self, name: str) -> TravelEstimate | None:
+        """Return the estimate of an effect, or None."""
+        return next((e for e in self.estimates if e.effect == name), None)
+
+
+def travel_evidence(
+    source: str, recording: Recording, sight: Sight, T_pc: Float, scale_sigma_stated: float
+) -> TravelEvidence:
+    """Compare the way seen with the encoder, and look for lines in the way across the pipe.
+
+    Parameters
+    ----------
+    source
+        ``gauge`` or ``field``.
+    sight
+        From poses made without the encoder.
+    T_pc : (K, 4, 4)
+        Poses of the recording's frames from the first to the last of ``sight``, both included.
+    scale_sigma_stated
+        Relative 1 σ of the encoder's scale as stated.
+    """
+    first = int(np.searchsorted(recording.frames.frame, sight.frame[0])) if len(sight.frame) else 0
+    span = slice(first, first + len(T_pc))
+    lit = recording.frames.illumination[span] != "laser"
+    lines = find_lines(recording.frames.time_s[span], T_pc[:, :2, 3], lit)
+    missing = _shortcomings(source, recording, sight)
+    encoder = recording.encoder
+    if encoder is None or len(encoder.time_s) < 2 or len(sight.frame) < _LEAST_FRAMES:
+        return TravelEvidence(source, (), (), (), lines, None, _of_lines(lines, sight), missing)
+    sight = _covered(sight, encoder)
+    if len(sight.frame) < _LEAST_FRAMES:
+        missing = (*missing, f"The encoder of the {source} covers too few of its frames to be compared.")
+        return TravelEvidence(source, (), (), (), lines, None, _of_lines(lines, sight), missing)
+    fit = with_events(sight, encoder)
+    steps = steps_found(fit, encoder)
+    slips = tuple(s for s in steps if not s.rivals)
+    doubtful = tuple(s for s in steps if s.rivals)
+    estimates = _estimates(fit, scale_sigma_stated)
+    anomalies = (*_of_estimates(source, estimates, sight), *_of_steps(steps, sight), *_of_lines(lines, sight))
+    return TravelEvidence(
+        source, estimates, slips, doubtful, lines, fit, anomalies, (*missing, *_blind(estimates, sight))
+    )
+
+
+def _covered(sight: Sight, encoder: Encoder) -> Sight:
+    """Return the frames within the encoder's time, half a frame more at the ends."""
+    slack = sight.frame_time_s / 2
+    return sight.select(
+        (sight.time_s >= encoder.time_s[0] - slack) & (sight.time_s <= encoder.time_s[-1] + slack)
+    )
+
+
+def _estimates(fit: TravelFit, scale_sigma_stated: float) -> tuple[TravelEstimate, ...]:
+    quantum = max(fit.noise.white_mm, 1e-6)
+    stated = {SCALE: scale_sigma_stated, DELAY: _STAMP_SIGMA_S, PLAY: _QUANTUM_SHARE * quantum}
+    smooth = np.arange(4)
+    usable = np.isfinite(fit.sigma[smooth])
+    scale = np.where(usable, fit.sigma[smooth], 1.0)
+    correlation = np.where(np.isfinite(fit.covariance[:4, :4]), fit.covariance[:4, :4], 0.0) / np.outer(
+        scale, scale
+    )
+    out = []
+    for k, allowed in stated.items():
+        name = SMOOTH[k]
+        quantity = effect(name).quantities[0]
+        sigma, value = float(fit.sigma[k]), float(fit.values[k])
+        total = float(np.hypot(sigma, allowed))
+        p = float(2 * norm.sf(abs(value) / total)) if np.isfinite(total) else 1.0
+        alike = tuple(
+            (SMOOTH[j], float(correlation[k, j]))
+            for j in stated
+            if j != k and usable[j] and usable[k] and abs(correlation[k, j]) > _INSEPARABLE
+        )
+        out.append(
+            TravelEstimate(
+                name, quantity.name, quantity.unit, value, sigma, allowed, p, _DETECTED * total, alike
+            )
+        )
+    return tuple(out)
+
+
+def _of_estimates(source: str, estimates: tuple[TravelEstimate, ...], sight: Sight) -> tuple[Anomaly, ...]:
+    ends = (int(sight.frame[0]), int(sight.frame[-1]))
+    # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.
+    scaled_by = {"encoder_scale": ("baseline",)} if source == "field" else {}
+    return tuple(
+        Anomaly(
+            Channel.MOTION, e.p_value, e.statement, ends,
+            (e.effect, *scaled_by.get(e.effect, ()), *(name for name, _ in e.alike)),
+        )
+        for e in estimates
+        if e.p_value < _REPORTED
+    )  # fmt: skip
+
+
+def _of_steps(steps: tuple[StepFound, ...], sight: Sight) -> tuple[Anomaly, ...]:
+    out = []
+    for s in steps:
+        frames = (int(sight.frame[s.place - 1]), int(sight.frame[s.place]))
+        gain = f"{s.gain_mm:+.2f} ± {s.sigma_mm:.2f} mm"
+        words = f"At {s.time_s:.2f} s the encoder gains {gain} on what the pictures show"
+        if not s.rivals:
+            out.append(Anomaly(Channel.MOTION, s.p_value, words + ".", frames, ("encoder_slip",)))
+            continue
+        other = " or ".join(str(r) for r in s.rivals)
+        if EventKind.LOST_TIME in s.rivals:
+            other += f" ({s.missing_s:+.3f} s)"
+        out.append(Anomaly(Channel.MOTION, s.p_value, f"{words}, or {other}.", frames, ()))
+    return tuple(out)
+
+
+def _of_lines(lines: tuple[Line, ...], sight: Sight) -> tuple[Anomaly, ...]:
+    ends = (int(sight.frame[0]), int(sight.frame[-1])) if len(sight.frame) else (0, 0)
+    return tuple(
+        Anomaly(
+            Channel.MOTION, line.p_value,
+            f"The camera swings across the pipe by {line.amplitude_mm:.3f} ± {line.sigma_mm:.3f} mm at "
+            f"{line.frequency_hz:.2f} Hz or an alias of it, toward {line.direction_deg:.0f}°.",
+            ends, line.explained_by,
+        )
+        for line in lines
+    )  # fmt: skip
+
+
+def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str, ...]:
+    out = []
+    if recording.encoder is None:
+        out.append(f"The {source} has no encoder: its scale, slips, play and delay cannot be told.")
+    if len(sight.frame) < _LEAST_FRAMES:
+        out.append(
+            f"Only {len(sight.frame)} frames of the {source} show where the camera is along the pipe: motion "
+            "and encoder cannot be compared."
+        )
+    elif sight.path_mm[-1] < _SHORTEST_MM:
+        out.append(
+            f"The probe moves by only {sight.path_mm[-1]:.1f} mm in the {source}: what grows with distance "
+            "or speed cannot be told."
+        )
+    return tuple(out)
+
+
+def _blind(estimates: tuple[TravelEstimate, ...], sight: Sight) -> tuple[str, ...]:
+    """Return what the motion leaves undetermined, or determined only together."""
+    out = []
+    for e in estimates:
+        if not np.isfinite(e.sigma):
+            why = "" if sight.reverses or e.effect != "encoder_backlash" else ": the probe never turns back"
+            out.append(f"This motion tells nothing of {e.effect}{why}.")
+        for other, correlation in e.alike:
+            out.append(f"This motion does not tell {e.effect} from {other} (correlation {correlation:+.2f}).")
+    return tuple(out)

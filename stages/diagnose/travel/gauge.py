@@ -1,0 +1,36 @@
+"""Travel through a gauge: poses by fiducials and known bore, compared with the encoder."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.recording.base import Recording
+from stages.calibrate.gauge.calibrate import MeasuredRun
+from stages.calibrate.gauge.state import Unknowns
+from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
+from stages.diagnose.travel.sight import sight_of_poses
+
+_PLACEMENT_SIGMA_MM = 0.05
+
+
+def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> TravelEvidence:
+    """Return what motion and encoder of a gauge run say.
+
+    Only frames with fiducials count: these place the camera to a few µm, so that the encoder, loosely weighted
+    in the adjustment, has no say there. The scale of the way is that of the fiducials' stated places.
+
+    Parameters
+    ----------
+    run
+        The measured run.
+    state
+        The adjusted state, as of `stages.diagnose.gauge.prepare.prepare`.
+    """
+    fiducials = recording.pipe.fiducials
+    places = np.array([m.distance_mm for m in fiducials.markers]) if fiducials else np.zeros(1)
+    spread = float(np.sqrt(np.sum((places - places.mean()) ** 2)))
+    sight = sight_of_poses(recording, state.T_pc, run.posed, _PLACEMENT_SIGMA_MM / max(spread, 1.0))
+    first, last = int(run.posed[0]), int(run.posed[-1])
+    return travel_evidence(
+        "gauge", recording, sight, state.T_pc[first : last + 1], state.stated.encoder_scale_sigma
+    )

@@ -1,0 +1,181 @@
+"""Lines in time: sinusoids in the camera's place across the pipe, and which pictures show them.
+
+Harmonic F-test over orthogonal tapers: D. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE,
+1982, § XIII. It compares a sinusoid with the noise right around its frequency, whatever the noise elsewhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal.windows import dpss
+from scipy.stats import f as fisher
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_BANDWIDTH = 3.0
+_TAPERS = 5
+_PADDING = 4
+# Below this the way a towed probe wanders is made of lines itself.
+_SLOWEST_HZ = 1.5
+_WANDER_HZ = 1.2
+_LEAST_SAMPLES = 48
+_LEAST_MM = 0.003
+_ABOVE_FLOOR = 4.0
+_REPORTED = 1e-4
+_MOST = 4
+_SIGNIFICANT = 5.0
+
+
+@dataclass(frozen=True)
+class Line:
+    """A sinusoid in the place across the pipe.
+
+    Attributes
+    ----------
+    frequency_hz : float
+        Between 0 and half the frame rate; the true one may be any alias |f ± k · frame rate|.
+    amplitude_mm, sigma_mm : float
+        Along the direction in which it is largest.
+    direction_deg : float
+        Of that direction in P, 0 to 180.
+    p_value : float
+        Over all frequencies searched.
+    lit_mm, laser_mm, share_sigma_mm : float
+        The amplitudes in lit and in laser pictures alone, and their 1 σ; NaN where one kind is missing or
+        its own rate hides the frequency among the probe's wander.
+    """
+
+    frequency_hz: float
+    amplitude_mm: float
+    sigma_mm: float
+    direction_deg: float
+    p_value: float
+    lit_mm: float
+    laser_mm: float
+    share_sigma_mm: float
+
+    @property
+    def explained_by(self) -> tuple[str, ...]:
+        """Effects that show so: a camera that swings shows in all pictures, a sheet only in its own."""
+        if not np.isfinite(self.lit_mm + self.laser_mm):
+            return ("probe_vibration", "laser_rocking")
+        if abs(self.lit_mm - self.laser_mm) < max(3 * self.share_sigma_mm, 0.2 * self.laser_mm):
+            return ("probe_vibration",)
+        if self.lit_mm < max(3 * self.share_sigma_mm, 0.2 * self.laser_mm):
+            return ("laser_rocking",)
+        return ("probe_vibration", "laser_rocking")
+
+
+def find_lines(time_s: Float, xy_mm: Float, lit: Mask) -> tuple[Line, ...]:
+    """Return the lines in places (N, 2) at times (N,), the strongest first.
+
+    ``lit`` (N,) tells the pictures in which the wall shows, with the laser or without it.
+    """
+    lines: list[Line] = []
+    if len(time_s) < _LEAST_SAMPLES:
+        return ()
+    left = xy_mm
+    while len(lines) < _MOST:
+        found = _strongest(time_s, left)
+        if found is None:
+            break
+        line = _measured(time_s, left, lit, *found)
+        if line.amplitude_mm < max(_LEAST_MM, _SIGNIFICANT * line.sigma_mm):
+            break
+        lines.append(line)
+        left = _without(time_s, left, lit, line)
+    return tuple(lines)
+
+
+def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
+    """Return frequency and p-value of the largest line that stands out, or None."""
+    rate = 1 / float(np.median(np.diff(time_s)))
+    even = time_s[0] + np.arange(int(np.round((time_s[-1] - time_s[0]) * rate)) + 1) / rate
+    series = np.stack([np.interp(even, time_s, xy_mm[:, k]) for k in range(2)], 1)
+    wander = _wander(even)
+    centred = series - wander @ np.linalg.lstsq(wander, series, rcond=1e-6)[0]
+    count = len(series)
+    tapers = dpss(count, _BANDWIDTH, _TAPERS)
+    size = _PADDING * count
+    spectrum = np.fft.rfft(tapers[:, :, None] * centred, size, axis=1)
+    frequency = np.fft.rfftfreq(size, 1 / rate)
+    area = tapers.sum(1)
+    mean = np.einsum("k,kfi->fi", area, spectrum) / np.sum(area**2)
+    rest = np.sum(np.abs(spectrum - area[:, None, None] * mean) ** 2, (0, 2))
+    power = np.sum(area**2) * np.sum(np.abs(mean) ** 2, 1)
+    ratio = (_TAPERS - 1) * power / np.maximum(rest, 1e-30)
+    band = (frequency > _SLOWEST_HZ) & (frequency < rate / 2 - _BANDWIDTH / count * rate)
+    floor = np.median(np.sqrt(power[band])) if band.any() else np.inf
+    ratio = np.where(band & (np.sqrt(power) > _ABOVE_FLOOR * floor), ratio, 0.0)
+    chance = np.minimum(fisher.sf(ratio, 4, 4 * (_TAPERS - 1)) * count, 1.0)
+    if chance.min() > _REPORTED:
+        return None
+    # What samples at two kinds of moments show of one line has images, which are weaker.
+    best = int(np.argmax(np.where(chance < _REPORTED, power, 0.0)))
+    return float(frequency[best]), float(chance[best])
+
+
+def _measured(time_s: Float, xy_mm: Float, lit: Mask, frequency: float, p_value: float) -> Line:
+    laser_only = ~lit
+    frequency = _refined(time_s, xy_mm, frequency)
+    both, sigma = _amplitudes(time_s, xy_mm, frequency)
+    direction = np.linalg.svd(both)[0][:, 0] if np.any(both) else np.array([1.0, 0.0])
+    shares = []
+    for kind in (lit, laser_only):
+        clear = kind.sum() >= _LEAST_SAMPLES / 2 and _clear(time_s[kind], frequency)
+        shares.append(_amplitudes(time_s[kind], xy_mm[kind], frequency) if clear else (both * np.nan, np.nan))
+    one, other = (float(np.linalg.norm(direction @ s[0])) for s in shares)
+    return Line(
+        frequency, float(np.linalg.norm(direction @ both)), sigma,
+        float(np.degrees(np.arctan2(direction[1], direction[0]))) % 180.0, p_value, one, other,
+        float(np.hypot(shares[0][1], shares[1][1])),
+    )  # fmt: skip
+
+
+def _refined(time_s: Float, xy_mm: Float, frequency: float) -> float:
+    """Return the frequency near ``frequency`` at which a sinusoid takes most."""
+    width = 1 / (time_s[-1] - time_s[0])
+    trial = frequency + width * np.linspace(-0.5, 0.5, 41)
+    return float(trial[np.argmax([np.linalg.norm(_amplitudes(time_s, xy_mm, f)[0]) for f in trial])])
+
+
+def _clear(time_s: Float, frequency: float) -> bool:
+    """Return whether pictures at these times show the frequency apart from the probe's wander."""
+    rate = 1 / float(np.median(np.diff(time_s)))
+    alias = abs(frequency - rate * round(frequency / rate))
+    return bool(alias > _SLOWEST_HZ or frequency < rate / 2)
+
+
+def _amplitudes(time_s: Float, xy_mm: Float, frequency: float) -> tuple[Float, float]:
+    """Return amplitudes (2, 2) along x and y of sine and cosine, wander taken out, and their 1 σ."""
+    t = time_s - time_s[0]
+    line = [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)]
+    design = np.concatenate([np.stack(line, 1), _wander(time_s)], 1)
+    if len(t) < 1.3 * design.shape[1]:
+        return np.full((2, 2), np.nan), float("nan")
+    solution = np.linalg.lstsq(design, xy_mm, rcond=1e-6)[0]
+    left = xy_mm - design @ solution
+    noise = float(np.sqrt(np.mean(left**2) * len(t) / (len(t) - design.shape[1])))
+    return np.asarray(solution[:2].T), noise * float(np.sqrt(2 / len(t)))
+
+
+def _wander(time_s: Float) -> Float:
+    """Return (N, K) columns of whatever changes more slowly than lines are looked for."""
+    span = float(time_s[-1] - time_s[0])
+    t = time_s - time_s[0]
+    phase = np.pi / span * np.arange(1, int(2 * span * _WANDER_HZ) + 1) * t[:, None]
+    return np.concatenate([np.stack([np.ones_like(t), t / span], 1), np.cos(phase), np.sin(phase)], 1)
+
+
+def _without(time_s: Float, xy_mm: Float, lit: Mask, line: Line) -> Float:
+    """Return the places less the line, as lit and as laser pictures show it where both tell."""
+    out = xy_mm.copy()
+    whole = np.ones(len(time_s), bool)
+    for kind in (lit, ~lit) if np.isfinite(line.share_sigma_mm) else (whole,):
+        amplitudes = _amplitudes(time_s[kind], xy_mm[kind], line.frequency_hz)[0]
+        phase = 2 * np.pi * line.frequency_hz * (time_s[kind] - time_s[kind][0])
+        out[kind] -= np.stack([np.sin(phase), np.cos(phase)], 1) @ amplitudes.T
+    return out

@@ -1,0 +1,159 @@
+"""What may stand between encoder and sight: offset, scale, delay, play, and single events."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.recording.base import Encoder
+from stages.diagnose.effects.base import Travel
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.travel.noise import (
+    DriftNoise,
+    Whitened,
+    estimated_noise,
+    robust_coefficients,
+    whitened_fit,
+)
+from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
+
+Float = NDArray[np.float64]
+OFFSET, SCALE, DELAY, PLAY = range(4)
+SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
+_ROUNDS = 4
+_LONGEST_S = 1.0
+_AROUND = 10
+
+
+class EventKind(StrEnum):
+    """What happens at one moment."""
+
+    STEP = "the reading gains"
+    OUTLIER = "one picture is off"
+    LOST_TIME = "frames are missing"
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something between frames ``place`` − 1 and ``place`` of a `Sight` (an outlier: in frame ``place``)."""
+
+    kind: EventKind
+    place: int
+
+
+@dataclass(frozen=True)
+class TravelFit:
+    """Encoder against sight, fitted.
+
+    Attributes
+    ----------
+    sight : Sight
+    events : tuple of Event
+    values : (4 + E,)
+        Offset in mm, scale, delay in s, play in mm; then gains in mm (for lost time: in s).
+    covariance : (4 + E, 4 + E)
+        Infinite variance where this motion tells nothing.
+    noise : DriftNoise
+    difference_mm : (N,)
+        Reading − sight, less the offset only.
+    whitened : Whitened
+        Around ``values``.
+    """
+
+    sight: Sight
+    events: tuple[Event, ...]
+    values: Float
+    covariance: Float
+    noise: DriftNoise
+    difference_mm: Float
+    whitened: Whitened
+
+    @property
+    def sigma(self) -> Float:
+        """(4 + E,) 1 σ of the values."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0)))
+
+
+def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: DriftNoise | None) -> TravelFit:
+    """Fit offset, scale, delay, play and given events; the noise is measured unless given.
+
+    The delay moves the time at which the encoder is read, so that kinks of the motion do no harm; it and the
+    play are found by least absolute deviations first, which unknown events do not disturb.
+    """
+    steady = _without_steps(sight, encoder, events)
+    speed = np.gradient(sight.distance_mm, sight.time_s)
+    delay_s, play_mm = 0.0, 0.0
+    for _ in range(_ROUNDS):
+        reading = readings_at(steady, sight.time_s + delay_s)
+        columns = np.concatenate(
+            [_smooth_columns(sight, speed, play_mm), event_columns(sight, events, speed)], 1
+        )
+        # The delay already in the reading is put back, so that every round gives the values in full.
+        difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s
+        found = robust_coefficients(difference, columns)
+        delay_s, play_mm = float(np.clip(found[DELAY], -_LONGEST_S, _LONGEST_S)), float(found[PLAY])
+    if noise is None:
+        noise = estimated_noise(difference, columns, sight.path_mm, quantum_mm(encoder) / np.sqrt(12))
+    whitened = whitened_fit(difference, columns, noise.covariance(sight.path_mm))
+    values = np.where(np.isfinite(np.diag(whitened.covariance)), whitened.estimate, 0.0)
+    covariance = whitened.covariance.copy()
+    covariance[SCALE, SCALE] += sight.scale_sigma**2
+    values[4:] += [_gain(encoder, sight, e) for e in events]
+    plain = readings_at(encoder, sight.time_s) - sight.distance_mm
+    return TravelFit(sight, events, values, covariance, noise, plain - np.median(plain), whitened)
+
+
+def moment(sight: Sight, encoder: Encoder, place: int) -> int:
+    """Return the reading after which it jumped most between two pictures: readings come more often."""
+    before, after = sight.time_s[place - 1], sight.time_s[place]
+    inside = np.flatnonzero((encoder.time_s[1:] >= before) & (encoder.time_s[:-1] <= after))
+    if not len(inside):
+        return int(np.clip(np.searchsorted(encoder.time_s, after) - 1, 0, len(encoder.time_s) - 2))
+    step = np.diff(encoder.distance_mm)[inside]
+    return int(inside[np.argmax(np.abs(step - np.median(step)))])
+
+
+def _gain(encoder: Encoder, sight: Sight, event: Event) -> float:
+    """Return what one reading gains at a step beyond its neighbours, mm; 0 for other events."""
+    if event.kind is not EventKind.STEP:
+        return 0.0
+    k = moment(sight, encoder, event.place)
+    around = np.diff(encoder.distance_mm)[max(k - _AROUND, 0) : k + _AROUND + 1]
+    return float(encoder.distance_mm[k + 1] - encoder.distance_mm[k] - np.median(around))
+
+
+def _without_steps(sight: Sight, encoder: Encoder, events: tuple[Event, ...]) -> Encoder:
+    """Return the readings less what jumps between two of them, so that they may be read a little off time."""
+    distance = encoder.distance_mm.copy()
+    for event in events:
+        distance[moment(sight, encoder, event.place) + 1 :] -= _gain(encoder, sight, event)
+    return Encoder(encoder.time_s, distance)
+
+
+def event_columns(sight: Sight, events: tuple[Event, ...], speed: Float) -> Float:
+    """Return (N, E)."""
+    if not events:
+        return np.zeros((len(sight.time_s), 0))
+    return np.stack([candidate_columns(sight, e.kind, speed)[:, e.place] for e in events], 1)
+
+
+def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Float:
+    """Return (N, N): the column of an event of that kind at every place."""
+    count = len(sight.time_s)
+    if kind is EventKind.OUTLIER:
+        return np.eye(count)
+    after = np.tril(np.ones((count, count)))
+    # Frames missing after a moment: pictures are later than their times say, by what the probe then moves.
+    return after if kind is EventKind.STEP else -after * speed[:, None]
+
+
+def _smooth_columns(sight: Sight, speed: Float, play_mm: float) -> Float:
+    """Return (N, 4) columns of offset, scale, delay and play; the latter per mm, at its present size."""
+    travel = Travel(sight.time_s, sight.distance_mm, speed, sight.distance_mm)
+    play = LIBRARY["encoder_backlash"]
+    size = float(np.clip(abs(play_mm), 0.05, 10.0)) * (1 if play_mm >= 0 else -1)
+    lag = play.reading_shift_mm(travel, (), np.array([size])) / size
+    return np.stack([np.ones(len(speed)), sight.distance_mm - sight.distance_mm[0], -speed, lag], 1)

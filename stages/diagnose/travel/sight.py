@@ -1,0 +1,115 @@
+"""Distance travelled as seen, without the encoder, beside what the encoder read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import Trajectory
+from pipeline.recording.base import Encoder, Illumination, Recording
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+_END_READINGS = 20
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The camera's way as seen, in frames whose own picture places the camera along the pipe.
+
+    Attributes
+    ----------
+    frame : (N,) int
+        Frame numbers.
+    time_s : (N,)
+    distance_mm : (N,)
+        Along the pipe; from poses estimated without the encoder.
+    path_mm : (N,)
+        Way travelled to and fro: what drift accumulates over.
+    scale_sigma : float
+        Relative 1 σ of the scale of ``distance_mm``.
+    frame_time_s : float
+        Usual time from one frame of the recording to the next.
+    """
+
+    frame: Int
+    time_s: Float
+    distance_mm: Float
+    path_mm: Float
+    scale_sigma: float
+    frame_time_s: float
+
+    @property
+    def direction(self) -> Float:
+        """(N,) +1 or −1: which way the probe moves, or moved before it stopped."""
+        step = np.gradient(self.distance_mm)
+        still = np.abs(step) < 0.05 * np.percentile(np.abs(step), 90)
+        last = np.maximum.accumulate(np.where(still, -1, np.arange(len(step))))
+        first = int(np.argmax(~still))
+        return np.asarray(np.sign(step[np.where(last < 0, first, last)]))
+
+    @property
+    def reverses(self) -> bool:
+        """Whether the probe moves both ways."""
+        return len(np.unique(self.direction)) > 1
+
+    def select(self, keep: Mask) -> Sight:
+        """Return the frames where ``keep`` (N,) is true."""
+        return replace(
+            self, frame=self.frame[keep], time_s=self.time_s[keep],
+            distance_mm=self.distance_mm[keep], path_mm=self.path_mm[keep],
+        )  # fmt: skip
+
+
+def sight_of_trajectory(recording: Recording, trajectory: Trajectory) -> Sight:
+    """Return the way in a field recording, from a trajectory made without the encoder.
+
+    Only lit frames: in the others the pose is carried on from its neighbours. Frames whose texture was lost
+    are left out.
+    """
+    lit = np.isin(trajectory.frame, recording.frames.of(Illumination.LED, Illumination.BOTH))
+    for event in trajectory.events:
+        if event.kind == "texture_lost":
+            lit &= (trajectory.frame < event.frame_from) | (trajectory.frame > event.frame_to)
+    return _sight(recording, trajectory.frame, trajectory.T_pc[:, 2, 3], lit, trajectory.scale_sigma)
+
+
+def sight_of_poses(recording: Recording, T_pc: Float, index: Int, scale_sigma: float) -> Sight:
+    """Return the way in a gauge run from poses (N, 4, 4), where fiducials (``index``) show it."""
+    posed = np.zeros(len(T_pc), bool)
+    posed[index] = True
+    return _sight(recording, recording.frames.frame, T_pc[:, 2, 3], posed, scale_sigma)
+
+
+def readings_at(encoder: Encoder, time_s: Float) -> Float:
+    """Return readings (N,) at times (N,); beyond the ends as if the speed there were held."""
+    held = np.clip(time_s, encoder.time_s[0], encoder.time_s[-1])
+    last = min(_END_READINGS, len(encoder.time_s) - 1)
+    early = (encoder.distance_mm[last] - encoder.distance_mm[0]) / (encoder.time_s[last] - encoder.time_s[0])
+    late = (encoder.distance_mm[-1] - encoder.distance_mm[-1 - last]) / (
+        encoder.time_s[-1] - encoder.time_s[-1 - last]
+    )
+    beyond = (time_s - held) * np.where(time_s < held, early, late)
+    return np.asarray(np.interp(held, encoder.time_s, encoder.distance_mm) + beyond)
+
+
+def quantum_mm(encoder: Encoder) -> float:
+    """Return the finest unit of the readings, mm; 0 where every step differs."""
+    steps = np.unique(np.round(np.abs(np.diff(encoder.distance_mm)), 4))
+    steps = steps[steps > 0]
+    if not len(steps):
+        return 0.0
+    unit = float(steps[0])
+    # Readings that are written with four digits are not quantised to any visible step.
+    return unit if np.all(np.abs(steps / unit - np.round(steps / unit)) < 0.02) else 0.0
+
+
+def _sight(recording: Recording, frame: Int, distance_mm: Float, use: Mask, scale_sigma: float) -> Sight:
+    place = np.searchsorted(recording.frames.frame, frame)
+    time_s = recording.frames.time_s[place]
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(distance_mm[use])))]) if use.any() else np.zeros(0)
+    frame_time = float(np.median(np.diff(recording.frames.time_s))) if len(time_s) > 1 else 0.0
+    return Sight(frame[use], time_s[use], distance_mm[use], path[: int(use.sum())], scale_sigma, frame_time)
