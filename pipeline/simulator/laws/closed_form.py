@@ -57,9 +57,7 @@ def beam_decentre(r: float, psi: Float, height_mm: float, direction_deg: float) 
     return np.asarray(-r / BASELINE_MM * height_mm * crest(psi, direction_deg))
 
 
-def sheet_waviness(
-    r: float, psi: Float, amplitude_mrad: float, order: float, direction_deg: float
-) -> Float:
+def sheet_waviness(r: float, psi: Float, amplitude_mrad: float, order: float, direction_deg: float) -> Float:
     """−(r²/l) ε_m c_m."""
     return np.asarray(-(r**2) / BASELINE_MM * 1e-3 * amplitude_mrad * crest(psi, direction_deg, order))
 
@@ -107,7 +105,7 @@ def housing_glass(r: float, psi: Float, thickness_mm: float) -> Float:
 
 
 def tube_wedge(r: float, psi: Float, wedge_mm: float, direction_deg: float) -> Float:
-    """The same × c₁."""
+    """−δt (1 − tan i′ / tan i) c₁."""
     return np.asarray(-wedge_mm * _glass_share(r) * crest(psi, direction_deg))
 
 

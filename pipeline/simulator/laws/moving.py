@@ -37,7 +37,7 @@ def moving_checks() -> Iterator[Check]:
 
 
 def _drifts() -> Iterator[Check]:
-    """Static law × (1 − exp(−t/t₀)), at t = t₀."""
+    """Check the static law × (1 − exp(−t/t₀)), at t = t₀."""
     psi, gone = np.linspace(-np.pi, np.pi, 73)[:-1], -math.expm1(-1.0)
     laws = (
         ("baseline_drift", "✓", "−(r/l) δl (1 − exp(−t/t₀))", 0, baseline),
@@ -58,7 +58,7 @@ def _drifts() -> Iterator[Check]:
 
 
 def _rocking() -> Check:
-    """The tilt's law, at the crest of the swing."""
+    """Check the tilt's law at the crest of the swing."""
     switch = typical_switch("laser_rocking")
     ring = effect_ring(switch, _RADIUS_MM, 0.25 / switch.quantities["frequency_hz"])
     predicted = _RADIUS_MM**2 / 22.0 * 1e-3 * switch.values[0]
@@ -70,7 +70,7 @@ def _rocking() -> Check:
 
 
 def _rolling() -> Iterator[Check]:
-    """ė_x: (ė_x τ/2) sin 2ψ; ė_y: (ė_y τ/2)(1 − cos 2ψ); axial v τ sin ψ; τ = readout ρ₀/H."""
+    """Check ė_x: (ė_x τ/2) sin 2ψ; ė_y: (ė_y τ/2)(1 − cos 2ψ); axial v τ sin ψ; τ = readout ρ₀/H."""
     switch = typical_switch("rolling_shutter")
     rate = 2 * math.pi * 5.3 * 0.2
     rho = FOCAL_PX * theta_of(_RADIUS_MM)
@@ -92,7 +92,7 @@ def _rolling() -> Iterator[Check]:
 
 
 def _vibration() -> Iterator[Check]:
-    """A ring off by e(t); frames see it at |f − k · frame rate|."""
+    """Check a ring off by e(t); frames see it at |f − k · frame rate|."""
     amplitude, frequency, direction = 0.2, _ALIASED_HZ, 40.0
     switch = Switch("probe_vibration", (amplitude, frequency, direction))
     truth = switch_on(bench_truth(_RADIUS_MM, frames=300), [switch])
@@ -109,7 +109,7 @@ def _vibration() -> Iterator[Check]:
 
 
 def _off_centre() -> Iterator[Check]:
-    """e c₁ − (e²/4r)(1 − c₂)."""
+    """E c₁ − (e²/4r)(1 − c₂)."""
     ring = trace_ring(_moving(x_mm=constant(-_OFF_CENTRE_MM)))
     e, second = _OFF_CENTRE_MM, _OFF_CENTRE_MM**2 / (4 * _RADIUS_MM)
     law = "e c₁ − (e²/4r)(1 − c₂)"
@@ -120,7 +120,7 @@ def _off_centre() -> Iterator[Check]:
 
 
 def _yaw() -> Iterator[Check]:
-    """(rβ²/4)(1 + c₂) about a centre that lies βl aside."""
+    """Check (rβ²/4)(1 + c₂) about a centre that lies βl aside."""
     beta = math.radians(_YAW_DEG)
     truth = _moving(yaw_rad=constant(beta))
     read = truth.stated.triangulate(trace_ring(truth).uv)[:, :2]

@@ -32,7 +32,7 @@ def odometry_checks() -> Iterator[Check]:
 
 
 def _scale() -> Check:
-    """Visual over encoder with a baseline error: the visual scale is that of the radius."""
+    """Check visual over encoder with a baseline error: the visual scale is that of the radius."""
     grown, count = 0.05, 0.005
     truth = _travelling([Switch("encoder_scale", (count,))])
     ring = effect_ring(Switch("baseline", (grown,)), _RADIUS_MM)
@@ -73,7 +73,7 @@ def _late() -> Check:
 
 
 def _bend() -> Iterator[Check]:
-    """Sagitta L²/8ρ over a chord; the wall's way ds (1 − (r/ρ) c₁)."""
+    """Check the sagitta L²/8ρ over a chord; the wall's way ds (1 − (r/ρ) c₁)."""
     curvature = 1 / (1.5 * 101.6)
     truth = switch_on(bench_truth(_RADIUS_MM), [Switch("pipe_bend", (curvature, 40.0))])
     s = np.array([0.0, _CHORD_MM / 2, _CHORD_MM])

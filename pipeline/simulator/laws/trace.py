@@ -48,7 +48,10 @@ def trace_ring(truth: SceneTruth, time_s: float = 0.0, azimuths: int = _AZIMUTHS
     low, high = (np.full(azimuths, end) for end in _SEARCH_PX)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        ahead = _height(truth, instrument, time_s, truth.stated.camera.centre_px + middle[:, None] * outward)[0] > 0
+        ahead = (
+            _height(truth, instrument, time_s, truth.stated.camera.centre_px + middle[:, None] * outward)[0]
+            > 0
+        )
         low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
     uv = truth.stated.camera.centre_px + (0.5 * (low + high))[:, None] * outward
     read = truth.stated.triangulate(uv)
