@@ -1,0 +1,213 @@
+"""Poses, globals and effects adjusted together under one hypothesis; evidence about its neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from stages.calibrate.gauge.state import ENCODER, Unknowns
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
+from stages.diagnose.inference import instrument_information
+from stages.diagnose.gauge.baseline import BASELINE_SIZE, SIGMA_PX
+from stages.diagnose.gauge.elimination import (
+    Equations,
+    MotionPrior,
+    OwnUnknowns,
+    Reduced,
+    eliminate_globals,
+    eliminate_poses,
+    score_inflation,
+)
+from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_CONVERGED = 0.5
+_PARTS = (1.0, 0.5, 0.2, 0.05)
+_ITERATIONS = 8
+_DELAY_SIGMA_S = 0.002
+_PLACEMENT_SIGMA_MM = 0.05
+_LEAST_BORE_SIGMA_MM = 1e-3
+# An effect may be many times its plausible size; the data say how large it is.
+_WIDE = 100.0
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The optimum under one hypothesis.
+
+    Attributes
+    ----------
+    state : Unknowns
+    terms : tuple of Term
+    cost : float
+        Weighted sum of squares, priors of the stated instrument included.
+    linearised : Linearised
+    reduced : Reduced
+    """
+
+    state: Unknowns
+    terms: tuple[Term, ...]
+    cost: float
+    linearised: Linearised
+    reduced: Reduced
+
+
+def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int = _ITERATIONS) -> Fit:
+    """Minimise over poses, globals and the terms' amplitudes by Gauss-Newton with fixed weights.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When something is not determined.
+    """
+    found = _at(run, start, tuple(terms))
+    for _ in range(iterations):
+        prior, pull, _ = _prior(found.state, found.terms, run)
+        information = found.reduced.information + prior
+        step = np.linalg.solve(information, found.reduced.right - pull)
+        better = _shortened(run, found, step)
+        if better is None:
+            return found
+        gain, found = found.cost - better.cost, better
+        if gain < _CONVERGED:
+            break
+    return found
+
+
+def _shortened(run: GaugeRun, found: Fit, step: Float) -> Fit | None:
+    """Return the fit after the step, halved until the cost falls; None when it never does."""
+    for part in _PARTS:
+        better = _at(run, *_moved(found, part * step))
+        if better.cost < found.cost:
+            return better
+    return None
+
+
+def evidence(
+    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], frames: Sequence[Mask] = ()
+) -> tuple[Evidence, ...]:
+    """Return what the run says about the fit's terms and the effects asked about, together.
+
+    Parameters
+    ----------
+    frames : sequence of (N,) bool
+        Parts of the run; each gives evidence of its own after that of the whole.
+
+    Returns
+    -------
+    tuple of Evidence
+        The whole run's first.
+    """
+    linearised = linearise(run, found.state, found.terms, asked, with_baseline=True)
+    parts = [linearised.equations, *(linearised.equations.of(part) for part in frames)]
+    return tuple(_reduced(run, found, asked, equations, linearised.motion) for equations in parts)
+
+
+def _reduced(
+    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], equations: Equations, motion: MotionPrior
+) -> Evidence:
+    """Return the evidence of equations, all but the shared columns eliminated."""
+    reduced = eliminate_poses(equations, motion, len(found.state.T_pc))
+    own = _own_unknowns(run, found, equations.by_global.shape[1])
+    left = eliminate_globals(reduced, own)
+    inflation = score_inflation(equations, reduced, left)
+    names, value = _named(found, asked)
+    information, right = left.information, left.right
+    # From the linearisation's place back to nothing beyond the stated.
+    misfit = left.misfit + float(2 * right @ value + value @ information @ value)
+    known = np.array([k for k, name in enumerate(names) if name is not None])
+    pick = np.ix_(known, known)
+    return Evidence(
+        tuple(name for name in names if name is not None), information[pick], (right + information @ value)[known],
+        (information * np.outer(inflation, inflation))[pick], misfit,
+        float(len(np.unique(equations.cell[equations.weight > 0]))),
+    )  # fmt: skip
+
+
+def _own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
+    """Return which globals are the run's own: offset, delay, bores, fiducials, and the baseline at the end."""
+    at = found.state.layout
+    prior, pull, value = _prior(found.state, found.terms, run)
+    wide = [np.zeros(size) for _ in range(3)]
+    for all_of_them, first in zip(wide, (prior.diagonal(), pull, value), strict=True):
+        all_of_them[: len(first)] = first
+    wide[0][size - BASELINE_SIZE :] = SIGMA_PX**-2
+    out = np.r_[1:ENCODER, at.bore, at.marker, size - BASELINE_SIZE : size]
+    return OwnUnknowns(out, np.setdiff1d(np.arange(size), out), *(x[out] for x in wide))
+
+
+def _named(found: Fit, asked: Sequence[tuple[EffectModel, Shape]]) -> tuple[list[Column | None], Float]:
+    """Return the kept globals' columns, and their present values, true minus stated."""
+    state = found.state
+    names: list[Column | None] = [Column(INSTRUMENT, "encoder_scale")]
+    value = [state.encoder[0] - 1]
+    sigma = np.sqrt(np.diag(state.stated.covariance))
+    for name, here, known in zip(state.stated.parameter_names, state.instrument, sigma, strict=True):
+        names.append(Column(INSTRUMENT, name) if known > 0 else None)
+        value.append(here)
+    for t in found.terms:
+        names += [Column(t.model.name, a.name, t.shape) for a in t.model.amplitudes]
+        value += list(t.amplitude)
+    for model, shape in asked:
+        names += [Column(model.name, a.name, shape) for a in model.amplitudes]
+        value += [0.0] * len(model.amplitudes)
+    return names, np.array(value)
+
+
+def own_parameters(state: Unknowns) -> Unknowns:
+    """Return the state with the instrument's corrections in the parameters' own units."""
+    correction = state.probe.parameters - state.stated.parameters
+    return replace(state, instrument=correction, unsure=np.eye(len(correction)))
+
+
+def _at(run: GaugeRun, state: Unknowns, terms: tuple[Term, ...]) -> Fit:
+    linearised = linearise(run, state, terms, ())
+    reduced = eliminate_poses(linearised.equations, linearised.motion, len(state.T_pc))
+    _, pull, value = _prior(state, terms, run)
+    # The poses' own step is part of the cost; what is left of the globals' step is below _CONVERGED.
+    return Fit(state, terms, reduced.misfit + float(value @ pull), linearised, reduced)
+
+
+def _prior(state: Unknowns, terms: Sequence[Term], run: GaugeRun) -> tuple[Float, Float, Float]:
+    """Return the information (G, G) of the globals' priors, its product with their values, and these."""
+    at = state.layout
+    size = at.size + sum(len(t.amplitude) for t in terms)
+    information = np.zeros((size, size))
+    sigma = np.ones(at.size)
+    sigma[:ENCODER] = state.stated.encoder_scale_sigma, 1e4, _DELAY_SIGMA_S
+    sigma[at.bore] = run.bore_sigma_mm
+    sigma[at.marker] = _PLACEMENT_SIGMA_MM
+    information[: at.size, : at.size] = np.diag(sigma**-2)
+    information[at.instrument, at.instrument] = instrument_information(state.stated)
+    plausible = [a.plausible for t in terms for a in t.model.amplitudes]
+    wide = np.arange(at.size, size)
+    information[wide, wide] = (_WIDE * np.array(plausible)) ** -2.0
+    value = np.concatenate(
+        [state.encoder - [1.0, 0.0, 0.0], state.bore_mm, state.edge_mm.ravel(), state.instrument,
+         *[t.amplitude for t in terms]]
+    )  # fmt: skip
+    return information, information @ value, value
+
+
+def _moved(found: Fit, step: Float) -> tuple[Unknowns, tuple[Term, ...]]:
+    """Return state and terms after a step (G,) of the globals, the poses following."""
+    state, size = found.state, found.state.border_size
+    reduced = found.reduced
+    poses = reduced.pose_step - reduced.pose_by_global @ step
+    moved = replace(
+        state.step(np.concatenate([poses, np.zeros((len(poses), 1))], 1), step[:size]),
+        T_pc=from_parts(
+            state.T_pc[:, :3, :3] @ rotation_from_vector(poses[:, 3:]), state.T_pc[:, :3, 3] + poses[:, :3]
+        ),
+    )
+    terms, first = [], size
+    for t in found.terms:
+        terms.append(replace(t, amplitude=t.amplitude + step[first : first + len(t.amplitude)]))
+        first += len(t.amplitude)
+    return moved, tuple(terms)

@@ -1,0 +1,95 @@
+"""Ring bins and fiducial edges of a gauge run as the image points that effects are predicted at."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from pipeline.artefacts import RingSamples
+from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
+from stages.calibrate.gauge.edges import Edges
+from stages.calibrate.gauge.rings import BoreRings
+from stages.calibrate.gauge.state import Unknowns
+from stages.diagnose.effects.base import ImagePoints
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_SMOOTHING = 9
+
+
+def ring_points(state: Unknowns, rings: BoreRings, time_s: Float, width_px: Float) -> ImagePoints:
+    """Return the ring bins, their wall points as probe and poses of the state place them."""
+    T = state.T_pc[rings.frame]
+    xyz_c = state.probe.triangulate(rings.uv)
+    xyz_p = transform(T, xyz_c)
+    normal_c, along_c = _wall_directions(xyz_p, T)
+    along_ray = np.einsum("mij,mj->mi", state.probe.triangulate_jacobian(rings.uv)[0], rings.outward)
+    passing = _passing(state, time_s, rings.frame, xyz_c)
+    rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
+    return ImagePoints(
+        state.probe, rings.frame, time_s[rings.frame], rings.uv, xyz_c, normal_c, along_c,
+        rate[:, None] * rings.outward, speed_along(state, time_s)[rings.frame], True, width_px,
+        np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2],
+    )  # fmt: skip
+
+
+def edge_points(state: Unknowns, edges: Edges, time_s: Float) -> ImagePoints:
+    """Return the points of fiducial borders."""
+    T = state.T_pc[edges.frame]
+    xyz_c = transform(inverse(T), edges.xyz_p)
+    normal_c, along_c = _wall_directions(edges.xyz_p, T)
+    passing = _passing(state, time_s, edges.frame, xyz_c)
+    by_c = state.probe.camera.project_jacobian(xyz_c).by_point
+    return ImagePoints(
+        state.probe, edges.frame, time_s[edges.frame], edges.uv, xyz_c, normal_c, along_c,
+        np.einsum("mij,mj->mi", by_c, passing), speed_along(state, time_s)[edges.frame], False,
+        np.full(len(edges.uv), np.nan), np.arctan2(edges.xyz_p[:, 1], edges.xyz_p[:, 0]), edges.xyz_p[:, 2],
+    )  # fmt: skip
+
+
+def bin_widths(source: RingSamples, index: Int, rings: BoreRings) -> Float:
+    """Return the line's width (M,) at the ring bins, from the sample nearest in azimuth.
+
+    Parameters
+    ----------
+    index : (F,) int
+        Places in the recording of the sampled frames.
+    """
+    row = np.searchsorted(index, rings.frame)
+    azimuth = np.arctan2(rings.outward[:, 1], rings.outward[:, 0])
+    step = 2 * np.pi / len(source.azimuth_rad)
+    column = np.round((azimuth - source.azimuth_rad[0]) / step).astype(np.int64) % len(source.azimuth_rad)
+    width = source.width_px[row, column].astype(float)
+    return np.where(np.isfinite(width), width, np.nanmedian(width) if np.isfinite(width).any() else 1.0)
+
+
+def speed_along(state: Unknowns, time_s: Float) -> Float:
+    """Return the camera's speed (N,) along the pipe, mm/s."""
+    rate = np.gradient(state.T_pc[:, 2:3, 3], time_s, axis=0)
+    return np.asarray(_smoothed(rate)[:, 0])
+
+
+def _wall_directions(xyz_p: Float, T_pc: Float) -> tuple[Float, Float]:
+    radius = np.hypot(xyz_p[:, 0], xyz_p[:, 1])
+    normal_p = np.stack([xyz_p[:, 0] / radius, xyz_p[:, 1] / radius, 0 * radius], -1)
+    return np.einsum("mij,mi->mj", T_pc[:, :3, :3], normal_p), T_pc[:, 2, :3]
+
+
+def _passing(state: Unknowns, time_s: Float, frame: Int, xyz_c: Float) -> Float:
+    """Return how points (M, 3) of the wall pass in C, mm/s."""
+    before = np.maximum(np.arange(len(time_s)) - 1, 0)
+    after = np.minimum(np.arange(len(time_s)) + 1, len(time_s) - 1)
+    span = np.maximum(time_s[after] - time_s[before], 1e-9)[:, None]
+    T = state.T_pc
+    velocity_p = (T[after, :3, 3] - T[before, :3, 3]) / span
+    turned = np.swapaxes(T[before, :3, :3], -1, -2) @ T[after, :3, :3]
+    turning_c = _smoothed(vector_from_rotation(turned) / span)
+    velocity_c = np.einsum("nij,ni->nj", T[:, :3, :3], _smoothed(velocity_p))
+    return np.asarray(-velocity_c[frame] - np.cross(turning_c[frame], xyz_c))
+
+
+def _smoothed(rate: Float) -> Float:
+    """Return rates (N, 3) smoothed in time: noise of the poses would be taken for motion."""
+    window = min(_SMOOTHING, len(rate) - 1 + len(rate) % 2)
+    return np.asarray(savgol_filter(rate, window, 2, axis=0)) if window > 2 else rate

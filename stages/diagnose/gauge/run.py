@@ -1,0 +1,213 @@
+"""A gauge run linearised about a state and a few effects at their present size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from pipeline.recording.base import Encoder
+from stages.calibrate.gauge.edges import Edges
+from stages.calibrate.gauge.rings import BoreRings
+from stages.calibrate.gauge.smooth import smooth_rows
+from stages.calibrate.gauge.state import ENCODER, Unknowns
+from stages.calibrate.gauge.terms import edge_equations, ring_equations
+from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.effects.predict import (
+    columns,
+    reading_columns,
+    ring_shift_px,
+    texture_columns,
+    texture_shift_px,
+)
+from stages.diagnose.gauge.baseline import edge_baseline, ring_baseline
+from stages.diagnose.gauge.elimination import POSE, Equations, MotionPrior
+from stages.diagnose.gauge.points import edge_points, ring_points, speed_along
+
+Float = NDArray[np.float64]
+_ROUNDS = 2
+_ENCODER_SIGMA_MM = 1.0
+# Encoder readings this many frames apart err apart.
+_ENCODER_CELL = 8
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect taken into the model: at one shape, with amplitudes (Q,)."""
+
+    model: EffectModel
+    shape: Shape
+    amplitude: Float
+
+
+@dataclass(frozen=True)
+class GaugeRun:
+    """The measurements of a gauge run with fixed weights.
+
+    Attributes
+    ----------
+    edges, rings
+    width_px : (R,)
+        Line width at the ring bins.
+    time_s : (N,)
+    encoder : Encoder or None
+    bore_sigma_mm : float
+    motion_sigma : (6,)
+        1 σ of the poses' third differences.
+    edge_weight, ring_weight : (E,), (R,)
+        Fixed, so that hypotheses are compared on the same measurements.
+    """
+
+    edges: Edges
+    rings: BoreRings
+    width_px: Float
+    time_s: Float
+    encoder: Encoder | None
+    bore_sigma_mm: float
+    motion_sigma: Float
+    edge_weight: Float
+    ring_weight: Float
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Measurements as equations, the motion's prior, and what the effects were predicted at."""
+
+    equations: Equations
+    motion: MotionPrior
+    rings: ImagePoints
+    edges: ImagePoints
+
+
+def linearise(
+    run: GaugeRun, state: Unknowns, terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
+    with_baseline: bool = False,
+) -> Linearised:  # fmt: skip
+    """Return the equations with columns for the state's globals, the terms, the effects asked about, the baseline."""
+    edges, edge_at = _without_edge_shift(run, state, terms)
+    rings, ring_at = _without_ring_shift(run, state, terms)
+    parts = [_edge_part(run, state, edges, edge_at, terms, asked)]
+    parts.append(_ring_part(run, state, rings, ring_at, terms, asked))
+    if run.encoder is not None:
+        parts.append(_encoder_part(run, run.encoder, state, terms, asked))
+    joined = {k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])}
+    if with_baseline:
+        joined["by_global"] = np.concatenate([joined["by_global"], _baseline(edges, edge_at, ring_at, parts)], 1)
+    smooth = smooth_rows(state, run.time_s, run.motion_sigma)
+    motion = MotionPrior(smooth.frame, smooth.by_frame[..., :POSE], smooth.residual, smooth.weight)
+    return Linearised(Equations(**joined), motion, ring_at, edge_at)
+
+
+def travel_of(run: GaugeRun, encoder: Encoder, state: Unknowns) -> Travel:
+    """Return the camera's way and the readings at the frames' times."""
+    reading = np.interp(run.time_s, encoder.time_s, encoder.distance_mm)
+    return Travel(run.time_s, state.T_pc[:, 2, 3], speed_along(state, run.time_s), reading)
+
+
+def _baseline(edges: Edges, edge_at: ImagePoints, ring_at: ImagePoints, parts: Sequence[Equations]) -> Float:
+    """Return (M, 38) derivatives of the residuals by the baseline's patterns, in px."""
+    on_edges = edge_baseline(edge_at, edges.normal)
+    # The residual of a ring falls with its outward shift by the millimetres of a pixel.
+    on_rings = -ring_mm_per_px(ring_at)[:, None] * ring_baseline(ring_at)
+    count = len(parts[2].residual) if len(parts) > 2 else 0
+    return block_diag(on_edges, on_rings, np.zeros((count, 0)))
+
+
+def ring_mm_per_px(points: ImagePoints) -> Float:
+    """Return (M,) by how much the radius grows with the ring's outward shift in the image."""
+    by_pixel = points.probe.triangulate_jacobian(points.uv)[0]
+    return np.asarray(np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward))
+
+
+def _without_ring_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> tuple[BoreRings, ImagePoints]:
+    """Return the ring bins where they would be without the terms, and the points there."""
+    uv = run.rings.uv
+    for _ in range(_ROUNDS if terms else 0):
+        points = ring_points(state, replace(run.rings, uv=uv), run.time_s, run.width_px)
+        shift = np.sum([ring_shift_px(t.model, points, t.shape, t.amplitude) for t in terms], 0)
+        uv = run.rings.uv - shift[:, None] * run.rings.outward
+    rings = replace(run.rings, uv=uv)
+    return rings, ring_points(state, rings, run.time_s, run.width_px)
+
+
+def _without_edge_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> tuple[Edges, ImagePoints]:
+    points = edge_points(state, run.edges, run.time_s)
+    uv = run.edges.uv
+    for t in terms:
+        uv = uv - texture_shift_px(t.model, points, t.shape, t.amplitude)
+    edges = replace(run.edges, uv=uv)
+    return edges, replace(points, uv=uv)
+
+
+def _ring_part(
+    run: GaugeRun, state: Unknowns, rings: BoreRings, points: ImagePoints,
+    terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
+) -> Equations:  # fmt: skip
+    made = ring_equations(state, rings)
+    mm_per_px = ring_mm_per_px(points)
+    shift = [_term_slope(t, lambda a, t=t: ring_shift_px(t.model, points, t.shape, a)) for t in terms]
+    shift += [columns(model, points, shape) for model, shape in asked]
+    return _with_effects(made.rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster)
+
+
+def _edge_part(
+    run: GaugeRun, state: Unknowns, edges: Edges, points: ImagePoints,
+    terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
+) -> Equations:  # fmt: skip
+    made = edge_equations(state, edges)
+
+    def across(shift: Float) -> Float:
+        return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
+
+    shift = [_term_slope(t, lambda a, t=t: across(texture_shift_px(t.model, points, t.shape, a))) for t in terms]
+    shift += [across(texture_columns(model, points, shape)) for model, shape in asked]
+    # Cells of fiducials count on where those of wall end.
+    return _with_effects(made.rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, -1 - made.cluster)
+
+
+def _with_effects(rows, sign: Float, shift: list[Float], weight: Float, cell) -> Equations:
+    effects = [sign * s for s in shift]
+    bad = ~np.all([np.isfinite(e).all(1) for e in effects], axis=0) if effects else np.zeros(len(weight), bool)
+    by_global = np.concatenate([rows.by_border, *effects], 1)
+    by_global[bad] = 0.0
+    usable = (rows.weight > 0) & ~bad
+    return Equations(
+        rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual, np.where(usable, weight, 0.0), cell
+    )
+
+
+def _term_slope(term: Term, shift_of) -> Float:
+    """Return (M, Q) derivatives of a shift by the term's amplitudes, where they are."""
+    out = []
+    for k, amplitude in enumerate(term.model.amplitudes):
+        step = np.zeros(len(term.amplitude))
+        step[k] = 0.05 * amplitude.plausible
+        out.append((shift_of(term.amplitude + step) - shift_of(term.amplitude - step)) / (2 * step[k]))
+    return np.stack(out, -1)
+
+
+def _encoder_part(
+    run: GaugeRun, encoder: Encoder, state: Unknowns,
+    terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
+) -> Equations:  # fmt: skip
+    count = len(run.time_s)
+    scale, offset, delay = state.encoder
+    travel = travel_of(run, encoder, state)
+    reading = np.interp(run.time_s - delay, encoder.time_s, encoder.distance_mm)
+    for t in terms:
+        reading = reading - t.model.reading_shift_mm(travel, t.shape, t.amplitude)
+    by_pose = np.zeros((count, POSE))
+    by_pose[:, 2] = 1
+    by_border = np.zeros((count, state.border_size))
+    by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
+    shift = [_term_slope(t, lambda a, t=t: t.model.reading_shift_mm(travel, t.shape, a)) for t in terms]
+    shift += [reading_columns(model, travel, shape) for model, shape in asked]
+    by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
+    cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
+    # Loosely: what the encoder says is a matter of its own, and a slip must not move the poses.
+    weight = np.full(count, _ENCODER_SIGMA_MM**-2)
+    residual = state.T_pc[:, 2, 3] - scale * reading - offset
+    return Equations(np.arange(count), by_pose, by_global, residual, weight, cell)

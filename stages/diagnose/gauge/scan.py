@@ -1,0 +1,108 @@
+"""Scores of every effect of the library about one fit of a gauge run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.gauge.fit import Fit, evidence
+from stages.diagnose.gauge.run import GaugeRun
+from stages.diagnose.inference import Score, Stated, places_of, score
+
+# More shapes than this are first tried on a thinned run.
+_MANY = 12
+_AT_ONCE = 240
+_REFINED = 5
+_THIN_RINGS, _THIN_EDGES = 8, 4
+
+
+@dataclass(frozen=True)
+class Scored:
+    """An effect at its best shape, its score there, and how many shapes were tried."""
+
+    model: EffectModel
+    shape: Shape
+    score: Score
+    tried: int
+
+    @property
+    def p_value(self) -> float:
+        """Chance of such a score at the best of the shapes tried when nothing is hidden."""
+        return min(self.score.p_value * self.tried, 1.0)
+
+
+def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated) -> list[Scored]:
+    """Return the scores of the effects not yet in the fit, the most telling first."""
+    models = [m for name, m in library.items() if name not in {t.model.name for t in found.terms}]
+    shapes = {m.name: m.shapes(*_span(run)) for m in models}
+    few = [(m, s) for m in models if len(shapes[m.name]) <= _MANY for s in shapes[m.name]]
+    best = _best(run, found, few, stated)
+    thin = thinned(run)
+    for m in models:
+        if len(shapes[m.name]) <= _MANY:
+            continue
+        coarse = _best(thin, found, [(m, s) for s in shapes[m.name]], stated)
+        for one in coarse:
+            fine = _best(run, found, [(m, s) for s in _near(one.shape, shapes[m.name])], stated)
+            best += [replace(f, tried=len(shapes[m.name])) for f in fine]
+    return sorted(best, key=lambda s: -s.score.statistic / max(len(s.score.amplitude), 1))
+
+
+def thinned(run: GaugeRun) -> GaugeRun:
+    """Return the run with a part of its measurements."""
+    rings, edges = np.zeros(len(run.rings.uv), bool), np.zeros(len(run.edges.uv), bool)
+    rings[::_THIN_RINGS], edges[::_THIN_EDGES] = True, True
+    return replace(
+        run, rings=run.rings.select(rings), edges=run.edges.select(edges), width_px=run.width_px[rings],
+        ring_weight=run.ring_weight[rings], edge_weight=run.edge_weight[edges],
+    )  # fmt: skip
+
+
+def _best(
+    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], stated: Stated
+) -> list[Scored]:
+    """Return each effect's best shape."""
+    best: dict[str, Scored] = {}
+    tried: dict[str, int] = {}
+    for part in _portions(asked):
+        here = evidence(run, found, part)[0]
+        given = np.concatenate(
+            [np.zeros(0, np.int64), *[places_of(here, t.model, t.shape) for t in found.terms]]
+        ).astype(np.int64)
+        for model, shape in part:
+            tried[model.name] = tried.get(model.name, 0) + 1
+            result = score(here, stated, places_of(here, model, shape), given)
+            if result is not None and (
+                model.name not in best or result.statistic > best[model.name].score.statistic
+            ):
+                best[model.name] = Scored(model, shape, result, 1)
+    return [replace(s, tried=tried[name]) for name, s in best.items()]
+
+
+def _portions(asked: Sequence[tuple[EffectModel, Shape]]) -> list[list[tuple[EffectModel, Shape]]]:
+    portions: list[list[tuple[EffectModel, Shape]]] = []
+    count = _AT_ONCE
+    for model, shape in asked:
+        if count + len(model.amplitudes) > _AT_ONCE:
+            portions.append([])
+            count = 0
+        portions[-1].append((model, shape))
+        count += len(model.amplitudes)
+    return portions
+
+
+def _near(shape: Shape, shapes: Sequence[Shape]) -> list[Shape]:
+    """Return shapes from the grid's neighbour on one side to that on the other."""
+    grid = np.array([s[0] for s in shapes])
+    at = int(np.argmin(np.abs(grid - shape[0])))
+    low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
+    between = np.unique(np.concatenate([np.linspace(low, high, _REFINED), [shape[0]]]))
+    return [(float(x), *shape[1:]) for x in between]
+
+
+def _span(run: GaugeRun) -> tuple[float, float]:
+    duration = float(run.time_s[-1] - run.time_s[0])
+    return duration, (len(run.time_s) - 1) / max(duration, 1e-9)

@@ -1,0 +1,154 @@
+"""Estimates and tests from evidence: small dense algebra over amplitudes and the stated instrument."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from pipeline.instrument.probe import Probe
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+# Scores are sums over so many independent cells that χ² has heavier tails: those of F.
+DEGREES = 60.0
+_TIED = 1e-6
+_SEEN = 1e-9
+# An amplitude's 1 σ beforehand, in plausible sizes.
+PRIOR_PLAUSIBLE = 10.0
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What is believed of the instrument beforehand, as information on its columns."""
+
+    names: tuple[str, ...]
+    information: Float
+
+    def over(self, columns: Sequence[Column]) -> Float:
+        """Return (K, K) the information on columns; nothing on effects."""
+        place = {name: k for k, name in enumerate(self.names)}
+        out = np.zeros((len(columns), len(columns)))
+        here = [k for k, c in enumerate(columns) if c.effect == INSTRUMENT and c.amplitude in place]
+        own = [place[columns[k].amplitude] for k in here]
+        out[np.ix_(here, here)] = self.information[np.ix_(own, own)]
+        return out
+
+
+def stated_belief(probe: Probe) -> Stated:
+    """Return the stated probe's and encoder's uncertainty as information."""
+    names = (*probe.parameter_names, "encoder_scale")
+    information = np.zeros((len(names), len(names)))
+    information[:-1, :-1] = instrument_information(probe)
+    information[-1, -1] = probe.encoder_scale_sigma**-2
+    return Stated(names, information)
+
+
+def instrument_information(probe: Probe) -> Float:
+    """Return (P, P) information on the stated parameters; those without uncertainty are held fast."""
+    sigma = np.sqrt(np.diag(probe.covariance))
+    scale = np.where(sigma > 0, sigma, 1e-6)
+    scaled = probe.covariance / np.outer(scale, scale) + np.diag(np.where(sigma > 0, 0.0, 1.0))
+    value, vector = np.linalg.eigh(scaled)
+    # Parameters stated as one number (both focal lengths) differ by next to nothing.
+    inverse = (vector / np.maximum(value, _TIED)) @ vector.T
+    return np.asarray(inverse / np.outer(scale, scale))
+
+
+@dataclass(frozen=True)
+class Score:
+    """What the data say of one effect when nothing else is added.
+
+    Attributes
+    ----------
+    amplitude, covariance : (Q,), (Q, Q)
+        Estimate and its true covariance, the stated instrument's uncertainty included.
+    statistic : float
+        χ² with Q degrees of freedom when nothing is hidden.
+    p_value : float
+    gain : float
+        Drop of χ² that the effect promises.
+    """
+
+    amplitude: Float
+    covariance: Float
+    statistic: float
+    p_value: float
+    gain: float
+
+
+def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = None) -> Score | None:
+    """Return the score of columns ``block``, the instrument and columns ``given`` being free.
+
+    None when the columns cannot be seen.
+    """
+    free = instrument_places(evidence)
+    if given is not None:
+        free = np.union1d(free, given)
+    free = free[np.diag(evidence.information)[free] > 0]
+    prior = stated.over(evidence.columns)
+    a, b = evidence.information, evidence.right
+    response = np.linalg.lstsq(a[np.ix_(free, free)] + prior[np.ix_(free, free)], a[np.ix_(free, block)], rcond=1e-13)[0]
+    right = b[block] - response.T @ b[free]
+    own = a[np.ix_(block, block)] - a[np.ix_(block, free)] @ response
+    size = np.sqrt(np.maximum(np.diag(a)[block], 1e-300))
+    value = np.linalg.eigvalsh(own / np.outer(size, size))
+    if not np.all(value > _SEEN):
+        return None
+    inflation = np.sqrt(np.diag(evidence.score_covariance)[block] / np.diag(a)[block])
+    amplitude, inverse = np.linalg.solve(own, right), np.linalg.inv(own)
+    covariance = inverse * np.outer(inflation, inflation)
+    statistic = float(amplitude @ np.linalg.solve(covariance, amplitude))
+    p_value = float(stats.f.sf(statistic / len(block), len(block), DEGREES))
+    return Score(amplitude, covariance, statistic, p_value, float(right @ amplitude))
+
+
+def instrument_places(evidence: Evidence) -> Int:
+    """Return the places of the instrument's columns."""
+    return np.array([k for k, c in enumerate(evidence.columns) if c.effect == INSTRUMENT], np.int64)
+
+
+def places_of(evidence: Evidence, model: EffectModel, shape: Shape) -> Int:
+    """Return the places of an effect's columns."""
+    wanted = {(model.name, a.name, shape): k for k, a in enumerate(model.amplitudes)}
+    here = [(wanted[key], k) for k, c in enumerate(evidence.columns) if (key := (c.effect, c.amplitude, c.shape)) in wanted]
+    return np.array([k for _, k in sorted(here)], np.int64)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Posterior of the columns: ``value`` (K,), ``covariance`` (K, K), and minus twice the log evidence."""
+
+    value: Float
+    covariance: Float
+    surprise: float
+
+
+def estimate(evidence: Evidence, stated: Stated, prior_sigma: Float) -> Estimate:
+    """Return the posterior under the stated instrument and Gaussian priors (K,) 1 σ on amplitudes.
+
+    ``prior_sigma`` is infinite for the instrument's columns, whose prior is the stated one. ``surprise`` is
+    −2 ln of the marginal likelihood up to a constant common to all hypotheses on the same measurements.
+    """
+    prior = stated.over(evidence.columns) + np.diag(np.where(np.isinf(prior_sigma), 0.0, prior_sigma**-2.0))
+    total = evidence.information + prior
+    scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
+    value, vector = np.linalg.eigh(total / np.outer(scale, scale))
+    value = np.maximum(value, 1e-14)
+    covariance = (vector / value) @ vector.T / np.outer(scale, scale)
+    best = covariance @ evidence.right
+    known = np.isfinite(prior_sigma)
+    occam = float(np.sum(np.log(value)) + 2 * np.sum(np.log(scale))) - _log_det(prior)
+    return Estimate(best, covariance, evidence.misfit - float(evidence.right @ best) + occam + 0.0 * known.sum())
+
+
+def _log_det(matrix: Float) -> float:
+    value = np.linalg.eigvalsh(matrix)
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    value = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
+    return float(np.sum(np.log(np.maximum(value, 1e-14))) + 2 * np.sum(np.log(scale)))

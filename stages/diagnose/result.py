@@ -1,0 +1,224 @@
+"""The answer of a diagnosis, as written to diagnosis.json and told in the report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+FORMAT = 1
+
+
+class Verdict(StrEnum):
+    """What a diagnosis comes to."""
+
+    CONSISTENT = "consistent"
+    NAMED = "named"
+    CLASS = "class"
+    UNEXPLAINED = "unexplained"
+    NOT_IDENTIFIABLE = "not_identifiable"
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number and its 1 σ."""
+
+    value: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A second prediction of the same physics, what was measured of it, and whether they agree."""
+
+    prediction: str
+    measured: str
+    agrees: bool
+
+
+@dataclass(frozen=True)
+class EffectFound:
+    """An effect with its size, the chance that it is the right name, and what confirms it."""
+
+    name: str
+    probability: float
+    parameters: dict[str, Value]
+    statement: str
+    equation: str
+    confirmed_by: tuple[Confirmation, ...] = ()
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where the mismatch is: channel, what its pattern is fixed to, and where and when it shows."""
+
+    channel: str
+    fixed_to: str
+    time: str
+    harmonic: int | None = None
+    radial_exponent: tuple[float, float] | None = None
+    frames: tuple[int, int] | None = None
+    distance_mm: tuple[float, float] | None = None
+    azimuth_deg: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class FitQuality:
+    """Residuals before and after, on all and on held-out measurements, beside the noise floor."""
+
+    unit: str
+    rms_before: float
+    rms_after: float
+    heldout_before: float
+    heldout_after: float
+    noise_floor: float
+
+
+@dataclass(frozen=True)
+class Feasible:
+    """What this recording could show of one effect, from motion and bores alone.
+
+    Attributes
+    ----------
+    name, quantity, unit : str
+    detectable : float
+        Least size that would stand out (5 σ), the stated instrument's uncertainty included.
+    typical : float
+    rival : str
+        The effect most like it here; empty when none comes near.
+    left : float
+        Share of its information that is left when the rival is free.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    detectable: float
+    typical: float
+    rival: str
+    left: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One explanation that was tried.
+
+    Attributes
+    ----------
+    names : tuple of str
+    probability : float
+    gain, heldout_gain : float
+        Drop of χ² against the stated instrument, corrected for neighbours that err alike: on all
+        measurements, and on regimes held out in turn.
+    statement : str
+    """
+
+    names: tuple[str, ...]
+    probability: float
+    gain: float
+    heldout_gain: float
+    statement: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Residuals over azimuth and frame, mm of radius: (F, A) before and after; NaN where nothing was seen."""
+
+    frame: NDArray[np.int64]
+    azimuth_rad: Float
+    before_mm: Float
+    after_mm: Float
+
+
+@dataclass(frozen=True)
+class WallPicture:
+    """The same on the unrolled wall: (S, A) before and after."""
+
+    distance_mm: Float
+    azimuth_rad: Float
+    before_mm: Float
+    after_mm: Float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found, how sure, and what it rests on; fields as in the formats' notes.
+
+    Attributes
+    ----------
+    members : tuple of str
+        The class, when the verdict is one.
+    identifiable : str
+        The combination that is determined, or the empirical formula.
+    feasibility, candidates, shortcomings, pictures
+        For the report.
+    """
+
+    recording: str
+    gauge: str
+    verdict: Verdict
+    global_p: float
+    location: Location | None = None
+    effects: tuple[EffectFound, ...] = ()
+    members: tuple[str, ...] = ()
+    identifiable: str = ""
+    fit: FitQuality | None = None
+    record_next: str = ""
+    feasibility: tuple[Feasible, ...] = ()
+    inseparable: tuple[tuple[str, ...], ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    shortcomings: tuple[str, ...] = ()
+    ring_picture: Picture | None = None
+    wall_picture: WallPicture | None = None
+    notes: tuple[str, ...] = field(default=())
+
+
+def to_json(found: Diagnosis) -> dict[str, object]:
+    """Return what diagnosis.json holds."""
+    out: dict[str, object] = {
+        "format": FORMAT, "recording": found.recording, "gauge": found.gauge, "verdict": str(found.verdict),
+        "global_p": _number(found.global_p),
+        "location": None if found.location is None else _location(found.location),
+        "effects": [_effect(e) for e in found.effects],
+        "class": list(found.members), "identifiable": found.identifiable,
+        "fit": None if found.fit is None else _plain(found.fit),
+        "record_next": found.record_next,
+        "feasibility": [_plain(f) for f in found.feasibility],
+        "inseparable": [list(names) for names in found.inseparable],
+        "candidates": [_plain(c) for c in found.candidates],
+        "shortcomings": list(found.shortcomings), "notes": list(found.notes),
+    }  # fmt: skip
+    return out
+
+
+def _effect(found: EffectFound) -> dict[str, object]:
+    return {
+        "name": found.name, "probability": _number(found.probability),
+        "parameters": {k: _plain(v) for k, v in found.parameters.items()},
+        "statement": found.statement, "equation": found.equation,
+        "confirmed_by": [_plain(c) for c in found.confirmed_by],
+    }  # fmt: skip
+
+
+def _location(found: Location) -> dict[str, object]:
+    return {k: v for k, v in _plain(found).items() if v is not None}
+
+
+def _plain(record: object) -> dict[str, object]:
+    return {k: _value(v) for k, v in vars(record).items()}
+
+
+def _value(value: object) -> object:
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, tuple):
+        return [_value(v) for v in value]
+    return value
+
+
+def _number(value: float) -> float | None:
+    """Return the number in six figures; None for what is no number, which JSON does not have."""
+    return float(f"{value:.6g}") if np.isfinite(value) else None
