@@ -107,11 +107,11 @@ def _line_light(view, line, speckle, row, k, samples, work, total):  # type: ign
 
 
 @kernel
-def _sheen(texture, normal, way, w_ray):  # type: ignore[no-untyped-def]
+def _sheen(texture, normal, way, ray):  # type: ignore[no-untyped-def]
     """Return what a partly glossy wall sends to the camera over what a dull one would (Blinn-Phong)."""
     if texture.gloss <= 0.0:
         return 1.0
-    a, b, c = -way[0] - w_ray[3], -way[1] - w_ray[4], -way[2] - w_ray[5]
+    a, b, c = -way[0] - ray[3], -way[1] - ray[4], -way[2] - ray[5]
     size = np.sqrt(a * a + b * b + c * c) + 1e-12
     cosine = max((a * normal[0] + b * normal[1] + c * normal[2]) / size, 0.0)
     if texture.lobe * (1.0 - cosine) > _NO_LOBE:
@@ -166,29 +166,28 @@ def _wall_light(view, leds, lobe, level, ambient, row, k, samples, work, total):
     if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):
         return
     normal_at(view.surface, hit, R, normal)
-    T = view.pose[min(row, view.pose.shape[0] - 1), k]
     facing = -(w_ray[3] * normal[0] + w_ray[4] * normal[1] + w_ray[5] * normal[2])
     if facing <= 0.0:
         return
+    T = view.pose[min(row, view.pose.shape[0] - 1), k]
     light = ambient
     hidden = _may_hide(view.surface, hit, T, o, R)
+    for a in range(3):
+        at[a] = T[0, a] * normal[0] + T[1, a] * normal[1] + T[2, a] * normal[2]
     for n in range(leds.shape[0]):
-        d2 = 0.0
-        for a in range(3):
-            at[a] = T[a, 0] * leds[n, 0] + T[a, 1] * leds[n, 1] + T[a, 2] * leds[n, 2] + T[a, 3]
-            way[a] = w_ray[a] + hit[0] * w_ray[3 + a] - at[a]
-            d2 += way[a] * way[a]
-        d = np.sqrt(d2)
-        for a in range(3):
-            way[a] /= d
-        forward = T[0, 2] * way[0] + T[1, 2] * way[1] + T[2, 2] * way[2]
-        square = -(normal[0] * way[0] + normal[1] * way[1] + normal[2] * way[2])
+        x = c_ray[0] + hit[0] * c_ray[3] - leds[n, 0]
+        y = c_ray[1] + hit[0] * c_ray[4] - leds[n, 1]
+        z = c_ray[2] + hit[0] * c_ray[5] - leds[n, 2]
+        d2 = x * x + y * y + z * z
+        size = 1.0 / np.sqrt(d2)
+        forward, square = z * size, -(x * at[0] + y * at[1] + z * at[2]) * size
         if forward <= 0.0 or square <= 0.0:
             continue
-        if hidden and _shaded(view.surface, hit, way, d, o, R):
+        way[0], way[1], way[2] = x * size, y * size, z * size
+        if hidden and _shaded(view.surface, hit, T, way, 1.0 / size, o, R):
             continue
         emitted = forward if lobe == 1.0 else forward**lobe
-        sheen = _sheen(view.texture, normal, way, w_ray)
+        sheen = _sheen(view.texture, at, way, c_ray)
         light += level / leds.shape[0] * emitted * square * REFERENCE_MM**2 / d2 * sheen
     albedo_at(view.texture, hit[1], hit[2], hit[0] / (view.px_per_rad * samples * max(facing, 0.05)), albedo)
     for c in range(3):
@@ -211,12 +210,17 @@ def _may_hide(surface, hit, T, o, R):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _shaded(surface, hit, way, distance, o, R):  # type: ignore[no-untyped-def]
-    """Tell whether the wall stands between a hit and an LED; the section's frame is taken as straight."""
-    c, s = np.cos(hit[2]), np.sin(hit[2])
-    dx = -(R[0, 0] * way[0] + R[1, 0] * way[1] + R[2, 0] * way[2])
-    dy = -(R[0, 1] * way[0] + R[1, 1] * way[1] + R[2, 1] * way[2])
-    dz = -(R[0, 2] * way[0] + R[1, 2] * way[1] + R[2, 2] * way[2])
+def _shaded(surface, hit, T, way, distance, o, R):  # type: ignore[no-untyped-def]
+    """Tell whether the wall stands between a hit and an LED; the section's frame is taken as straight.
+
+    ``way`` is the light's direction in C, ``T`` takes C to W.
+    """
+    c, s, dx, dy, dz = np.cos(hit[2]), np.sin(hit[2]), 0.0, 0.0, 0.0
+    for a in range(3):
+        turned = -(T[a, 0] * way[0] + T[a, 1] * way[1] + T[a, 2] * way[2])
+        dx += R[a, 0] * turned
+        dy += R[a, 1] * turned
+        dz += R[a, 2] * turned
     step = 0.3
     back = step
     while back < min(distance, 40.0):
@@ -224,10 +228,7 @@ def _shaded(surface, hit, way, distance, o, R):  # type: ignore[no-untyped-def]
         rho = np.sqrt(x * x + y * y)
         if rho < surface.least_mm:
             return False
-        if (
-            radius_at(surface.radius, surface.from_mm, surface.step_mm, hit[1] + back * dz, np.arctan2(y, x))
-            < rho - 0.01
-        ):
+        if radius_at(surface, hit[1] + back * dz, np.arctan2(y, x)) < rho - 0.01:
             return True
         step *= 1.25
         back += step

@@ -100,7 +100,7 @@ class OdometerScene(Parameters):
 class Rendering(Parameters):
     """How finely a frame is computed."""
 
-    line_samples: int = Field(4, ge=1, le=16, description="samples a pixel and side where the line is")
+    line_samples: int = Field(3, ge=1, le=16, description="samples a pixel and side where the line is")
     wall_samples: int = Field(1, ge=1, le=8, description="samples a pixel and side elsewhere")
     time_samples: int = Field(1, ge=1, le=64, description="moments within an exposure")
 

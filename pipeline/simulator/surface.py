@@ -18,9 +18,9 @@ Float32 = NDArray[np.float32]
 # Blocks that the two floors look ahead; a step of a ray stays within them.
 _NEAR_BLOCKS, _NEAR_STEP_MM = 2, 1.9
 _WIDE_BLOCKS, _WIDE_STEP_MM = 32, 31.9
-_FINE_MM, _LEAST_STEP_MM = 0.3, 0.004
+_FINE_MM = 0.3
 _FAR_MM = 2000.0
-_CLOSE_MM = 1e-7
+_CLOSE_MM = 1e-6
 
 
 class Surface(NamedTuple):
@@ -92,8 +92,9 @@ def _floor(wall: Wall) -> Float:
 
 
 @kernel
-def _frame(axis_s, axis_o, axis_R, s, o, R):  # type: ignore[no-untyped-def]
-    """Write the axis point and the section's frame at distance s; straight beyond the ends."""
+def _frame(surface, s, o, R):  # type: ignore[no-untyped-def]
+    """Write a bent axis' point and the section's frame at distance s; straight beyond the ends."""
+    axis_s, axis_o, turn = surface.axis_s, surface.axis_o, surface.axis_turn
     count = axis_s.shape[0]
     span = (axis_s[count - 1] - axis_s[0]) / (count - 1)
     w = (s - axis_s[0]) / span
@@ -102,7 +103,7 @@ def _frame(axis_s, axis_o, axis_R, s, o, R):  # type: ignore[no-untyped-def]
     inside = min(max(w, 0.0), 1.0)
     for a in range(3):
         for b in range(3):
-            R[a, b] = (1.0 - inside) * axis_R[k, a, b] + inside * axis_R[k + 1, a, b]
+            R[a, b] = (1.0 - inside) * turn[k, a, b] + inside * turn[k + 1, a, b]
     _orthonormalise(R)
     beyond = (w - inside) * span
     for a in range(3):
@@ -126,16 +127,17 @@ def _orthonormalise(R):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def locate(axis_s, axis_o, axis_R, x, y, z, s, o, R):  # type: ignore[no-untyped-def]
-    """Return distance, and x and y off the axis in its section, of a point of W; s is a first guess.
+def _locate(surface, ray, way, s, o, R):  # type: ignore[no-untyped-def]
+    """Return distance, and x and y off the axis in its section, of a ray's point; s is a first guess.
 
     Leaves the section's axis point and frame in ``o`` and ``R``, unless the axis is straight.
     """
-    if axis_s.shape[0] == 2:
+    x, y, z = ray[0] + way * ray[3], ray[1] + way * ray[4], ray[2] + way * ray[5]
+    if surface.axis_s.shape[0] == 2:
         return z, x, y
     a, b = 0.0, 0.0
     for _ in range(30):
-        _frame(axis_s, axis_o, axis_R, s, o, R)
+        _frame(surface, s, o, R)
         dx, dy, dz = x - o[0], y - o[1], z - o[2]
         a = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz
         b = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz
@@ -147,10 +149,11 @@ def locate(axis_s, axis_o, axis_R, x, y, z, s, o, R):  # type: ignore[no-untyped
 
 
 @kernel
-def radius_at(radius, from_mm, step_mm, s, psi):  # type: ignore[no-untyped-def]
+def radius_at(surface, s, psi):  # type: ignore[no-untyped-def]
     """Return the wall's radius at a distance and an azimuth, linear between samples."""
+    radius = surface.radius
     rows, columns = radius.shape[0], radius.shape[1] - 2
-    y = min(max((s - from_mm) / step_mm, 0.0), rows - 1.0)
+    y = min(max((s - surface.from_mm) / surface.step_mm, 0.0), rows - 1.0)
     i = min(int(y), rows - 2)
     x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
     x -= np.floor((x - 0.5) / columns) * columns
@@ -181,45 +184,37 @@ def meet(surface, ray, s, o, R, hit):  # type: ignore[no-untyped-def]
     bool
         False where the ray leaves without meeting the wall within two metres.
     """
-    radius, floor, from_mm, step_mm = surface.radius, surface.floor_mm, surface.from_mm, surface.step_mm
-    axis_s, axis_o, axis_R = surface.axis_s, surface.axis_o, surface.axis_turn
+    straight, last = surface.axis_s.shape[0] == 2, surface.floor_mm.shape[1] - 1
     way, low, gap, gap_low = 0.0, 0.0, 0.0, -1.0
-    if axis_s.shape[0] == 2:
-        s, way = ray[2], _to_cylinder(ray, surface.least_mm * 0.999)
-    last = floor.shape[1] - 1
+    da, db = ray[3], ray[4]
+    if straight:
+        way = _reach(ray[0], ray[1], da, db, surface.least_mm * 0.999)
     while way < _FAR_MM:
-        s, a, b = locate(
-            axis_s,
-            axis_o,
-            axis_R,
-            ray[0] + way * ray[3],
-            ray[1] + way * ray[4],
-            ray[2] + way * ray[5],
-            s,
-            o,
-            R,
-        )
+        s, a, b = _locate(surface, ray, way, s, o, R)
+        if not straight:
+            da = R[0, 0] * ray[3] + R[1, 0] * ray[4] + R[2, 0] * ray[5]
+            db = R[0, 1] * ray[3] + R[1, 1] * ray[4] + R[2, 1] * ray[5]
         rho = np.sqrt(a * a + b * b)
-        k = min(max(int(s - from_mm), 0), last)
-        near = floor[0, k] - rho
-        if near > 0.0:
-            wide = floor[1, k] - rho
+        k = min(max(int(s - surface.from_mm), 0), last)
+        if rho < surface.floor_mm[0, k]:
             low, gap_low = way, -1.0
-            way += max(min(wide, _WIDE_STEP_MM), min(max(near, _FINE_MM), _NEAR_STEP_MM))
+            far = min(_reach(a, b, da, db, surface.floor_mm[1, k]), _WIDE_STEP_MM)
+            near = min(_reach(a, b, da, db, surface.floor_mm[0, k] + _CLOSE_MM), _NEAR_STEP_MM)
+            way += max(far, near, _CLOSE_MM)
             continue
         psi = np.arctan2(b, a)
-        wall = radius_at(radius, from_mm, step_mm, s, psi)
+        wall = radius_at(surface, s, psi)
         gap = wall - rho
         hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
         if gap <= _CLOSE_MM:
             break
         low, gap_low = way, gap
-        way += min(max(gap, _LEAST_STEP_MM), _FINE_MM)
+        way += min(max(_reach(a, b, da, db, wall), _CLOSE_MM), _FINE_MM)
     if way >= _FAR_MM or np.isnan(way):
         return False
     if gap < -_CLOSE_MM:
-        _refine(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, low, gap_low, way, gap, s, o, R, hit)
-    if axis_s.shape[0] == 2:
+        _refine(surface, ray, low, gap_low, way, gap, s, o, R, hit)
+    if straight:
         _straight_frame(hit[1], o, R)
     return True
 
@@ -233,39 +228,36 @@ def _straight_frame(s, o, R):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _to_cylinder(ray, radius):  # type: ignore[no-untyped-def]
-    """Return the way at which a ray reaches a radius about W's z; 0 if it starts beyond."""
-    px, py, dx, dy = ray[0], ray[1], ray[3], ray[4]
-    a, b, c = dx * dx + dy * dy, px * dx + py * dy, px * px + py * py - radius * radius
-    if c >= 0.0:
+def _reach(a, b, da, db, radius):  # type: ignore[no-untyped-def]
+    """Return the way from (a, b) in a section to a radius about its axis; 0 from beyond it."""
+    square, along, left = da * da + db * db, a * da + b * db, a * a + b * b - radius * radius
+    if left >= 0.0:
         return 0.0
-    if a * _FAR_MM * _FAR_MM < -c:
+    if square * _FAR_MM * _FAR_MM < -left:
         return _FAR_MM
-    return (-b + np.sqrt(b * b - a * c)) / a
+    return (-along + np.sqrt(along * along - square * left)) / square
 
 
 @kernel
-def _gap(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, way, s, o, R, hit):  # type: ignore[no-untyped-def]
-    s, a, b = locate(
-        axis_s, axis_o, axis_R, ray[0] + way * ray[3], ray[1] + way * ray[4], ray[2] + way * ray[5], s, o, R
-    )
+def _gap(surface, ray, way, s, o, R, hit):  # type: ignore[no-untyped-def]
+    s, a, b = _locate(surface, ray, way, s, o, R)
     psi = np.arctan2(b, a)
-    wall = radius_at(radius, from_mm, step_mm, s, psi)
+    wall = radius_at(surface, s, psi)
     hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
     return wall - np.sqrt(a * a + b * b)
 
 
 @kernel
-def _refine(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, low, f_low, high, f_high, s, o, R, hit):  # type: ignore[no-untyped-def]
+def _refine(surface, ray, low, f_low, high, f_high, s, o, R, hit):  # type: ignore[no-untyped-def]
     """Close in on the crossing between two ways: regula falsi with the Illinois rule."""
     if f_low <= 0.0:
-        f_low = _gap(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, low, s, o, R, hit)
+        f_low = _gap(surface, ray, low, s, o, R, hit)
     if f_low <= 0.0:
         return
     side = 0
     for _ in range(60):
         way = (low * f_high - high * f_low) / (f_high - f_low)
-        f = _gap(radius, from_mm, step_mm, axis_s, axis_o, axis_R, ray, way, s, o, R, hit)
+        f = _gap(surface, ray, way, s, o, R, hit)
         if abs(f) < _CLOSE_MM or high - low < 1e-9:
             return
         if f > 0.0:
@@ -286,18 +278,32 @@ def normal_at(surface, hit, R, normal):  # type: ignore[no-untyped-def]
 
     The foreshortening of distance in a bend, 1 − κ r cos, is left out of the slope along the pipe.
     """
-    radius, from_mm, step_mm = surface.radius, surface.from_mm, surface.step_mm
-    s, psi, r = hit[1], hit[2], hit[3]
-    ds = step_mm
-    dp = 2.0 * np.pi / (radius.shape[1] - 2)
-    along = (
-        radius_at(radius, from_mm, step_mm, s + ds, psi) - radius_at(radius, from_mm, step_mm, s - ds, psi)
-    ) / (2.0 * ds)
-    around = (
-        radius_at(radius, from_mm, step_mm, s, psi + dp) - radius_at(radius, from_mm, step_mm, s, psi - dp)
-    ) / (2.0 * dp * r)
+    radius, psi = surface.radius, hit[2]
+    rows, columns = radius.shape[0], radius.shape[1] - 2
+    y = min(max((hit[1] - surface.from_mm) / surface.step_mm, 1.0), rows - 2.001)
+    x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
+    i, j = int(y), int(np.floor(x))
+    wy, wx = y - i, x - j
+    j = (j - 1) % columns + 1
+    left, right, beyond = j - 1 if j > 1 else columns, j + 1, j + 2 if j < columns else 2
+    along = (1.0 - wx) * (
+        (1.0 - wy) * (radius[i + 1, j] - radius[i - 1, j]) + wy * (radius[i + 2, j] - radius[i, j])
+    )
+    along += wx * (
+        (1.0 - wy) * (radius[i + 1, right] - radius[i - 1, right])
+        + wy * (radius[i + 2, right] - radius[i, right])
+    )
+    around = (1.0 - wy) * (
+        (1.0 - wx) * (radius[i, right] - radius[i, left]) + wx * (radius[i, beyond] - radius[i, j])
+    )
+    around += wy * (
+        (1.0 - wx) * (radius[i + 1, right] - radius[i + 1, left])
+        + wx * (radius[i + 1, beyond] - radius[i + 1, j])
+    )
+    along /= 2.0 * surface.step_mm
+    around *= columns / (4.0 * np.pi * hit[3])
     c, sn = np.cos(psi), np.sin(psi)
-    size = np.sqrt(1.0 + along * along + around * around)
-    x, y, z = -(c + around * sn) / size, -(sn - around * c) / size, along / size
+    size = 1.0 / np.sqrt(1.0 + along * along + around * around)
+    x, y, z = -(c + around * sn) * size, -(sn - around * c) * size, along * size
     for k in range(3):
         normal[k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z
