@@ -1,0 +1,156 @@
+"""How bright the line and its surroundings are: dust, stray light, clipping, a decentred beam."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.stats import norm
+
+from pipeline.artefacts import RingSamples
+from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
+from stages.diagnose.profile.geometry import LineGeometry
+from stages.diagnose.profile.measure import LineProfiles
+from stages.diagnose.profile.regression import regress, two_sided_p
+
+Float = NDArray[np.float64]
+# Of the line's height: light beside the line that black offsets and compression leave.
+STRAY_FLOOR = 2e-4
+# Of ln brightness: paint, gloss and markers that a recording happens to keep at one azimuth.
+DUST_FLOOR = 0.05
+# Of ln brightness: a pipe that reflects more on one side.
+DECENTRE_FLOOR = 0.05
+_SMOOTH_ORDER = 6
+_WIDTHS_DEG = (1.0, 2.0, 4.0, 8.0)
+_FAR_PX = 40.0
+
+
+def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Finding:
+    """Return the finding of `dust`: a dip of the line's brightness at one azimuth of C through all frames."""
+    if len(cells.frames) < 4:
+        return untestable("dust", "Too few frames to tell a spot of the lens from one of the wall.")
+    courses = np.array([_course(rings, profiles.row[rows]) for rows in cells.frames])
+    known = np.isfinite(courses)
+    middle = np.nanmedian(courses, axis=0)
+    sigma = 1.4826 * np.nanmedian(np.abs(courses - middle), axis=0) / np.sqrt(np.maximum(known.sum(0), 1))
+    z, depth, width, at = _deepest(middle, np.hypot(np.median(sigma), sigma))
+    azimuth = float(np.degrees(rings.azimuth_rad[at]))
+    spot = np.hypot(DUST_FLOOR, depth / max(z, 1e-9))
+    tries = len(rings.azimuth_rad) / 4 * len(_WIDTHS_DEG)
+    p = float(min(1.0, tries * 2 * norm.sf(depth / spot))) if depth > 0 else 1.0
+    sizes = (
+        Size("attenuation", "", float(-np.expm1(-depth)), float(np.exp(-depth) * spot)),
+        Size("azimuth_deg", "deg", azimuth, width / max(z, 1.0)),
+        Size("width_deg", "deg", width, 0.3 * width),
+    )  # fmt: skip
+    dip = np.exp(-0.5 * ((np.degrees(rings.azimuth_rad) - azimuth + 180) % 360 - 180) ** 2 / width**2)
+    curve = Curve(
+        "Brightness of the line by camera azimuth", "azimuth, deg", "ln of brightness less its slow part",
+        np.degrees(rings.azimuth_rad), middle, sigma, -depth * dip,
+    )  # fmt: skip
+    return finding(
+        "dust", depth / spot, p, sizes,
+        f"At {azimuth:.0f}° the line is {100 * -np.expm1(-depth):.0f} % darker in all frames alike.", curve,
+        alike=("fixed_pattern",),
+    )  # fmt: skip
+
+
+def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
+    """Return the finding of `ambient_light`: grey beside the line in frames lit by the laser alone."""
+    height = np.nanmedian(geometry.height, axis=1)
+    used = geometry.steady & np.isfinite(height)
+    if not used.any():
+        return untestable("ambient_light", "No frame shows the line against the dark.")
+    share = profiles.background[used] / height[used]
+    worst = float(np.percentile(share, 90))
+    z = worst / STRAY_FLOOR
+    curve = Curve(
+        "Light beside the line", "frame", "share of the line's height",
+        profiles.frame[used].astype(float), share, np.full(used.sum(), STRAY_FLOOR), np.zeros(used.sum()),
+    )  # fmt: skip
+    return finding(
+        "ambient_light", z, float(2 * norm.sf(abs(z))), (Size("relative", "", worst, STRAY_FLOOR),),
+        f"Beside the line lies light of {100 * worst:.2f} % of its height where there is most.", curve,
+    )  # fmt: skip
+
+
+def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
+    """Return the finding of `beam_decentre` as far as brightness tells: its first harmonic, fixed in C."""
+    psi = np.broadcast_to(geometry.azimuth_rad, geometry.height.shape)
+    group = np.full(len(geometry.steady), -1)
+    for k, rows in enumerate(cells.frames):
+        group[rows] = k
+    log = np.log(geometry.height)
+    blocks = [(group == k)[:, None] * np.ones_like(psi) for k in range(len(cells.frames))]
+    design = np.stack([np.cos(psi), np.sin(psi), np.log(geometry.radius_mm), *blocks], axis=-1)
+    fit = regress(design.reshape(-1, design.shape[-1]), log.ravel(), np.repeat(group, psi.shape[1]))
+    if not np.isfinite(fit.sigma[0]):
+        return untestable("beam_decentre", "The line's brightness is not seen all round.")
+    size = float(np.hypot(*fit.coefficient[:2]))
+    sigma = float(np.hypot(np.sqrt(np.trace(fit.covariance[:2, :2]) / 2), DECENTRE_FLOOR))
+    direction = float(np.degrees(np.arctan2(fit.coefficient[1], fit.coefficient[0])))
+    return finding(
+        "beam_decentre",
+        size / sigma,
+        two_sided_p(size / sigma, fit.groups),
+        (),
+        f"Brightness varies around the ring by ±{100 * size:.0f} %, most at {direction:.0f}° of the camera.",
+    )
+
+
+def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -> Finding:
+    """Return the finding of `saturation`: a longer foot along the columns where the line clips.
+
+    A clipped line alone is ordinary; a sensor that overflows spills along its columns.
+    """
+    open_foot = np.abs(cells.offset_px) > 5
+    foot = np.nanmean(np.where(open_foot & (np.abs(cells.offset_px) < 20), cells.profile, np.nan), axis=1)
+    share = np.array([profiles.clipped[rows].mean(0) for rows in cells.frames]).ravel()
+    along = np.cos(2 * cells.azimuth_rad)
+    design = np.stack([np.ones_like(share), along, share, -share * along], axis=1)
+    fit = regress(design, foot, cells.block)
+    clipped = float(np.mean(profiles.clipped[geometry.steady])) if geometry.steady.any() else 0.0
+    if clipped < 0.05 or not np.isfinite(fit.sigma[3]):
+        return untestable("saturation", f"{100 * clipped:.1f} % of the line clips: too little to test bloom.")
+    sigma = float(np.hypot(fit.sigma[3], 2 * STRAY_FLOOR))
+    z = float(fit.coefficient[3] / sigma)
+    return finding(
+        "saturation", z, two_sided_p(z, fit.groups), (),
+        f"{100 * clipped:.0f} % of the line clips; its foot is {100 * fit.coefficient[3]:+.2f} % higher "
+        "along the sensor's columns where it does.", alike=("gamma",),
+    )  # fmt: skip
+
+
+def _course(rings: RingSamples, rows: NDArray[np.int64]) -> Float:
+    """Return ln brightness (A,) of the block, its slow change around the ring taken out; NaN where unseen."""
+    height = np.where(rings.valid[rows], rings.amplitude[rows], np.nan).astype(float)
+    log = np.log(np.maximum(height, 1e-3))
+    seen = np.isfinite(log)
+    median = np.nanmedian(np.where(seen.mean(0) > 0.3, log, 0.0), axis=0)
+    good = seen.mean(0) > 0.3
+    waves = np.outer(rings.azimuth_rad, np.arange(1, _SMOOTH_ORDER + 1))
+    basis = np.concatenate([np.ones((len(waves), 1)), np.cos(waves), np.sin(waves)], axis=1)
+    weight = good.astype(float)
+    for _ in range(6):
+        fit = np.linalg.lstsq(basis * weight[:, None], np.where(good, median, 0) * weight, rcond=None)[0]
+        rest = np.where(good, median - basis @ fit, 0.0)
+        scale = 1.4826 * np.median(np.abs(rest[good])) if good.any() else 1.0
+        weight = good * np.maximum(1 - (rest / (3 * max(scale, 1e-3))) ** 2, 0.0)
+    return np.where(good, rest, np.nan)
+
+
+def _deepest(course: Float, sigma: Float) -> tuple[float, float, float, int]:
+    """Return z, depth, width in degrees and index of the dip that stands out most."""
+    step = 360.0 / len(course)
+    filled = np.where(np.isfinite(course), course, 0.0)
+    best = (0.0, 0.0, _WIDTHS_DEG[0], 0)
+    for width in _WIDTHS_DEG:
+        smooth = gaussian_filter1d(filled, width / step, mode="wrap")
+        depth = -np.sqrt(2.0) * smooth
+        error = sigma / np.sqrt(max(2 * np.sqrt(np.pi) * width / step, 1.0)) * np.sqrt(2.0)
+        z = depth / np.hypot(error, DUST_FLOOR)
+        at = int(np.argmax(z))
+        if z[at] > best[0]:
+            best = (float(z[at]), float(depth[at]), width, at)
+    return best

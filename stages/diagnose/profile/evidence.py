@@ -1,0 +1,117 @@
+"""The profile channel of the diagnosis: every test of the line's light on one recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import RingSamples
+from pipeline.errors import UnusableError
+from pipeline.instrument.probe import Probe
+from pipeline.recording.base import Recording
+from pipeline.stage import Context
+from stages.diagnose.profile.brightness import clip_finding, decentre_finding, dust_finding, stray_finding
+from stages.diagnose.profile.cells import make_cells
+from stages.diagnose.profile.finding import Finding
+from stages.diagnose.profile.geometry import line_geometry
+from stages.diagnose.profile.measure import measure_profiles
+from stages.diagnose.profile.secondary import ghost_findings
+from stages.diagnose.profile.sensor import locking_finding, pattern_finding
+from stages.diagnose.profile.shape import skew_findings
+from stages.diagnose.profile.width import blur_finding, width_findings
+
+Float = NDArray[np.float64]
+_LEAST_BLOCKS = 4
+
+
+@dataclass(frozen=True)
+class ProfileEvidence:
+    """What the line's light says of one recording.
+
+    Attributes
+    ----------
+    source : str
+        Name of the recording.
+    frame : (F,) int
+        Frames lit by the laser alone.
+    azimuth_rad : (S,)
+        Middles of the sectors.
+    findings : tuple of Finding
+        One an effect, found or not.
+    offset_px : (B,)
+        Distance from the line, outward positive.
+    profile : (S, B)
+        The line by sector, all blocks averaged, over its height; NaN where it was not seen.
+    """
+
+    source: str
+    frame: NDArray[np.int64]
+    azimuth_rad: Float
+    findings: tuple[Finding, ...]
+    offset_px: Float
+    profile: Float
+
+    @property
+    def found(self) -> tuple[Finding, ...]:
+        """Findings beyond what image formation and chance do, the clearest first."""
+        return tuple(sorted((f for f in self.findings if f.found), key=lambda f: -abs(f.z)))
+
+    def of(self, effect: str) -> Finding:
+        """Return the finding of an effect.
+
+        Raises
+        ------
+        KeyError
+            When the profile does not test that effect.
+        """
+        return {f.effect: f for f in self.findings}[effect]
+
+
+def profile_evidence(
+    recording: Recording, rings: RingSamples, probe: Probe, context: Context
+) -> ProfileEvidence:
+    """Test every effect that the line's light can show.
+
+    Raises
+    ------
+    UnusableError
+        When too few frames are lit by the laser alone, or the ring never holds still for long enough.
+    """
+    profiles = measure_profiles(recording, rings)
+    geometry = line_geometry(
+        rings, profiles.row, profiles.time_s, profiles.azimuth_rad, profiles.clipped, probe
+    )
+    cells = make_cells(profiles, geometry)
+    if len(cells.frames) < _LEAST_BLOCKS:
+        raise UnusableError(
+            "diagnose", f"only {len(cells.frames)} stretches of frames show the line alone and steady",
+            limit=f"at least {_LEAST_BLOCKS}", hint="record frames with the LEDs off",
+        )  # fmt: skip
+    findings = (
+        *ghost_findings(cells, geometry, probe),
+        *skew_findings(cells, geometry, probe),
+        *width_findings(cells, geometry, probe),
+        blur_finding(cells, geometry, probe),
+        dust_finding(rings, profiles, cells),
+        stray_finding(profiles, geometry),
+        decentre_finding(geometry, cells),
+        clip_finding(profiles, cells, geometry),
+        locking_finding(rings, profiles, cells),
+        pattern_finding(profiles, recording.source.image_size),
+    )
+    context.report("effects found in the line's profile", sum(f.found for f in findings), "effects")
+    whole = np.where(cells.whole[:, None], cells.profile, np.nan).reshape(
+        len(cells.frames), -1, len(cells.offset_px)
+    )
+    return ProfileEvidence(
+        recording.name, profiles.frame, profiles.azimuth_rad, findings, cells.offset_px, _mean(whole)
+    )
+
+
+def _mean(values: Float) -> Float:
+    """Return the mean over the first axis of what is finite."""
+    known = np.isfinite(values)
+    count = known.sum(0)
+    return np.asarray(np.where(known, values, 0.0).sum(0) / np.where(count > 0, count, np.nan))

@@ -1,0 +1,99 @@
+"""What one test of the line's light says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import FixedTo
+
+Float = NDArray[np.float64]
+# One in ten million by the estimate's own σ, and never less than this many σ of what image formation does.
+FOUND_P, FOUND_Z = 1e-7, 6.0
+
+
+@dataclass(frozen=True)
+class Size:
+    """One measured quantity, true minus stated, with its 1 σ (random and what image formation may do)."""
+
+    name: str
+    unit: str
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What was measured and what the effect predicts, to be drawn: (K,) each."""
+
+    title: str
+    x_label: str
+    y_label: str
+    x: Float
+    measured: Float
+    sigma: Float
+    predicted: Float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The test of one effect.
+
+    Attributes
+    ----------
+    effect : str
+        Name of the catalogue.
+    z : float
+        Estimate over its σ, image formation's own doing included.
+    p_value : float
+        Two-sided, with the degrees of freedom σ was estimated with; 1 when it could not be tested.
+    sizes : tuple of Size
+        Quantities of the catalogue; empty when the test gives none.
+    fixed_to : FixedTo
+    time : str
+    statement : str
+        What was seen, with numbers.
+    curve : Curve or None
+    shift_px : (F, S) or None
+        By how much the line is found too far out for it, per frame and sector of the evidence.
+    confirms : tuple of Size
+        Sizes of other effects that this measurement gives independently, named ``effect.quantity``.
+    alike : tuple of str
+        Effects that would show the same here.
+    """
+
+    effect: str
+    z: float
+    p_value: float
+    sizes: tuple[Size, ...]
+    fixed_to: FixedTo
+    time: str
+    statement: str
+    curve: Curve | None = None
+    shift_px: Float | None = None
+    confirms: tuple[Size, ...] = ()
+    alike: tuple[str, ...] = ()
+
+    @property
+    def found(self) -> bool:
+        """Whether it is beyond what image formation and chance do."""
+        return self.p_value < FOUND_P and abs(self.z) > FOUND_Z
+
+
+def finding(
+    name: str, z: float, p_value: float, sizes: tuple[Size, ...], statement: str, curve: Curve | None = None,
+    shift_px: Float | None = None, confirms: tuple[Size, ...] = (), alike: tuple[str, ...] = (),
+) -> Finding:  # fmt: skip
+    """Return the finding of an effect that behaves as the catalogue says."""
+    known = effect(name)
+    return Finding(
+        name, z, p_value, sizes, known.fixed_to, known.time, statement, curve, shift_px, confirms, alike
+    )
+
+
+def untestable(name: str, why: str) -> Finding:
+    """Return the finding of an effect that these frames cannot show."""
+    return finding(name, 0.0, 1.0, (), why)

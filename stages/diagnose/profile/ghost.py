@@ -1,0 +1,259 @@
+"""A second, fainter line: bounced across the bore, or copied at a constant distance.
+
+Light that crosses the bore meets the wall apart from the line by (shared PHYSICS notes)
+tilt 4 r φ cos(ψ − ψ₀) behind it, cone 2 r ε₀ ahead of it, along the axis: the line's own place does not
+matter, so it tells the laser's misalignment from the camera's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.regression import two_sided_p
+
+Float = NDArray[np.float64]
+REACH_PX, STEP_PX = 45.0, 0.5
+NOISE_FLOOR = 3e-4
+_LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.04), np.radians(0.08)
+_LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04
+_CLEAR_WIDTHS = 2.5
+_SHRINK, _HALVINGS = 0.5, 9
+
+
+@dataclass(frozen=True)
+class Responses:
+    """How strongly each of N cells asks for a second line at D distances from the line.
+
+    Attributes
+    ----------
+    distance_px : (D,)
+        Uniform.
+    score, information : (N, D)
+        Their ratio is the height over that of the line; 1 / √information its σ if bins erred independently.
+    """
+
+    distance_px: Float
+    score: Float
+    information: Float
+
+
+@dataclass(frozen=True)
+class SecondLine:
+    """A second line where one law puts it.
+
+    Attributes
+    ----------
+    parameters : (P,)
+        Of the law, with their covariance (P, P).
+    relative, sigma : float
+        Height over that of the line.
+    information : float
+        How well the cells show a line there; the misfit falls by relative² × information.
+    blocks : int
+    distance_px : (N,)
+        From the line, in every cell.
+    """
+
+    parameters: Float
+    relative: float
+    sigma: float
+    information: float
+    blocks: int
+    distance_px: Float
+    parameter_covariance: Float
+
+    @property
+    def z(self) -> float:
+        """Height over its σ."""
+        return self.relative / self.sigma if self.sigma > 0 else 0.0
+
+    @property
+    def misfit_drop(self) -> float:
+        """By how much the weighted sum of squares falls."""
+        return self.relative**2 * self.information
+
+    def stack(self, found: Responses, offset_px: Float) -> Float:
+        """Return (K,) the height found at offsets (K,) from the line's place, over all cells."""
+        parts = [_at(found, self.distance_px + o) for o in offset_px]
+        return np.array([s.sum() / max(i.sum(), 1e-12) for s, i in parts])
+
+    @property
+    def p_value(self) -> float:
+        """Two-sided, for this one hypothesis."""
+        return two_sided_p(self.z, self.blocks)
+
+
+def responses(cells: Cells) -> Responses:
+    """Return matched-filter responses of the whole cells; what a Gaussian fit would absorb is taken out.
+
+    So is what the opposite side of the line shows as well: halos, glare and compression are alike on both.
+    """
+    distance = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
+    rest = cells.rest[cells.whole]
+    noise = np.hypot(1.4826 * np.median(np.abs(rest - np.median(rest, axis=0)), axis=0), NOISE_FLOOR)
+    score, information = np.zeros((len(rest), len(distance))), np.zeros((len(rest), len(distance)))
+    _match(
+        rest, cells.offset_px, cells.centre_px[cells.whole], cells.width_px[cells.whole], 1 / noise**2,
+        distance, score, information,
+    )  # fmt: skip
+    with np.errstate(invalid="ignore", divide="ignore"):
+        height = np.where(information > 0, score / information, 0.0)
+    return Responses(distance, score - height[:, ::-1] * information, information)
+
+
+@numba.njit(cache=True, nogil=True)
+def _match(rest, offset, centre, width, weight, distance, score, information):  # type: ignore[no-untyped-def]
+    bins = offset.size
+    basis, cross = np.zeros((3, bins)), np.zeros(3)
+    gram = np.zeros((3, 3))
+    for n in range(rest.shape[0]):
+        for b in range(bins):
+            x = (offset[b] - centre[n]) / width[n]
+            e = np.exp(-0.5 * x * x) if abs(x) < 3.5 else 0.0
+            basis[0, b], basis[1, b], basis[2, b] = e, x * e, x * x * e
+        for i in range(3):
+            for j in range(3):
+                gram[i, j] = np.sum(basis[i] * basis[j])
+        inverse = np.linalg.inv(gram)
+        for d in range(distance.size):
+            ghost = np.exp(-0.5 * ((offset - centre[n] - distance[d]) / width[n]) ** 2)
+            inside = np.abs(offset - centre[n]) < 3.5 * width[n]
+            for i in range(3):
+                cross[i] = np.sum(basis[i] * ghost * inside)
+            taken = inverse @ cross
+            for b in range(bins):
+                template = ghost[b]
+                for i in range(3):
+                    template -= taken[i] * basis[i, b]
+                if not np.isnan(rest[n, b]):
+                    score[n, d] += weight[b] * template * rest[n, b]
+                    information[n, d] += weight[b] * template * template
+
+
+def bounced(found: Responses, cells: Cells, floor: float) -> SecondLine:
+    """Return the best line bounced across the bore: parameters tan φ (along x, y) and ε₀, rad.
+
+    ``floor`` is the relative height that ordinary image formation may leave at any distance.
+    """
+    w = cells.whole
+    scale = cells.px_per_mm[w] * cells.radius_mm[w]
+    psi = cells.azimuth_rad[w]
+    design = np.stack([4 * scale * np.cos(psi), 4 * scale * np.sin(psi), -2 * scale], axis=1)
+    tilt = np.arange(-_LARGEST_RAD, _LARGEST_RAD + 1e-9, _TILT_STEP_RAD)
+    cone = np.arange(-_LARGEST_RAD, _LARGEST_RAD + 1e-9, _CONE_STEP_RAD)
+    grid = np.stack(np.meshgrid(tilt, tilt, cone, indexing="ij"), -1).reshape(-1, 3)
+    steps = np.array([_TILT_STEP_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD])
+    return _best(found, design, grid, steps, cells.block[w], cells.width_px[w], floor)
+
+
+def copied(found: Responses, cells: Cells, floor: float) -> SecondLine:
+    """Return the best copy at a constant axial distance, mm, forward positive."""
+    w = cells.whole
+    grid = np.arange(-_LARGEST_MM, _LARGEST_MM + 1e-9, _COPY_STEP_MM)[:, None]
+    design = -cells.px_per_mm[w][:, None]
+    return _best(found, design, grid, np.array([_COPY_STEP_MM]), cells.block[w], cells.width_px[w], floor)
+
+
+def _best(
+    found: Responses, design: Float, grid: Float, steps: Float, block: NDArray[np.int64], width_px: Float,
+    floor: float,
+) -> SecondLine:  # fmt: skip
+    """Search the grid of parameters, then refine by ever smaller steps; σ by leaving out blocks."""
+    clear = _CLEAR_WIDTHS * float(np.median(width_px)) if len(width_px) else 0.0
+
+    def rated(parameters: Float) -> Float:
+        return np.asarray(_rate(found.score, found.information, design, parameters, clear))
+
+    rating = rated(grid)
+    if not len(grid) or not np.isfinite(rating).any() or rating.max() <= 0:
+        size = design.shape[1]
+        return SecondLine(np.zeros(size), 0.0, 1.0, 0.0, 0, np.zeros(len(design)), np.zeros((size, size)))
+    best = grid[int(np.argmax(rating))]
+    for _ in range(_HALVINGS):
+        around = _around(best, steps)
+        best = around[int(np.argmax(rated(around)))]
+        steps = steps * _SHRINK
+    return _sized(found, design, best, block, floor)
+
+
+def _around(best: Float, steps: Float) -> Float:
+    moves = np.stack(np.meshgrid(*[[-1, 0, 1]] * len(best), indexing="ij"), -1).reshape(-1, len(best))
+    return np.asarray(best + moves * steps)
+
+
+@numba.njit(cache=True, nogil=True)
+def _rate(score, information, design, parameters, clear):  # type: ignore[no-untyped-def]
+    """Σ score / √(Σ information) of parameters (K, P); −1 where hardly any ghost is clear of the line."""
+    cells, distances = score.shape
+    out = np.empty(len(parameters))
+    middle = (distances - 1) / 2
+    for k in range(len(parameters)):
+        s = i = 0.0
+        apart = 0
+        for n in range(cells):
+            d = 0.0
+            for j in range(design.shape[1]):
+                d += design[n, j] * parameters[k, j]
+            if abs(d) > clear:
+                apart += 1
+            at = middle + d / STEP_PX
+            low = int(np.floor(at))
+            if low < 0 or low >= distances - 1:
+                continue
+            f = at - low
+            s += (1 - f) * score[n, low] + f * score[n, low + 1]
+            i += (1 - f) * information[n, low] + f * information[n, low + 1]
+        out[k] = s / np.sqrt(i) if i > 0 and apart > 0.2 * cells else -1.0
+    return out
+
+
+def _sized(
+    found: Responses, design: Float, best: Float, block: NDArray[np.int64], floor: float
+) -> SecondLine:
+    """Return height, σ and the parameters' covariance at the best place."""
+    at = design @ best
+    score, information = _at(found, at)
+    blocks = np.unique(block)
+    parts = np.array([(score[block == b].sum(), information[block == b].sum()) for b in blocks])
+    total = parts.sum(0)
+    left = total - parts
+    height = total[0] / total[1]
+    others = left[:, 0] / np.maximum(left[:, 1], 1e-12)
+    random = np.sqrt((len(blocks) - 1) / len(blocks) * np.sum((others - height) ** 2))
+    return SecondLine(
+        best, float(height), float(np.hypot(random, floor)), float(total[1]), len(blocks), at,
+        _place_covariance(found, design, at, height, block),
+    )  # fmt: skip
+
+
+def _at(found: Responses, distance_px: Float) -> tuple[Float, Float]:
+    """Return score and information (N,) at a distance (N,) of each cell; 0 beyond reach."""
+    place = (distance_px - found.distance_px[0]) / STEP_PX
+    low = np.clip(np.floor(place).astype(int), 0, len(found.distance_px) - 2)
+    f, row = place - low, np.arange(len(place))
+    inside = (place >= 0) & (place <= len(found.distance_px) - 1)
+    both = [(1 - f) * v[row, low] + f * v[row, low + 1] for v in (found.score, found.information)]
+    return np.where(inside, both[0], 0.0), np.where(inside, both[1], 0.0)
+
+
+def _place_covariance(
+    found: Responses, design: Float, at: Float, height: float, block: NDArray[np.int64]
+) -> Float:
+    """Covariance of the parameters from the curvature of the fit and its slopes' scatter over blocks."""
+
+    def gain(d: Float) -> Float:
+        score, information = _at(found, d)
+        return np.asarray(height * score - 0.5 * height**2 * information)
+
+    up, here, down = gain(at + STEP_PX), gain(at), gain(at - STEP_PX)
+    slope, curvature = (up - down) / (2 * STEP_PX), (up - 2 * here + down) / STEP_PX**2
+    bread = -design.T @ (curvature[:, None] * design)
+    each = np.array([design[block == b].T @ slope[block == b] for b in np.unique(block)])
+    spread = each - each.mean(0)
+    inverse = np.linalg.pinv(bread)
+    return np.asarray(inverse @ (spread.T @ spread) @ inverse)

@@ -1,0 +1,105 @@
+"""Findings of a second line: `ghost_ring` and `tube_ghost`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.probe import Probe
+from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
+from stages.diagnose.profile.geometry import LineGeometry
+from stages.diagnose.profile.ghost import Responses, SecondLine, bounced, copied, responses
+
+Float = NDArray[np.float64]
+# Of the line's height: what compression leaves on one side and not on the other, in places and everywhere.
+BOUNCED_FLOOR, COPIED_FLOOR = 1e-3, 5e-4
+_LEAST_CELLS = 30
+_BETTER = 1.2
+# A constant distance has one parameter where the bounced line has three.
+_SIMPLER = 0.95
+
+
+def ghost_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[Finding, Finding]:
+    """Return the findings of `ghost_ring` and `tube_ghost`; of two that fit, the clearly better one is kept.
+
+    The bounced line also measures the sheet's tilt and cone, whatever the camera's errors are.
+    """
+    if cells.whole.sum() < _LEAST_CELLS:
+        why = "The line's middle is hardly ever seen unclipped: no fainter line can be compared with it."
+        return untestable("ghost_ring", why), untestable("tube_ghost", why)
+    found = responses(cells)
+    ring, copy = bounced(found, cells, BOUNCED_FLOOR), copied(found, cells, COPIED_FLOOR)
+    bounced_wins = ring.misfit_drop > _BETTER * copy.misfit_drop
+    copied_wins = copy.misfit_drop > _SIMPLER * ring.misfit_drop
+    return (
+        _ring_finding(ring, cells, geometry, probe, found, kept=not copied_wins),
+        _copy_finding(copy, cells, geometry, found, kept=not bounced_wins),
+    )
+
+
+def _ring_finding(
+    line: SecondLine, cells: Cells, geometry: LineGeometry, probe: Probe, found: Responses, *, kept: bool
+) -> Finding:
+    tilt_x, tilt_y, cone = line.parameters
+    sigma = np.sqrt(np.diagonal(line.parameter_covariance))
+    stated = probe.laser
+    confirms = (
+        _degrees("laser_tilt.tilt_deg along x", tilt_x - stated.tilt_x, sigma[0]),
+        _degrees("laser_tilt.tilt_deg along y", tilt_y - stated.tilt_y, sigma[1]),
+        _degrees("laser_cone.cone_deg", cone - np.tan(stated.cone_rad), sigma[2]),
+    )
+    scale = geometry.px_per_mm * geometry.radius_mm
+    psi = geometry.azimuth_rad
+    apart = 4 * scale * (tilt_x * np.cos(psi) + tilt_y * np.sin(psi)) - 2 * scale * cone
+    tilt_deg, cone_deg = np.degrees(np.arctan(np.hypot(tilt_x, tilt_y))), np.degrees(np.arctan(cone))
+    return finding(
+        "ghost_ring", line.z, line.p_value if kept else 1.0,
+        (Size("relative", "", line.relative, line.sigma),),
+        f"A second line of {100 * line.relative:.2f} % lies where light bounced across the bore would: "
+        f"the sheet tilts by {tilt_deg:.3f}° and is a cone of {cone_deg:+.3f}°.",
+        _curve(cells, found, line, "A line bounced across the bore"),
+        pulled(apart, geometry.width_px, line.relative), confirms if kept else (),
+        alike=() if kept else ("tube_ghost",),
+    )  # fmt: skip
+
+
+def _copy_finding(
+    line: SecondLine, cells: Cells, geometry: LineGeometry, found: Responses, *, kept: bool
+) -> Finding:
+    distance = float(line.parameters[0])
+    sigma = float(np.sqrt(line.parameter_covariance[0, 0]))
+    return finding(
+        "tube_ghost", line.z, line.p_value if kept else 1.0,
+        (Size("relative", "", line.relative, line.sigma), Size("separation_mm", "mm", distance, sigma)),
+        f"A copy of the line of {100 * line.relative:.2f} % lies {distance:+.2f} mm along the axis from it, "
+        "the same all round.",
+        _curve(cells, found, line, "A copy of the line at a constant distance"),
+        pulled(-geometry.px_per_mm * distance, geometry.width_px, line.relative),
+        alike=() if kept else ("ghost_ring",),
+    )  # fmt: skip
+
+
+def pulled(apart_px: Float, width_px: Float, relative: float) -> Float:
+    """Return (F, S) by how much a Gaussian fit is drawn toward a fainter line ``apart_px`` away, px.
+
+    First order in the height: the overlap of the second line with the fit's influence function.
+    """
+    typical = float(np.nanmedian(width_px)) if np.isfinite(width_px).any() else 1.0
+    x = apart_px / np.where(np.isfinite(width_px), width_px, typical)
+    return np.asarray(relative * apart_px * np.exp(-0.25 * x * x))
+
+
+def _degrees(name: str, slope: float, sigma: float) -> Size:
+    return Size(name, "deg", float(np.degrees(slope)), float(np.degrees(sigma)))
+
+
+def _curve(cells: Cells, found: Responses, line: SecondLine, title: str) -> Curve:
+    """Return the second line's response around its place, stacked over all cells."""
+    offset = np.arange(-12.0, 12.01, 0.5)
+    height = line.stack(found, offset)
+    width = float(np.median(cells.width_px[cells.whole]))
+    return Curve(
+        title, "distance from where it should be, px", "share of the line's height", offset, height,
+        np.full(len(offset), line.sigma), line.relative * np.exp(-0.25 * (offset / width) ** 2),
+    )  # fmt: skip

@@ -1,0 +1,122 @@
+"""What is fixed to the sensor's pixels: locking of the line to them, and their own gains."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from pipeline.artefacts import RingSamples
+from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
+from stages.diagnose.profile.measure import LineProfiles
+from stages.diagnose.profile.regression import regress, two_sided_p
+
+Float = NDArray[np.float64]
+# px: by how much pixel integration, rounding and compression lock a line to pixels.
+LOCKING_FLOOR_PX = 1.5e-3
+# Variance of gains that speckle of a still wall or compression may fake.
+GAIN_FLOOR = 0.01
+_SMOOTH_AZIMUTHS = 41
+_LEAST_SEEN = 3.0e3
+_TILE_PX = 64
+
+
+def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Finding:
+    """Return the finding of `pixel_locking`: the line's radius pulled by a sin 2πρ.
+
+    Radius and prediction are both freed of what is smooth around the ring: that is the pipe's.
+    """
+    rows = np.concatenate([profiles.row[b] for b in cells.frames]) if cells.frames else np.empty(0, int)
+    if not len(rows):
+        return untestable("pixel_locking", "No steady frames.")
+    group = np.repeat(np.arange(len(cells.frames)), [len(b) for b in cells.frames])
+    valid = rings.valid[rows]
+    smooth = _smoothed(rings.radius_px[rows].astype(float), valid)
+    rough = np.where(valid, rings.radius_px[rows] - smooth, np.nan)
+    phase = 2 * np.pi * smooth
+    parts = [np.where(valid, f(phase) - _smoothed(f(phase), valid), np.nan) for f in (np.sin, np.cos)]
+    design = np.stack(parts, axis=-1).reshape(-1, 2)
+    fit = regress(design, rough.ravel(), np.repeat(group, rough.shape[1]))
+    if not np.isfinite(fit.sigma[0]):
+        return untestable("pixel_locking", "The line keeps to one place of its pixels.")
+    size = float(np.hypot(*fit.coefficient))
+    sigma = float(np.hypot(np.sqrt(np.trace(fit.covariance) / 2), LOCKING_FLOOR_PX))
+    return finding(
+        "pixel_locking", size / sigma, two_sided_p(size / sigma, fit.groups),
+        (Size("amplitude_px", "px", float(fit.coefficient[0]), sigma),),
+        f"The line's radius follows the pixels by {size:.4f} ± {sigma:.4f} px.",
+        _phase_curve(rough, smooth, fit.coefficient),
+    )  # fmt: skip
+
+
+def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Finding:
+    """Return the finding of `fixed_pattern`: gains of single pixels, alike in two halves of the frames.
+
+    The halves' covariance is the variance of what stays in the pixels. A pixel is compared with its
+    neighbours along the row, so that the line's own shape falls out.
+    """
+    gain, seen = _gains(profiles, image_size)
+    rough = [g - _row_means(g, s) for g, s in zip(gain, seen, strict=True)]
+    both = seen[0] & seen[1]
+    tiles = _tiles(image_size)[both]
+    product = (rough[0] * rough[1])[both]
+    if len(product) < 500:
+        return untestable("fixed_pattern", "The line does not come back to the same pixels.")
+    fit = regress(np.ones((len(product), 1)), product, tiles)
+    variance = float(fit.coefficient[0]) * 1.5
+    sigma = float(np.hypot(1.5 * fit.sigma[0], GAIN_FLOOR**2))
+    z = variance / sigma
+    size = float(np.sqrt(max(variance, 0.0)))
+    return finding(
+        "fixed_pattern", z, two_sided_p(z, fit.groups),
+        (Size("relative", "", size, sigma / (2 * max(size, np.sqrt(sigma)))),),
+        f"Pixels keep gains of their own of {100 * size:.2f} % (1 σ).", alike=("dust",),
+    )  # fmt: skip
+
+
+def _smoothed(values: Float, valid: NDArray[np.bool_]) -> Float:
+    """Return running means around the ring of what is valid."""
+    some = np.where(valid, values, 0.0)
+    total = uniform_filter1d(some, _SMOOTH_AZIMUTHS, axis=1, mode="wrap")
+    weight = uniform_filter1d(valid.astype(float), _SMOOTH_AZIMUTHS, axis=1, mode="wrap")
+    return np.asarray(total / np.maximum(weight, 1e-3))
+
+
+def _phase_curve(rough: Float, smooth: Float, coefficient: Float) -> Curve:
+    edges = np.linspace(0, 1, 17)
+    phase, known = (smooth % 1).ravel(), np.isfinite(rough).ravel()
+    index = np.digitize(phase, edges) - 1
+    parts = [rough.ravel()[known & (index == k)] for k in range(16)]
+    x = (edges[1:] + edges[:-1]) / 2
+    turn = 2 * np.pi * x
+    return Curve(
+        "Radius against the pixels' phase", "fraction of a pixel", "px", x,
+        np.array([np.median(p) if len(p) else np.nan for p in parts]),
+        np.array([1.4826 * np.median(np.abs(p)) / np.sqrt(len(p)) if len(p) else np.nan for p in parts]),
+        coefficient[0] * np.sin(turn) + coefficient[1] * np.cos(turn),
+    )  # fmt: skip
+
+
+def _gains(
+    profiles: LineProfiles, image_size: tuple[int, int]
+) -> tuple[list[Float], list[NDArray[np.bool_]]]:
+    """Return for both halves the relative gain less 1 of every pixel (H, W), and where it is seen."""
+    gains, seen = [], []
+    for residual, square in profiles.gain:
+        enough = square > _LEAST_SEEN
+        gains.append(np.where(enough, residual / np.maximum(square, 1e-9), 0.0).reshape(image_size[::-1]))
+        seen.append(enough.reshape(image_size[::-1]))
+    return gains, seen
+
+
+def _row_means(values: Float, seen: NDArray[np.bool_]) -> Float:
+    """Return the mean of the two neighbours in the row, as far as they are seen."""
+    left, right = np.roll(values, 1, 1), np.roll(values, -1, 1)
+    a, b = np.roll(seen, 1, 1), np.roll(seen, -1, 1)
+    return np.asarray((left * a + right * b) / np.maximum(a.astype(float) + b, 1.0))
+
+
+def _tiles(image_size: tuple[int, int]) -> NDArray[np.int64]:
+    v, u = np.mgrid[: image_size[1], : image_size[0]]
+    return np.asarray((v // _TILE_PX) * 1000 + u // _TILE_PX)

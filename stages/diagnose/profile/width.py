@@ -1,0 +1,126 @@
+"""How wide the line is: against the image's scale, and against how fast it moves."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.instrument.probe import Probe
+from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
+from stages.diagnose.profile.geometry import LineGeometry
+from stages.diagnose.profile.regression import Regression, regress, two_sided_p
+
+Float = NDArray[np.float64]
+# Of (line σ / stated)², and of exposure², s²: what compression and clipped neighbours may do to a width.
+SCALE_FLOOR, EXPOSURE2_FLOOR = 0.03, 2e-5
+_LEAST_SCALE_SPREAD = 0.05
+
+
+def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[Finding, Finding]:
+    """Return the findings of `gamma` and `albedo_bias`: width² = blur² + s (stated σ · px per mm)².
+
+    A response I^γ divides all widths² by γ; a wider sheet than stated changes s alone. The blur is not
+    stated, so the two look alike here.
+    """
+    stated = stated_variance(geometry, probe)
+    fit = scale_law(cells, geometry, probe)
+    spread = np.nanstd(stated) / np.nanmean(stated) if np.isfinite(stated).any() else 0.0
+    if not np.isfinite(fit.sigma[0]) or spread < _LEAST_SCALE_SPREAD:
+        why = "The line is seen at one scale only: its own width and the image's blur cannot be told apart."
+        return untestable("gamma", why), untestable("albedo_bias", why)
+    scale, sigma = float(fit.coefficient[0]), float(np.hypot(fit.sigma[0], SCALE_FLOOR))
+    z = (scale - 1) / sigma
+    p = two_sided_p(z, fit.groups)
+    safe = max(scale, 0.05)
+    exponent = Size("exponent", "", 1 / safe, sigma / safe**2)
+    stated_mm = probe.laser.line_sigma_mm
+    line = Size("line_sigma_mm", "mm", stated_mm * np.sqrt(safe), stated_mm * sigma / (2 * np.sqrt(safe)))
+    seen = f"The line's width² follows the image's scale with {scale:.3f} ± {sigma:.3f} of what is stated."
+    curve = _scale_curve(cells, geometry, stated, fit)
+    return (
+        finding("gamma", z, p, (exponent,), seen, curve, alike=("albedo_bias",)),
+        finding("albedo_bias", z, p, (line,), seen, curve, alike=("gamma",)),
+    )
+
+
+def stated_variance(geometry: LineGeometry, probe: Probe) -> Float:
+    """Return (F, S) the stated line's variance in the image, px²."""
+    return np.asarray((probe.laser.line_sigma_mm * geometry.px_per_mm) ** 2)
+
+
+def scale_law(cells: Cells, geometry: LineGeometry, probe: Probe) -> Regression:
+    """Regress width², px², on the stated line's and on 1: (σ / stated)², blur², fixed patterns."""
+    stated = stated_variance(geometry, probe)
+    design = np.stack([stated, np.ones_like(stated), *_fixed_patterns(geometry)], axis=-1)
+    width2 = (geometry.width_px**2).ravel()
+    return regress(design.reshape(-1, design.shape[-1]), width2, _groups(cells, geometry))
+
+
+def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
+    """Return the finding of `motion_blur`: width² grows by (speed · exposure)² / 12.
+
+    Each frame's own mean is taken out, so that only the pattern around the ring counts.
+    """
+    columns = [
+        geometry.speed_px_s**2 / 12,
+        stated_variance(geometry, probe),
+        1 / geometry.height,
+        *_fixed_patterns(geometry),
+    ]
+    design = np.stack(columns, axis=-1)
+    width2 = geometry.width_px**2
+    known = np.isfinite(width2) & np.isfinite(design).all(-1)
+    design, width2 = _without_frame_means(design, known), _without_frame_means(width2[..., None], known)
+    fit = regress(design.reshape(-1, design.shape[-1]), width2.ravel(), _groups(cells, geometry))
+    if not np.isfinite(fit.sigma[0]):
+        return untestable("motion_blur", "The line does not move enough for its width to tell the exposure.")
+    exposure2, sigma = float(fit.coefficient[0]), float(np.hypot(fit.sigma[0], EXPOSURE2_FLOOR))
+    own = probe.shutter.exposure_s
+    total = np.sqrt(max(exposure2, 0.0))
+    size = Size("exposure_s", "s", float(total - own), sigma / (2 * max(total, np.sqrt(sigma))))
+    z = (exposure2 - own**2) / sigma
+    shift = -0.5 * total * geometry.speed_px_s
+    return finding(
+        "motion_blur", z, two_sided_p(z, fit.groups), (size,),
+        f"The line widens with its own speed as an exposure of {1e3 * total:.1f} ms makes it.",
+        shift_px=np.nan_to_num(shift) + 0.5 * own * np.nan_to_num(geometry.speed_px_s),
+    )  # fmt: skip
+
+
+def _fixed_patterns(geometry: LineGeometry) -> list[Float]:
+    """Return patterns that stay with the camera: a tilted sheet's false radius, pixels seen askew."""
+    psi = np.broadcast_to(geometry.azimuth_rad, geometry.px_per_mm.shape)
+    return [f(order * psi) for order in (1, 2, 4) for f in (np.cos, np.sin)]
+
+
+def _groups(cells: Cells, geometry: LineGeometry) -> NDArray[np.int64]:
+    """Return the block (F · S,) of every sector of every frame; −1 for frames of no block."""
+    group = np.full(len(geometry.steady), -1)
+    for k, rows in enumerate(cells.frames):
+        group[rows] = k
+    return np.repeat(group, len(geometry.azimuth_rad))
+
+
+def _without_frame_means(values: Float, known: NDArray[np.bool_]) -> Float:
+    """Return values (F, S, K) less each frame's mean over what is known; NaN elsewhere."""
+    some = np.where(known[..., None], values, 0.0)
+    mean = some.sum(1, keepdims=True) / np.maximum(known.sum(1), 1)[:, None, None]
+    return np.where(known[..., None], values - mean, np.nan)
+
+
+def _scale_curve(cells: Cells, geometry: LineGeometry, stated: Float, fit: Regression) -> Curve:
+    """Return width² against the stated line's, medians of every block."""
+    width2 = geometry.width_px**2
+    x = np.array([np.nanmedian(stated[rows]) for rows in cells.frames])
+    y = np.array(
+        [np.nanmedian(width2[rows]) if np.isfinite(width2[rows]).any() else np.nan for rows in cells.frames]
+    )
+    sigma = np.array([
+        1.4826 * np.nanmedian(np.abs(width2[rows] - m)) / np.sqrt(max(np.isfinite(width2[rows]).sum(), 1))
+        if np.isfinite(m) else np.nan for rows, m in zip(cells.frames, y, strict=True)
+    ])  # fmt: skip
+    return Curve(
+        "Width of the line against the image's scale", "stated line's width², px²", "fitted width², px²",
+        x, y, sigma, fit.coefficient[0] * x + fit.coefficient[1],
+    )  # fmt: skip
