@@ -14,6 +14,7 @@ from pipeline.simulator.view import TILE_PX, to_wall
 REFERENCE_MM = 50.0
 # The glossy lobe is left out where it is below e to the minus this.
 _NO_LOBE = 16.0
+_PATCH_PX = 16
 
 
 @owner
@@ -141,26 +142,37 @@ def hashed(x):  # type: ignore[no-untyped-def]
 @owner
 def add_wall_light(view, leds, lobe, colour, level, ambient, samples, v_from, v_to, image):  # type: ignore[no-untyped-def]
     """Add what LEDs at ``leds`` (L, 3) in C, and even stray light, make of the wall, to rows of an image."""
-    work = _work()
-    total, times = np.empty(3), view.pose.shape[1]
-    share = 1.0 / (samples * samples * times)
-    for v in range(v_from, v_to):
-        for u in range(image.shape[1]):
-            total[:] = 0.0
-            for n in range(samples * samples):
-                y = v + (n // samples + 0.5) / samples - 0.5
-                x = u + (n % samples + 0.5) / samples - 0.5
-                ray_at(view.rays, x, y, work[0])
-                for k in range(times):
-                    _wall_light(view, leds, lobe, level, ambient, v, k, samples, work, total)
-            for c in range(3):
-                image[v, u, c] += share * colour[c] * total[c]
+    work, total = _work(), np.empty(3)
+    across = -(-image.shape[1] // _PATCH_PX)
+    # in patches, so that neighbours find the wall's samples still at hand
+    for patch in range(across * -(-(v_to - v_from) // _PATCH_PX)):
+        v_first, u_first = v_from + patch // across * _PATCH_PX, patch % across * _PATCH_PX
+        for v in range(v_first, min(v_first + _PATCH_PX, v_to)):
+            for u in range(u_first, min(u_first + _PATCH_PX, image.shape[1])):
+                _pixel_wall_light(view, leds, lobe, level, ambient, samples, u, v, work, total)
+                for c in range(3):
+                    image[v, u, c] += colour[c] * total[c]
+
+
+@kernel
+def _pixel_wall_light(view, leds, lobe, level, ambient, samples, u, v, work, total):  # type: ignore[no-untyped-def]
+    times = view.pose.shape[1]
+    total[:] = 0.0
+    for n in range(samples * samples):
+        y = v + (n // samples + 0.5) / samples - 0.5
+        x = u + (n % samples + 0.5) / samples - 0.5
+        ray_at(view.rays, x, y, work[0])
+        for k in range(times):
+            _wall_light(view, leds, lobe, level, ambient, v, k, samples, work, total)
+    for c in range(3):
+        total[c] /= samples * samples * times
 
 
 @kernel
 def _wall_light(view, leds, lobe, level, ambient, row, k, samples, work, total):  # type: ignore[no-untyped-def]
     c_ray, w_ray, hit, o, R, normal, albedo, way, at = work
-    if not (c_ray[5] > -0.2):
+    # LEDs face forward and sit about at the viewpoint
+    if not (c_ray[5] > (-0.02 if ambient == 0.0 else -1.0)):
         return
     to_wall(view, row, k, c_ray, w_ray)
     if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):

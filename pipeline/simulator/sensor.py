@@ -6,11 +6,11 @@ from functools import cache
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from pipeline.simulator.instrument import TrueSensor
+from pipeline.simulator.kernel import kernel
 from pipeline.simulator.light import hashed
 from pipeline.simulator.workers import in_bands
 
@@ -50,12 +50,18 @@ def exposed(light: Float32, sensor: TrueSensor, seed: int, frame: int) -> Image:
     well, read, black = sensor.full_well_e, sensor.read_noise_e, sensor.black_level
     draw = np.uint64(seed * 1_000_003 + frame + 1)
     numbers = (well, read, black, sensor.gamma, sensor.fixed_pattern)
+    quantile = _normal_quantiles()
+    dark = _grey(quantile * read / well, black, sensor.gamma)
 
     def band(first: int, last: int) -> None:
-        _expose(light, numbers, draw, np.uint64(seed), _normal_quantiles(), first, last, out)
+        _expose(light, numbers, draw, np.uint64(seed), quantile, dark, first, last, out)
 
     in_bands(band, len(light))
     return out
+
+
+def _grey(share: Float32, black: float, gamma: float) -> Image:
+    return np.asarray(black + (255 - black) * np.clip(share, 0, 1) ** gamma + 0.5, np.uint8)
 
 
 def _widely(light: Float32, sigma_px: float) -> Float32:
@@ -71,14 +77,18 @@ def _normal_quantiles() -> Float32:
     return np.asarray(ndtri((np.arange(_QUANTILES) + 0.5) / _QUANTILES), np.float32)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _expose(light, numbers, draw, seed, quantile, v_from, v_to, out):  # type: ignore[no-untyped-def]
+@kernel
+def _expose(light, numbers, draw, seed, quantile, dark, v_from, v_to, out):  # type: ignore[no-untyped-def]
     well, read, black, gamma, pattern = numbers
     columns, mask = light.shape[1], np.uint64(0xFFFF)
     for v in range(v_from, v_to):
         for u in range(columns):
             pixel = np.uint64(v * columns + u + 1)
             bits = hashed(draw * np.uint64(0x9E3779B97F4A7C15) + pixel * np.uint64(0xD1B54A32D192ED03))
+            if light[v, u, 0] == 0.0 and light[v, u, 1] == 0.0 and light[v, u, 2] == 0.0:
+                for c in range(3):
+                    out[v, u, c] = dark[(bits >> np.uint64(16 * c)) & mask]
+                continue
             gain = 1.0
             if pattern > 0.0:
                 fixed = hashed(seed + pixel * np.uint64(0xA24BAED4963EE407))

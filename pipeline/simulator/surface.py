@@ -20,7 +20,7 @@ _NEAR_BLOCKS, _NEAR_STEP_MM = 2, 1.9
 _WIDE_BLOCKS, _WIDE_STEP_MM = 32, 31.9
 _FINE_MM = 0.3
 _FAR_MM = 2000.0
-_CLOSE_MM = 1e-6
+_CLOSE_MM = 2e-5
 
 
 class Surface(NamedTuple):
