@@ -46,6 +46,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "defects": json.loads(files.defects_text()),
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),
+        "diagnosis": _diagnosis(files),
     }
 
 
@@ -147,6 +148,19 @@ def _overlay(overlay: Overlay) -> dict[str, Any]:
         "high_mm": overlay.high_mm,
         "colours": [f"#{r:02x}{g:02x}{b:02x}" for b, g, r in overlay.palette_bgr[at]],
     }
+
+
+def _diagnosis(files: RunFiles) -> dict[str, Any] | None:
+    """Return what a diagnosis laid into the run folder says, None without one."""
+    file = files.path / "diagnosis.json"
+    if not file.is_file():
+        return None
+    told = json.loads(file.read_text("utf-8"))
+    effects = told.get("effects", [])
+    words = [str(e.get("statement", e.get("name", ""))) for e in effects]
+    statement = " ".join(words) or str(told.get("identifiable") or told.get("record_next") or "")
+    return {"verdict": str(told.get("verdict", "")), "statement": statement,
+            "effects": [str(e.get("name", "")) for e in effects]}  # fmt: skip
 
 
 def _axis(trajectory: Trajectory) -> dict[str, Any]:

@@ -1,0 +1,137 @@
+/** The list of findings and what can be done with the chosen one. */
+import { chart } from "./chart";
+import { bySeverity, type Session } from "./session";
+import type { Finding } from "./types";
+import { clockOfHours, element, measured, number } from "./words";
+
+export class FindingsPanel {
+  readonly root = element("div", { class: "findings" });
+  private readonly list = element("ol", { class: "list", "aria-label": "Findings, most severe first" });
+  private readonly detail = element("div", { class: "detail" });
+  private wanted = 0;
+
+  constructor(private readonly session: Session) {
+    this.root.append(this.progress, this.list, this.detail);
+    session.on(["state", "selection"], () => this.paint());
+    this.paint();
+  }
+
+  private readonly progress = element("p", { class: "progress", "aria-live": "polite" });
+
+  get order(): Finding[] { return bySeverity(this.session.standing); }
+
+  next(step: number): void {
+    const order = this.order;
+    if (!order.length) return;
+    const at = order.findIndex((f) => f.id === this.session.selected);
+    this.session.select(order[(at + step + order.length) % order.length]!.id);
+    this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus();
+  }
+
+  private paint(): void {
+    const order = this.order;
+    const open = order.filter((f) => f.status === "open").length;
+    this.progress.textContent = !order.length ? "Nothing was found on this wall."
+      : open ? `${order.length - open} of ${order.length} decided, ${open} to go.` : `All ${order.length} decided.`;
+    this.list.replaceChildren(...order.map((f) => this.row(f)));
+    this.describe();
+  }
+
+  private row(finding: Finding): HTMLElement {
+    const { session } = this;
+    const mark = element("input", {
+      type: "checkbox", checked: session.marked.has(finding.id), "aria-label": `mark ${finding.id} for merging`,
+      change: () => { session.marked.has(finding.id) ? session.marked.delete(finding.id) : session.marked.add(finding.id); this.describe(); },
+    });
+    const size = finding.size;
+    const face = element("button", {
+      class: "row", "aria-current": String(finding.id === session.selected), click: () => session.select(finding.id),
+    },
+      element("span", { class: `dot ${finding.status}` , title: finding.status }),
+      element("strong", {}, `${finding.id} ${finding.kind}`),
+      element("span", {}, measured(size.depth_mm, size.depth_sigma_mm)),
+      element("span", { class: "quiet" }, `${number(size.distance_from_mm, 0)} mm, ${clockOfHours(size.clock_from)}`));
+    return element("li", {}, session.source.readOnly ? null : mark, face);
+  }
+
+  private describe(): void {
+    const finding = this.session.finding;
+    if (!finding) {
+      this.detail.replaceChildren(element("p", { class: "quiet" }, "Choose a finding, or press N for the next."));
+      return;
+    }
+    const wrong = this.session.run.defects.find((d) => d.id === finding.original);
+    this.detail.replaceChildren(
+      element("h3", {}, `${finding.id}: ${finding.kind}, ${finding.status}`),
+      this.session.source.readOnly ? "" : this.buttons(finding),
+      this.table(finding),
+      wrong && finding.edited ? element("p", { class: "original" }, `As measured: ${wrong.statement}`)
+        : element("p", {}, wrong?.statement ?? "Made by hand."),
+      element("p", { class: "quiet" }, wrong ? [wrong.pof_class && `POF ${wrong.pof_class}`, wrong.pacp_suggestion && `PACP ${wrong.pacp_suggestion}`,
+        wrong.en13508_suggestion && `EN 13508-2 ${wrong.en13508_suggestion}`].filter(Boolean).join(" · ") : ""),
+      this.remarks(finding), this.curves(finding));
+  }
+
+  private table(finding: Finding): HTMLElement {
+    const s = finding.size;
+    const rows: [string, string][] = [
+      ["depth into the wall", measured(s.depth_mm, s.depth_sigma_mm)],
+      ["along × around", `${number(s.length_mm, 1)} × ${number(s.width_mm, 1)} mm`],
+      ["distance", `${number(s.distance_from_mm, 1)} to ${number(s.distance_to_mm, 1)} mm`],
+      ["clock", `${clockOfHours(s.clock_from)} to ${clockOfHours(s.clock_to)}`],
+    ];
+    if (finding.wall_loss_percent !== null) rows.push(["wall loss", measured(finding.wall_loss_percent, finding.wall_loss_sigma_percent, "%")]);
+    if (finding.strength) {
+      rows.push(["fails at, B31G", measured(finding.strength.b31g_mpa, finding.strength.b31g_sigma_mpa, "MPa")]);
+      rows.push(["fails at, modified B31G", measured(finding.strength.modified_mpa, finding.strength.modified_sigma_mpa, "MPa")]);
+    }
+    if (finding.decided_by) rows.push(["decided", `${finding.decided_by}, ${finding.decided_at.slice(0, 16).replace("T", " ")} UTC`]);
+    if (finding.reason) rows.push(["reason", finding.reason]);
+    if (finding.made_of.length) rows.push(["made of", finding.made_of.join(", ")]);
+    return element("table", {}, ...rows.map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, v))));
+  }
+
+  private buttons(finding: Finding): HTMLElement {
+    const { session } = this;
+    const act = (action: object) => void session.act({ ...action, finding: finding.id });
+    const kind = element("select", {
+      "aria-label": "kind", change: () => act({ do: "reclassify", kind: kind.value }),
+    }, ...session.run.kinds.map((k) => element("option", { value: k, selected: k === finding.kind }, k)));
+    const marked = [...session.marked];
+    return element("div", { class: "buttons" },
+      element("button", { class: "accept", click: () => act({ do: "accept" }), title: "A" }, "Accept"),
+      element("button", { class: "reject", click: () => this.reject(finding), title: "R" }, "Reject"),
+      finding.status !== "open" ? element("button", { click: () => act({ do: "reopen" }) }, "Reopen") : null,
+      element("label", {}, "kind ", kind),
+      element("button", { click: () => session.take("redraw") }, "Redraw"),
+      element("button", { click: () => session.take("split") }, "Split"),
+      marked.length > 1 ? element("button", { click: () => void session.act({ do: "merge", findings: marked }) }, `Merge ${marked.join(" + ")}`) : null);
+  }
+
+  reject(finding: Finding): void {
+    const reason = window.prompt(`Why is ${finding.id} no defect?`, "");
+    if (reason !== null) void this.session.act({ do: "reject", finding: finding.id, reason });
+  }
+
+  private remarks(finding: Finding): HTMLElement {
+    const said = finding.remarks.map((r) => element("p", { class: "remark" }, `${r.who}: ${r.text}`));
+    if (this.session.source.readOnly) return element("div", {}, ...said);
+    const text = element("input", { type: "text", maxlength: "4000", "aria-label": "comment", placeholder: "Comment" });
+    const form = element("form", { class: "comment", submit: (e) => {
+      e.preventDefault();
+      if (text.value.trim()) void this.session.act({ do: "comment", finding: finding.id, text: text.value.trim() });
+    } }, text, element("button", {}, "Add"));
+    return element("div", {}, ...said, form);
+  }
+
+  private curves(finding: Finding): HTMLElement {
+    const place = element("div", { class: "curves" });
+    const turn = ++this.wanted;
+    const half = Math.max(finding.size.length_mm, finding.size.width_mm) / 2 + 8;
+    const [distance, azimuth] = this.session.cursor;
+    void this.session.source.profile(distance, azimuth, Math.min(half, 40)).then((profile) => {
+      if (turn === this.wanted) place.replaceChildren(chart(profile.along, "along"), chart(profile.around, "around"));
+    }).catch((error: Error) => place.replaceChildren(element("p", { class: "quiet" }, error.message)));
+    return place;
+  }
+}

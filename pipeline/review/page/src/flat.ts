@@ -1,0 +1,299 @@
+/** The unrolled wall: distance to the right, clock downward from 6 over 12 to 6, tiles loaded as they are seen. */
+import type { Session } from "./session";
+import type { Layer, Point } from "./types";
+import { TURN, clock, element, wrapped } from "./words";
+
+const TILE = 512;
+const TOP = -1.5 * Math.PI; // 6 o'clock
+const MOST_TILES = 160;
+
+interface View { distance: number; azimuth: number; mmPerPx: number }
+
+export class FlatView {
+  readonly root: HTMLElement;
+  private readonly canvas = element("canvas", {
+    tabindex: "0", role: "img",
+    "aria-label": "Unrolled wall. Arrow keys move the spot, plus and minus zoom.",
+  });
+  private readonly tiles = new Map<string, HTMLImageElement>();
+  private layer: Layer | null = null;
+  private view: View;
+  private drag: { x: number; y: number; view: View; moved: boolean } | null = null;
+
+  constructor(private readonly session: Session) {
+    this.root = element("div", { class: "flat" }, this.canvas);
+    const { run } = session;
+    this.view = { distance: session.cursor[0], azimuth: TOP + Math.PI, mmPerPx: (TURN * run.radius_mm) / 320 };
+    session.on(["layer"], () => void this.load());
+    session.on(["state", "selection", "cursor", "shape", "tool"], () => this.paint());
+    session.on(["selection"], () => this.reveal());
+    new ResizeObserver(() => this.resize()).observe(this.root);
+    this.canvas.addEventListener("pointerdown", (e) => this.press(e));
+    this.canvas.addEventListener("pointermove", (e) => this.move(e));
+    this.canvas.addEventListener("pointerup", (e) => this.release(e));
+    this.canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
+    this.canvas.addEventListener("keydown", (e) => this.key(e));
+    void this.load();
+  }
+
+  private get perRad(): number { return this.session.run.radius_mm / this.view.mmPerPx; }
+  private get size(): [number, number] { return [this.canvas.clientWidth, this.canvas.clientHeight]; }
+
+  private x(distance: number): number { return this.size[0] / 2 + (distance - this.view.distance) / this.view.mmPerPx; }
+  private y(azimuth: number): number { return this.size[1] / 2 + (azimuth - this.view.azimuth) * this.perRad; }
+
+  private point(x: number, y: number): Point {
+    return [
+      this.view.distance + (x - this.size[0] / 2) * this.view.mmPerPx,
+      this.view.azimuth + (y - this.size[1] / 2) / this.perRad,
+    ];
+  }
+
+  private async load(): Promise<void> {
+    const name = this.session.layer;
+    const layer = await this.session.source.layer(name);
+    if (name !== this.session.layer) return;
+    this.layer = layer;
+    this.paint();
+  }
+
+  private resize(): void {
+    const ratio = window.devicePixelRatio || 1;
+    const [width, height] = [this.root.clientWidth, this.root.clientHeight];
+    if (!width || !height) return;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    this.view.mmPerPx = Math.min(this.view.mmPerPx, (TURN * this.session.run.radius_mm) / height);
+    this.paint();
+  }
+
+  private reveal(): void {
+    const found = this.session.finding;
+    if (!found) return;
+    const spans = found.outline.map((p) => p[0]);
+    const long = Math.max(...spans) - Math.min(...spans);
+    const turn = Math.max(...found.outline.map((p) => p[1])) - Math.min(...found.outline.map((p) => p[1]));
+    const whole = (TURN * this.session.run.radius_mm) / Math.max(this.size[1], 1);
+    const fit = Math.max((long * 3) / this.size[0], (turn * this.session.run.radius_mm * 3) / this.size[1], 0.05);
+    this.view = { distance: this.session.cursor[0], azimuth: this.session.cursor[1], mmPerPx: Math.min(whole, fit) };
+    this.keepInside();
+    this.paint();
+  }
+
+  private keepInside(): void {
+    const half = (this.size[1] / 2) / this.perRad;
+    this.view.azimuth = half * 2 >= TURN ? TOP + Math.PI
+      : Math.min(Math.max(this.view.azimuth < TOP ? this.view.azimuth + TURN : this.view.azimuth, TOP + half - Math.PI),
+        TOP + TURN + Math.PI - half);
+  }
+
+  private paint(): void {
+    const context = this.canvas.getContext("2d");
+    if (!context || !this.layer) return;
+    const ratio = window.devicePixelRatio || 1;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const [width, height] = this.size;
+    const style = getComputedStyle(this.root);
+    context.fillStyle = style.getPropertyValue("--ground");
+    context.fillRect(0, 0, width, height);
+    for (const turn of [-TURN, 0, TURN]) this.paintTiles(context, turn);
+    this.paintGrid(context, style);
+    for (const turn of [-TURN, 0, TURN]) this.paintFindings(context, turn, style);
+    this.paintCursor(context, style);
+    this.paintShape(context, style);
+  }
+
+  private paintTiles(context: CanvasRenderingContext2D, turn: number): void {
+    const layer = this.layer!;
+    const mmPerPixel = (layer.distance_mm[1] - layer.distance_mm[0]) / layer.width;
+    const level = Math.max(0, Math.min(layer.levels - 1, Math.floor(Math.log2(this.view.mmPerPx / mmPerPixel))));
+    const span = TILE << level;
+    const left = this.point(0, 0)[0], right = this.point(this.size[0], 0)[0];
+    const first = Math.max(0, Math.floor((left - layer.distance_mm[0]) / mmPerPixel / span));
+    const last = Math.min(Math.ceil(layer.width / span) - 1, Math.floor((right - layer.distance_mm[0]) / mmPerPixel / span));
+    context.imageSmoothingEnabled = this.view.mmPerPx > mmPerPixel / 3;
+    for (let row = 0; row * span < layer.height; row++) {
+      const from = -Math.PI + turn + (row * span * TURN) / layer.height;
+      const to = -Math.PI + turn + (Math.min((row + 1) * span, layer.height) * TURN) / layer.height;
+      if (this.y(to) < 0 || this.y(from) > this.size[1]) continue;
+      for (let column = first; column <= last; column++) {
+        const image = this.tile(level, column, row);
+        if (!image) continue;
+        const x0 = this.x(layer.distance_mm[0] + column * span * mmPerPixel);
+        const x1 = this.x(layer.distance_mm[0] + Math.min((column + 1) * span, layer.width) * mmPerPixel);
+        context.drawImage(image, x0, this.y(from), x1 - x0 + 0.5, this.y(to) - this.y(from) + 0.5);
+      }
+    }
+  }
+
+  private tile(level: number, column: number, row: number): HTMLImageElement | null {
+    const address = this.session.source.tile(this.session.layer, level, column, row);
+    const known = this.tiles.get(address);
+    if (known) {
+      this.tiles.delete(address);
+      this.tiles.set(address, known); // the least recently seen are dropped first
+      return known.complete && known.naturalWidth ? known : null;
+    }
+    const image = new Image();
+    image.onload = () => this.paint();
+    image.src = address;
+    this.tiles.set(address, image);
+    for (const old of this.tiles.keys()) {
+      if (this.tiles.size <= MOST_TILES) break;
+      this.tiles.delete(old);
+    }
+    return null;
+  }
+
+  private paintGrid(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
+    const [width, height] = this.size;
+    context.font = "12px system-ui, sans-serif";
+    context.textBaseline = "middle";
+    for (let hour = -12; hour < 24; hour += 3) {
+      const azimuth = TOP + (hour * Math.PI) / 6;
+      this.label(context, style, clock(azimuth).replace(":00", " h"), 4, this.y(azimuth), "left");
+    }
+    const step = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000].find((s) => s / this.view.mmPerPx > 90) ?? 20000;
+    for (let s = Math.ceil(this.point(0, 0)[0] / step) * step; s < this.point(width, 0)[0]; s += step) {
+      this.label(context, style, `${s} mm`, this.x(s), height - 10, "center");
+    }
+  }
+
+  private label(context: CanvasRenderingContext2D, style: CSSStyleDeclaration, text: string, x: number, y: number, align: CanvasTextAlign): void {
+    context.textAlign = align;
+    context.lineWidth = 3;
+    context.strokeStyle = style.getPropertyValue("--halo");
+    context.fillStyle = style.getPropertyValue("--ink");
+    context.strokeText(text, x, y);
+    context.fillText(text, x, y);
+  }
+
+  private paintFindings(context: CanvasRenderingContext2D, turn: number, style: CSSStyleDeclaration): void {
+    for (const finding of this.session.standing) {
+      const chosen = finding.id === this.session.selected;
+      context.setLineDash(finding.status === "rejected" ? [4, 4] : []);
+      this.trace(context, finding.outline.map(([s, a]) => [s, a + turn] as Point), true);
+      context.lineWidth = chosen ? 5 : 4;
+      context.strokeStyle = style.getPropertyValue("--halo");
+      context.stroke();
+      context.lineWidth = chosen ? 3 : 1.8;
+      context.strokeStyle = style.getPropertyValue(chosen ? "--chosen" : `--${finding.status}`);
+      context.stroke();
+    }
+    context.setLineDash([]);
+  }
+
+  private paintCursor(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
+    const [s, a] = this.session.cursor;
+    context.lineWidth = 1;
+    context.strokeStyle = style.getPropertyValue("--chosen");
+    const x = Math.round(this.x(s)) + 0.5;
+    context.beginPath();
+    context.moveTo(x, 0);
+    context.lineTo(x, this.size[1]);
+    for (const turn of [-TURN, 0, TURN]) {
+      const y = Math.round(this.y(a + turn)) + 0.5;
+      context.moveTo(x - 14, y);
+      context.lineTo(x + 14, y);
+    }
+    context.stroke();
+  }
+
+  private paintShape(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
+    const { drawn: points, tool } = this.session;
+    if (!points.length) return;
+    this.trace(context, points, !["distance", "point", "diameter"].includes(tool));
+    context.lineWidth = 2;
+    context.strokeStyle = style.getPropertyValue("--chosen");
+    context.stroke();
+    context.fillStyle = style.getPropertyValue("--chosen");
+    for (const [s, a] of points) context.fillRect(this.x(s) - 3, this.y(a) - 3, 6, 6);
+  }
+
+  private trace(context: CanvasRenderingContext2D, points: Point[], closed: boolean): void {
+    context.beginPath();
+    points.forEach(([s, a], k) => (k ? context.lineTo(this.x(s), this.y(a)) : context.moveTo(this.x(s), this.y(a))));
+    if (closed) context.closePath();
+  }
+
+  private press(event: PointerEvent): void {
+    this.canvas.setPointerCapture(event.pointerId);
+    this.drag = { x: event.offsetX, y: event.offsetY, view: { ...this.view }, moved: false };
+  }
+
+  private move(event: PointerEvent): void {
+    if (!this.drag) return;
+    const [dx, dy] = [event.offsetX - this.drag.x, event.offsetY - this.drag.y];
+    this.drag.moved ||= Math.hypot(dx, dy) > 4;
+    if (!this.drag.moved) return;
+    this.view.distance = this.drag.view.distance - dx * this.view.mmPerPx;
+    this.view.azimuth = this.drag.view.azimuth - dy / this.perRad;
+    this.keepInside();
+    this.paint();
+  }
+
+  private release(event: PointerEvent): void {
+    const clicked = this.drag && !this.drag.moved;
+    this.drag = null;
+    if (clicked) this.pick(this.point(event.offsetX, event.offsetY));
+  }
+
+  private pick(at: Point): void {
+    const { session } = this;
+    if (session.tool !== "none") {
+      session.drawn = [...session.drawn, at];
+      session.tell("shape");
+      return;
+    }
+    const found = session.standing.find((f) => [-TURN, 0, TURN].some((t) => inside([at[0], at[1] + t], f.outline)));
+    if (found) session.selected = found.id;
+    session.moveTo(at);
+    if (found) session.tell("selection");
+  }
+
+  private wheel(event: WheelEvent): void {
+    event.preventDefault();
+    this.zoom(Math.exp(event.deltaY * 0.0015), event.offsetX, event.offsetY);
+  }
+
+  private zoom(factor: number, x = this.size[0] / 2, y = this.size[1] / 2): void {
+    const before = this.point(x, y);
+    const whole = (TURN * this.session.run.radius_mm) / Math.max(this.size[1], 1);
+    this.view.mmPerPx = Math.min(Math.max(this.view.mmPerPx * factor, 0.01), whole);
+    const after = this.point(x, y);
+    this.view.distance += before[0] - after[0];
+    this.view.azimuth += before[1] - after[1];
+    this.keepInside();
+    this.paint();
+  }
+
+  private key(event: KeyboardEvent): void {
+    const [s, a] = this.session.cursor;
+    const step = (event.shiftKey ? 40 : 4) * this.view.mmPerPx;
+    const turn = step / this.session.run.radius_mm;
+    const moves: Record<string, Point> = {
+      ArrowLeft: [s - step, a], ArrowRight: [s + step, a], ArrowUp: [s, a - turn], ArrowDown: [s, a + turn],
+    };
+    const to = moves[event.key];
+    if (to) {
+      this.session.moveTo(to);
+      this.view.distance = this.session.cursor[0];
+      this.paint();
+    } else if (event.key === "+" || event.key === "=") this.zoom(0.7);
+    else if (event.key === "-") this.zoom(1.4);
+    else if (event.key === "Enter" && this.session.tool !== "none") {
+      this.session.drawn = [...this.session.drawn, [s, wrapped(a)]];
+      this.session.tell("shape");
+    } else return;
+    event.preventDefault();
+  }
+}
+
+function inside([s, a]: Point, outline: Point[]): boolean {
+  let hit = false;
+  for (let k = 0, j = outline.length - 1; k < outline.length; j = k++) {
+    const [s0, a0] = outline[k]!, [s1, a1] = outline[j]!;
+    if (a0 > a !== a1 > a && s < ((s1 - s0) * (a - a0)) / (a1 - a0) + s0) hit = !hit;
+  }
+  return hit;
+}

@@ -1,0 +1,260 @@
+/** The 3D model: every material variant, depth exaggerated, cut open, seen from outside or flown through. */
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
+import { Pipe, type Vector } from "./pipe";
+import type { Session } from "./session";
+import { element } from "./words";
+
+const MM = 1e-3;
+const VARIANTS: Record<string, string> = { deviation_nominal: "deviation" };
+const FLIGHT_MM = 6;
+const MOST_PIXELS = 1280 * 720;
+
+interface Part { mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material> }
+
+export class ModelView {
+  readonly root = element("div", { class: "model" });
+  readonly frameTimes: number[] = [];
+  private readonly canvas = element("canvas", {
+    tabindex: "0", role: "img", "aria-label": "Model of the pipe. Inside: W and S fly along it, A and D turn the view.",
+  });
+  private readonly told = element("p", { class: "veil" }, "Loading the model…");
+  private readonly gain = element("input", { type: "range", min: "1", max: "20", value: "1", "aria-label": "exaggeration of depth" });
+  private readonly cut = element("input", { type: "checkbox", id: "cut" });
+  private readonly inside = element("input", { type: "checkbox", id: "inside", checked: true });
+  private readonly pipe: Pipe;
+  private readonly scene = new THREE.Scene();
+  private readonly camera = new THREE.PerspectiveCamera(80, 1, 1e-3, 1000);
+  private readonly lamp = new THREE.PointLight(0xffffff, 0.012, 0, 2);
+  private readonly marker = new THREE.Mesh(
+    new THREE.TorusGeometry(1, 0.14, 8, 32), new THREE.MeshBasicMaterial({ color: 0xffb000, depthTest: false }));
+  private readonly plane = new THREE.Plane(new THREE.Vector3(1, 0, 0), 0);
+  private renderer: THREE.WebGLRenderer | null = null;
+  private controls: OrbitControls | null = null;
+  private parts: Part[] = [];
+  private flown: number;
+  private look = { yaw: 0, pitch: 0 };
+  private asked = false;
+  private pressed: { x: number; y: number } | null = null;
+
+  constructor(private readonly session: Session) {
+    this.pipe = new Pipe(session.run.axis);
+    this.flown = session.run.distance_mm[0];
+    this.root.append(this.bar(), element("div", { class: "stage" }, this.canvas, this.told));
+    session.on(["layer"], () => this.dress());
+    session.on(["cursor"], () => this.follow());
+    void this.start();
+  }
+
+  private bar(): HTMLElement {
+    const whole = element("button", { click: () => { this.inside.checked = false; this.stand(); } }, "Whole pipe");
+    this.gain.addEventListener("input", () => this.exaggerate());
+    this.cut.addEventListener("change", () => this.draw());
+    this.inside.addEventListener("change", () => this.stand());
+    return element("div", { class: "bar" },
+      element("label", { for: "inside" }, this.inside, " inside"), whole,
+      element("label", { for: "cut" }, this.cut, " cut open"),
+      element("label", {}, "depth × ", this.gain));
+  }
+
+  private async start(): Promise<void> {
+    try {
+      this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true });
+    } catch {
+      this.told.textContent = "This browser shows no 3D (WebGL is off). Everything else works.";
+      return;
+    }
+    this.renderer.localClippingEnabled = true;
+    this.scene.background = new THREE.Color(getComputedStyle(this.root).getPropertyValue("--ground").trim() || "#222");
+    this.scene.add(new THREE.AmbientLight(0xffffff, 1.1), this.lamp, this.marker);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.addEventListener("change", () => this.draw());
+    this.canvas.addEventListener("pointerdown", (e) => { this.pressed = { x: e.clientX, y: e.clientY }; });
+    this.canvas.addEventListener("pointermove", (e) => this.turn(e));
+    this.canvas.addEventListener("pointerup", (e) => this.pick(e));
+    this.canvas.addEventListener("wheel", (e) => { if (this.inside.checked) { e.preventDefault(); this.fly(-e.deltaY / 20); } }, { passive: false });
+    this.canvas.addEventListener("keydown", (e) => this.key(e));
+    new ResizeObserver(() => this.resize()).observe(this.root);
+    try {
+      const loaded = await new GLTFLoader().parseAsync(await this.session.source.model(), "");
+      await this.take(loaded);
+      this.told.remove();
+    } catch (error) {
+      this.told.textContent = error instanceof Error ? error.message : String(error);
+    }
+  }
+
+  private async take(gltf: GLTF): Promise<void> {
+    const names: string[] = ((gltf.userData["gltfExtensions"] as Record<string, { variants?: { name: string }[] }> | undefined)
+      ?.["KHR_materials_variants"]?.variants ?? []).map((v) => v.name);
+    const meshes: THREE.Mesh[] = [];
+    gltf.scene.traverse((node) => { if (node instanceof THREE.Mesh) meshes.push(node as THREE.Mesh); });
+    for (const mesh of meshes) this.parts.push(await this.part(mesh, gltf, names));
+    this.scene.add(gltf.scene);
+    this.scene.updateMatrixWorld(true);
+    this.dress();
+    this.stand();
+  }
+
+  private async part(mesh: THREE.Mesh, gltf: GLTF, names: string[]): Promise<Part> {
+    const variants = new Map<string, THREE.Material>([["photo", mesh.material as THREE.Material]]);
+    const extension = mesh.userData["gltfExtensions"]?.["KHR_materials_variants"] as
+      { mappings: { material: number; variants: number[] }[] } | undefined;
+    for (const mapping of extension?.mappings ?? []) {
+      const material = (await gltf.parser.getDependency("material", mapping.material)) as THREE.Material;
+      gltf.parser.assignFinalMaterial(mesh);
+      for (const k of mapping.variants) variants.set(names[k] ?? "", material);
+    }
+    for (const material of variants.values()) {
+      material.side = THREE.DoubleSide;
+      material.clippingPlanes = [];
+    }
+    const position = mesh.geometry.getAttribute("position") as THREE.BufferAttribute;
+    const base = Float32Array.from(position.array);
+    const away = new Float32Array(base.length);
+    for (let k = 0; k < base.length; k += 3) {
+      // vertices are stored in the pipe's own frame; only the node above turns them for glTF
+      const at = this.pipe.coordinates([base[k]! / MM, base[k + 1]! / MM, base[k + 2]! / MM]);
+      const off = (at.radius - this.session.run.radius_mm) * MM;
+      away.set(at.outward.map((n) => n * off), k);
+    }
+    return { mesh, base, away, variants };
+  }
+
+  private dress(): void {
+    const wanted = VARIANTS[this.session.layer] ?? this.session.layer;
+    for (const part of this.parts) {
+      const material = part.variants.get(wanted) ?? part.variants.get("photo");
+      if (material) part.mesh.material = material;
+    }
+    this.draw();
+  }
+
+  private exaggerate(): void {
+    const more = Number(this.gain.value) - 1;
+    for (const { mesh, base, away } of this.parts) {
+      const position = mesh.geometry.getAttribute("position") as THREE.BufferAttribute;
+      const array = position.array as Float32Array;
+      for (let k = 0; k < array.length; k++) array[k] = base[k]! + more * away[k]!;
+      position.needsUpdate = true;
+    }
+    this.draw();
+  }
+
+  private stand(): void {
+    if (!this.controls) return;
+    this.controls.enabled = !this.inside.checked;
+    const [from, to] = this.session.run.distance_mm;
+    if (this.inside.checked) {
+      this.fly(0);
+      return;
+    }
+    const centre = toModel(this.pipe.at((from + to) / 2).origin);
+    const far = ((to - from) * 0.75 + this.session.run.radius_mm * 3) * MM;
+    this.camera.position.copy(centre).add(new THREE.Vector3(0.75, 0.5, 0.55).normalize().multiplyScalar(far));
+    this.controls.target.copy(centre);
+    this.controls.update();
+    this.draw();
+  }
+
+  private fly(mm: number): void {
+    const [from, to] = this.session.run.distance_mm;
+    this.flown = Math.min(Math.max(this.flown + mm, from - this.session.run.radius_mm * 0.3), to);
+    const { origin, x, y, tangent } = this.pipe.at(this.flown);
+    const up = toModel(y).negate();
+    const forward = toModel(tangent).applyAxisAngle(up, this.look.yaw).applyAxisAngle(toModel(x), this.look.pitch);
+    this.camera.up.copy(up);
+    this.camera.position.copy(toModel(origin).multiplyScalar(MM));
+    this.camera.lookAt(this.camera.position.clone().add(forward));
+    this.draw();
+  }
+
+  private follow(): void {
+    const [distance, azimuth] = this.session.cursor;
+    if (this.inside.checked && this.controls) {
+      this.flown = distance - this.session.run.radius_mm * 1.1;
+      this.look = { yaw: 0, pitch: 0 };
+      this.fly(0);
+    }
+    const at = this.pipe.point(distance, azimuth, this.session.run.radius_mm * 0.995);
+    this.marker.position.copy(toModel(at).multiplyScalar(MM));
+    this.marker.lookAt(toModel(this.pipe.at(distance).origin).multiplyScalar(MM));
+    this.marker.scale.setScalar(this.session.run.radius_mm * 0.06 * MM);
+    this.draw();
+  }
+
+  private key(event: KeyboardEvent): void {
+    const step = event.shiftKey ? 5 * FLIGHT_MM : FLIGHT_MM;
+    const keys: Record<string, () => void> = {
+      w: () => this.fly(step), s: () => this.fly(-step), ArrowUp: () => this.fly(step), ArrowDown: () => this.fly(-step),
+      a: () => this.glance(0.08, 0), d: () => this.glance(-0.08, 0), ArrowLeft: () => this.glance(0.08, 0), ArrowRight: () => this.glance(-0.08, 0),
+    };
+    const act = keys[event.key];
+    if (!act) return;
+    if (!this.inside.checked) { this.inside.checked = true; this.stand(); }
+    act();
+    event.preventDefault();
+  }
+
+  private glance(yaw: number, pitch: number): void {
+    this.look = { yaw: this.look.yaw + yaw, pitch: Math.max(-1.3, Math.min(1.3, this.look.pitch + pitch)) };
+    this.fly(0);
+  }
+
+  private turn(event: PointerEvent): void {
+    if (!this.inside.checked || event.buttons !== 1) return;
+    this.glance(event.movementX * 0.004, -event.movementY * 0.004);
+  }
+
+  private pick(event: PointerEvent): void {
+    const from = this.pressed;
+    this.pressed = null;
+    if (!from || Math.hypot(event.clientX - from.x, event.clientY - from.y) > 4) return;
+    const box = this.canvas.getBoundingClientRect();
+    const at = new THREE.Vector2(
+      ((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(at, this.camera);
+    const hit = caster.intersectObjects(this.parts.map((p) => p.mesh), false)
+      .find((h) => !this.cut.checked || this.plane.distanceToPoint(h.point) >= 0);
+    if (!hit) return;
+    const { distance, azimuth } = this.pipe.coordinates(fromModel(hit.point));
+    const stay = this.flown;
+    this.session.moveTo([distance, azimuth]);
+    this.flown = stay; // a click looks, it does not travel
+    if (this.inside.checked) this.fly(0);
+  }
+
+  private resize(): void {
+    const stage = this.canvas.parentElement!;
+    const [width, height] = [stage.clientWidth, stage.clientHeight];
+    if (!this.renderer || !width || !height) return;
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, Math.sqrt(MOST_PIXELS / (width * height))));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  private draw(): void {
+    if (this.asked || !this.renderer) return;
+    this.asked = true;
+    requestAnimationFrame((now) => {
+      this.asked = false;
+      this.frameTimes.push(now);
+      if (this.frameTimes.length > 120) this.frameTimes.shift();
+      this.lamp.position.copy(this.camera.position);
+      const across = new THREE.Vector3(this.camera.position.x, this.camera.position.y, 0);
+      if (across.lengthSq() < 1e-12) across.set(1, 0, 0);
+      this.plane.normal.copy(across.normalize().negate());
+      const planes = this.cut.checked ? [this.plane] : [];
+      for (const part of this.parts) (part.mesh.material as THREE.Material).clippingPlanes = planes;
+      this.renderer!.render(this.scene, this.camera);
+    });
+  }
+}
+
+/** The model's axes are glTF's: x right, y up, z toward the viewer; the pipe's are x right, y down, z forward. */
+function toModel([x, y, z]: Vector): THREE.Vector3 { return new THREE.Vector3(x, -y, -z); }
+function fromModel(v: THREE.Vector3): Vector { return [v.x / MM, -v.y / MM, -v.z / MM]; }

@@ -1,0 +1,100 @@
+/** What the page shows now, and who wants to know when it changes. */
+import { RefusedError, type Source } from "./source";
+import type { Finding, Point, ReviewState, Run, Tool } from "./types";
+import { wrapped } from "./words";
+
+export type Topic = "state" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape";
+
+export class Session {
+  selected: string | null = null;
+  marked = new Set<string>();
+  cursor: Point;
+  layer = "photo";
+  tool: Tool = "none";
+  drawn: Point[] = [];
+  message = "";
+  private readonly listeners = new Map<Topic, (() => void)[]>();
+
+  constructor(readonly source: Source, readonly run: Run, public state: ReviewState) {
+    this.cursor = [(run.distance_mm[0] + run.distance_mm[1]) / 2, -Math.PI / 2];
+  }
+
+  on(topics: Topic[], listener: () => void): void {
+    for (const topic of topics) this.listeners.set(topic, [...(this.listeners.get(topic) ?? []), listener]);
+  }
+
+  tell(topic: Topic): void {
+    for (const listener of this.listeners.get(topic) ?? []) listener();
+  }
+
+  get who(): string { return localStorage.getItem("boresight-who") ?? ""; }
+  set who(name: string) { localStorage.setItem("boresight-who", name); }
+
+  get standing(): Finding[] { return this.state.findings.filter((f) => f.status !== "gone"); }
+  get finding(): Finding | null { return this.standing.find((f) => f.id === this.selected) ?? null; }
+
+  select(id: string | null): void {
+    this.selected = id;
+    const found = this.finding;
+    if (found) this.moveTo(middle(found.outline));
+    this.tell("selection");
+  }
+
+  moveTo([distance, azimuth]: Point): void {
+    const [from, to] = this.run.distance_mm;
+    this.cursor = [Math.min(Math.max(distance, from), to), wrapped(azimuth)];
+    this.tell("cursor");
+  }
+
+  show(layer: string): void { this.layer = layer; this.tell("layer"); }
+
+  take(tool: Tool): void { this.tool = tool; this.drawn = []; this.tell("tool"); this.tell("shape"); }
+
+  say(message: string): void { this.message = message; this.tell("message"); }
+
+  async act(action: object): Promise<boolean> {
+    if (!this.who) { this.say("Give your name first, at the top right."); return false; }
+    return this.change(() => this.source.act(action, this.who, this.state.revision));
+  }
+
+  async sign(name: string, standard: string, remarks: string): Promise<boolean> {
+    return this.change(() => this.source.sign(name, standard, remarks, this.state.revision));
+  }
+
+  async refresh(): Promise<void> {
+    const state = await this.source.state();
+    if (state.revision !== this.state.revision || state.sha256 !== this.state.sha256) this.put(state);
+  }
+
+  private async change(work: () => Promise<ReviewState>): Promise<boolean> {
+    try {
+      this.put(await work());
+      this.say("");
+      return true;
+    } catch (error) {
+      if (error instanceof RefusedError && error.stale) this.put(await this.source.state());
+      this.say(error instanceof Error ? error.message : String(error));
+      return false;
+    }
+  }
+
+  private put(state: ReviewState): void {
+    this.state = state;
+    if (this.selected && !this.finding) this.selected = null;
+    this.marked = new Set([...this.marked].filter((id) => this.standing.some((f) => f.id === id)));
+    this.tell("state");
+    this.tell("selection");
+  }
+}
+
+export function middle(outline: Point[]): Point {
+  const sum = outline.reduce((a, p) => [a[0] + p[0], a[1] + p[1]] as Point, [0, 0] as Point);
+  return [sum[0] / outline.length, sum[1] / outline.length];
+}
+
+/** Worst first: metal loss and cracks before the rest, then by depth in σ-free size. */
+export function bySeverity(findings: Finding[]): Finding[] {
+  const rank: Record<string, number> = { crack: 0, pit: 1, corrosion: 1, gouge: 1, dent: 2, deposit: 3, weld: 4 };
+  return [...findings].sort((a, b) =>
+    (rank[a.kind] ?? 9) - (rank[b.kind] ?? 9) || Math.abs(b.size.depth_mm ?? 0) - Math.abs(a.size.depth_mm ?? 0));
+}

@@ -1,0 +1,72 @@
+/** Sign-off: what is assumed, who signs by which standard, history, and the papers. */
+import type { Session } from "./session";
+import { element } from "./words";
+
+const PAPERS: [string, string][] = [
+  ["report.pdf", "Report, PDF"], ["report.html", "Report, HTML"], ["findings.csv", "Findings, CSV"],
+  ["findings.json", "Findings, JSON"], ["pof.csv", "POF table, CSV"], ["pictures.zip", "Pictures of findings, JPEG"],
+];
+
+export function signPage(session: Session): HTMLElement {
+  const root = element("div", { class: "page" });
+  const paint = () => root.replaceChildren(...parts(session));
+  session.on(["state"], paint);
+  paint();
+  return root;
+}
+
+function parts(session: Session): HTMLElement[] {
+  const { state } = session;
+  const open = session.standing.filter((f) => f.status === "open").length;
+  const last = state.signature;
+  const standing = !last ? "Not signed." : state.signed
+    ? `Signed by ${last.name} on ${last.at.slice(0, 16).replace("T", " ")} UTC${last.standard ? `, ${last.standard}` : ""}.`
+    : `Changed since ${last.name} signed on ${last.at.slice(0, 16).replace("T", " ")} UTC: unsigned.`;
+  const made = [
+    element("section", {}, element("h2", {}, "Signature"),
+      element("p", { class: state.signed ? "signed" : "unsigned" }, standing),
+      last?.remarks ? element("p", {}, `Remarks: ${last.remarks}`) : null,
+      element("p", { class: "quiet" }, `Inputs and decisions: SHA-256 ${state.sha256}`),
+      open ? element("p", {}, `${open} findings are not decided yet; a signature covers them as undecided.`) : null,
+      session.source.readOnly ? null : form(session)),
+  ];
+  if (!session.source.readOnly) {
+    made.push(assumptions(session), element("section", {}, element("h2", {}, "Papers"), element("ul", { class: "papers" },
+      ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: `/api/papers/${file}`, target: "_blank", rel: "noopener" }, name))))));
+  }
+  const lost = state.lost.map((e) => element("li", {}, `${e.who}: ${e.action.do} ${String(e.action["finding"] ?? "")}`));
+  if (lost.length) made.push(element("section", {}, element("h2", {}, "Decisions without their finding"),
+    element("p", {}, "The run was computed again and no longer shows what these were taken on."), element("ul", {}, ...lost)));
+  made.push(element("section", {}, element("h2", {}, "History"), element("ol", { class: "history" },
+    ...state.history.map((e) => element("li", {}, `${e.at.slice(0, 16).replace("T", " ")} ${e.who}: ${told(e.action)}`)))));
+  return made;
+}
+
+function told(action: Record<string, unknown> & { do: string }): string {
+  const about = action["finding"] ?? (Array.isArray(action["findings"]) ? (action["findings"] as string[]).join(" + ") : "");
+  const more = action["text"] ?? action["kind"] ?? action["reason"] ?? "";
+  return [action.do, about, more].filter((t) => t !== "").map(String).join(" ");
+}
+
+function form(session: Session): HTMLElement {
+  const name = element("input", { type: "text", required: true, maxlength: "200", value: session.who, id: "sign-name" });
+  const standard = element("input", { type: "text", maxlength: "200", id: "sign-standard", placeholder: "such as POF 100, EN 13508-2" });
+  const remarks = element("textarea", { maxlength: "4000", rows: "3", id: "sign-remarks" });
+  return element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.sign(name.value.trim(), standard.value.trim(), remarks.value.trim()); } },
+    element("label", { for: "sign-name" }, "Name"), name,
+    element("label", { for: "sign-standard" }, "Standard applied"), standard,
+    element("label", { for: "sign-remarks" }, "Remarks"), remarks,
+    element("button", { class: "accept" }, "Sign"));
+}
+
+function assumptions(session: Session): HTMLElement {
+  const { assumed } = session.state;
+  const wall = element("input", { type: "number", min: "0.1", max: "1000", step: "any", id: "wall", value: String(assumed.wall_thickness_mm ?? session.run.wall_thickness_mm ?? "") });
+  const strength = element("input", { type: "number", min: "1", max: "5000", step: "any", id: "yield", value: String(assumed.yield_mpa ?? "") });
+  const value = (input: HTMLInputElement) => (input.value ? Number(input.value) : null);
+  return element("section", {}, element("h2", {}, "Taken for known"),
+    element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "assume", wall_thickness_mm: value(wall), yield_mpa: value(strength) }); } },
+      element("label", { for: "wall" }, "Wall thickness, mm"), wall,
+      element("label", { for: "yield" }, "Yield strength, MPa"), strength,
+      element("button", {}, "Use for wall loss and B31G")));
+}

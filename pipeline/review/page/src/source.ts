@@ -1,0 +1,99 @@
+/** Where the page gets its data: the local server, or the files of a read-only export. */
+import type { Layer, Point, Profile, Reading, ReviewState, Run, Section, Sight, Tool } from "./types";
+
+export class RefusedError extends Error {
+  constructor(message: string, readonly stale: boolean) { super(message); }
+}
+
+export interface Source {
+  readonly readOnly: boolean;
+  run(): Promise<Run>;
+  state(): Promise<ReviewState>;
+  act(action: object, who: string, revision: number): Promise<ReviewState>;
+  sign(name: string, standard: string, remarks: string, revision: number): Promise<ReviewState>;
+  measure(tool: Tool, points: Point[]): Promise<Reading[]>;
+  section(distance: number): Promise<Section>;
+  profile(distance: number, azimuth: number, half: number): Promise<Profile>;
+  sights(distance: number, azimuth: number): Promise<Sight[]>;
+  layer(name: string): Promise<Layer>;
+  tile(layer: string, level: number, column: number, row: number): string;
+  frame(frame: number): string;
+  model(): Promise<ArrayBuffer>;
+}
+
+async function answer<T>(response: Response): Promise<T> {
+  if (response.ok) return (await response.json()) as T;
+  const told = response.headers.get("content-type")?.includes("json")
+    ? ((await response.json()) as { error: string }).error : await response.text();
+  throw new RefusedError(told || response.statusText, response.status === 409);
+}
+
+async function reached(address: string, init?: RequestInit): Promise<Response> {
+  try {
+    return await fetch(address, init);
+  } catch {
+    throw new RefusedError("The server does not answer. Start it again: boresight review", false);
+  }
+}
+
+const get = async <T>(address: string): Promise<T> => answer<T>(await reached(address));
+const post = async <T>(address: string, body: object): Promise<T> =>
+  answer<T>(await reached(address, {
+    method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body),
+  }));
+
+export class Server implements Source {
+  readonly readOnly = false;
+  run = () => get<Run>("/api/run");
+  state = () => get<ReviewState>("/api/state");
+  act = (action: object, who: string, revision: number) => post<ReviewState>("/api/actions", { action, who, revision });
+  sign = (name: string, standard: string, remarks: string, revision: number) =>
+    post<ReviewState>("/api/sign", { name, standard, remarks, revision });
+  measure = async (tool: Tool, points: Point[]) =>
+    (await post<{ readings: Reading[] }>("/api/measure", { tool, points })).readings;
+  section = (distance: number) => get<Section>(`/api/section?distance=${distance}`);
+  profile = (distance: number, azimuth: number, half: number) =>
+    get<Profile>(`/api/profile?distance=${distance}&azimuth=${azimuth}&half=${half}`);
+  sights = async (distance: number, azimuth: number) =>
+    (await get<{ sights: Sight[] }>(`/api/sights?distance=${distance}&azimuth=${azimuth}`)).sights;
+  layer = (name: string) => get<Layer>(`/api/tiles/${name}`);
+  tile = (layer: string, level: number, column: number, row: number) => `/api/tiles/${layer}/${level}/${column}/${row}.png`;
+  frame = (frame: number) => `/api/frames/${frame}.jpg`;
+  model = async () => {
+    const response = await reached("/api/model.glb");
+    if (!response.ok) throw new RefusedError("The run has no model.", false);
+    return response.arrayBuffer();
+  };
+}
+
+/** Data that an export puts beside the page, as a script, because a page from a file may not fetch. */
+export interface Exported {
+  run: Run; state: ReviewState; sections: Section[]; layers: Record<string, Layer>; model: string;
+  spots: { distance_mm: number; azimuth_rad: number; sights: Sight[]; profile: Profile }[];
+}
+
+export class Export implements Source {
+  readonly readOnly = true;
+  constructor(private readonly data: Exported) {}
+  run = async () => this.data.run;
+  state = async () => this.data.state;
+  act = async (): Promise<ReviewState> => { throw new RefusedError("This copy is read-only.", false); };
+  sign = this.act;
+  measure = async (): Promise<Reading[]> => { throw new RefusedError("Measuring needs boresight review.", false); };
+  section = async (distance: number) =>
+    this.data.sections.reduce((a, b) =>
+      Math.abs(b.distance_mm - distance) < Math.abs(a.distance_mm - distance) ? b : a);
+  private near(distance: number, azimuth: number) {
+    const away = (s: { distance_mm: number; azimuth_rad: number }) =>
+      Math.hypot(s.distance_mm - distance, 50 * Math.sin((s.azimuth_rad - azimuth) / 2));
+    const found = [...this.data.spots].sort((a, b) => away(a) - away(b))[0];
+    if (!found || away(found) > 8) throw new RefusedError("This copy shows frames of findings only.", false);
+    return found;
+  }
+  profile = async (distance: number, azimuth: number) => this.near(distance, azimuth).profile;
+  sights = async (distance: number, azimuth: number) => this.near(distance, azimuth).sights;
+  layer = async (name: string) => this.data.layers[name]!;
+  tile = (layer: string, level: number, column: number, row: number) => `tiles/${layer}/${level}/${column}/${row}.png`;
+  frame = (frame: number) => `frames/${frame}.jpg`;
+  model = async () => Uint8Array.from(atob(this.data.model), (c) => c.charCodeAt(0)).buffer;
+}

@@ -1,0 +1,101 @@
+/** The bar above the flat view: layers with their legend, measuring tools, drawing. */
+import type { Session } from "./session";
+import type { Tool } from "./types";
+import { clock, element, measured, number } from "./words";
+
+const TOOLS: [Tool, string, number][] = [
+  ["point", "Point", 1], ["distance", "Distance", 2], ["area", "Area", 3], ["depth", "Depth", 3], ["diameter", "Diameter", 1],
+];
+const HELP: Partial<Record<Tool, string>> = {
+  redraw: "Click around the defect, then Done (Enter adds the spot, Esc leaves).",
+  add: "Click around the defect that was missed, then Done.",
+  split: "Click around the first part, Next part, then around the second, then Done.",
+};
+
+export class ToolBar {
+  readonly root = element("div", { class: "tools" });
+  readonly status = element("p", { class: "status", role: "status" });
+  private readonly layers = element("select", { "aria-label": "what the wall shows" });
+  private readonly legend = element("div", { class: "legend" });
+  private readonly buttons = element("div", { class: "bar" });
+  private parts: [number, number][][] = [];
+
+  constructor(private readonly session: Session) {
+    const titles: [string, string][] = [["photo", "Photo"], ...session.run.overlays.map((o) => [o.name, o.title] as [string, string])];
+    this.layers.append(...titles.map(([name, title]) => element("option", { value: name }, title)));
+    this.layers.addEventListener("change", () => session.show(this.layers.value));
+    this.root.append(this.layers, this.legend, this.buttons);
+    session.on(["layer"], () => this.explain());
+    session.on(["tool", "selection"], () => this.offer());
+    session.on(["shape"], () => void this.drawn());
+    session.on(["cursor"], () => this.place());
+    session.on(["message"], () => { if (session.message) this.status.textContent = session.message; else this.place(); });
+    this.explain();
+    this.offer();
+    this.place();
+  }
+
+  private explain(): void {
+    this.layers.value = this.session.layer;
+    const overlay = this.session.run.overlays.find((o) => o.name === this.session.layer);
+    if (!overlay) { this.legend.replaceChildren(); return; }
+    const bar = element("span", { class: "colours" }, ...overlay.colours.map((colour) => {
+      const step = element("i");
+      step.style.background = colour;
+      return step;
+    }));
+    this.legend.replaceChildren(`${number(overlay.low_mm, 3)} `, bar, ` ${number(overlay.high_mm, 3)} mm`);
+  }
+
+  private offer(): void {
+    const { session } = this;
+    const drawing = ["redraw", "add", "split"].includes(session.tool);
+    const toggles = session.source.readOnly ? [] : TOOLS.map(([tool, name]) => element("button", {
+      "aria-pressed": String(session.tool === tool), click: () => session.take(session.tool === tool ? "none" : tool),
+    }, name));
+    const add = session.source.readOnly ? null : element("button", { "aria-pressed": String(session.tool === "add"), click: () => session.take("add") }, "Add defect");
+    this.buttons.replaceChildren(...toggles, add ?? "",
+      drawing ? element("button", { class: "accept", click: () => void this.finish() }, "Done") : "",
+      session.tool === "split" ? element("button", { click: () => this.nextPart() }, "Next part") : "",
+      session.tool !== "none" ? element("button", { click: () => this.leave() }, "Leave") : "");
+    if (drawing) this.status.textContent = HELP[session.tool] ?? "";
+  }
+
+  leave(): void { this.parts = []; this.session.take("none"); this.place(); }
+
+  private nextPart(): void {
+    if (this.session.drawn.length < 3) { this.session.say("A part needs three points."); return; }
+    this.parts.push(this.session.drawn);
+    this.session.drawn = [];
+    this.session.tell("shape");
+  }
+
+  async finish(): Promise<void> {
+    const { session } = this;
+    const outline = session.drawn;
+    if (outline.length < 3) { session.say("An outline needs three points."); return; }
+    const done = session.tool === "redraw" ? await session.act({ do: "redraw", finding: session.selected, outline })
+      : session.tool === "add" ? await session.act({ do: "add", kind: "pit", outline })
+        : await session.act({ do: "split", finding: session.selected, outlines: [...this.parts, outline] });
+    if (done) this.leave();
+  }
+
+  private async drawn(): Promise<void> {
+    const { session } = this;
+    const wanted = TOOLS.find(([tool]) => tool === session.tool);
+    if (!wanted || session.drawn.length < wanted[2]) return;
+    const points = ["area", "depth"].includes(session.tool) ? session.drawn : session.drawn.slice(-wanted[2]);
+    if (points.length !== session.drawn.length) { session.drawn = points; session.tell("shape"); return; }
+    try {
+      const readings = await session.source.measure(session.tool, points);
+      this.status.textContent = readings.map((r) => `${r.name} ${measured(r.value, r.sigma, r.unit)}`).join("; ");
+    } catch (error) {
+      this.status.textContent = error instanceof Error ? error.message : String(error);
+    }
+  }
+
+  private place(): void {
+    const [distance, azimuth] = this.session.cursor;
+    if (!this.session.message && this.session.tool === "none") this.status.textContent = `Spot at ${distance.toFixed(1)} mm, ${clock(azimuth)} o'clock.`;
+  }
+}

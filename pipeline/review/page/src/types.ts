@@ -1,0 +1,59 @@
+/** What the server tells, in its own words; lengths mm, angles rad, clock positions hours. */
+export type Point = [number, number]; // distance, azimuth
+
+export interface Overlay { name: string; title: string; low_mm: number; high_mm: number; colours: string[] }
+export interface Quantity { name: string; value: number | string | null; unit: string }
+
+export interface Axis { distance_mm: number[]; origin_p: number[][]; x_p: number[][]; y_p: number[][] }
+
+export interface MeasuredDefect {
+  id: number; kind: string; depth_mm: number | null; depth_sigma_mm: number | null; length_mm: number; width_mm: number;
+  confidence: number; frames: number[]; pof_class: string; pacp_suggestion: string; en13508_suggestion: string;
+  statement: string; clock_from: number; clock_to: number; distance_from_mm: number; distance_to_mm: number;
+}
+
+export interface Run {
+  name: string; metrics: Quantity[]; numbers: { stage: string; numbers: Quantity[] }[]; warnings: string[];
+  program: { name: string; version: string }; inputs: Record<string, string>; has_recording: boolean;
+  nominal_diameter_mm: number; wall_thickness_mm: number | null; distance_mm: [number, number]; radius_mm: number;
+  overlays: Overlay[]; kinds: string[]; defects: MeasuredDefect[]; axis: Axis; diagnosis: Diagnosis | null;
+}
+
+export interface Diagnosis { verdict: string; statement: string; effects: string[] }
+
+export interface Size {
+  distance_from_mm: number; distance_to_mm: number; clock_from: number; clock_to: number; length_mm: number;
+  width_mm: number; depth_mm: number | null; depth_sigma_mm: number | null;
+}
+
+export interface Strength { b31g_mpa: number; b31g_sigma_mpa: number; modified_mpa: number; modified_sigma_mpa: number }
+
+export type Status = "open" | "accepted" | "rejected" | "gone";
+
+export interface Finding {
+  id: string; kind: string; outline: Point[]; size: Size; status: Status; original: number | null; edited: boolean;
+  decided_by: string; decided_at: string; reason: string; remarks: { who: string; at: string; text: string }[];
+  made_of: string[]; wall_loss_percent: number | null; wall_loss_sigma_percent: number | null; strength: Strength | null;
+}
+
+export interface Entry { id: number; who: string; at: string; action: Record<string, unknown> & { do: string } }
+export interface Signature { name: string; standard: string; remarks: string; at: string; revision: number; sha256: string }
+
+export interface ReviewState {
+  revision: number; findings: Finding[]; may_undo: boolean; may_redo: boolean; lost: Entry[];
+  assumed: { wall_thickness_mm: number | null; yield_mpa: number | null }; history: Entry[]; sha256: string;
+  signed: boolean; signature: Signature | null;
+}
+
+export interface Section {
+  distance_mm: number; azimuth_rad: number[]; radius_mm: (number | null)[]; sigma_mm: (number | null)[];
+  fitted_mm: number[]; nominal_mm: number;
+}
+
+export interface Curve { mm: number[]; depth_mm: (number | null)[]; sigma_mm: (number | null)[] }
+export interface Profile { along: Curve; around: Curve }
+
+export interface Sight { frame: number; time_s: number; illumination: string; spot_px: Point; ring_px: Point[] }
+export interface Layer { levels: number; width: number; height: number; distance_mm: [number, number] }
+export interface Reading { name: string; value: number; sigma: number; unit: string }
+export type Tool = "none" | "point" | "distance" | "area" | "depth" | "diameter" | "redraw" | "add" | "split";

@@ -1,0 +1,53 @@
+/** Numbers and places in words. */
+export const TURN = 2 * Math.PI;
+
+export function clock(azimuth: number): string {
+  const hours = ((((azimuth * 180) / Math.PI / 30 + 3) % 12) + 12) % 12;
+  const minutes = Math.round(hours * 60) % 720;
+  return `${Math.floor(minutes / 60) || 12}:${String(minutes % 60).padStart(2, "0")}`;
+}
+
+export function clockOfHours(hours: number): string {
+  return clock(((hours - 3) * 30 * Math.PI) / 180);
+}
+
+export function number(value: number | null | undefined, digits = 2): string {
+  return value === null || value === undefined || !Number.isFinite(value) ? "–" : value.toFixed(digits);
+}
+
+/** A value and its 1 σ, with as many digits as the σ bears. */
+export function measured(value: number | null, sigma: number | null, unit = "mm"): string {
+  if (value === null || !Number.isFinite(value)) return "not seen";
+  if (sigma === null || !(sigma > 0)) return `${value.toPrecision(4)} ${unit}`.trim();
+  const digits = Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(sigma))));
+  return `${value.toFixed(digits)} ± ${sigma.toFixed(digits)} ${unit}`.trim();
+}
+
+export function wrapped(azimuth: number): number {
+  return ((((azimuth + Math.PI) % TURN) + TURN) % TURN) - Math.PI;
+}
+
+type Child = Node | string | null | undefined | false;
+
+/** Make an element; text is always text, never markup. */
+export function element<K extends keyof HTMLElementTagNameMap>(
+  tag: K, attributes: Record<string, string | boolean | ((event: Event) => void)> = {}, ...children: Child[]
+): HTMLElementTagNameMap[K] {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (typeof value === "function") made.addEventListener(name, value);
+    else if (value === true) made.setAttribute(name, "");
+    else if (value !== false) made.setAttribute(name, value);
+  }
+  for (const child of children) if (child) made.append(child);
+  return made;
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export function drawn(tag: string, attributes: Record<string, string | number>, text = ""): SVGElement {
+  const made = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
+  if (text) made.textContent = text;
+  return made;
+}
