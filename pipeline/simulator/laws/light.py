@@ -206,8 +206,9 @@ def _speckle() -> Check:
     around = _R / (FOCAL_PX * theta_of(_R)) * math.sqrt(1 + 4 * math.pi * 0.7**2)
     wide = contrast * math.sqrt(grain * LINE_SIGMA_MM / (4 * math.sqrt(math.pi)) * min(grain / around, 1.0))
     return Check(
-        "speckle", "✓", "σ_r = (S/√(l²+r²)) C λ / (2π sin u)", "C = 0.3, grain λ/(2 sin u) = 0.05 mm, 4 inch",
-        predicted, scatter * _MM_PER_PX, "mm", 0.3 * predicted,
+        "speckle", "✓", "σ_r = (S/√(l²+r²)) C λ / (2π sin u)",
+        "cells of λ/(2 sin u) = 0.05 mm, C = 0.3, 4 inch", predicted, scatter * _MM_PER_PX, "mm",
+        0.3 * predicted,
         mended="for a line wider than the grain g, (r/l) C √(g σ / 4√π) √(g / w), w seen by a pixel around",
         mended_value=_R / BASELINE_MM * wide,
     )  # fmt: skip

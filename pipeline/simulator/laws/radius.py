@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects.parts import with_laser
 from pipeline.simulator.effects.switch import Switch, typical_switch
 from pipeline.simulator.laws.bench import RADII_MM, bench_truth
 from pipeline.simulator.laws.check import Check
@@ -30,6 +31,7 @@ def radius_checks() -> Iterator[Check]:
     """Yield a check of each law at the catalogue's typical size."""
     for name in _CHECKED:
         yield radius_check(typical_switch(name))
+    yield _tube_before_camera()
 
 
 def radius_check(switch: Switch) -> Check:
@@ -53,6 +55,22 @@ def radius_check(switch: Switch) -> Check:
         mended,
         None if mended_law is None
         else _along(harmonic(psi, mended_law(RADII_MM[-1], psi, **switch.quantities), order), crest),
+    )  # fmt: skip
+
+
+def _tube_before_camera() -> Check:
+    """Check the viewing ray's part of the tilted tube, for which the notes give size and exponent."""
+    switch = typical_switch("tube_tilt")
+    crest = np.exp(1j * np.radians(switch.quantities["direction_deg"]))
+    sizes = []
+    for radius in RADII_MM:
+        ring = trace_ring(with_laser(switch_on(bench_truth(radius), [switch]), windows=()))
+        sizes.append(_along(harmonic(ring.azimuth_rad, ring.error_mm, 1), crest))
+    stated = switch.effect.typical_mm or 0.0
+    return Check(
+        "tube_tilt", "✓", "d′(i) χ c₁ / sin i, of the viewing ray alone",
+        "δr, 1 deg, 4 inch, against the notes' figure", stated, sizes[-1], "mm", SHARE * stated, (1, 1),
+        (0.26, exponent(np.array(RADII_MM), np.array(sizes))),
     )  # fmt: skip
 
 

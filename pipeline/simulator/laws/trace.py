@@ -55,7 +55,7 @@ def trace_ring(truth: SceneTruth, time_s: float = 0.0, azimuths: int = _AZIMUTHS
         low, high = np.where(ahead, middle, low), np.where(ahead, high, middle)
     uv = truth.stated.camera.centre_px + (0.5 * (low + high))[:, None] * outward
     read = truth.stated.triangulate(uv)
-    error = np.hypot(read[:, 0], read[:, 1]) - float(truth.wall.radius_mm[0].mean())
+    error = np.hypot(read[:, 0], read[:, 1]) - float(truth.wall.radius_mm[0].astype(float).mean())
     point = _height(truth, instrument, time_s, uv)[1]
     return TracedRing(uv, point, np.arctan2(read[:, 1], read[:, 0]), error)
 
