@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,26 +38,30 @@ class Bore:
         return from_axis - (from_axis @ along)[:, None] * along
 
 
-def ring_radius_px(triangulate: Callable[[Float], Float], bore: Bore, azimuth_rad: Float) -> Float:
+def ring_radius_px(
+    triangulate: Callable[[Float], Float], bore: Bore, azimuth_rad: Float, centre: Sequence[float] = CENTRE
+) -> Float:
     """(M,) distance from the stated centre at which the line shows, for an instrument that maps pixels so."""
     low, high = np.full(len(azimuth_rad), 60.0), np.full(len(azimuth_rad), 520.0)
     for _ in range(60):
         middle = (low + high) / 2
-        xyz = triangulate(pixels(middle, azimuth_rad))
+        xyz = triangulate(pixels(middle, azimuth_rad, centre))
         inside = np.linalg.norm(bore.away(xyz), axis=1) < bore.radius_mm
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     return (low + high) / 2
 
 
-def pixels(rho_px: Float, azimuth_rad: Float) -> Float:
-    return np.array(CENTRE) + rho_px[:, None] * np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], axis=1)
+def pixels(rho_px: Float, azimuth_rad: Float, centre: Sequence[float]) -> Float:
+    return np.array(centre) + rho_px[:, None] * np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], axis=1)
 
 
 def ring_points(probe: Probe, bore: Bore, count: int = 360, time_s: float = 5.0) -> ImagePoints:
     """The line's points in a bore as ``probe`` states them."""
     azimuth = np.linspace(-np.pi, np.pi, count, endpoint=False)
-    rho = ring_radius_px(probe.triangulate, bore, azimuth)
-    return image_points(probe, bore, probe.triangulate(pixels(rho, azimuth)), on_line=True, time_s=time_s)
+    centre = probe.camera.centre_px
+    rho = ring_radius_px(probe.triangulate, bore, azimuth, centre)
+    xyz_c = probe.triangulate(pixels(rho, azimuth, centre))
+    return image_points(probe, bore, xyz_c, on_line=True, time_s=time_s)
 
 
 def texture_points(probe: Probe, bore: Bore, distance_mm: float = 40.0, count: int = 60) -> ImagePoints:

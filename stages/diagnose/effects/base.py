@@ -97,8 +97,10 @@ class ImagePoints:
 
     @cached_property
     def azimuth_p_rad(self) -> Float:
-        """(M,) azimuth in P as far as it is known."""
-        return self.azimuth_rad if self.wall_azimuth_rad is None else self.wall_azimuth_rad
+        """(M,) azimuth in P, or where the wall faces in C."""
+        if self.wall_azimuth_rad is not None:
+            return self.wall_azimuth_rad
+        return np.asarray(np.arctan2(self.normal_c[:, 1], self.normal_c[:, 0]))
 
     @cached_property
     def outward(self) -> Float:
@@ -113,7 +115,9 @@ class Travel:
 
     Attributes
     ----------
-    time_s, distance_mm, speed_mm_s, reading_mm : (N,)
+    time_s : (N,)
+        Since the first frame.
+    distance_mm, speed_mm_s, reading_mm : (N,)
     """
 
     time_s: Float

@@ -7,6 +7,7 @@ from abc import abstractmethod
 import numpy as np
 
 from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import Quantity
 from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
 
 
@@ -48,7 +49,8 @@ class Drifting(Worded):
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return time constants from a step at the start to what is a straight line in this recording."""
-        return tuple((duration_s * part,) for part in (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4))
+        parts = np.array([0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4])
+        return _within(effect(self.name).quantity("time_s"), duration_s * parts)
 
     def course(self, time_s: Float, shape: Shape) -> Float:
         """Return (M,) the part of the final size that is reached."""
@@ -89,7 +91,8 @@ class Periodic(Worded):
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return frequencies half a resolution cell apart, up to half the frame rate."""
         step = 0.5 / duration_s
-        return tuple((float(f),) for f in np.arange(2 * step, frame_rate / 2 + step / 2, step))
+        frequencies = np.arange(2 * step, frame_rate / 2 + step / 2, step)
+        return _within(effect(self.name).quantity("frequency_hz"), frequencies)
 
     def size_at(self, time_s: Float, shape: Shape, amplitude: Float) -> Float:
         """Return (M, 2) size along x and y at the times (M,)."""
@@ -112,6 +115,11 @@ class Periodic(Worded):
             "frequency_hz": shape[0],
             "direction_deg": float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))),
         }
+
+
+def _within(quantity: Quantity, grid: Float) -> tuple[Shape, ...]:
+    """Return the grid's shapes within the catalogue's range."""
+    return tuple((float(x),) for x in grid if quantity.low <= x <= quantity.high)
 
 
 def one(name: str, plausible: float) -> tuple[Amplitude]:
