@@ -16,6 +16,7 @@ from stages.diagnose.profile.brightness import clip_finding, decentre_finding, d
 from stages.diagnose.profile.cells import make_cells
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.profile.geometry import line_geometry
+from stages.diagnose.profile.lit import vignetting_finding
 from stages.diagnose.profile.measure import measure_profiles
 from stages.diagnose.profile.secondary import ghost_findings
 from stages.diagnose.profile.sensor import locking_finding, pattern_finding
@@ -94,6 +95,7 @@ def profile_evidence(
         *skew_findings(cells, geometry, probe),
         *width_findings(cells, geometry, probe),
         blur_finding(cells, geometry, probe),
+        vignetting_finding(recording, probe),
         dust_finding(rings, profiles, cells),
         stray_finding(profiles, geometry),
         decentre_finding(geometry, cells),

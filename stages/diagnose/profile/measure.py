@@ -96,9 +96,10 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
             width, rings.valid[rows[k]], dark, trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
             light[k], height[k], share[k], gain[k // _TURNS % 2],
         )  # fmt: skip
+    offset: Float = -REACH_PX + STEP_PX * (np.arange(bins, dtype=np.float64) + 0.5)
     middle: Float = -np.pi - step / 2 + 2 * np.pi / SECTORS * (np.arange(SECTORS, dtype=np.float64) + 0.5)
     return LineProfiles(
-        rings.frame[rows], rows, _times(recording, rings.frame[rows]), middle, -REACH_PX + STEP_PX * (np.arange(bins) + 0.5),
+        rings.frame[rows], rows, _times(recording, rings.frame[rows]), middle, offset,
         light, height, share[..., 0], share[..., 1] / np.maximum(share[..., 0], 1), share[..., 2],
         background, gain,
     )  # fmt: skip
