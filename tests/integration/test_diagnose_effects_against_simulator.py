@@ -28,7 +28,7 @@ ASIDE = Motion(constant(20.0), constant(5.0), constant(-4.0), constant(YAW))
 BESIDE = Bore(RADIUS_MM, (-5.0 * np.cos(YAW), 4.0, -5.0 * np.sin(YAW)), (-np.sin(YAW), 0.0, np.cos(YAW)))
 PLACES = {"on the axis": (CENTRED, Bore(RADIUS_MM)), "beside it and leaning": (ASIDE, BESIDE)}
 # Sizes of some consequence; per cent that a prediction may leave out. What a tilted tube does to camera and
-# laser nearly cancels, so that terms of second order weigh more; far ahead, undoing the straight tube adds some.
+# laser nearly cancels, so that second order weighs more; far ahead, undoing the straight tube adds to it.
 SWITCHES = {
     "laser_tilt": ((0.6, 40.0), 0.1),
     "laser_cone": ((0.3,), 0.1),
