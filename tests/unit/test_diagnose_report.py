@@ -1,0 +1,56 @@
+"""The page of a diagnosis: every verdict renders, numbers that are missing are shown as missing."""
+
+import numpy as np
+import pytest
+
+from pipeline.commands.diagnose_report import headline, write_page
+from stages.diagnose.result import (
+    Candidate,
+    Confirmation,
+    Diagnosis,
+    EffectFound,
+    Feasible,
+    FitQuality,
+    Location,
+    Picture,
+    Value,
+    Verdict,
+    WallPicture,
+)
+
+AZIMUTH = np.linspace(-np.pi, np.pi, 24, endpoint=False)
+WAVE = 0.1 * np.cos(AZIMUTH)[None] * np.ones((5, 1))
+HOLED = np.where(np.arange(24) == 3, np.nan, 0.01 * WAVE)
+TILT = EffectFound(
+    "laser_tilt", 0.99, {"tilt_deg": Value(0.6, 0.01)}, "The sheet leans by 0.600 ± 0.010°.", "δr = −r x",
+    (Confirmation("0.60°", "0.61° in another bore", True), Confirmation("<b>ghost</b>", "not seen", False)),
+)  # fmt: skip
+WHOLE = Diagnosis(
+    recording="field", gauge="gauge", verdict=Verdict.NAMED, global_p=1e-30,
+    location=Location("ring", "laser", "static", 1, (2.0, 0.1), (0, 200), (0.0, 120.0), (-180.0, 180.0)),
+    effects=(TILT,), fit=FitQuality("px", 0.4, 0.08, 0.41, 0.08, float("nan")),
+    feasibility=(Feasible("laser_tilt", "tilt_deg", "deg", 0.02, 0.05, "principal_point", 0.4),),
+    candidates=(Candidate(("laser_tilt",), 0.99, 900.0, 850.0, "x"), Candidate((), 0.0, 0.0, -3.0, "")),
+    ring_picture=Picture(np.arange(5), AZIMUTH, WAVE, HOLED),
+    wall_picture=WallPicture(np.arange(5.0), AZIMUTH, WAVE, HOLED),
+)  # fmt: skip
+
+
+def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
+    write_page(WHOLE, "Wall loss at 3 o'clock was understated by 0.21 mm.", tmp_path)
+    page = (tmp_path / "diagnosis.html").read_text()
+    assert headline(WHOLE) == "Left out: laser tilt"
+    assert page.count("data:image/png;base64,") == 4
+    assert "does not agree" in page
+    assert "<b>ghost" not in page
+    assert "understated by 0.21 mm" in page
+    assert "below 10⁻⁹" in page
+
+
+@pytest.mark.parametrize("verdict", [v for v in Verdict if v is not Verdict.NAMED])
+def test_every_other_verdict_has_its_page(tmp_path, verdict):
+    bare = Diagnosis(recording="", gauge="gauge", verdict=verdict, global_p=float("nan"), members=("a", "b"))
+    write_page(bare, "", tmp_path)
+    page = (tmp_path / "diagnosis.html").read_text()
+    assert headline(bare) in page
+    assert "nan" not in page
