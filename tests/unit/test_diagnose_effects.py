@@ -10,11 +10,12 @@ from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import CLASSES, EFFECTS
+from pipeline.physics.effect import Channel
 from stages.diagnose.classes import alike, class_of, classes_of, record_next
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.decoys import DECOYS
 from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns
-from stages.diagnose.effects.library import LIBRARY, NOT_PREDICTED, without
+from stages.diagnose.effects.library import LIBRARY, NOT_PREDICTED, shown_in, without
 from stages.diagnose.effects.predict import (
     columns,
     reading_columns,
@@ -230,6 +231,24 @@ def test_the_library_without_some_knows_the_others():
     assert set(LIBRARY) - set(fewer) == {"laser_tilt"}
     with pytest.raises(InputError):
         without(["laser_tlit"])
+
+
+def test_effects_of_the_profile_can_be_left_to_the_profile():
+    positions = shown_in((Channel.RING, Channel.TEXTURE, Channel.MOTION), LIBRARY)
+    assert {"line_skew", "subsurface", "vignetting", "motion_blur"} == set(LIBRARY) - set(positions)
+
+
+def test_a_skewed_line_moves_rings_as_a_longer_baseline_does():
+    points = line()
+    skewed, longer = (columns(LIBRARY[name], points, ())[:, 0] for name in ("line_skew", "baseline"))
+    assert skewed == pytest.approx(-points.probe.laser.line_sigma_mm * longer)
+
+
+def test_vignetting_draws_the_line_inward_by_its_variance():
+    points = ring_points(plain_probe(), Bore(50.8))
+    sigma_px = 0.15 * 50.8 / (22.0**2 + 50.8**2) * 360.0
+    shift = LIBRARY["vignetting"].line_shift_px(points, (), np.array([2.0]))
+    assert shift == pytest.approx(-2.0 * sigma_px**2 * (50.8 / 22.0) / 360.0, rel=1e-6)
 
 
 def test_the_generic_basis_mimics_a_tilted_sheet_and_decoys_are_beyond_it():

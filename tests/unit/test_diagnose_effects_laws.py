@@ -63,7 +63,7 @@ CASES = {
     "dome_lateral": ((), [1e-3], lambda r, a: s(r) * 0.5 * 2 * a * np.cos(theta(r)) / (1.5 * 14**2)),
     "outside_index": ((), [1e-5], lambda r, a: -(r - 15) * a / np.sin(theta(r)) ** 2),
     "ovality": ((), [1e-2], lambda r, a: a),
-    "subsurface": ((), [1e-2], lambda r, a: a),
+    "subsurface": ((0.0,), [1e-2], lambda r, a: a),
     "line_skew": ((), [1e-2], lambda r, a: (r / L) * 0.15 * a),
 }
 

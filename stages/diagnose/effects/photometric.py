@@ -29,15 +29,27 @@ class AlbedoBias(Worded):
 
 
 class Subsurface(Scalar):
-    """The line's light comes back from within the wall, on average the transport length deep."""
+    """The line's light comes back, on average, the transport length farther on.
+
+    The shape is 0 where that is deeper in the wall, and 1 where it is farther along it: which, depends on how
+    the light enters.
+    """
 
     name = "subsurface"
     amplitudes = one(name, 0.2)
-    words = "The line's light returns from {transport_mm:+.3f} mm within the wall."
+    words = "The line's light travels {transport_mm:+.3f} mm within the wall before it returns."
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return deeper and farther along."""
+        return ((0.0,), (1.0,))
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the transport length for the line, nothing for texture."""
-        return np.full(len(points.uv), float(amplitude[0]) if points.on_line else 0.0)
+        """Return the transport length into the wall for the line, nothing for texture."""
+        return np.full(len(points.uv), float(amplitude[0]) * (1 - shape[0]) if points.on_line else 0.0)
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the transport length along the wall."""
+        return np.full(len(points.uv), float(amplitude[0]) * shape[0])
 
 
 class LineSkew(Scalar):
@@ -60,10 +72,9 @@ class Vignetting(Scalar):
     words = "Light falls off as cos^k θ with k {falloff:+.3f} beyond the stated, and draws the line inward."
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return σ_px² ∂ ln V/∂ρ = −k σ_px² tan θ / (dρ/dθ)."""
-        return np.asarray(
-            -amplitude[0] * points.line_width_px**2 * np.tan(points.theta) / _px_per_rad(points)
-        )
+        """Return σ_px² ∂ ln V/∂ρ = −k σ_px² tan θ / (dρ/dθ), σ of the sheet: the lens blurs the line later."""
+        sigma_px = points.probe.laser.line_sigma_mm * points.ring.read_move(points.ring.per_sheet_c)
+        return np.asarray(-amplitude[0] * sigma_px**2 * np.tan(points.theta) / _px_per_rad(points))
 
 
 def _px_per_rad(points: ImagePoints) -> Float:
