@@ -73,7 +73,7 @@ def _without_distortion(camera: TrueCamera, uv: Float) -> Float:
     """Return where the model alone would put what decentring and pixel sides put at ``uv``."""
     offset = (uv - camera.model.centre_px) / np.array([1 + camera.aspect / 2, 1 - camera.aspect / 2])
     if any(camera.decentring):
-        focal = _focal_px(camera)
+        focal = focal_px(camera)
         seen, m = offset / focal, offset / focal
         p = np.array(camera.decentring)
         for _ in range(_DECENTRING_STEPS):
@@ -82,7 +82,7 @@ def _without_distortion(camera: TrueCamera, uv: Float) -> Float:
     return offset + camera.model.centre_px
 
 
-def _focal_px(camera: TrueCamera) -> float:
+def focal_px(camera: TrueCamera) -> float:
     """Return pixels a radian on the axis."""
     ray = np.array([[1e-6, 0.0, 1.0], [-1e-6, 0.0, 1.0]])
     uv = camera.model.project(ray).uv

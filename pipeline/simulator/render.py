@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.recording.base import Illumination
 from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueSensor
 from pipeline.simulator.light import add_line, add_wall_light
-from pipeline.simulator.rays import RayTable, ray_table
+from pipeline.simulator.rays import RayTable, focal_px, ray_table
 from pipeline.simulator.sensor import exposed, shade_of, through_lens
 from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
 from pipeline.simulator.surface import Surface, surface_of
@@ -26,7 +26,6 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Image = NDArray[np.uint8]
 _SHEET_MOMENTS = 5
-_NEAR = 1e-4
 
 
 @dataclass(frozen=True)
@@ -46,11 +45,15 @@ class Renderer:
 
     def frame(self, number: int) -> Image:
         """Return frame ``number`` (H, W, 3), BGR."""
+        sensor = self.truth.instrument_at(self._time_s(number)).sensor
+        return exposed(self.seen(number), sensor, self.truth.seed, number)
+
+    def seen(self, number: int) -> Float32:
+        """Return the light (H, W, 3) at each pixel, through the lens and without noise, in full scales."""
         instrument = self.truth.instrument_at(self._time_s(number))
-        light = self.light(number)
-        shade = _shade(instrument.camera, instrument.sensor)
-        seen = through_lens(light, instrument.sensor, shade)
-        return exposed(seen, instrument.sensor, self.truth.seed, number)
+        return through_lens(
+            self.light(number), instrument.sensor, _shade(instrument.camera, instrument.sensor)
+        )
 
     def frames(self, numbers: Sequence[int]) -> Iterator[Image]:
         """Yield several frames in order."""
@@ -77,7 +80,7 @@ class Renderer:
         moment = (opened - opened.min()) / max(span, 1e-9)
         distance = float(self.truth.motion.distance_mm.at(np.array(self._time_s(number))))
         table = _rays(instrument.camera)
-        return View(table, self.surface, self.texture, pose, moment, distance, _px_per_rad(table))
+        return View(table, self.surface, self.texture, pose, moment, distance, focal_px(instrument.camera))
 
     def _time_s(self, number: int) -> float:
         return float(self.truth.frames.time_s[number])
@@ -143,14 +146,6 @@ def _shade(camera: TrueCamera, sensor: TrueSensor) -> Float32 | None:
         table.node[..., 5].astype(np.float32), *map(np.ascontiguousarray, np.meshgrid(u, v)), cv2.INTER_LINEAR
     )
     return shade_of(sensor, np.asarray(np.nan_to_num(cosine, nan=-1.0), np.float32))
-
-
-def _px_per_rad(table: RayTable) -> float:
-    """Return pixels a radian near the centre."""
-    j = round((table.centre_u - table.first) / table.step)
-    i = round((table.centre_v - table.first) / table.step)
-    turn = np.arccos(np.clip(table.node[i, j, 3:] @ table.node[i, j + 1, 3:], -1, 1))
-    return float(table.step / max(turn, _NEAR))
 
 
 def _add_leds(view: View, light: LedRing, samples: int, image: Float32) -> None:
