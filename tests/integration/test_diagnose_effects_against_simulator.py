@@ -14,8 +14,9 @@ from pipeline.simulator.effects.catalogue import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.laws.bench import bench_truth
 from pipeline.simulator.laws.trace import trace_ring
-from pipeline.simulator.motion import Motion, constant
+from pipeline.simulator.motion import Motion, Odometer, Signal, Slip, Wave, constant
 from pipeline.simulator.rays import viewing_rays
+from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.predict import ring_shift_px, texture_shift_px
 from tests.unit.wall_points import Bore, ring_points, texture_points
@@ -98,3 +99,42 @@ def test_wall_points_lie_on_the_simulators_rays_of_the_pixels_predicted(name, ah
         return np.linalg.norm(np.cross(points.xyz_c - origin, ray), axis=1).max()
 
     assert missed_mm(points.uv + shift) <= per_cent / 100 * missed_mm(points.uv) + 1e-9
+
+
+def test_the_simulators_rolling_shutter_bends_the_ring_as_predicted():
+    sway = Motion(constant(20.0), Signal(np.zeros(1), np.array([2.0]), (Wave(0.5, 2.0),)), constant(-1.0))
+    plain = bench_truth(RADIUS_MM, sway)
+    changed = switch_on(plain, [Switch("rolling_shutter", (0.016,))])
+    points = ring_points(plain.stated, Bore(RADIUS_MM, (-2.0, 1.0, 0.0)), COUNT, TIME_S)
+    assert trace_ring(plain, TIME_S, COUNT).uv == pytest.approx(points.uv, abs=1e-6)
+    later, earlier = (trace_ring(plain, TIME_S + step, COUNT).uv for step in (1e-3, -1e-3))
+    moving = replace(points, velocity_px=(later - earlier) / 2e-3)
+    moved = np.sum((trace_ring(changed, TIME_S, COUNT).uv - points.uv) * points.outward, axis=1)
+    predicted = ring_shift_px(LIBRARY["rolling_shutter"], moving, (), np.array([0.016]))
+    assert np.abs(moved).max() > 0.05
+    # Within a row's delay of up to 5 ms the sway's speed itself changes by some per cent.
+    assert predicted == pytest.approx(moved, abs=0.05 * np.abs(moved).max())
+
+
+ODOMETERS = {
+    "encoder_scale": ((), [0.01], Odometer(quantum_mm=0.0, scale=0.01)),
+    "encoder_slip": ((4.005,), [3.0], Odometer(quantum_mm=0.0, slips=(Slip(4.005, 3.0),))),
+    "encoder_backlash": ((), [0.8], Odometer(quantum_mm=0.0, backlash_mm=0.8)),
+    "time_offset": ((), [0.1], Odometer(quantum_mm=0.0, delay_s=0.1)),
+}
+
+
+@pytest.mark.parametrize("name", ODOMETERS)
+def test_the_simulators_odometer_reads_too_much_by_what_is_predicted(name):
+    shape, amplitude, odometer = ODOMETERS[name]
+    to_and_fro = Motion(Signal(np.zeros(1), np.zeros(1), (Wave(20.0, 0.15),)))
+    true, read = (meter.readings(to_and_fro, 10.0) for meter in (Odometer(quantum_mm=0.0), odometer))
+    time, way = true.time_s, true.distance_mm
+    travel = Travel(time, way, np.gradient(way, time), way)
+    predicted = LIBRARY[name].reading_shift_mm(travel, shape, np.array(amplitude))
+    excess = read.distance_mm - way
+    # Readings count from their first; a delay reaches back before it, where the way is not known.
+    settled = time > 0.5
+    difference = (excess - predicted)[settled]
+    assert np.ptp(excess[settled]) > 0.3
+    assert difference - difference.mean() == pytest.approx(np.zeros(settled.sum()), abs=2e-3)

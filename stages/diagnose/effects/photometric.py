@@ -72,7 +72,7 @@ class Vignetting(Scalar):
     words = "Light falls off as cos^k θ with k {falloff:+.3f} beyond the stated, and draws the line inward."
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return σ_px² ∂ ln V/∂ρ = −k σ_px² tan θ / (dρ/dθ), σ of the sheet: the lens blurs the line later."""
+        """Return σ_px² ∂ ln V/∂ρ = −k σ_px² tan θ / (dρ/dθ), σ of the sheet: the lens blurs later."""
         sigma_px = points.probe.laser.line_sigma_mm * points.ring.read_move(points.ring.per_sheet_c)
         return np.asarray(-amplitude[0] * sigma_px**2 * np.tan(points.theta) / _px_per_rad(points))
 
