@@ -11,8 +11,8 @@ from scipy.stats import norm
 
 from pipeline.artefacts import PointCloud, WallTexture
 from pipeline.findings import Defect, DefectKind, clock_of_azimuth
+from pipeline.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
 from stages.defects.classify import Features, features_of, probabilities
-from stages.defects.codes import en13508_suggestion, pacp_suggestion, pof_class
 from stages.defects.depth import Depth
 from stages.defects.relief import Relief
 from stages.defects.segment import Region

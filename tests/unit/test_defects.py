@@ -10,7 +10,7 @@ import pytest
 from pipeline.errors import UnusableError
 from pipeline.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
-from stages.defects.codes import pof_class
+from pipeline.inspection_codes import pof_class
 from stages.defects.segment import millimetre_mean
 from tests.synthetic_wall import (
     DrawnDefect,

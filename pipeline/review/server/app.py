@@ -23,6 +23,7 @@ from pipeline.review.decisions.ledger import StaleError
 from pipeline.review.flat_tiles import PHOTO, FlatPicture, overlay_picture, photo_picture
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.measuring.tools import readings
+from pipeline.review.papers.catalogue import paper_of
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.review import Review
 
@@ -55,6 +56,7 @@ class ReviewApp:
             Route(
                 "/api/tiles/{layer:str}/{level:int}/{column:int}/{row:int}.png", self._answering(self._tile)
             ),
+            Route("/api/papers/{name:str}", self._answering(self._paper)),
             Route("/api/model.glb", self._model),
         ]
 
@@ -129,6 +131,13 @@ class ReviewApp:
         at: dict[str, Any] = request.path_params
         picture = self._picture(at["layer"])
         return Response(picture.tile(at["level"], at["column"], at["row"]), media_type="image/png")
+
+    def _paper(self, request: Request, _: bytes) -> Response:
+        paper = paper_of(request.path_params["name"], self.review, self.review.state())
+        disposition = f'{"inline" if paper.shown else "attachment"}; filename="{paper.name}"'
+        return Response(
+            paper.content, media_type=paper.media_type, headers={"content-disposition": disposition}
+        )
 
     def _picture(self, layer: str) -> FlatPicture:
         files = self.review.files

@@ -1,0 +1,104 @@
+"""The report of a review: one set of data, as HTML that opens offline and as a paged PDF."""
+
+from __future__ import annotations
+
+import base64
+import json
+import tempfile
+import zipfile
+from dataclasses import asdict
+from importlib.resources import files
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typst
+from jinja2 import Environment, StrictUndefined
+
+from pipeline.model import Overlays
+from pipeline.review.decisions.replay import REJECTED, Finding
+from pipeline.review.documents import cleaned, run_document
+from pipeline.review.papers.pictures import finding_picture, section_plot
+from pipeline.review.papers.tables import findings_table
+from pipeline.review.review import Review, State
+
+_HEADLINE_METRICS = 14
+
+
+def report_data(review: Review, state: State) -> dict[str, Any]:
+    """Return all that the report tells."""
+    run = run_document(review.files)
+    rows = findings_table(review, state)
+    statements = {str(d["id"]): d["statement"] for d in run["defects"]}
+    return cleaned({
+        "name": run["name"],
+        "nominal_diameter_mm": run["nominal_diameter_mm"],
+        "distance_mm": run["distance_mm"],
+        "metrics": run["metrics"][:_HEADLINE_METRICS],
+        "program": run["program"],
+        "diagnosis": run["diagnosis"],
+        "assumed": state.assumed.model_dump(exclude={"do"}),
+        "findings": [row | {"statement": "" if row["edited"] else statements.get(row["id"], "")} for row in rows],
+        "signed": state.signed,
+        "signature": asdict(state.signature) if state.signature else None,
+        "sha256": state.sha256,
+    })  # fmt: skip
+
+
+def pictures(review: Review, state: State) -> dict[str, bytes]:
+    """Return the pictures of every finding that was not rejected, by file name."""
+    overlays, wall = review.files.artefact(Overlays), review.wall()
+    made: dict[str, bytes] = {}
+    for finding in pictured(state):
+        distance, azimuth = (float(v) for v in np.mean(np.asarray(finding.outline), axis=0))
+        made[f"{finding.id}.jpg"] = finding_picture(review.files, finding, overlays.nominal_radius_mm)
+        made[f"{finding.id}.svg"] = section_plot(wall, overlays, distance, azimuth)
+    return made
+
+
+def pictured(state: State) -> tuple[Finding, ...]:
+    """Return the findings that the papers show."""
+    return tuple(f for f in state.findings if f.status not in (REJECTED, "gone"))
+
+
+def pdf_report(review: Review, state: State) -> bytes:
+    """Return the report as PDF; names and remarks reach the page as data, never as markup.
+
+    Raises
+    ------
+    OSError
+        When the temporary folder cannot be written.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "data.json").write_text(json.dumps(_with_pictures(review, state)), "utf-8")
+        for file, content in pictures(review, state).items():
+            (folder / file).write_bytes(content)
+        template = files("pipeline.review.papers").joinpath("report.typ").read_bytes()
+        (folder / "report.typ").write_bytes(template)
+        made = typst.compile(str(folder / "report.typ"), root=str(folder), ignore_system_fonts=True)
+    return bytes(made)
+
+
+def html_report(review: Review, state: State) -> str:
+    """Return the report as one HTML file without scripts."""
+    page = files("pipeline.review.papers").joinpath("report.html").read_text("utf-8")
+    shown = {k: base64.b64encode(v).decode("ascii") for k, v in pictures(review, state).items()}
+    environment = Environment(undefined=StrictUndefined, autoescape=True)
+    return environment.from_string(page).render(d=_with_pictures(review, state), pictures=shown)
+
+
+def pictures_archive(review: Review, state: State) -> bytes:
+    """Return the pictures of the findings as a ZIP file; the same state gives the same bytes."""
+    out = BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
+        for file, content in sorted(pictures(review, state).items()):
+            archive.writestr(zipfile.ZipInfo(file), content)
+    return out.getvalue()
+
+
+def _with_pictures(review: Review, state: State) -> dict[str, Any]:
+    shown = {f.id for f in pictured(state)}
+    data = report_data(review, state)
+    return data | {"findings": [row | {"pictured": row["id"] in shown} for row in data["findings"]]}
