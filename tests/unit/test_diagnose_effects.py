@@ -14,7 +14,7 @@ from pipeline.physics.effect import Channel
 from stages.diagnose.classes import alike, class_of, classes_of, record_next
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.decoys import DECOYS
-from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns
+from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns, smooth_texture_columns
 from stages.diagnose.effects.library import LIBRARY, NOT_PREDICTED, shown_in, without
 from stages.diagnose.effects.predict import (
     columns,
@@ -265,6 +265,15 @@ def test_the_generic_basis_mimics_a_tilted_sheet_and_decoys_are_beyond_it():
     assert basis.shape == (270, 72)
     assert left(LIBRARY["laser_tilt"]) < 1e-6
     assert left(next(d for d in DECOYS if d.name == "decoy_rows_97")) > 0.5
+
+
+@pytest.mark.parametrize("name", ["principal_point", "focal_scale", "radial_distortion", "sensor_tilt"])
+def test_the_generic_basis_mimics_a_wrong_lens_on_texture(name):
+    walls = [texture_points(plain_probe(), Bore(42.0), ahead) for ahead in (10.0, 25.0, 45.0, 80.0)]
+    basis = np.concatenate([smooth_texture_columns(wall) for wall in walls]).reshape(-1, 144)
+    column = np.concatenate([texture_columns(LIBRARY[name], wall, ()) for wall in walls])[..., 0].ravel()
+    fitted = basis @ np.linalg.lstsq(basis, column, rcond=1e-12)[0]
+    assert np.linalg.norm(column - fitted) < 1e-6 * np.linalg.norm(column)
 
 
 def test_generic_terms_move_either_the_line_or_the_whole_image():
