@@ -1,4 +1,4 @@
-"""The library: what it covers, what each effect leaves alone, linearity, words, decoys, classes."""
+"""The library: what it covers, what each effect leaves alone, linearity, words, decoys."""
 
 from dataclasses import replace
 
@@ -9,9 +9,8 @@ from pipeline.errors import InputError
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.physics.catalogue import CLASSES, EFFECTS
+from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.effect import Channel
-from stages.diagnose.classes import alike, class_of, classes_of, record_next
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.decoys import DECOYS
 from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns, smooth_texture_columns
@@ -282,32 +281,3 @@ def test_generic_terms_move_either_the_line_or_the_whole_image():
         size = np.full(len(term.amplitudes), 0.1)
         assert ring_shift_px(term, points, (0.0,), size).any() or term.moves is Moves.AROUND
         assert bool(texture_shift_px(term, wall, (0.0,), size).any()) == (term.moves is not Moves.LINE)
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_an_effect_is_in_its_own_class(name):
-    assert name in class_of(name)
-    assert set(class_of(name)) in ({name}, *map(set, CLASSES))
-
-
-def test_classes_join_in_the_catalogues_order():
-    joined = classes_of(["principal_point", "laser_cone"])
-    assert set(joined) == {*CLASSES[0], *CLASSES[2]}
-    assert list(joined) == [name for name in EFFECTS if name in joined]
-
-
-def test_likeness_goes_both_ways():
-    assert alike("laser_rocking", "probe_vibration")
-    assert alike("probe_vibration", "laser_rocking")
-    assert not alike("laser_tilt", "laser_cone")
-
-
-def test_what_to_record_next_names_each_recording_once():
-    sentence = record_next(["laser_tilt", "principal_point", "sensor_tilt"])
-    assert sentence.startswith("To tell laser_tilt, principal_point and sensor_tilt apart, record: ")
-    assert sentence.count("several diameters") == 1
-    assert "off-centre sweep of 8 mm" in sentence
-    assert (
-        record_next(["outside_index"])
-        == "To confirm outside_index, record: a log of pressure and temperature."
-    )

@@ -1,0 +1,35 @@
+"""Classes of effects that one kind of recording cannot split, and what to record next."""
+
+import pytest
+
+from pipeline.physics.catalogue import CLASSES, EFFECTS
+from stages.diagnose.classes import alike, class_of, classes_of, record_next
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_is_in_its_own_class(name):
+    assert name in class_of(name)
+    assert set(class_of(name)) in ({name}, *map(set, CLASSES))
+
+
+def test_classes_join_in_the_catalogues_order():
+    joined = classes_of(["principal_point", "laser_cone"])
+    assert set(joined) == {*CLASSES[0], *CLASSES[2]}
+    assert list(joined) == [name for name in EFFECTS if name in joined]
+
+
+def test_likeness_goes_both_ways():
+    assert alike("laser_rocking", "probe_vibration")
+    assert alike("probe_vibration", "laser_rocking")
+    assert not alike("laser_tilt", "laser_cone")
+
+
+def test_what_to_record_next_names_each_recording_once():
+    sentence = record_next(["laser_tilt", "principal_point", "sensor_tilt"])
+    assert sentence.startswith("To tell laser_tilt, principal_point and sensor_tilt apart, record: ")
+    assert sentence.count("several diameters") == 1
+    assert "off-centre sweep of 8 mm" in sentence
+    assert (
+        record_next(["outside_index"])
+        == "To confirm outside_index, record: a log of pressure and temperature."
+    )
