@@ -12,7 +12,9 @@ from typing import Annotated
 import typer
 import uvicorn
 
+from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
+from pipeline.review.export import export_review
 from pipeline.review.review import Review, open_review
 from pipeline.review.run_files import RunFiles
 from pipeline.review.server.app import application
@@ -22,6 +24,9 @@ from pipeline.review.server.guard import Guard
 def review(
     run: Annotated[Path, typer.Argument(help="folder of a finished run")],
     port: Annotated[int, typer.Option(min=0, max=65535, help="port on 127.0.0.1; 0 takes a free one")] = 0,
+    export: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="write the page as files, read-only, and end")
+    ] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
 ) -> None:
     """Go through a run in the browser: decide on each finding, measure, sign, print.
@@ -32,6 +37,11 @@ def review(
     with as_file(files("pipeline.review").joinpath("page", "dist")) as page:
         if not (page / "index.html").is_file():
             raise InputError(page, "has no page", hint="install boresight whole")
+        if export is not None:
+            with disk_errors_named(export):
+                export_review(opened, page, export)
+            typer.echo(f"Read-only review: {export.resolve() / 'index.html'}")
+            return
         serve(opened, page, port, browser)
 
 

@@ -30,7 +30,8 @@ def report_data(review: Review, state: State) -> dict[str, Any]:
     """Return all that the report tells."""
     run = run_document(review.files)
     rows = findings_table(review, state)
-    statements = {str(d["id"]): d["statement"] for d in run["defects"]}
+    edited = {row["id"] for row in rows if row["edited"]}
+    said = {str(d["id"]): d["statement"] for d in run["defects"] if str(d["id"]) not in edited}
     return cleaned({
         "name": run["name"],
         "nominal_diameter_mm": run["nominal_diameter_mm"],
@@ -39,7 +40,7 @@ def report_data(review: Review, state: State) -> dict[str, Any]:
         "program": run["program"],
         "diagnosis": run["diagnosis"],
         "assumed": state.assumed.model_dump(exclude={"do"}),
-        "findings": [row | {"statement": "" if row["edited"] else statements.get(row["id"], "")} for row in rows],
+        "findings": [row | {"statement": said.get(row["id"], "")} for row in rows],
         "signed": state.signed,
         "signature": asdict(state.signature) if state.signature else None,
         "sha256": state.sha256,

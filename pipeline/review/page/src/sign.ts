@@ -30,10 +30,10 @@ function parts(session: Session): HTMLElement[] {
       open ? element("p", {}, `${open} findings are not decided yet; a signature covers them as undecided.`) : null,
       session.source.readOnly ? null : form(session)),
   ];
-  if (!session.source.readOnly) {
-    made.push(assumptions(session), element("section", {}, element("h2", {}, "Papers"), element("ul", { class: "papers" },
-      ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: `/api/papers/${file}`, target: "_blank", rel: "noopener" }, name))))));
-  }
+  if (!session.source.readOnly) made.push(assumptions(session));
+  const folder = session.source.readOnly ? "" : "/api/papers/";
+  made.push(element("section", {}, element("h2", {}, "Papers"), element("ul", { class: "papers" },
+    ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: folder + file, target: "_blank", rel: "noopener" }, name))))));
   const lost = state.lost.map((e) => element("li", {}, `${e.who}: ${e.action.do} ${String(e.action["finding"] ?? "")}`));
   if (lost.length) made.push(element("section", {}, element("h2", {}, "Decisions without their finding"),
     element("p", {}, "The run was computed again and no longer shows what these were taken on."), element("ul", {}, ...lost)));
