@@ -10,7 +10,9 @@ from pathlib import Path
 
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
-from pipeline.simulator.build import build_truth
+from pipeline.simulator.build import plain_truth
+from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects.switch import switches_from_mapping
 from pipeline.simulator.premises.base import Premise
 from pipeline.simulator.premises.check import require_recording, require_scene
 from pipeline.simulator.record import write_recording
@@ -56,9 +58,11 @@ def produce(
         When the scene cannot show what it is meant to show.
     """
     _require_apart(places)
-    truth = build_truth(scene, file)
+    plain = plain_truth(scene, file)
+    switches = switches_from_mapping(scene.effects, file)
+    truth = switch_on(plain, switches)
     renderer = renderer_of(truth)
-    before = require_scene(scene, renderer)
+    before = require_scene(plain, switches, renderer)
     with _whole_or_nothing(places) as new:
         write_recording(renderer, new.recording, scene.codec, scene.quality, progress)
         after = require_recording(new.recording, truth)

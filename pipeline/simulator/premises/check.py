@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.recording.folder import open_folder
+from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.premises.base import Premise, require
+from pipeline.simulator.premises.effect import effect_premises
 from pipeline.simulator.premises.pictures import chosen_frames, picture_premises
 from pipeline.simulator.render import Renderer
-from pipeline.simulator.scene import Scene
 from pipeline.simulator.truth import SceneTruth
 
 
-def require_scene(scene: Scene, renderer: Renderer) -> tuple[Premise, ...]:
-    """Return what holds of a scene before it is rendered; see `require`."""
+def require_scene(plain: SceneTruth, switches: Sequence[Switch], renderer: Renderer) -> tuple[Premise, ...]:
+    """Return what holds of a scene before it is rendered; see `require`.
+
+    Parameters
+    ----------
+    plain : SceneTruth
+        The scene without its effects.
+    switches : sequence of Switch
+        Its effects.
+    renderer : Renderer
+        Of the scene with them.
+    """
     truth = renderer.truth
     pictures = {n: renderer.frame(n) for n in chosen_frames(truth)}
-    return require(picture_premises(truth, pictures))
+    return require([*picture_premises(truth, pictures), *effect_premises(plain, switches)])
 
 
 def require_recording(folder: Path, truth: SceneTruth) -> tuple[Premise, ...]:

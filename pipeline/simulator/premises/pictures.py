@@ -64,6 +64,7 @@ def _laser_premises(truth: SceneTruth, pictures: Mapping[int, Image]) -> list[Pr
 def _lit_premises(truth: SceneTruth, pictures: Mapping[int, Image]) -> list[Premise]:
     ring = _annulus(truth)
     walls = [p[..., 1][ring] for p in pictures.values()]
+    contrast = [_texture(p, ring) for p in pictures.values()]
     frames = tuple(pictures)
     return [
         Premise(
@@ -75,7 +76,7 @@ def _lit_premises(truth: SceneTruth, pictures: Mapping[int, Image]) -> list[Prem
             _MOST_CLIPPED_WALL, at_most=True, frames=frames, hint="lower light.level",
         ),
         Premise(
-            "contrast of the wall's fine texture", float(np.median([_texture(p, ring) for p in pictures.values()])),
+            "contrast of the wall's fine texture", float(np.median(contrast)),
             _LEAST_TEXTURE, "of 255", frames=frames, hint="raise pipe.surface.grain or mottle",
         ),
     ]  # fmt: skip
@@ -123,5 +124,3 @@ def _texture(picture: Image, ring: NDArray[np.bool_]) -> float:
     grey = picture[..., 1].astype(np.float32)
     fine = grey - cv2.blur(grey, (_TEXTURE_PX, _TEXTURE_PX))
     return float(fine[ring].std())
-
-
