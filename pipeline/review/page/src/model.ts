@@ -66,7 +66,7 @@ export class ModelView {
       return;
     }
     this.renderer.localClippingEnabled = true;
-    this.scene.background = new THREE.Color(getComputedStyle(this.root).getPropertyValue("--ground").trim() || "#222");
+    this.scene.background = new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue("--ground").trim());
     this.scene.add(new THREE.AmbientLight(0xffffff, 1.1), this.lamp, this.marker);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.draw());
@@ -150,7 +150,8 @@ export class ModelView {
       this.fly(0);
       return;
     }
-    const centre = toModel(this.pipe.at((from + to) / 2).origin);
+    const centre = toModel(this.pipe.at((from + to) / 2).origin).multiplyScalar(MM);
+    this.camera.up.set(0, 1, 0);
     const far = ((to - from) * 0.75 + this.session.run.radius_mm * 3) * MM;
     this.camera.position.copy(centre).add(new THREE.Vector3(0.75, 0.5, 0.55).normalize().multiplyScalar(far));
     this.controls.target.copy(centre);
