@@ -16,8 +16,8 @@ _PLACEMENT_SIGMA_MM = 0.05
 def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> TravelEvidence:
     """Return what motion and encoder of a gauge run say.
 
-    Only frames with fiducials count: these place the camera to a few µm, so that the encoder, loosely weighted
-    in the adjustment, has no say there. The scale of the way is that of the fiducials' stated places.
+    Only frames with fiducials count: these place the camera to a few µm, so that the encoder, loosely
+    weighted in the adjustment, has no say there. The scale of the way is that of the fiducials' stated places.
 
     Parameters
     ----------

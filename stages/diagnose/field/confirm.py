@@ -1,0 +1,114 @@
+"""Whether a field recording bears out an effect that the gauge names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.predict import columns
+from stages.diagnose.evidence import Evidence
+from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.field.points import ring_points
+from stages.diagnose.field.run import FieldRun
+from stages.diagnose.inference import DEGREES, Score, Stated, places_of, score
+from stages.diagnose.result import Confirmation
+
+Float = NDArray[np.float64]
+_AGREE = 1e-3
+# Predictions are good to this part of an effect's size.
+_LAW = 0.05
+# The field tells something only when it knows the effect to this part of its size.
+_TELLING = 0.33
+
+
+@dataclass(frozen=True)
+class InField:
+    """An effect of the gauge, met again in the field.
+
+    Attributes
+    ----------
+    confirmation : Confirmation
+        What the gauge lets expect of the field, what the field says by itself, and whether they agree.
+    before_px, after_px : float
+        How far rings are off from where texture has them (r.m.s. over the ring bins), of the pattern of this
+        effect, without and with the gauge's correction.
+    noise_px : float
+        What of that is the field's own uncertainty.
+    """
+
+    confirmation: Confirmation
+    before_px: float
+    after_px: float
+    noise_px: float
+
+
+def confirm_in_field(
+    model: EffectModel,
+    shape: Shape,
+    amplitude: Float,
+    covariance: Float,
+    found: FieldEvidence,
+    stated: Stated,
+) -> InField | None:
+    """Return whether the field by itself says the same of an effect as the gauge; None when it cannot tell.
+
+    The field's estimate owes nothing to the gauge: poses from texture, a pipe of unknown size, the stated
+    instrument within its uncertainty. ``amplitude`` (Q,) and ``covariance`` (Q, Q) are the gauge's.
+    """
+    if found.run is None:
+        return None
+    own = _own_score(model, shape, found, stated)
+    size = float(np.linalg.norm(amplitude))
+    if own is None or np.sqrt(np.trace(own.covariance)) > _TELLING * size:
+        return None
+    gap = own.amplitude - amplitude
+    spread = own.covariance + covariance + (_LAW * size) ** 2 * np.eye(len(gap))
+    statistic = float(gap @ np.linalg.solve(spread, gap))
+    same_sign = float(own.amplitude @ amplitude) > 0
+    agrees = bool(stats.f.sf(statistic / len(gap), len(gap), DEGREES) > _AGREE) and same_sign
+    confirmation = Confirmation(
+        f"in the field, from the gauge: {_words(model, shape, amplitude, covariance)}",
+        f"field alone: {_words(model, shape, own.amplitude, own.covariance)}",
+        agrees,
+    )
+    pattern = columns(model, ring_points(found.run), shape)
+    pattern = pattern[np.isfinite(pattern).all(1)]
+    noise = np.einsum("mi,ij,mj->m", pattern, own.covariance, pattern)
+    return InField(
+        confirmation, _rms(pattern @ own.amplitude), _rms(pattern @ gap), float(np.sqrt(np.mean(noise)))
+    )
+
+
+def ring_noise_px(run: FieldRun) -> float:
+    """Return the robust r.m.s. of single ring bins about the smooth pipe, px."""
+    points = ring_points(run)
+    by_pixel = run.probe.triangulate_jacobian(points.uv)[0]
+    inclined = np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward)
+    return float(1.4826 * np.median(np.abs(run.equations.rings.residual / inclined)))
+
+
+def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: Stated) -> Score | None:
+    whole: Evidence | None = found.channel.whole
+    assert whole is not None
+    place = places_of(whole, model, shape)
+    if not len(place):
+        whole = found.about([(model, shape)])
+        if whole is None:
+            return None
+        place = places_of(whole, model, shape)
+    return score(whole, stated, place)
+
+
+def _words(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:
+    numbers = model.quantities(shape, amplitude)
+    named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
+    spread = float(np.sqrt(np.trace(covariance) / len(amplitude)))
+    return f"{named} (± {spread:.2g} {model.amplitudes[0].unit})"
+
+
+def _rms(values: Float) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,98 @@
+"""Ring bins and landmark observations of a field recording as the points that effects are predicted at."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import RingSamples
+from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
+from stages.diagnose.effects.base import ImagePoints
+from stages.diagnose.field.run import FieldRun
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+def ring_points(run: FieldRun) -> ImagePoints:
+    """Return the ring bins where the smooth pipe would have them.
+
+    Not where they were found: derivatives that follow a measurement's error correlate with its residual.
+    """
+    frame, found_c = run.measured.rings.frame, run.measured.rings.xyz_c
+    uv = run.probe.camera.project(found_c).uv
+    away = uv - run.probe.camera.centre_px
+    outward = away / np.linalg.norm(away, axis=1)[:, None]
+    along_ray = np.einsum("mij,mj->mi", run.probe.triangulate_jacobian(uv)[0], outward)
+    inclined = np.einsum("mi,mi->m", _wall_at(run, frame, found_c)[0], along_ray)
+    uv = uv - (run.equations.rings.residual / inclined)[:, None] * outward
+    xyz_c = run.probe.triangulate(uv)
+    normal_c, along_c, azimuth, distance = _wall_at(run, frame, xyz_c)
+    passing = _passing(run, frame, xyz_c)
+    rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
+    return ImagePoints(
+        run.probe, frame, run.measured.time_s[frame], uv, xyz_c, normal_c, along_c, rate[:, None] * outward,
+        speed_mm_s(run)[frame], True, _widths(run.rings, run.ring_frames, frame, uv), azimuth, distance,
+    )  # fmt: skip
+
+
+def texture_points(run: FieldRun) -> ImagePoints:
+    """Return the landmark observations where poses and landmarks of the state place them."""
+    tracks, state = run.measured.tracks, run.state
+    xyz_c = transform(inverse(state.T_pc[tracks.frame]), state.xyz_p[tracks.landmark])
+    normal_c, along_c, azimuth, distance = _wall_at(run, tracks.frame, xyz_c)
+    by_c = run.probe.camera.project_jacobian(xyz_c).by_point
+    velocity = np.einsum("mij,mj->mi", by_c, _passing(run, tracks.frame, xyz_c))
+    return ImagePoints(
+        run.probe, tracks.frame, run.measured.time_s[tracks.frame], run.probe.camera.project(xyz_c).uv,
+        xyz_c, normal_c, along_c, velocity,
+        speed_mm_s(run)[tracks.frame], False, np.full(len(tracks.uv), np.nan), azimuth, distance,
+    )  # fmt: skip
+
+
+def speed_mm_s(run: FieldRun) -> Float:
+    """Return the camera's speed (N,) along the pipe."""
+    return np.asarray(np.gradient(distance_mm(run), run.measured.time_s))
+
+
+def distance_mm(run: FieldRun) -> Float:
+    """Return the camera's distance (N,) along the pipe's axis."""
+    return to_pipe(run.state.axis, run.state.T_pc[:, :3, 3])[0]
+
+
+def _wall_at(run: FieldRun, frame: Int, xyz_c: Float) -> tuple[Float, Float, Float, Float]:
+    """Return outward normal and axis direction (M, 3) in C, azimuth and distance (M,) in P."""
+    T = run.state.T_pc[frame]
+    s, azimuth, _ = to_pipe(run.state.axis, transform(T, xyz_c))
+    sections = frames_at(run.state.axis, s)[1]
+    normal_p = np.cos(azimuth)[:, None] * sections[:, :, 0] + np.sin(azimuth)[:, None] * sections[:, :, 1]
+    to_c = T[:, :3, :3]
+    return (
+        np.einsum("mij,mi->mj", to_c, normal_p), np.einsum("mij,mi->mj", to_c, sections[:, :, 2]), azimuth, s,
+    )  # fmt: skip
+
+
+def _passing(run: FieldRun, frame: Int, xyz_c: Float) -> Float:
+    """Return how points (M, 3) of the wall pass in C, mm/s."""
+    T, time_s = run.state.T_pc, run.measured.time_s
+    before = np.maximum(np.arange(len(time_s)) - 1, 0)
+    after = np.minimum(np.arange(len(time_s)) + 1, len(time_s) - 1)
+    span = np.maximum(time_s[after] - time_s[before], 1e-9)[:, None]
+    velocity_p = (T[after, :3, 3] - T[before, :3, 3]) / span
+    turning_c = vector_from_rotation(np.swapaxes(T[before, :3, :3], -1, -2) @ T[after, :3, :3]) / span
+    velocity_c = np.einsum("nij,ni->nj", T[:, :3, :3], velocity_p)
+    return np.asarray(-velocity_c[frame] - np.cross(turning_c[frame], xyz_c))
+
+
+def _widths(rings: RingSamples, ring_frames: Int, frame: Int, uv: Float) -> Float:
+    """Return the line's width (M,) of the sample nearest in azimuth."""
+    away = uv - rings.centre_px
+    count = len(rings.azimuth_rad)
+    step = 2 * np.pi / count
+    column = (
+        np.round((np.arctan2(away[:, 1], away[:, 0]) - rings.azimuth_rad[0]) / step).astype(np.int64) % count
+    )
+    width = rings.width_px[np.searchsorted(ring_frames, frame), column].astype(float)
+    seen = np.isfinite(width)
+    return np.where(seen, width, np.median(width[seen]) if seen.any() else 1.0)

@@ -1,0 +1,106 @@
+"""A field recording measured and adjusted with the stated instrument, without the encoder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import RingSamples, Trajectory
+from pipeline.errors import UnusableError
+from pipeline.instrument.probe import Probe
+from pipeline.recording.base import Recording
+from pipeline.stage import Context
+from stages import motion
+from stages.motion import MotionParameters
+from stages.motion.encoder import encoder_at_frames
+from stages.motion.equations import MATCH_BIASES, Equations, Measurements
+from stages.motion.events import find_events
+from stages.motion.output import in_pipe_frame
+from stages.motion.prediction import Predictor
+from stages.motion.sections import at_all_frames, ring_bins
+from stages.motion.state import EncoderReadings, State
+from stages.rings import RingParameters, extract_rings
+from stages.triangulate import TriangulateParameters, triangulate_rings
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class FieldRun:
+    """A field recording at the optimum with the stated instrument.
+
+    Attributes
+    ----------
+    recording : Recording
+    probe : Probe
+        As stated.
+    rings : RingSamples
+    measured : Measurements
+        Without encoder.
+    state : State
+    equations : Equations
+        At ``state``, with the weights that count from now on.
+    trajectory : Trajectory
+        In P.
+    encoder : EncoderReadings or None
+    ring_frames : (F,) int
+        Places of the ring frames in the frame table.
+    parameters : MotionParameters
+    """
+
+    recording: Recording
+    probe: Probe
+    rings: RingSamples
+    measured: Measurements
+    state: State
+    equations: Equations
+    trajectory: Trajectory
+    encoder: EncoderReadings | None
+    ring_frames: Int
+    parameters: MotionParameters
+
+
+def field_run(
+    recording: Recording, probe: Probe, context: Context, rings: RingSamples | None = None
+) -> FieldRun:
+    """Measure rings and texture of a recording and adjust poses, pipe and wall to them.
+
+    The encoder has no say, so that it can be compared with what is seen.
+
+    Raises
+    ------
+    UnusableError
+        When rings and texture alone do not determine the motion.
+    """
+    parameters = MotionParameters.model_validate({})
+    if rings is None:
+        rings = extract_rings(recording, probe, RingParameters.model_validate({}), context)
+    points = triangulate_rings(rings, probe, TriangulateParameters.model_validate({}), context)
+    centre_c, radius_mm = motion._pipe_in_rings(points)
+    grid = motion._strip_grid(radius_mm, parameters)
+    frames = recording.frames
+    ring_frames = np.searchsorted(frames.frame, rings.frame)
+    predictor = Predictor(frames.time_s, None, at_all_frames(ring_frames, centre_c, len(frames.frame)))
+    tracks = motion._tracked(recording, probe, grid, predictor, parameters, context)
+    motion._require_distance(tracks, None)
+    unsure = probe.principal_uncertainties()
+    bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
+    bins = replace(bins, frame=np.searchsorted(frames.frame, bins.frame))
+    measured = Measurements(tracks, bins, frames.time_s, None, probe, unsure, motion._LOOSE)
+    T_pc = predictor.between(tracks.frames, tracks.T_pc, len(frames.frame))
+    start = motion._first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
+    estimate = motion._adjusted(start, measured, parameters)
+    motion._require_convergence(estimate, radius_mm, context)
+    trajectory = in_pipe_frame(estimate, frames, measured)
+    events = find_events(frames, trajectory, tracks, estimate.state.slip, False)
+    encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
+    return FieldRun(
+        recording, probe, rings, measured, estimate.state, estimate.adjusted.equations,
+        replace(trajectory, events=events), encoder, np.asarray(ring_frames), parameters,
+    )  # fmt: skip
+
+
+__all__ = ["FieldRun", "UnusableError", "field_run"]
