@@ -93,7 +93,9 @@ def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = No
     free = free[np.diag(evidence.information)[free] > 0]
     prior = stated.over(evidence.columns)
     a, b = evidence.information, evidence.right
-    response = np.linalg.lstsq(a[np.ix_(free, free)] + prior[np.ix_(free, free)], a[np.ix_(free, block)], rcond=1e-13)[0]
+    response = np.linalg.lstsq(
+        a[np.ix_(free, free)] + prior[np.ix_(free, free)], a[np.ix_(free, block)], rcond=1e-13
+    )[0]
     right = b[block] - response.T @ b[free]
     own = a[np.ix_(block, block)] - a[np.ix_(block, free)] @ response
     size = np.sqrt(np.maximum(np.diag(a)[block], 1e-300))
@@ -116,7 +118,11 @@ def instrument_places(evidence: Evidence) -> Int:
 def places_of(evidence: Evidence, model: EffectModel, shape: Shape) -> Int:
     """Return the places of an effect's columns."""
     wanted = {(model.name, a.name, shape): k for k, a in enumerate(model.amplitudes)}
-    here = [(wanted[key], k) for k, c in enumerate(evidence.columns) if (key := (c.effect, c.amplitude, c.shape)) in wanted]
+    here = [
+        (wanted[key], k)
+        for k, c in enumerate(evidence.columns)
+        if (key := (c.effect, c.amplitude, c.shape)) in wanted
+    ]
     return np.array([k for _, k in sorted(here)], np.int64)
 
 
@@ -144,7 +150,9 @@ def estimate(evidence: Evidence, stated: Stated, prior_sigma: Float) -> Estimate
     best = covariance @ evidence.right
     known = np.isfinite(prior_sigma)
     occam = float(np.sum(np.log(value)) + 2 * np.sum(np.log(scale))) - _log_det(prior)
-    return Estimate(best, covariance, evidence.misfit - float(evidence.right @ best) + occam + 0.0 * known.sum())
+    return Estimate(
+        best, covariance, evidence.misfit - float(evidence.right @ best) + occam + 0.0 * known.sum()
+    )
 
 
 def _log_det(matrix: Float) -> float:

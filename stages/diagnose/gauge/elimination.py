@@ -9,20 +9,29 @@ clustering", 2011).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, cholesky_banded, cho_solve_banded
+from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_matrix
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 POSE = 6
+RING, EDGE, ENCODER = 0, 1, 2
 _REACH = 4
 # A pose that nothing holds keeps its place: 1 σ far beyond the size of any pipe.
 _HOLD = 1e-8
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some frames (N,) of a run, and some kinds of its measurements."""
+
+    frames: NDArray[np.bool_]
+    kinds: tuple[int, ...] = (RING, EDGE, ENCODER)
 
 
 @dataclass(frozen=True)
@@ -37,6 +46,8 @@ class Equations:
     residual, weight : (M,)
     cell : (M,) int
         Measurements of one cell err alike.
+    kind : (M,) int
+        `RING`, `EDGE` or `ENCODER`.
     """
 
     frame: Int
@@ -45,11 +56,12 @@ class Equations:
     residual: Float
     weight: Float
     cell: Int
+    kind: Int
 
-    def of(self, frames: NDArray[np.bool_]) -> Equations:
-        """Return the same measurements, without weight outside the frames (N,) chosen."""
-        weight = np.where(frames[self.frame], self.weight, 0.0)
-        return Equations(self.frame, self.by_pose, self.by_global, self.residual, weight, self.cell)
+    def of(self, part: Part) -> Equations:
+        """Return the same measurements, without weight outside a part of the run."""
+        use = part.frames[self.frame] & np.isin(self.kind, part.kinds)
+        return replace(self, weight=np.where(use, self.weight, 0.0))
 
 
 @dataclass(frozen=True)

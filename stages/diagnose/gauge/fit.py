@@ -12,21 +12,21 @@ from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
-from stages.diagnose.inference import instrument_information
 from stages.diagnose.gauge.baseline import BASELINE_SIZE, SIGMA_PX
 from stages.diagnose.gauge.elimination import (
     Equations,
     MotionPrior,
     OwnUnknowns,
+    Part,
     Reduced,
     eliminate_globals,
     eliminate_poses,
     score_inflation,
 )
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
+from stages.diagnose.inference import instrument_information
 
 Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _CONVERGED = 0.5
 _PARTS = (1.0, 0.5, 0.2, 0.05)
 _ITERATIONS = 8
@@ -90,14 +90,14 @@ def _shortened(run: GaugeRun, found: Fit, step: Float) -> Fit | None:
 
 
 def evidence(
-    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], frames: Sequence[Mask] = ()
+    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], parts: Sequence[Part] = ()
 ) -> tuple[Evidence, ...]:
     """Return what the run says about the fit's terms and the effects asked about, together.
 
     Parameters
     ----------
-    frames : sequence of (N,) bool
-        Parts of the run; each gives evidence of its own after that of the whole.
+    parts : sequence of Part
+        Each gives evidence of its own after that of the whole.
 
     Returns
     -------
@@ -105,12 +105,16 @@ def evidence(
         The whole run's first.
     """
     linearised = linearise(run, found.state, found.terms, asked, with_baseline=True)
-    parts = [linearised.equations, *(linearised.equations.of(part) for part in frames)]
-    return tuple(_reduced(run, found, asked, equations, linearised.motion) for equations in parts)
+    each = [linearised.equations, *(linearised.equations.of(part) for part in parts)]
+    return tuple(_reduced(run, found, asked, equations, linearised.motion) for equations in each)
 
 
 def _reduced(
-    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], equations: Equations, motion: MotionPrior
+    run: GaugeRun,
+    found: Fit,
+    asked: Sequence[tuple[EffectModel, Shape]],
+    equations: Equations,
+    motion: MotionPrior,
 ) -> Evidence:
     """Return the evidence of equations, all but the shared columns eliminated."""
     reduced = eliminate_poses(equations, motion, len(found.state.T_pc))

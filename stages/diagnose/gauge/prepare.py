@@ -24,7 +24,9 @@ _CAUCHY = 2.5
 # Jerk is not the same all along a run: what is learned as typical must not hold poses where it is larger.
 _LOOSER = 5.0
 # The camera is let free while outliers are told from effects.
-_FREE = GaugeParameters(camera_prior_scale=50.0, tilt_prior_deg=3.0, baseline_prior_mm=3.0, cone_prior_deg=3.0)
+_FREE = GaugeParameters(
+    camera_prior_scale=50.0, tilt_prior_deg=3.0, baseline_prior_mm=3.0, cone_prior_deg=3.0, ring_bins=120
+)
 
 
 def prepare(measured_run: MeasuredRun) -> tuple[GaugeRun, Unknowns]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,10 +24,13 @@ from stages.diagnose.effects.predict import (
     texture_shift_px,
 )
 from stages.diagnose.gauge.baseline import edge_baseline, ring_baseline
-from stages.diagnose.gauge.elimination import POSE, Equations, MotionPrior
+from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations, MotionPrior
+from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import edge_points, ring_points, speed_along
+from stages.motion.bordered import Rows
 
 Float = NDArray[np.float64]
+Int = NDArray[np.int64]
 _ROUNDS = 2
 _ENCODER_SIGMA_MM = 1.0
 # Encoder readings this many frames apart err apart.
@@ -95,7 +98,9 @@ def linearise(
         parts.append(_encoder_part(run, run.encoder, state, terms, asked))
     joined = {k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])}
     if with_baseline:
-        joined["by_global"] = np.concatenate([joined["by_global"], _baseline(edges, edge_at, ring_at, parts)], 1)
+        joined["by_global"] = np.concatenate(
+            [joined["by_global"], _baseline(edges, edge_at, ring_at, parts)], 1
+        )
     smooth = smooth_rows(state, run.time_s, run.motion_sigma)
     motion = MotionPrior(smooth.frame, smooth.by_frame[..., :POSE], smooth.residual, smooth.weight)
     return Linearised(Equations(**joined), motion, ring_at, edge_at)
@@ -122,7 +127,9 @@ def ring_mm_per_px(points: ImagePoints) -> Float:
     return np.asarray(np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward))
 
 
-def _without_ring_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> tuple[BoreRings, ImagePoints]:
+def _without_ring_shift(
+    run: GaugeRun, state: Unknowns, terms: Sequence[Term]
+) -> tuple[BoreRings, ImagePoints]:
     """Return the ring bins where they would be without the terms, and the points there."""
     uv = run.rings.uv
     for _ in range(_ROUNDS if terms else 0):
@@ -150,7 +157,7 @@ def _ring_part(
     mm_per_px = ring_mm_per_px(points)
     shift = [_term_slope(t, lambda a, t=t: ring_shift_px(t.model, points, t.shape, a)) for t in terms]
     shift += [columns(model, points, shape) for model, shape in asked]
-    return _with_effects(made.rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster)
+    return _with_effects(made.rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster, RING)
 
 
 def _edge_part(
@@ -162,24 +169,33 @@ def _edge_part(
     def across(shift: Float) -> Float:
         return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
 
-    shift = [_term_slope(t, lambda a, t=t: across(texture_shift_px(t.model, points, t.shape, a))) for t in terms]
+    shift = [
+        _term_slope(t, lambda a, t=t: across(texture_shift_px(t.model, points, t.shape, a))) for t in terms
+    ]
     shift += [across(texture_columns(model, points, shape)) for model, shape in asked]
     # Cells of fiducials count on where those of wall end.
-    return _with_effects(made.rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, -1 - made.cluster)
+    return _with_effects(
+        made.rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, -1 - made.cluster, EDGE
+    )
 
 
-def _with_effects(rows, sign: Float, shift: list[Float], weight: Float, cell) -> Equations:
+def _with_effects(
+    rows: Rows, sign: Float, shift: list[Float], weight: Float, cell: Int, kind: int
+) -> Equations:
     effects = [sign * s for s in shift]
-    bad = ~np.all([np.isfinite(e).all(1) for e in effects], axis=0) if effects else np.zeros(len(weight), bool)
+    bad = (
+        ~np.all([np.isfinite(e).all(1) for e in effects], axis=0) if effects else np.zeros(len(weight), bool)
+    )
     by_global = np.concatenate([rows.by_border, *effects], 1)
     by_global[bad] = 0.0
     usable = (rows.weight > 0) & ~bad
     return Equations(
-        rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual, np.where(usable, weight, 0.0), cell
-    )
+        rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual,
+        np.where(usable, weight, 0.0), cell, np.full(len(cell), kind),
+    )  # fmt: skip
 
 
-def _term_slope(term: Term, shift_of) -> Float:
+def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
     """Return (M, Q) derivatives of a shift by the term's amplitudes, where they are."""
     out = []
     for k, amplitude in enumerate(term.model.amplitudes):
@@ -210,4 +226,5 @@ def _encoder_part(
     # Loosely: what the encoder says is a matter of its own, and a slip must not move the poses.
     weight = np.full(count, _ENCODER_SIGMA_MM**-2)
     residual = state.T_pc[:, 2, 3] - scale * reading - offset
-    return Equations(np.arange(count), by_pose, by_global, residual, weight, cell)
+    kind = np.full(count, ENCODER_ROW)
+    return Equations(np.arange(count), by_pose, by_global, residual, weight, cell, kind)

@@ -21,7 +21,7 @@ Float = NDArray[np.float64]
 DETECTED = 1e-4
 _REFITTED = 5
 _MOST_EFFECTS = 3
-_WORTH_REFITTING = 0.02
+_WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
 # A further effect smaller than this share of the first may be the first's imprecise prediction.
 _LEAST_SHARE = 0.01
@@ -111,7 +111,9 @@ def _counts(run: GaugeRun, found: Fit) -> bool:
 def shift_px(found: Fit, term: Term) -> float:
     """Return the r.m.s. shift in px of rings and fiducials by a term."""
     ring = ring_shift_px(term.model, found.linearised.rings, term.shape, term.amplitude)
-    edge = np.linalg.norm(texture_shift_px(term.model, found.linearised.edges, term.shape, term.amplitude), axis=1)
+    edge = np.linalg.norm(
+        texture_shift_px(term.model, found.linearised.edges, term.shape, term.amplitude), axis=1
+    )
     return float(max(np.sqrt(np.nanmean(ring**2)), np.sqrt(np.nanmean(edge**2))))
 
 

@@ -1,0 +1,84 @@
+"""``boresight diagnose``: what physics was left out, where it shows, and what bears it out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from pipeline.commands.diagnose_report import write_page
+from pipeline.disk import disk_errors_named
+from pipeline.errors import InputError
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import read_probe
+from pipeline.recording import open_recording
+from pipeline.recording.base import Recording
+from pipeline.recording.checks import check_probe_fits
+from pipeline.stage import quiet_context
+from stages.diagnose.diagnose import diagnose as diagnose_recordings
+from stages.diagnose.effects.library import without as library_without
+from stages.diagnose.result import Diagnosis, to_json
+
+
+def diagnose(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")],
+    field: Annotated[Path | None, typer.Argument(help="recording of an inspection")] = None,
+    gauge: Annotated[
+        Path | None, typer.Option(metavar="GAUGE", help="recording of the same probe's run through a gauge")
+    ] = None,
+    probe: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="stated probe, in place of the recording's own")
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option("--without", metavar="NAME", help="leave an effect out of the library; repeatable"),
+    ] = None,
+) -> None:
+    """Find what physics was left out, from an inspection and a gauge run of one probe; either may be missing.
+
+    Writes diagnosis.json, diagnosis.html, arrays.npz, and probe.yaml with what was found put in.
+    """
+    if field is None and gauge is None:
+        raise InputError("diagnose", "is given no recording", hint="give FIELD, or --gauge GAUGE, or both")
+    recordings = [open_recording(path) if path is not None else None for path in (field, gauge)]
+    stated = _stated_probe(recordings, probe)
+    console = Console(stderr=True)
+    with console.status("comparing the recordings with the stated instrument"):
+        found = diagnose_recordings(
+            recordings[0], recordings[1], stated, library_without(without or ()), quiet_context()
+        )
+    with disk_errors_named(output):
+        output.mkdir(parents=True, exist_ok=True)
+        _write(found, output)
+    _show(found, output, console)
+
+
+def _stated_probe(recordings: Sequence[Recording | None], probe: Path | None) -> Probe:
+    given = [r for r in recordings if r is not None]
+    file = probe or next((r.probe_file for r in given if r.probe_file is not None), None)
+    if file is None:
+        raise InputError(given[0].path, "names no probe", hint="give one with --probe FILE")
+    stated = read_probe(file)
+    for recording in given:
+        check_probe_fits(recording, stated)
+    return stated
+
+
+def _write(found: Diagnosis, output: Path) -> None:
+    """Write the answer last: where it is, all of it is."""
+    write_page(found, "", output)
+    text = json.dumps(to_json(found), indent=1, ensure_ascii=False)
+    unfinished = output / "diagnosis.json.part"
+    unfinished.write_text(text + "\n", "utf-8")
+    unfinished.replace(output / "diagnosis.json")
+
+
+def _show(found: Diagnosis, output: Path, console: Console) -> None:
+    console.print(f"Verdict: {found.verdict} (chance that nothing is left out: {found.global_p:.2g})")
+    for e in found.effects:
+        console.print(f"  {e.name} ({e.probability:.1%}): {e.statement}")
+    console.print(f"Report: {output / 'diagnosis.html'}")

@@ -1,0 +1,146 @@
+"""Second predictions of the same physics within a gauge run: other bores, other motion, fiducials against rings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from pipeline.physics.catalogue import effect
+from stages.diagnose.evidence import Evidence
+from stages.diagnose.gauge.elimination import EDGE, RING, Part
+from stages.diagnose.gauge.fit import evidence
+from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
+from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.inference import DEGREES, Stated, estimate
+from stages.diagnose.result import Confirmation
+
+Float = NDArray[np.float64]
+# Estimates from disjoint measurements agree when their difference is no rarer than this.
+_AGREE = 1e-3
+# Predictions are good to this part of an effect's size.
+_LAW = 0.05
+# An estimate tells something only when it is known to this part of the effect.
+_TELLING = 0.25
+_LEAST_FRAMES = 8
+
+
+@dataclass(frozen=True)
+class Partial:
+    """Amplitudes (Q,) of a term from one part of the measurements, with covariance."""
+
+    where: str
+    amplitude: Float
+    covariance: Float
+
+
+def confirmations(
+    run: GaugeRun, judged: Judged, regimes: Sequence[Regime], term: Term, stated: Stated
+) -> tuple[Confirmation, ...]:
+    """Return what disjoint parts of the run say of a term, each against all the others."""
+    parts = [*_by_bore(regimes), *_by_direction(run, judged), *_by_half(run)]
+    _, *each = evidence(run, judged.fit, (), [part for _, part in parts])
+    found = [
+        partial
+        for (where, _), e in zip(parts, each, strict=True)
+        if (partial := partial_of(where, e, judged, term, stated)) is not None
+    ]
+    out = [_compared(a, b, term) for a, b in _pairs(found)]
+    return (*(c for c in out if c is not None), *_by_kind(run, judged, term, stated))
+
+
+def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: Stated) -> Partial | None:
+    """Return the term's estimate from a part of the measurements, the other terms being free."""
+    result = estimate(part, stated, 10 * prior_sigma(part, judged.fit.terms))
+    wanted = [(term.model.name, a.name, term.shape) for a in term.model.amplitudes]
+    keys = [(c.effect, c.amplitude, c.shape) for c in part.columns]
+    at = [keys.index(w) for w in wanted]
+    inflation = np.sqrt(
+        np.diag(part.score_covariance)[at] / np.maximum(np.diag(part.information)[at], 1e-300)
+    )
+    if not np.all(np.diag(part.information)[at] > 0):
+        return None
+    covariance = result.covariance[np.ix_(at, at)] * np.outer(inflation, inflation)
+    return Partial(where, result.value[at], covariance)
+
+
+def _by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
+    out = []
+    for section in sorted({r.section for r in regimes}):
+        mask = np.any([r.part.frames for r in regimes if r.section == section], axis=0)
+        out.append((f"bore {section + 1}", Part(mask)))
+    return out
+
+
+def _by_direction(run: GaugeRun, judged: Judged) -> list[tuple[str, Part]]:
+    speed = np.gradient(judged.fit.state.T_pc[:, 2, 3], run.time_s)
+    masks = [("forward travel", speed > 0), ("backward travel", speed < 0)]
+    if min(m.sum() for _, m in masks) < _LEAST_FRAMES:
+        return []
+    return [(where, Part(mask)) for where, mask in masks]
+
+
+def _by_half(run: GaugeRun) -> list[tuple[str, Part]]:
+    middle = run.time_s[len(run.time_s) // 2]
+    return [("first half", Part(run.time_s < middle)), ("second half", Part(run.time_s >= middle))]
+
+
+def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
+    """Return neighbours of one kind: bores with the next bore, forward with backward, half with half."""
+    by_kind: dict[str, list[Partial]] = {}
+    for p in found:
+        kind = "bore" if p.where.startswith("bore") else p.where.split()[-1]
+        by_kind.setdefault(kind, []).append(p)
+    return [(a, b) for group in by_kind.values() for a, b in zip(group, group[1:], strict=False)]
+
+
+def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | None:
+    """Return whether two estimates agree in sign and size; None when either tells too little."""
+    size = float(np.linalg.norm(term.amplitude))
+    if max(np.sqrt(np.trace(p.covariance)) for p in (first, second)) > _TELLING * size:
+        return None
+    law = (_LAW * size) ** 2 * np.eye(len(term.amplitude))
+    gap = first.amplitude - second.amplitude
+    statistic = float(gap @ np.linalg.solve(first.covariance + second.covariance + law, gap))
+    agrees = bool(stats.f.sf(statistic / len(gap), len(gap), DEGREES) > _AGREE)
+    same_sign = float(first.amplitude @ second.amplitude) > 0
+    return Confirmation(
+        f"{first.where}: {_words(term, first)}",
+        f"{second.where}: {_words(term, second)}",
+        agrees and same_sign,
+    )
+
+
+def _by_kind(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> tuple[Confirmation, ...]:
+    """Return fiducials against rings: both show what the camera does, only rings what the sheet does."""
+    everything = np.ones(len(run.time_s), bool)
+    _, edges, both = evidence(
+        run, judged.fit, (), [Part(everything, (EDGE,)), Part(everything, (EDGE, RING))]
+    )
+    if effect(term.model.name).family != "camera" and not _seen(edges, term):
+        return ()
+    from_edges = partial_of("fiducials alone", edges, judged, term, stated)
+    rings = Evidence(
+        both.columns, both.information - edges.information, both.right - edges.right,
+        both.score_covariance - edges.score_covariance, both.misfit - edges.misfit, both.cells,
+    )  # fmt: skip
+    from_rings = partial_of("rings alone", rings, judged, term, stated)
+    if from_edges is None or from_rings is None:
+        return ()
+    compared = _compared(from_edges, from_rings, term)
+    return () if compared is None else (compared,)
+
+
+def _seen(edges: Evidence, term: Term) -> bool:
+    at = [k for k, c in enumerate(edges.columns) if c.effect == term.model.name]
+    return bool(np.all(np.diag(edges.information)[at] > 0))
+
+
+def _words(term: Term, part: Partial) -> str:
+    numbers = term.model.quantities(term.shape, part.amplitude)
+    spread = float(np.sqrt(np.trace(part.covariance) / len(part.amplitude)))
+    named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
+    return f"{named} (± {spread:.2g} {term.model.amplitudes[0].unit})"
