@@ -37,9 +37,11 @@ class _Attached:
 _ATTACHED = (
     _Attached("error-model", "What a misaligned laser sheet does to the radius; tables, figures, page."),
     _Attached("error-budget", "Every source of error, its share in the radius, and what dominates."),
+    _Attached("batch", "Run many recordings, on local workers or a Dask scheduler; resumable."),
     _Attached("calibrate", "Find camera and laser sheet, with covariance, from a gauge run."),
     _Attached("calibrate-camera", "Calibrate a camera from pictures of boards."),
     _Attached("calibrate-laser", "Find the laser plane from pictures of a board with the line across it."),
+    _Attached("diagnose", "Find what physics was left out, where it shows, and what bears it out."),
     _Attached("prove", "Conceal effects in recordings, diagnose them, open the truth, and score."),
     _Attached("simulate", "Render recordings from a scene, with their truth apart."),
     _Attached("open-seal", "Verify that a truth is the one a recording was sealed with."),
