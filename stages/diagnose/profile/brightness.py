@@ -12,7 +12,7 @@ from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.measure import LineProfiles
-from stages.diagnose.profile.regression import regress, two_sided_p
+from stages.diagnose.profile.regression import regress, tested
 
 Float = NDArray[np.float64]
 # Of the line's height: light beside the line that black offsets and compression leave.
@@ -23,7 +23,7 @@ DUST_FLOOR = 0.05
 DECENTRE_FLOOR = 0.05
 _SMOOTH_ORDER = 6
 _WIDTHS_DEG = (1.0, 2.0, 4.0, 8.0)
-_FAR_PX = 40.0
+_INDEPENDENT = 2.0
 
 
 def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Finding:
@@ -34,11 +34,14 @@ def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Fi
     known = np.isfinite(courses)
     middle = np.nanmedian(courses, axis=0)
     sigma = 1.4826 * np.nanmedian(np.abs(courses - middle), axis=0) / np.sqrt(np.maximum(known.sum(0), 1))
-    z, depth, width, at = _deepest(middle, np.hypot(np.median(sigma), sigma))
+    depth, width, at = _deepest(middle)
     azimuth = float(np.degrees(rings.azimuth_rad[at]))
-    spot = np.hypot(DUST_FLOOR, depth / max(z, 1e-9))
+    around = np.abs((np.arange(len(middle)) - at + len(middle) // 2) % len(middle) - len(middle) // 2)
+    near = around * 360 / len(middle) < width
+    spot = float(np.hypot(DUST_FLOOR, np.nanmedian(sigma[near]) / np.sqrt(_INDEPENDENT)))
+    z = depth / spot
     tries = len(rings.azimuth_rad) / 4 * len(_WIDTHS_DEG)
-    p = float(min(1.0, tries * 2 * norm.sf(depth / spot))) if depth > 0 else 1.0
+    p = float(min(1.0, tries * 2 * norm.sf(z))) if z > 0 else 1.0
     sizes = (
         Size("attenuation", "", float(-np.expm1(-depth)), float(np.exp(-depth) * spot)),
         Size("azimuth_deg", "deg", azimuth, width / max(z, 1.0)),
@@ -50,7 +53,7 @@ def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Fi
         np.degrees(rings.azimuth_rad), middle, sigma, -depth * dip,
     )  # fmt: skip
     return finding(
-        "dust", depth / spot, p, sizes,
+        "dust", z, p, sizes,
         f"At {azimuth:.0f}° the line is {100 * -np.expm1(-depth):.0f} % darker in all frames alike.", curve,
         alike=("fixed_pattern",),
     )  # fmt: skip
@@ -88,12 +91,13 @@ def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
     if not np.isfinite(fit.sigma[0]):
         return untestable("beam_decentre", "The line's brightness is not seen all round.")
     size = float(np.hypot(*fit.coefficient[:2]))
-    sigma = float(np.hypot(np.sqrt(np.trace(fit.covariance[:2, :2]) / 2), DECENTRE_FLOOR))
+    random = float(np.sqrt(np.trace(fit.covariance[:2, :2]) / 2))
+    test = tested(size, random, DECENTRE_FLOOR, fit.groups)
     direction = float(np.degrees(np.arctan2(fit.coefficient[1], fit.coefficient[0])))
     return finding(
         "beam_decentre",
-        size / sigma,
-        two_sided_p(size / sigma, fit.groups),
+        test.z,
+        test.p_value,
         (),
         f"Brightness varies around the ring by ±{100 * size:.0f} %, most at {direction:.0f}° of the camera.",
     )
@@ -113,10 +117,9 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
     clipped = float(np.mean(profiles.clipped[geometry.steady])) if geometry.steady.any() else 0.0
     if clipped < 0.05 or not np.isfinite(fit.sigma[3]):
         return untestable("saturation", f"{100 * clipped:.1f} % of the line clips: too little to test bloom.")
-    sigma = float(np.hypot(fit.sigma[3], 2 * STRAY_FLOOR))
-    z = float(fit.coefficient[3] / sigma)
+    test = tested(float(fit.coefficient[3]), float(fit.sigma[3]), 2 * STRAY_FLOOR, fit.groups)
     return finding(
-        "saturation", z, two_sided_p(z, fit.groups), (),
+        "saturation", test.z, test.p_value, (),
         f"{100 * clipped:.0f} % of the line clips; its foot is {100 * fit.coefficient[3]:+.2f} % higher "
         "along the sensor's columns where it does.", alike=("gamma",),
     )  # fmt: skip
@@ -140,17 +143,16 @@ def _course(rings: RingSamples, rows: NDArray[np.int64]) -> Float:
     return np.where(good, rest, np.nan)
 
 
-def _deepest(course: Float, sigma: Float) -> tuple[float, float, float, int]:
-    """Return z, depth, width in degrees and index of the dip that stands out most."""
+def _deepest(course: Float) -> tuple[float, float, int]:
+    """Return depth, width in degrees and index of the Gaussian dip that takes most out of the course."""
     step = 360.0 / len(course)
     filled = np.where(np.isfinite(course), course, 0.0)
-    best = (0.0, 0.0, _WIDTHS_DEG[0], 0)
+    best, most = (0.0, _WIDTHS_DEG[0], 0), 0.0
     for width in _WIDTHS_DEG:
         smooth = gaussian_filter1d(filled, width / step, mode="wrap")
-        depth = -np.sqrt(2.0) * smooth
-        error = sigma / np.sqrt(max(2 * np.sqrt(np.pi) * width / step, 1.0)) * np.sqrt(2.0)
-        z = depth / np.hypot(error, DUST_FLOOR)
-        at = int(np.argmax(z))
-        if z[at] > best[0]:
-            best = (float(z[at]), float(depth[at]), width, at)
+        weight = np.sqrt(np.pi) * width / step
+        total = -smooth * np.sqrt(2 * np.pi) * width / step
+        at = int(np.argmax(total))
+        if total[at] / np.sqrt(weight) > most:
+            best, most = (float(total[at] / weight), width, at), float(total[at] / np.sqrt(weight))
     return best

@@ -16,6 +16,7 @@ CORE_REACH = 3.5
 _LEAST_HEIGHT = 600.0
 _SECOND_LINE = 3.0
 _SECOND_LINE_FLOOR = 5e-4
+_ODD = 5.0
 _STEPS = 12
 
 
@@ -105,7 +106,10 @@ def _second_lines(profiles: LineProfiles) -> NDArray[np.bool_]:
     far = np.abs(profiles.offset_px) > 8
     light, height = profiles.light[..., far].sum((1, 2)), profiles.height[..., far].sum((1, 2))
     share = light / np.maximum(height, 1e-9)
-    return np.asarray(share > _SECOND_LINE * np.median(share) + _SECOND_LINE_FLOOR)
+    usual = np.median(share)
+    spread = 1.4826 * np.median(np.abs(share - usual))
+    limit = max((_SECOND_LINE - 1) * usual, _ODD * spread) + _SECOND_LINE_FLOOR
+    return np.asarray(share - usual > limit)
 
 
 def _blocks(good: NDArray[np.bool_]) -> list[NDArray[np.int64]]:

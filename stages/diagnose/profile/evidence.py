@@ -18,6 +18,7 @@ from stages.diagnose.profile.finding import Finding
 from stages.diagnose.profile.geometry import line_geometry
 from stages.diagnose.profile.lit import vignetting_finding
 from stages.diagnose.profile.measure import measure_profiles
+from stages.diagnose.profile.rivals import settle
 from stages.diagnose.profile.secondary import ghost_findings
 from stages.diagnose.profile.sensor import locking_finding, pattern_finding
 from stages.diagnose.profile.shape import skew_findings
@@ -90,7 +91,7 @@ def profile_evidence(
             "diagnose", f"only {len(cells.frames)} stretches of frames show the line alone and steady",
             limit=f"at least {_LEAST_BLOCKS}", hint="record frames with the LEDs off",
         )  # fmt: skip
-    findings = (
+    findings: tuple[Finding, ...] = (
         *ghost_findings(cells, geometry, probe),
         *skew_findings(cells, geometry, probe),
         *width_findings(cells, geometry, probe),
@@ -103,6 +104,7 @@ def profile_evidence(
         locking_finding(rings, profiles, cells),
         pattern_finding(profiles, recording.source.image_size),
     )
+    findings = settle(findings, cells)
     context.report("effects found in the line's profile", sum(f.found for f in findings), "effects")
     whole = np.where(cells.whole[:, None], cells.profile, np.nan).reshape(
         len(cells.frames), -1, len(cells.offset_px)

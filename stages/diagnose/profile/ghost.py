@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.regression import two_sided_p
+from stages.diagnose.profile.regression import Tested, tested
 
 Float = NDArray[np.float64]
 REACH_PX, STEP_PX = 45.0, 0.5
@@ -50,8 +50,8 @@ class SecondLine:
     ----------
     parameters : (P,)
         Of the law, with their covariance (P, P).
-    relative, sigma : float
-        Height over that of the line.
+    relative, random, floor : float
+        Height over that of the line, its random 1 σ, and what image formation may leave at any distance.
     information : float
         How well the cells show a line there; the misfit falls by relative² × information.
     blocks : int
@@ -61,16 +61,17 @@ class SecondLine:
 
     parameters: Float
     relative: float
-    sigma: float
+    random: float
+    floor: float
     information: float
     blocks: int
     distance_px: Float
     parameter_covariance: Float
 
     @property
-    def z(self) -> float:
-        """Height over its σ."""
-        return self.relative / self.sigma if self.sigma > 0 else 0.0
+    def test(self) -> Tested:
+        """Height against its σ, for this one hypothesis."""
+        return tested(self.relative, self.random, self.floor, self.blocks)
 
     @property
     def misfit_drop(self) -> float:
@@ -81,11 +82,6 @@ class SecondLine:
         """Return (K,) the height found at offsets (K,) from the line's place, over all cells."""
         parts = [_at(found, self.distance_px + o) for o in offset_px]
         return np.array([s.sum() / max(i.sum(), 1e-12) for s, i in parts])
-
-    @property
-    def p_value(self) -> float:
-        """Two-sided, for this one hypothesis."""
-        return two_sided_p(self.z, self.blocks)
 
 
 def responses(cells: Cells) -> Responses:
@@ -172,7 +168,9 @@ def _best(
     rating = rated(grid)
     if not len(grid) or not np.isfinite(rating).any() or rating.max() <= 0:
         size = design.shape[1]
-        return SecondLine(np.zeros(size), 0.0, 1.0, 0.0, 0, np.zeros(len(design)), np.zeros((size, size)))
+        return SecondLine(
+            np.zeros(size), 0.0, 1.0, floor, 0.0, 0, np.zeros(len(design)), np.zeros((size, size))
+        )
     best = grid[int(np.argmax(rating))]
     for _ in range(_HALVINGS):
         around = _around(best, steps)
@@ -226,7 +224,7 @@ def _sized(
     others = left[:, 0] / np.maximum(left[:, 1], 1e-12)
     random = np.sqrt((len(blocks) - 1) / len(blocks) * np.sum((others - height) ** 2))
     return SecondLine(
-        best, float(height), float(np.hypot(random, floor)), float(total[1]), len(blocks), at,
+        best, float(height), float(random), floor, float(total[1]), len(blocks), at,
         _place_covariance(found, design, at, height, block),
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
-from stages.diagnose.profile.regression import Regression, regress, two_sided_p
+from stages.diagnose.profile.regression import Regression, regress, tested
 from stages.texture.light import irradiance
 
 Float = NDArray[np.float64]
@@ -34,13 +34,13 @@ def vignetting_finding(recording: Recording, probe: Probe) -> Finding:
     fit = _fitted(grey, light, theta)
     if not np.isfinite(fit.sigma[0]):
         return untestable("vignetting", "The lit wall is too dark or too bright to follow into the depth.")
-    sigma = np.hypot(fit.sigma[:2], (EXPONENT_FLOOR, FALLOFF_FLOOR))
+    test = tested(float(fit.coefficient[1]), float(fit.sigma[1]), FALLOFF_FLOOR, fit.groups)
+    sigma = float(np.hypot(fit.sigma[0], EXPONENT_FLOOR))
     exponent, falloff = (float(c) for c in fit.coefficient[:2])
-    z = falloff / float(sigma[1])
     middle = np.nanmean(np.log(grey), axis=0)
     predicted = exponent * light + falloff * np.log(np.cos(theta))
     return finding(
-        "vignetting", z, two_sided_p(z, fit.groups), (Size("falloff", "", falloff, float(sigma[1])),),
+        "vignetting", test.z, test.p_value, (Size("falloff", "", falloff, test.sigma),),
         f"The lit wall's grey follows the light to the power {exponent:.2f} and falls off as cos^k θ with "
         f"k = {falloff:+.2f}.",
         Curve(
@@ -48,7 +48,7 @@ def vignetting_finding(recording: Recording, probe: Probe) -> Finding:
             np.degrees(theta), middle,
             np.full(len(theta), EXPONENT_FLOOR), predicted + np.nanmean(middle - predicted),
         ),
-        confirms=(Size("gamma.exponent", "", exponent, float(sigma[0])),), alike=("gamma",),
+        confirms=(Size("gamma.exponent", "", exponent, sigma),), alike=("gamma",),
     )  # fmt: skip
 
 

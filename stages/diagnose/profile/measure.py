@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +21,7 @@ REACH_PX, STEP_PX = 60.0, 0.5
 FIT_WIDTHS, CORE_WIDTHS = 5.0, 4.5
 _TRUSTED = 0.97
 _MOST = 0.5
+_TILE_PX, _DARK_PERCENT = 32, 2.0
 _SLOPE_SECTORS = 6
 _TURNS = 10
 _BOTH_PLANES: tuple[Planes, ...] = ("grey", "bgr")
@@ -87,13 +89,14 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
     for k, (_, image) in enumerate(recording.read(rings.frame[rows], "grey")):
         if image is None:
             continue
-        dark = float(np.median(image)) if np.isnan(dark) else dark
+        dark = _dark_level(image) if np.isnan(dark) else dark
         line, width = _line(rings, rows[k])
         slope = (np.roll(line, -_SLOPE_SECTORS) - np.roll(line, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
-        background[k] = _far_level(image, sectors, line) - dark
+        beside = _far_level(image, sectors, line)
+        background[k] = beside - dark
         stack_frame(
             image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad, line, slope,
-            width, rings.valid[rows[k]], dark, trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
+            width, rings.valid[rows[k]], beside, trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
             light[k], height[k], share[k], gain[k // _TURNS % 2],
         )  # fmt: skip
     offset: Float = -REACH_PX + STEP_PX * (np.arange(bins, dtype=np.float64) + 0.5)
@@ -112,6 +115,13 @@ def _line(rings: RingSamples, row: int) -> tuple[Float, Float]:
     radius = np.interp(every, good, rings.radius_px[row, good], period=turn)
     width = np.interp(every, good, rings.width_px[row, good], period=turn)
     return radius, np.clip(width, 0.5 * np.median(width), 2 * np.median(width))
+
+
+def _dark_level(image: Image) -> float:
+    """Return the grey level of the darkest place: tiles are averaged first, so that noise has no say."""
+    size = (image.shape[1] // _TILE_PX, image.shape[0] // _TILE_PX)
+    tiles = cv2.resize(image.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    return float(np.percentile(tiles, _DARK_PERCENT))
 
 
 def _far_level(image: Image, sectors: Sectors, line: Float) -> float:

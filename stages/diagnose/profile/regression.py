@@ -49,9 +49,25 @@ def regress(design: Float, value: Float, group: NDArray[np.int64]) -> Regression
     return Regression(best, (len(names) - 1) / len(names) * left.T @ left, len(names))
 
 
-def two_sided_p(z: float, groups: int) -> float:
-    """Return the p-value of an estimate over its σ when σ was itself estimated from ``groups`` groups."""
-    return float(2 * student.sf(abs(z), max(groups - 1, 1)))
+@dataclass(frozen=True)
+class Tested:
+    """An estimate against nothing: over its σ, and the two-sided p-value."""
+
+    sigma: float
+    z: float
+    p_value: float
+
+
+def tested(estimate: float, random: float, floor: float, groups: int) -> Tested:
+    """Test an estimate whose 1 σ ``random`` was found from ``groups`` groups, on top of a known ``floor``.
+
+    Student's t with Welch and Satterthwaite's degrees of freedom: the floor has as many as one likes.
+    """
+    variance = random**2 + floor**2
+    sigma = float(np.sqrt(variance))
+    freedom = max(groups - 1, 1) * (variance / max(random**2, 1e-12 * variance)) ** 2
+    z = float(estimate / sigma)
+    return Tested(sigma, z, float(2 * student.sf(abs(z), freedom)))
 
 
 def _biweights(x: Float, y: Float) -> Float:

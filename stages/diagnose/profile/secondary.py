@@ -14,6 +14,8 @@ from stages.diagnose.profile.ghost import Responses, SecondLine, bounced, copied
 Float = NDArray[np.float64]
 # Of the line's height: what compression leaves on one side and not on the other, in places and everywhere.
 BOUNCED_FLOOR, COPIED_FLOOR = 1e-3, 5e-4
+# px: by how much a faint line's place may be off; and relative, the radius being that of the stated sheet.
+PLACE_FLOOR_PX, SCALE_FLOOR = 0.05, 0.01
 _LEAST_CELLS = 30
 _BETTER = 1.2
 # A constant distance has one parameter where the bounced line has three.
@@ -41,8 +43,11 @@ def ghost_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
 def _ring_finding(
     line: SecondLine, cells: Cells, geometry: LineGeometry, probe: Probe, found: Responses, *, kept: bool
 ) -> Finding:
+    test = line.test
     tilt_x, tilt_y, cone = line.parameters
-    sigma = np.sqrt(np.diagonal(line.parameter_covariance))
+    lever_px = np.array([4.0, 4.0, 2.0]) * float(np.nanmedian(geometry.px_per_mm * geometry.radius_mm))
+    systematic = np.hypot(PLACE_FLOOR_PX / lever_px, SCALE_FLOOR * np.linalg.norm(line.parameters))
+    sigma = np.sqrt(np.diagonal(line.parameter_covariance) + systematic**2)
     stated = probe.laser
     confirms = (
         _degrees("laser_tilt.tilt_deg along x", tilt_x - stated.tilt_x, sigma[0]),
@@ -54,8 +59,8 @@ def _ring_finding(
     apart = 4 * scale * (tilt_x * np.cos(psi) + tilt_y * np.sin(psi)) - 2 * scale * cone
     tilt_deg, cone_deg = np.degrees(np.arctan(np.hypot(tilt_x, tilt_y))), np.degrees(np.arctan(cone))
     return finding(
-        "ghost_ring", line.z, line.p_value if kept else 1.0,
-        (Size("relative", "", line.relative, line.sigma),),
+        "ghost_ring", test.z, test.p_value if kept else 1.0,
+        (Size("relative", "", line.relative, test.sigma),),
         f"A second line of {100 * line.relative:.2f} % lies where light bounced across the bore would: "
         f"the sheet tilts by {tilt_deg:.3f}° and is a cone of {cone_deg:+.3f}°.",
         _curve(cells, found, line, "A line bounced across the bore"),
@@ -67,11 +72,12 @@ def _ring_finding(
 def _copy_finding(
     line: SecondLine, cells: Cells, geometry: LineGeometry, found: Responses, *, kept: bool
 ) -> Finding:
-    distance = float(line.parameters[0])
-    sigma = float(np.sqrt(line.parameter_covariance[0, 0]))
+    distance, test = float(line.parameters[0]), line.test
+    systematic = PLACE_FLOOR_PX / float(np.nanmedian(geometry.px_per_mm))
+    sigma = float(np.hypot(np.sqrt(line.parameter_covariance[0, 0]), systematic))
     return finding(
-        "tube_ghost", line.z, line.p_value if kept else 1.0,
-        (Size("relative", "", line.relative, line.sigma), Size("separation_mm", "mm", distance, sigma)),
+        "tube_ghost", test.z, test.p_value if kept else 1.0,
+        (Size("relative", "", line.relative, test.sigma), Size("separation_mm", "mm", distance, sigma)),
         f"A copy of the line of {100 * line.relative:.2f} % lies {distance:+.2f} mm along the axis from it, "
         "the same all round.",
         _curve(cells, found, line, "A copy of the line at a constant distance"),
@@ -101,5 +107,5 @@ def _curve(cells: Cells, found: Responses, line: SecondLine, title: str) -> Curv
     width = float(np.median(cells.width_px[cells.whole]))
     return Curve(
         title, "distance from where it should be, px", "share of the line's height", offset, height,
-        np.full(len(offset), line.sigma), line.relative * np.exp(-0.25 * (offset / width) ** 2),
+        np.full(len(offset), line.test.sigma), line.relative * np.exp(-0.25 * (offset / width) ** 2),
     )  # fmt: skip

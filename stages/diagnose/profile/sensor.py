@@ -10,7 +10,7 @@ from pipeline.artefacts import RingSamples
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.measure import LineProfiles
-from stages.diagnose.profile.regression import regress, two_sided_p
+from stages.diagnose.profile.regression import regress, tested
 
 Float = NDArray[np.float64]
 # px: by how much pixel integration, rounding and compression lock a line to pixels.
@@ -41,9 +41,11 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
     if not np.isfinite(fit.sigma[0]):
         return untestable("pixel_locking", "The line keeps to one place of its pixels.")
     size = float(np.hypot(*fit.coefficient))
-    sigma = float(np.hypot(np.sqrt(np.trace(fit.covariance) / 2), LOCKING_FLOOR_PX))
+    random = float(np.sqrt(np.trace(fit.covariance) / 2))
+    test = tested(size, random, LOCKING_FLOOR_PX, fit.groups)
+    sigma = test.sigma
     return finding(
-        "pixel_locking", size / sigma, two_sided_p(size / sigma, fit.groups),
+        "pixel_locking", test.z, test.p_value,
         (Size("amplitude_px", "px", float(fit.coefficient[0]), sigma),),
         f"The line's radius follows the pixels by {size:.4f} ± {sigma:.4f} px.",
         _phase_curve(rough, smooth, fit.coefficient),
@@ -65,11 +67,11 @@ def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Find
         return untestable("fixed_pattern", "The line does not come back to the same pixels.")
     fit = regress(np.ones((len(product), 1)), product, tiles)
     variance = float(fit.coefficient[0]) * 1.5
-    sigma = float(np.hypot(1.5 * fit.sigma[0], GAIN_FLOOR**2))
-    z = variance / sigma
+    test = tested(variance, 1.5 * float(fit.sigma[0]), GAIN_FLOOR**2, fit.groups)
+    sigma = test.sigma
     size = float(np.sqrt(max(variance, 0.0)))
     return finding(
-        "fixed_pattern", z, two_sided_p(z, fit.groups),
+        "fixed_pattern", test.z, test.p_value,
         (Size("relative", "", size, sigma / (2 * max(size, np.sqrt(sigma)))),),
         f"Pixels keep gains of their own of {100 * size:.2f} % (1 σ).", alike=("dust",),
     )  # fmt: skip

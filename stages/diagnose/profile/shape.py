@@ -9,7 +9,7 @@ from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry
-from stages.diagnose.profile.regression import regress, two_sided_p
+from stages.diagnose.profile.regression import Tested, regress, tested
 from stages.diagnose.profile.skewed import cell_skewness, skew_table
 from stages.diagnose.profile.width import scale_law
 
@@ -33,12 +33,10 @@ def skew_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[F
     if not np.isfinite(mean.sigma[0]):
         why = "The line's middle clips or is not seen: its skewness cannot be told."
         return untestable("line_skew", why), untestable("subsurface", why)
-    sigma = float(np.hypot(mean.sigma[0], HERMITE_FLOOR))
-    z = float(mean.coefficient[0] / sigma)
-    p = two_sided_p(z, mean.groups)
-    tail = _Tail(cells, geometry, probe, float(mean.coefficient[0]), sigma)
-    curve = _curve(cells, coefficient)
-    return _judged(tail, z, p, curve, geometry)
+    hermite = float(mean.coefficient[0])
+    test = tested(hermite, float(mean.sigma[0]), HERMITE_FLOOR, mean.groups)
+    tail = _Tail(cells, geometry, probe, hermite, test.sigma)
+    return _judged(tail, test, _curve(cells, coefficient), geometry)
 
 
 class _Tail:
@@ -96,8 +94,9 @@ class _Tail:
         return bool(off < _CLEARLY and left > _SMALLEST_BLUR_PX2 - _CLEARLY * max(spread, 0.05))
 
 
-def _judged(tail: _Tail, z: float, p: float, curve: Curve, geometry: LineGeometry) -> tuple[Finding, Finding]:
+def _judged(tail: _Tail, test: Tested, curve: Curve, geometry: LineGeometry) -> tuple[Finding, Finding]:
     """Return both findings; one that the widths rule out keeps p = 1."""
+    z, p = test.z, test.p_value
     side = "outside" if tail.sign > 0 else "inside"
     seen = f"The line has a longer tail on its {side}, {z:.1f} σ beyond compression."
     width = tail.scale

@@ -9,7 +9,7 @@ from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry
-from stages.diagnose.profile.regression import Regression, regress, two_sided_p
+from stages.diagnose.profile.regression import Regression, regress, tested
 
 Float = NDArray[np.float64]
 # Of (line σ / stated)², and of exposure², s²: what compression and clipped neighbours may do to a width.
@@ -29,9 +29,9 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     if not np.isfinite(fit.sigma[0]) or spread < _LEAST_SCALE_SPREAD:
         why = "The line is seen at one scale only: its own width and the image's blur cannot be told apart."
         return untestable("gamma", why), untestable("albedo_bias", why)
-    scale, sigma = float(fit.coefficient[0]), float(np.hypot(fit.sigma[0], SCALE_FLOOR))
-    z = (scale - 1) / sigma
-    p = two_sided_p(z, fit.groups)
+    scale = float(fit.coefficient[0])
+    test = tested(scale - 1, float(fit.sigma[0]), SCALE_FLOOR, fit.groups)
+    sigma = test.sigma
     safe = max(scale, 0.05)
     exponent = Size("exponent", "", 1 / safe, sigma / safe**2)
     stated_mm = probe.laser.line_sigma_mm
@@ -39,8 +39,8 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     seen = f"The line's width² follows the image's scale with {scale:.3f} ± {sigma:.3f} of what is stated."
     curve = _scale_curve(cells, geometry, stated, fit)
     return (
-        finding("gamma", z, p, (exponent,), seen, curve, alike=("albedo_bias",)),
-        finding("albedo_bias", z, p, (line,), seen, curve, alike=("gamma",)),
+        finding("gamma", test.z, test.p_value, (exponent,), seen, curve, alike=("albedo_bias",)),
+        finding("albedo_bias", test.z, test.p_value, (line,), seen, curve, alike=("gamma",)),
     )
 
 
@@ -75,14 +75,14 @@ def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     fit = regress(design.reshape(-1, design.shape[-1]), width2.ravel(), _groups(cells, geometry))
     if not np.isfinite(fit.sigma[0]):
         return untestable("motion_blur", "The line does not move enough for its width to tell the exposure.")
-    exposure2, sigma = float(fit.coefficient[0]), float(np.hypot(fit.sigma[0], EXPOSURE2_FLOOR))
-    own = probe.shutter.exposure_s
+    exposure2, own = float(fit.coefficient[0]), probe.shutter.exposure_s
+    test = tested(exposure2 - own**2, float(fit.sigma[0]), EXPOSURE2_FLOOR, fit.groups)
+    sigma = test.sigma
     total = np.sqrt(max(exposure2, 0.0))
     size = Size("exposure_s", "s", float(total - own), sigma / (2 * max(total, np.sqrt(sigma))))
-    z = (exposure2 - own**2) / sigma
     shift = -0.5 * total * geometry.speed_px_s
     return finding(
-        "motion_blur", z, two_sided_p(z, fit.groups), (size,),
+        "motion_blur", test.z, test.p_value, (size,),
         f"The line widens with its own speed as an exposure of {1e3 * total:.1f} ms makes it.",
         shift_px=np.nan_to_num(shift) + 0.5 * own * np.nan_to_num(geometry.speed_px_s),
     )  # fmt: skip
