@@ -1,0 +1,39 @@
+"""The summary of a batch: batch.json, and batch.html over all runs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, StrictUndefined
+
+from pipeline.batch.work import Ending
+from pipeline.codec import Json
+from pipeline.disk import replace_json
+
+SHOWN_METRICS = ("inspected length", "wall seen", "mean diameter", "defects", "deepest defect")
+
+
+def write_summary(endings: Iterable[Ending], folder: Path) -> None:
+    """Write batch.json and batch.html; the order is that of the names, whoever came first."""
+    ordered = sorted(endings, key=lambda e: e.name)
+    runs: list[Json] = [_document(e) for e in ordered]
+    replace_json(folder / "batch.json", {"format": 1, "runs": runs, "states": dict(_states(ordered))})
+    page = files("pipeline.batch").joinpath("page.html").read_text("utf-8")
+    environment = Environment(undefined=StrictUndefined, autoescape=True)
+    rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
+    text = environment.from_string(page).render(rows=rows, states=_states(ordered), metrics=SHOWN_METRICS)
+    temporary = folder / ".new-batch.html"
+    temporary.write_text(text, "utf-8")
+    temporary.replace(folder / "batch.html")
+
+
+def _states(endings: list[Ending]) -> Counter[str]:
+    return Counter(e.state for e in endings)
+
+
+def _document(ending: Ending) -> Json:
+    metrics: list[Json] = [{"name": n, "value": v, "unit": u} for n, v, u in ending.metrics]
+    return {"name": ending.name, "state": ending.state, "problem": ending.problem, "metrics": metrics}

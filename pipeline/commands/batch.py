@@ -1,0 +1,64 @@
+"""``boresight batch``: run many recordings, on local workers or a Dask scheduler."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from pipeline.batch.cluster import endings, workers
+from pipeline.batch.find import find_recordings
+from pipeline.batch.summary import write_summary
+from pipeline.batch.work import Ending, Work
+from pipeline.config import resolve
+from pipeline.disk import disk_errors_named
+from stages.catalogue import PIPELINE
+
+_EXIT_SOME_FAILED = 3
+
+
+def batch(
+    folder: Annotated[Path, typer.Argument(help="folder of recordings, searched to any depth")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="folder for the runs")],
+    count: Annotated[
+        int | None, typer.Option("--workers", min=1, help="local workers; one for each core where left out")
+    ] = None,
+    scheduler: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="a Dask scheduler instead, tcp://HOST:PORT")
+    ] = "",
+    probe: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="probe to use in place of the recordings' own")
+    ] = None,
+    config: Annotated[Path | None, typer.Option(metavar="FILE", help="parameters (YAML)")] = None,
+    assignments: Annotated[
+        list[str] | None, typer.Option("--set", metavar="STAGE.NAME=VALUE", help="one parameter")
+    ] = None,
+) -> None:
+    """Run every recording below a folder; one that fails stops no other.
+
+    Writes OUT/NAME for each, batch.json and batch.html. What is complete already is not computed again.
+    """
+    resolve(PIPELINE, config, assignments or ())
+    options = _options(probe, config, assignments or [])
+    found = find_recordings(folder)
+    console = Console(stderr=True)
+    done: list[Ending] = []
+    with disk_errors_named(output):
+        output.mkdir(parents=True, exist_ok=True)
+        works = [Work(n, p.resolve(), (output / n).resolve(), options) for n, p in found.items()]
+        with workers(count, scheduler) as client:
+            for ending in endings(client, works):
+                done.append(ending)
+                console.print(f"{len(done)}/{len(works)}  {ending.name}: {ending.state}", highlight=False)
+                write_summary(done, output)
+    typer.echo(f"Summary: {(output / 'batch.html').resolve()}")
+    if any(e.state != "completed" for e in done):
+        raise typer.Exit(_EXIT_SOME_FAILED)
+
+
+def _options(probe: Path | None, config: Path | None, assignments: list[str]) -> tuple[str, ...]:
+    words = ["--probe", str(probe.resolve())] if probe else []
+    words += ["--config", str(config.resolve())] if config else []
+    return (*words, *(w for a in assignments for w in ("--set", a)))
