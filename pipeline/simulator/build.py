@@ -98,14 +98,18 @@ def _power(peak: float, profile: LineProfile, wall: Wall) -> float:
 def _light(scene: LightScene, stated: Probe, wall: Wall) -> LedRing:
     """Return LEDs under which the mean wall is ``level`` where it is brightest."""
     lighting = stated.lighting
-    ring = LedRing(lighting.leds, lighting.radius_mm, lighting.z_mm, 1.0, scene.lobe, scene.colour_bgr)
+    ring = LedRing(
+        lighting.leds, lighting.radius_mm, lighting.z_mm, 1.0, scene.lobe, scene.even, scene.colour_bgr
+    )
     ahead = np.linspace(1.0, 4.0 * _radius(wall), 400)
     around = 2 * np.pi * (np.arange(ring.leds) + 0.5) / ring.leds
     x = _radius(wall) - ring.radius_mm * np.cos(around)
     y = ring.radius_mm * np.sin(around)
     z = (ahead - ring.z_mm)[:, None]
     d = np.sqrt(x**2 + y**2 + z**2)
-    lit = REFERENCE_MM**2 * np.mean((z / d) ** ring.lobe * np.clip(x, 0, None) / d**3, axis=1)
+    lit = REFERENCE_MM**2 * np.mean(
+        (ring.even + (1 - ring.even) * (z / d) ** ring.lobe) * np.clip(x, 0, None) / d**3, axis=1
+    )
     return replace(ring, level=scene.level / (_albedo(wall) * float(lit.max())))
 
 

@@ -109,8 +109,8 @@ class LedRing:
         Number, circle's radius and plane in C.
     level : float
         Light of the whole ring, full scales, on a white wall that faces it squarely from 50 mm.
-    lobe : float
-        Exponent m of the emission cos^m about the forward direction.
+    lobe, even : float
+        Emission even + (1 − even) cos^m about the forward direction, with exponent m = lobe; none backward.
     colour_bgr : Bgr
     """
 
@@ -119,6 +119,7 @@ class LedRing:
     z_mm: float = -1.0
     level: float = 2.0
     lobe: float = 1.0
+    even: float = 0.0
     colour_bgr: Bgr = (1.0, 1.0, 1.0)
 
 

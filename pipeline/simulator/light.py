@@ -140,8 +140,11 @@ def hashed(x):  # type: ignore[no-untyped-def]
 
 
 @owner
-def add_wall_light(view, leds, lobe, colour, level, ambient, samples, v_from, v_to, image):  # type: ignore[no-untyped-def]
-    """Add what LEDs at ``leds`` (L, 3) in C, and even stray light, make of the wall, to rows of an image."""
+def add_wall_light(view, leds, emission, colour, level, ambient, samples, v_from, v_to, image):  # type: ignore[no-untyped-def]
+    """Add what LEDs at ``leds`` (L, 3) in C, and even stray light, make of the wall, to rows of an image.
+
+    ``emission`` is the exponent of their lobe and the even share: see `LedRing`.
+    """
     work, total = _work(), np.empty(3)
     across = -(-image.shape[1] // _PATCH_PX)
     # in patches, so that neighbours find the wall's samples still at hand
@@ -149,13 +152,13 @@ def add_wall_light(view, leds, lobe, colour, level, ambient, samples, v_from, v_
         v_first, u_first = v_from + patch // across * _PATCH_PX, patch % across * _PATCH_PX
         for v in range(v_first, min(v_first + _PATCH_PX, v_to)):
             for u in range(u_first, min(u_first + _PATCH_PX, image.shape[1])):
-                _pixel_wall_light(view, leds, lobe, level, ambient, samples, u, v, work, total)
+                _pixel_wall_light(view, leds, emission, level, ambient, samples, u, v, work, total)
                 for c in range(3):
                     image[v, u, c] += colour[c] * total[c]
 
 
 @kernel
-def _pixel_wall_light(view, leds, lobe, level, ambient, samples, u, v, work, total):  # type: ignore[no-untyped-def]
+def _pixel_wall_light(view, leds, emission, level, ambient, samples, u, v, work, total):  # type: ignore[no-untyped-def]
     times = view.pose.shape[1]
     total[:] = 0.0
     for n in range(samples * samples):
@@ -163,16 +166,16 @@ def _pixel_wall_light(view, leds, lobe, level, ambient, samples, u, v, work, tot
         x = u + (n % samples + 0.5) / samples - 0.5
         ray_at(view.rays, x, y, work[0])
         for k in range(times):
-            _wall_light(view, leds, lobe, level, ambient, v, k, samples, work, total)
+            _wall_light(view, leds, emission, level, ambient, v, k, samples, work, total)
     for c in range(3):
         total[c] /= samples * samples * times
 
 
 @kernel
-def _wall_light(view, leds, lobe, level, ambient, row, k, samples, work, total):  # type: ignore[no-untyped-def]
+def _wall_light(view, leds, emission, level, ambient, row, k, samples, work, total):  # type: ignore[no-untyped-def]
     c_ray, w_ray, hit, o, R, normal, albedo, way, at = work
     # LEDs face forward and sit about at the viewpoint
-    if not (c_ray[5] > (-0.02 if ambient == 0.0 else -1.0)):
+    if not (c_ray[5] > (-0.05 if ambient == 0.0 else -1.0)):
         return
     to_wall(view, row, k, c_ray, w_ray)
     if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):
@@ -198,7 +201,8 @@ def _wall_light(view, leds, lobe, level, ambient, row, k, samples, work, total):
         way[0], way[1], way[2] = x * size, y * size, z * size
         if hidden and _shaded(view.surface, hit, T, way, 1.0 / size, o, R):
             continue
-        emitted = forward if lobe == 1.0 else forward**lobe
+        lobe = forward if emission[0] == 1.0 else forward ** emission[0]
+        emitted = emission[1] + (1.0 - emission[1]) * lobe
         sheen = _sheen(view.texture, at, way, c_ray)
         light += level / leds.shape[0] * emitted * square * REFERENCE_MM**2 / d2 * sheen
     albedo_at(view.texture, hit[1], hit[2], hit[0] / (view.px_per_rad * samples * max(facing, 0.05)), albedo)

@@ -111,7 +111,9 @@ class Renderer:
 
             in_bands(band, len(light))
         if instrument.sensor.ambient > 0:
-            _add_wall(view, np.zeros((0, 3)), 1.0, np.ones(3), 0.0, instrument.sensor.ambient, 1, light)
+            _add_wall(
+                view, np.zeros((0, 3)), (1.0, 0.0), np.ones(3), 0.0, instrument.sensor.ambient, 1, light
+            )
 
     def lines(self, number: int, view: View, instrument: TrueInstrument) -> tuple[Line, ...]:
         """Return the laser's sheet and, where the wall mirrors, its bounce across the bore."""
@@ -152,14 +154,16 @@ def _add_leds(view: View, light: LedRing, samples: int, image: Float32) -> None:
     around = 2 * np.pi * (np.arange(light.leds) + 0.5) / light.leds
     place = np.stack([light.radius_mm * np.cos(around), light.radius_mm * np.sin(around)], 1)
     leds = np.concatenate([place, np.full((light.leds, 1), light.z_mm)], 1)
-    _add_wall(view, leds, light.lobe, np.array(light.colour_bgr), light.level, 0.0, samples, image)
+    _add_wall(
+        view, leds, (light.lobe, light.even), np.array(light.colour_bgr), light.level, 0.0, samples, image
+    )
 
 
 def _add_wall(
-    view: View, leds: Float, lobe: float, colour: Float, level: float, ambient: float, samples: int,
-    image: Float32,
+    view: View, leds: Float, emission: tuple[float, float], colour: Float, level: float, ambient: float,
+    samples: int, image: Float32,
 ) -> None:  # fmt: skip
     def band(first: int, last: int) -> None:
-        add_wall_light(view, leds, lobe, colour, level, ambient, samples, first, last, image)
+        add_wall_light(view, leds, emission, colour, level, ambient, samples, first, last, image)
 
     in_bands(band, len(image))

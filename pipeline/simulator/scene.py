@@ -36,6 +36,7 @@ class LightScene(Parameters):
 
     level: float = Field(0.6, gt=0, le=50, description="brightest wall on the axis' side over full scale")
     lobe: float = Field(1.0, ge=0, le=20, description="exponent of the emission cos^m")
+    even: float = Field(0.15, ge=0, le=1, description="share emitted evenly over the forward half")
     colour_bgr: Bgr = Field((1.0, 1.0, 1.0), description="share of each channel")
 
 

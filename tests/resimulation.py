@@ -1,0 +1,116 @@
+"""The open recordings of an independent renderer as scenes of the simulator, from their truth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from pipeline.artefacts import PipeAxis, RingSamples
+from pipeline.geometry.axis import frames_at, straight_axis, to_pipe
+from pipeline.geometry.rigid import rotation_from_vector
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import read_probe
+from pipeline.recording import open_recording
+from pipeline.simulator.exact import room_mm
+from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueLaser, TrueSensor
+from pipeline.simulator.motion import Motion, Signal
+from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.scene import Rendering
+from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.wall.base import Wall, WallGrid
+from pipeline.simulator.wall.build import bent_axis
+from pipeline.simulator.wall.description import Bend
+
+Float = NDArray[np.float64]
+
+
+def truth_of_recording(folder: Path) -> SceneTruth:
+    """Return the scene of an open recording, its instrument as stated."""
+    recording = open_recording(folder)
+    told = json.loads((folder / "truth.json").read_text())
+    probe = read_probe(recording.probe_file)
+    wall = wall_of(folder, told)
+    T_pc = np.array(told["camera_pose_in_pipe"])
+    T_pc = np.concatenate([T_pc, np.broadcast_to([[[0, 0, 0, 1]]], (len(T_pc), 1, 4))], 1)
+    light = LedRing(probe.lighting.leds, probe.lighting.radius_mm, probe.lighting.z_mm)
+    laser = TrueLaser(probe.laser, profile=LineProfile(probe.laser.line_sigma_mm))
+    return SceneTruth(
+        name=recording.name, kind=recording.kind, seed=0, stated=probe,
+        instrument=TrueInstrument(TrueCamera(probe.camera), laser, light, TrueSensor()),
+        wall=wall, facts=recording.pipe, motion=motion_through(T_pc, recording.frames.time_s, wall.axis),
+        odometer=None, frames=recording.frames, frame_rate=recording.frame_rate,
+        rendering=Rendering.model_validate({}),
+    )  # fmt: skip
+
+
+def wall_of(folder: Path, told: dict) -> Wall:
+    shape = np.load(folder / "truth_wall.npz")
+    s, radius = shape["distance_mm"], shape["radius_mm"]
+    albedo = cv2.imread(str(folder / "truth_albedo.jpg"), cv2.IMREAD_COLOR).astype(np.float32) / 255
+    first, last = told["albedo_extent"]["distance_mm"]
+    step = (last - first) / len(albedo)
+    curvature, direction = told["pipe"]["bend"]
+    ends = float(s[0]), float(s[-1])
+    axis = straight_axis(*ends)
+    if curvature:
+        bend = Bend(distance_mm=ends[0], length_mm=ends[1] - ends[0] + 1, curvature_per_mm=curvature,
+                    direction_deg=float(np.degrees(direction)))  # fmt: skip
+        axis = bent_axis(ends, (bend,))
+    return Wall(
+        axis, WallGrid(ends[0], float(np.diff(s).mean()), *radius.shape), radius.astype(np.float32),
+        WallGrid(first + step / 2, step, *albedo.shape[:2]), albedo,
+    )  # fmt: skip
+
+
+def motion_through(T_pc: Float, time_s: Float, axis: PipeAxis) -> Motion:
+    """Return the motion that passes through poses (N, 4, 4) at their times."""
+    s, psi, r = to_pipe(axis, T_pc[:, :3, 3])
+    R = np.swapaxes(frames_at(axis, s)[1], -1, -2) @ T_pc[:, :3, :3]
+    forward = R[:, :, 2]
+    across = np.hypot(forward[:, 0], forward[:, 1])
+    angle = np.arctan2(across, forward[:, 2]) / np.maximum(across, 1e-12)
+    pitch, yaw = -forward[:, 1] * angle, forward[:, 0] * angle
+    lean = rotation_from_vector(np.stack([pitch, yaw, 0 * yaw], -1))
+    turn = np.swapaxes(lean, -1, -2) @ R
+    roll = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+    values = (s, r * np.cos(psi), r * np.sin(psi), yaw, pitch, roll)
+    return Motion(*(Signal(time_s, value) for value in values))
+
+
+def fitted_probe(truth: SceneTruth, rings: RingSamples, every: int = 12, columns: int = 48) -> Probe:
+    """Return the instrument that puts exact rings where they were measured, within what is stated."""
+    frames = np.arange(len(rings.frame))[::every]
+    take = np.arange(0, len(rings.azimuth_rad), len(rings.azimuth_rad) // columns)
+    measured = rings.radius_px[np.ix_(frames, take)].astype(float)
+    good = (rings.validity[np.ix_(frames, take)] == 0) & np.isfinite(measured)
+    probe = truth.stated
+    directions = probe.principal_uncertainties()
+
+    outward = np.stack([np.cos(rings.azimuth_rad[take]), np.sin(rings.azimuth_rad[take])], -1)
+
+    def residual(x: Float) -> Float:
+        scene = with_probe(truth, probe.with_parameters(probe.parameters + directions @ x, probe.covariance))
+        off = [off_line(scene, int(rings.frame[f]), rings.centre_px, outward, measured[n])
+               for n, f in enumerate(frames)]  # fmt: skip
+        off = np.where(good & np.isfinite(off), off, 0.0)
+        return np.concatenate([off.ravel() / 0.05, 0.1 * x])
+
+    found = least_squares(residual, np.zeros(directions.shape[1]), loss="soft_l1", x_scale=1.0, max_nfev=6)
+    return probe.with_parameters(probe.parameters + directions @ found.x, probe.covariance)
+
+
+def off_line(truth: SceneTruth, frame: int, centre_px: Float, outward: Float, radius_px: Float) -> Float:
+    """Return by how much measured image radii (A,) lie beyond the exact line, px, to first order."""
+    here, beyond = (room_mm(truth, frame, centre_px + (radius_px + d)[:, None] * outward) for d in (0, 0.5))
+    return np.asarray(0.5 * here / (beyond - here))
+
+
+def with_probe(truth: SceneTruth, probe: Probe) -> SceneTruth:
+    camera, laser = TrueCamera(probe.camera), replace(truth.instrument.laser, sheet=probe.laser)
+    return replace(truth, instrument=replace(truth.instrument, camera=camera, laser=laser))
