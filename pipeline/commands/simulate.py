@@ -28,7 +28,9 @@ def simulate(
     scene: Annotated[Path | None, typer.Argument(help="scene file, such as configs/scenes/*.yaml")] = None,
     effects: Annotated[
         list[str] | None,
-        typer.Option("--with", metavar="NAME=VALUES", help="an effect, such as laser_tilt=0.6@40; repeatable"),
+        typer.Option(
+            "--with", metavar="NAME=VALUES", help="an effect, such as laser_tilt=0.6@40; repeatable"
+        ),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="in place of the scene's; of the draw")] = None,
     truth: Annotated[
@@ -54,7 +56,9 @@ def simulate(
         if scene or effects:
             raise InputError("--draw", "draws scene and effects itself", hint="leave out SCENE and --with")
     else:
-        jobs = iter([_single(scene, effects or (), seed, frames, Places(output, truth or beside(output), seal))])
+        jobs = iter(
+            [_single(scene, effects or (), seed, frames, Places(output, truth or beside(output), seal))]
+        )
     for job in jobs:
         _render(job, console)
 
@@ -73,7 +77,13 @@ def _single(
 
 
 def _drawn(
-    count: int, prior_file: Path, seed: int, folder: Path, truth: Path | None, sealed: bool, frames: int | None
+    count: int,
+    prior_file: Path,
+    seed: int,
+    folder: Path,
+    truth: Path | None,
+    sealed: bool,
+    frames: int | None,
 ) -> Iterator[Job]:
     prior = read_prior(prior_file)
     truths = truth or beside(folder)

@@ -162,7 +162,9 @@ def test_texture_is_as_fine_as_a_frame_shows() -> None:
 
 
 def test_a_bent_axis_is_an_arc_and_starts_along_z() -> None:
-    made = wall(bends=[{"distance_mm": 0.0, "length_mm": 60.0, "curvature_per_mm": 0.01, "direction_deg": 90.0}])
+    made = wall(
+        bends=[{"distance_mm": 0.0, "length_mm": 60.0, "curvature_per_mm": 0.01, "direction_deg": 90.0}]
+    )
     axis = made.axis
     end = int(np.argmin(np.abs(axis.distance_mm - 50)))
     assert axis.origin_p[end] == pytest.approx([0, 100 * (1 - np.cos(0.5)), 100 * np.sin(0.5)], abs=1e-6)
@@ -227,7 +229,10 @@ def test_a_marker_on_a_smaller_bore_keeps_its_size_there() -> None:
         ({"rings": [{"distance_mm": 20.0, "count": 4}, {"distance_mm": 24.0, "count": 4}]}, "overlap"),
         ({"rings": [{"distance_mm": 10.5, "count": 4}]}, "over the step"),
         ({"dictionary": "DICT_9X9", "rings": [{"distance_mm": 20.0, "count": 4}]}, "DICT_9X9"),
-        ({"dictionary": "DICT_4X4_50", "size_mm": 1.0, "rings": [{"distance_mm": 20.0, "count": 60}]}, "only 50"),
+        (
+            {"dictionary": "DICT_4X4_50", "size_mm": 1.0, "rings": [{"distance_mm": 20.0, "count": 60}]},
+            "only 50",
+        ),
     ],
 )
 def test_fiducials_without_room_are_refused(fiducials: dict[str, Any], said: str) -> None:
