@@ -1,4 +1,4 @@
-"""Where the line lies in the image, by finding roots: without image, table of rays or the renderer's kernels."""
+"""Where the line lies in the image, by finding roots: without image or the renderer's kernels."""
 
 from __future__ import annotations
 

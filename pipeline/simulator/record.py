@@ -62,12 +62,12 @@ def write_video(
             rate=Fraction(truth.frame_rate).limit_denominator(1001),
             options={"crf": str(quality), "preset": "fast"} if codec == "h264" else {"slicecrc": "1"},
         )
-        stream.width, stream.height = truth.instrument.camera.model.image_size
-        stream.pix_fmt = {"h264": "yuv444p", "ffv1": "bgr0"}[codec]
+        stream.width, stream.height = truth.instrument.camera.model.image_size  # type: ignore[union-attr]
+        stream.pix_fmt = {"h264": "yuv444p", "ffv1": "bgr0"}[codec]  # type: ignore[union-attr]
         for number, image in enumerate(images):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))  # type: ignore[arg-type, union-attr]
             progress(number + 1, total)
-        container.mux(stream.encode())
+        container.mux(stream.encode())  # type: ignore[union-attr]
 
 
 def _write_tables(truth: SceneTruth, folder: Path, video: str) -> None:

@@ -144,7 +144,7 @@ def _shade(camera: TrueCamera, sensor: TrueSensor) -> Float32 | None:
     width, height = camera.model.image_size
     u = ((np.arange(width) - table.first) / table.step).astype(np.float32)
     v = ((np.arange(height) - table.first) / table.step).astype(np.float32)
-    cosine = cv2.remap(
+    cosine = cv2.remap(  # type: ignore[call-overload]
         table.node[..., 5].astype(np.float32), *map(np.ascontiguousarray, np.meshgrid(u, v)), cv2.INTER_LINEAR
     )
     return shade_of(sensor, np.asarray(np.nan_to_num(cosine, nan=-1.0), np.float32))

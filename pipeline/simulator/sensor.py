@@ -28,7 +28,7 @@ def through_lens(light: Float32, sensor: TrueSensor, shade: Float32 | None) -> F
     if sensor.psf_sigma_px > 0:
         # at 6 σ the cut-off tail is below rounding
         side = 2 * int(np.ceil(6 * sensor.psf_sigma_px)) + 1
-        seen = cv2.GaussianBlur(seen, (side, side), sensor.psf_sigma_px, borderType=cv2.BORDER_REPLICATE)
+        seen = cv2.GaussianBlur(seen, (side, side), sensor.psf_sigma_px, borderType=cv2.BORDER_REPLICATE)  # type: ignore[assignment]
     return np.asarray(seen, np.float32)
 
 

@@ -10,6 +10,7 @@ from pipeline.physics.catalogue import effect
 from stages.diagnose.classes import classes_of, record_next
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.answer import location_of
+from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Location, Value, Verdict
@@ -119,7 +120,8 @@ def _of_travel(travel: TravelEvidence | None) -> list[Claim]:
                 "amplitude_mm": Value(line.amplitude_mm, line.sigma_mm),
                 "frequency_hz": Value(line.frequency_hz, 0.05),
             }
-            words = f"The camera swings across the pipe by {line.amplitude_mm:.3f} mm at {line.frequency_hz:.2f} Hz."
+            size_words = f"{line.amplitude_mm:.3f} mm at {line.frequency_hz:.2f} Hz"
+            words = f"The camera swings across the pipe by {size_words}."
             found = EffectFound("probe_vibration", 0.98, size, words, effect("probe_vibration").law)
             out.append(Claim(found, "motion", line.p_value, (), travel.source))
     return out
@@ -151,7 +153,7 @@ def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Cla
     return out
 
 
-def _location(examined: of_gauge.Examined | None, claims: Sequence[Claim]) -> Location | None:
+def _location(examined: Examined | None, claims: Sequence[Claim]) -> Location | None:
     if examined is not None and examined.best is not None and examined.best.fit.terms:
         return location_of(examined.best)
     if not claims:

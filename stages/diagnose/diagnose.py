@@ -49,7 +49,7 @@ def examine_gauge(
     profile = _profile(recording, rings, probe, context, missing)
     geometry, travel = None, None
     try:
-        run = measure_gauge(recording, rings, probe, GaugeParameters(), context)
+        run = measure_gauge(recording, rings, probe, GaugeParameters.model_validate({}), context)
         geometry = examine(run, _of_geometry(library, profile), probe)
         travel = gauge_travel(recording, run, geometry.searched.found.state)
         missing += travel.shortcomings

@@ -107,7 +107,7 @@ def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = No
     covariance = inverse * np.outer(inflation, inflation)
     statistic = float(amplitude @ np.linalg.solve(covariance, amplitude))
     p_value = float(stats.f.sf(statistic / len(block), len(block), DEGREES))
-    return Score(amplitude, covariance, statistic, p_value, float(right @ amplitude))
+    return Score(amplitude, covariance, statistic, p_value, float(right @ amplitude))  # type: ignore[arg-type]
 
 
 def instrument_places(evidence: Evidence) -> Int:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
+from pipeline.inspection_codes import pof_class
 from pipeline.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
-from pipeline.inspection_codes import pof_class
 from stages.defects.segment import millimetre_mean
 from tests.synthetic_wall import (
     DrawnDefect,

@@ -1,1 +1,1 @@
-"""A gauge run as evidence: poses, rings on known bore, fiducials and encoder against the stated instrument."""
+"""A gauge run as evidence: poses, rings on known bore, fiducials, encoder against the stated instrument."""

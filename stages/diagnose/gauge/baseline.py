@@ -20,7 +20,7 @@ BASELINE_SIZE = 2 * (2 * len(_RING_HARMONICS) - 1) + 4 * (2 * len(_EDGE_HARMONIC
 
 
 def ring_baseline(points: ImagePoints) -> Float:
-    """Return (M, 18) outward shifts in px: harmonics of the azimuth, constant and linear in the polar angle."""
+    """Return (M, 18) outward shifts in px: harmonics of azimuth, constant and linear in polar angle."""
     return _patterns(points, _RING_HARMONICS)
 
 

@@ -1,7 +1,8 @@
-"""Second predictions of the same physics within a gauge run: other bores, other motion, fiducials against rings."""
+"""Second predictions of the same physics in a gauge run: other bores and motion, fiducials against rings."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -94,7 +95,7 @@ def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
     for p in found:
         kind = "bore" if p.where.startswith("bore") else p.where.split()[-1]
         by_kind.setdefault(kind, []).append(p)
-    return [(a, b) for group in by_kind.values() for a, b in zip(group, group[1:], strict=False)]
+    return [(a, b) for group in by_kind.values() for a, b in itertools.pairwise(group)]
 
 
 def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | None:

@@ -66,7 +66,7 @@ class Equations:
 
 @dataclass(frozen=True)
 class MotionPrior:
-    """Rows that tie four neighbouring frames: ``frame`` (S, 4), ``by_pose`` (S, 4, 6), ``residual``, ``weight``."""
+    """Rows that tie four frames: ``frame`` (S, 4), ``by_pose`` (S, 4, 6), ``residual``, ``weight``."""
 
     frame: Int
     by_pose: Float
@@ -128,7 +128,7 @@ def _band(blocks: Float, motion: MotionPrior) -> tuple[Float, Float, float]:
         np.add.at(pull, motion.frame[:, i], motion.by_pose[:, i] * (motion.weight * motion.residual)[:, None])
         for j in range(i + 1):
             part = np.einsum("s,si,sj->sij", motion.weight, motion.by_pose[:, i], motion.by_pose[:, j])
-            np.add.at(full, (motion.frame[:, j], i - j), part)
+            np.add.at(full, (motion.frame[:, j], i - j), part)  # type: ignore[arg-type]
     band = np.zeros((POSE * _REACH, POSE * frames))
     row, column = np.meshgrid(np.arange(POSE), np.arange(POSE), indexing="ij")
     for gap in range(_REACH):
@@ -223,4 +223,4 @@ def _clustered(scores: Float, place: Int) -> Float:
     count = int(place.max(initial=-1)) + 1
     member = csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(count, len(place)))
     summed = member @ scores
-    return np.asarray(np.sum(summed**2, 0) * count / max(count - 1, 1))
+    return np.asarray(np.sum(summed**2, 0) * count / max(count - 1, 1))  # type: ignore[arg-type]

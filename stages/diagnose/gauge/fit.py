@@ -71,7 +71,7 @@ def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int =
         prior, pull, _ = _prior(found.state, found.terms, run)
         information = found.reduced.information + prior
         step = np.linalg.solve(information, found.reduced.right - pull)
-        better = _shortened(run, found, step)
+        better = _shortened(run, found, step)  # type: ignore[arg-type]
         if better is None:
             return found
         gain, found = found.cost - better.cost, better
@@ -128,14 +128,16 @@ def _reduced(
     known = np.array([k for k, name in enumerate(names) if name is not None])
     pick = np.ix_(known, known)
     return Evidence(
-        tuple(name for name in names if name is not None), information[pick], (right + information @ value)[known],
+        tuple(name for name in names if name is not None),
+        information[pick],
+        (right + information @ value)[known],
         (information * np.outer(inflation, inflation))[pick], misfit,
         float(len(np.unique(equations.cell[equations.weight > 0]))),
     )  # fmt: skip
 
 
 def _own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
-    """Return which globals are the run's own: offset, delay, bores, fiducials, and the baseline at the end."""
+    """Return which globals are the run's own: offset, delay, bores, fiducials, the baseline at the end."""
     at = found.state.layout
     prior, pull, value = _prior(found.state, found.terms, run)
     wide = [np.zeros(size) for _ in range(3)]

@@ -1,4 +1,4 @@
-"""Rival explanations of a gauge run compared on regimes held out: another bore, another part of the motion."""
+"""Rivals compared on held-out regimes: another bore, another part of the motion."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def judged_of(
 
 
 def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
-    """Return (K,) 1 σ of amplitudes beforehand; infinite for the instrument, whose prior is the stated one."""
+    """Return (K,) 1 σ of amplitudes beforehand; infinite for the instrument, which has its own."""
     plausible = {(t.model.name, a.name): a.plausible for t in terms for a in t.model.amplitudes}
     return np.array(
         [

@@ -24,8 +24,14 @@ _CAUCHY = 2.5
 # Jerk is not the same all along a run: what is learned as typical must not hold poses where it is larger.
 _LOOSER = 5.0
 # The camera is let free while outliers are told from effects.
-_FREE = GaugeParameters(
-    camera_prior_scale=50.0, tilt_prior_deg=3.0, baseline_prior_mm=3.0, cone_prior_deg=3.0, ring_bins=120
+_FREE = GaugeParameters.model_validate(
+    {
+        "camera_prior_scale": 50.0,
+        "tilt_prior_deg": 3.0,
+        "baseline_prior_mm": 3.0,
+        "cone_prior_deg": 3.0,
+        "ring_bins": 120,
+    }
 )
 
 
@@ -38,7 +44,8 @@ def prepare(measured_run: MeasuredRun) -> tuple[GaugeRun, Unknowns]:
     smooth = adjust(loose, replace(measured, rings=rings, smooth_sigma=sigma), _FREE).state
     rings = source.on_bore(smooth.T_pc, smooth.probe, _FREE)
     run = GaugeRun(
-        measured.edges, rings, bin_widths(source.rings, source.index, rings), measured.time_s, measured.encoder,
+        measured.edges, rings, bin_widths(source.rings, source.index, rings),
+        measured.time_s, measured.encoder,
         max(measured.bore_sigma_mm, 1e-3), _LOOSER * sigma,
         measured.edges.sigma_px**-2, np.ones(len(rings.frame)),
     )  # fmt: skip
@@ -72,7 +79,7 @@ def _freed(state: Unknowns) -> Unknowns:
 
 def _ring_sigma_mm(rings: BoreRings, state: Unknowns) -> Float:
     by_pixel = state.probe.triangulate_jacobian(rings.uv)[0]
-    return rings.sigma_px * np.linalg.norm(np.einsum("mij,mj->mi", by_pixel, rings.outward), axis=1)
+    return rings.sigma_px * np.linalg.norm(np.einsum("mij,mj->mi", by_pixel, rings.outward), axis=1)  # type: ignore[no-any-return]
 
 
 def _weight(frame: NDArray[np.int64], residual: Float, sigma: Float) -> Float:

@@ -89,7 +89,7 @@ def linearise(
     run: GaugeRun, state: Unknowns, terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
     with_baseline: bool = False,
 ) -> Linearised:  # fmt: skip
-    """Return the equations with columns for the state's globals, the terms, the effects asked about, the baseline."""
+    """Return the equations with columns for globals, terms, the effects asked about, and the baseline."""
     edges, edge_at = _without_edge_shift(run, state, terms)
     rings, ring_at = _without_ring_shift(run, state, terms)
     parts = [_edge_part(run, state, edges, edge_at, terms, asked)]
@@ -155,7 +155,7 @@ def _ring_part(
 ) -> Equations:  # fmt: skip
     made = ring_equations(state, rings)
     mm_per_px = ring_mm_per_px(points)
-    shift = [_term_slope(t, lambda a, t=t: ring_shift_px(t.model, points, t.shape, a)) for t in terms]
+    shift = [_term_slope(t, lambda a, t=t: ring_shift_px(t.model, points, t.shape, a)) for t in terms]  # type: ignore[misc]
     shift += [columns(model, points, shape) for model, shape in asked]
     return _with_effects(made.rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster, RING)
 
@@ -170,7 +170,8 @@ def _edge_part(
         return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
 
     shift = [
-        _term_slope(t, lambda a, t=t: across(texture_shift_px(t.model, points, t.shape, a))) for t in terms
+        _term_slope(t, lambda a, t=t: across(texture_shift_px(t.model, points, t.shape, a)))  # type: ignore[misc]
+        for t in terms
     ]
     shift += [across(texture_columns(model, points, shape)) for model, shape in asked]
     # Cells of fiducials count on where those of wall end.
@@ -219,7 +220,7 @@ def _encoder_part(
     by_pose[:, 2] = 1
     by_border = np.zeros((count, state.border_size))
     by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
-    shift = [_term_slope(t, lambda a, t=t: t.model.reading_shift_mm(travel, t.shape, a)) for t in terms]
+    shift = [_term_slope(t, lambda a, t=t: t.model.reading_shift_mm(travel, t.shape, a)) for t in terms]  # type: ignore[misc]
     shift += [reading_columns(model, travel, shape) for model, shape in asked]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
     cell = -10_000_000 - np.arange(count) // _ENCODER_CELL

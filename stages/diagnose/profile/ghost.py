@@ -163,7 +163,7 @@ def _best(
     clear = _CLEAR_WIDTHS * float(np.median(width_px)) if len(width_px) else 0.0
 
     def rated(parameters: Float) -> Float:
-        return np.asarray(_rate(found.score, found.information, design, parameters, clear))
+        return np.asarray(_rate(found.score, found.information, design, parameters, block, clear))
 
     rating = rated(grid)
     if not len(grid) or not np.isfinite(rating).any() or rating.max() <= 0:
@@ -185,13 +185,17 @@ def _around(best: Float, steps: Float) -> Float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _rate(score, information, design, parameters, clear):  # type: ignore[no-untyped-def]
-    """Σ score / √(Σ information) of parameters (K, P); −1 where hardly any ghost is clear of the line."""
+def _rate(score, information, design, parameters, block, clear):  # type: ignore[no-untyped-def]
+    """Σ score / √(Σ information) of parameters (K, P) without the block that speaks most for them.
+
+    One block beside an edge of the bore must not decide. −1 where hardly any ghost is clear of the line.
+    """
     cells, distances = score.shape
     out = np.empty(len(parameters))
     middle = (distances - 1) / 2
+    blocks = block.max() + 1
     for k in range(len(parameters)):
-        s = i = 0.0
+        s, i = np.zeros(blocks), np.zeros(blocks)
         apart = 0
         for n in range(cells):
             d = 0.0
@@ -204,9 +208,11 @@ def _rate(score, information, design, parameters, clear):  # type: ignore[no-unt
             if low < 0 or low >= distances - 1:
                 continue
             f = at - low
-            s += (1 - f) * score[n, low] + f * score[n, low + 1]
-            i += (1 - f) * information[n, low] + f * information[n, low + 1]
-        out[k] = s / np.sqrt(i) if i > 0 and apart > 0.2 * cells else -1.0
+            s[block[n]] += (1 - f) * score[n, low] + f * score[n, low + 1]
+            i[block[n]] += (1 - f) * information[n, low] + f * information[n, low + 1]
+        most = np.argmax(s)
+        left = np.sum(i) - i[most]
+        out[k] = (np.sum(s) - s[most]) / np.sqrt(left) if left > 0 and apart > 0.2 * cells else -1.0
     return out
 
 

@@ -17,7 +17,7 @@ def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> Tra
     """Return what motion and encoder of a gauge run say.
 
     Only frames with fiducials count: these place the camera to a few µm, so that the encoder, loosely
-    weighted in the adjustment, has no say there. The scale of the way is that of the fiducials' stated places.
+    weighted in the adjustment, has no say there. The scale is that of the fiducials' stated places.
 
     Parameters
     ----------
