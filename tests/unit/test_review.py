@@ -1,0 +1,88 @@
+"""The review: what is decided is kept, undone and refused as it should be; strangers are turned away."""
+
+import numpy as np
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.review.assessment import b31g, strength
+from pipeline.review.decisions import actions as do
+from pipeline.review.decisions.ledger import Ledger, StaleError
+from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, replay
+from pipeline.review.measuring.outline import OutlineGauge
+from pipeline.review.measuring.tools import readings
+from pipeline.review.measuring.wall import MeasuredWall
+
+SQUARE = ((48.0, 0.1), (52.0, 0.1), (52.0, 0.2), (48.0, 0.2))
+SIZE = Measured(48, 52, 3, 4, 4, 5, 1.0, 0.1)
+
+
+class SameSize:
+    def measure(self, outline):
+        return SIZE
+
+
+@pytest.fixture
+def ledger(tmp_path):
+    made = Ledger(tmp_path / "review" / "decisions.sqlite")
+    made.prepare()
+    made.keep_basis("b", "[]")
+    return made
+
+
+def found(number):
+    return Finding(str(number), "pit", SQUARE, SIZE, original=number)
+
+
+def after(ledger):
+    return {f.id: f for f in replay([found(1), found(2)], ledger.entries(), SameSize())}
+
+
+def test_actions_are_kept_and_undone_in_order(ledger):
+    for k, action in enumerate([do.Accept(finding="1"), do.Merge(findings=("1", "2")), do.Undo()]):
+        ledger.append(action, "ann", "b", k)
+    assert after(ledger)["1"].status == "accepted"
+    assert after(ledger)["2"].status == "open"
+    ledger.append(do.Redo(), "ann", "b", 3)
+    assert after(ledger)["1"].status == "gone"
+    assert "m2" in after(ledger)
+    assert len(counting(ledger.entries())[0]) == 2
+
+
+def test_an_author_who_has_not_seen_the_last_action_is_refused(ledger):
+    ledger.append(do.Accept(finding="1"), "ann", "b", 0)
+    with pytest.raises(StaleError, match="1 changes"):
+        ledger.append(do.Reject(finding="1"), "bo", "b", 0)
+    assert after(ledger)["1"].decided_by == "ann"
+
+
+def test_what_is_gone_cannot_be_decided(ledger):
+    ledger.append(do.Merge(findings=("1", "2")), "ann", "b", 0)
+    ledger.append(do.Accept(finding="1"), "ann", "b", 1)
+    with pytest.raises(ImpossibleError, match="not there any more"):
+        after(ledger)
+
+
+def test_a_file_that_is_no_ledger_is_refused(tmp_path):
+    file = tmp_path / "decisions.sqlite"
+    file.write_text("not a database, " * 20)
+    with pytest.raises(InputError, match="cannot be used as a ledger"):
+        Ledger(file).prepare()
+
+
+def test_a_pit_of_known_depth_is_measured_against_the_wall_around_it():
+    s, psi = np.arange(0, 100, 0.5), -np.pi + 2 * np.pi / 720 * np.arange(720)
+    radius = np.full((len(s), len(psi)), 50.0)
+    radius[(s > 45)[:, None] & (s < 55)[:, None] & (np.abs(psi - 0.15) < 0.1)[None]] += 1.0
+    wall = MeasuredWall(s, psi, radius, np.full_like(radius, 0.03), np.full_like(radius, 0.02))
+    inside = ((44.0, 0.03), (56.0, 0.03), (56.0, 0.27), (44.0, 0.27))
+    assert OutlineGauge(wall).measure(inside).depth_mm == pytest.approx(1.0, abs=0.01)
+    diameter = readings(wall, "diameter", ((20.0, 1.0),))[0]
+    assert (diameter.value, diameter.sigma) == pytest.approx((100.0, 0.06))
+
+
+def test_strength_falls_from_sound_pipe_to_the_barlow_pressure_of_what_is_left():
+    assert b31g(0.0, 5.0) == 1.0
+    assert b31g(0.5, 1e9) == 0.5
+    assert strength(-1, 0.1, 10, 100, 6, 240) is None
+    shallow, deep = (strength(d, 0.1, 50, 100, 6, 240) for d in (1.0, 3.0))
+    assert shallow.b31g_mpa > deep.b31g_mpa > 0
