@@ -10,7 +10,7 @@ from pipeline.artefacts import RingSamples, RingValidity
 from pipeline.review.page import Table
 from pipeline.review.summary import ReportedNumber, RunSummary
 
-_REASONS = {
+REASONS = {
     RingValidity.VALID: "used",
     RingValidity.NO_LINE: "no laser line there",
     RingValidity.LOW_CONTRAST: "line too faint",
@@ -58,7 +58,7 @@ def _samples(rings: RingSamples | None) -> Table | None:
         return None
     counts = np.bincount(rings.validity.ravel(), minlength=len(RingValidity))
     total = rings.validity.size
-    rows = [(_REASONS[v], f"{counts[v]:,}", f"{100 * counts[v] / total:.2f} %") for v in RingValidity]
+    rows = [(REASONS[v], f"{counts[v]:,}", f"{100 * counts[v] / total:.2f} %") for v in RingValidity]
     rows = [r for r in rows if r[1] != "0"]
     return Table(
         "Ring samples", ("what became of it", "samples", "share"), (*rows, ("all", f"{total:,}", ""))

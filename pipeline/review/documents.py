@@ -47,6 +47,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),
         "diagnosis": _diagnosis(files),
+        "version": str(files.version),
     }
 
 
@@ -64,6 +65,7 @@ def state_document(state: State, files: RunFiles) -> dict[str, Any]:
         "sha256": state.sha256,
         "signed": state.signed,
         "signature": asdict(state.signature) if state.signature else None,
+        "run_version": str(files.version),
     })  # fmt: skip
 
 

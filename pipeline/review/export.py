@@ -17,6 +17,7 @@ from pipeline.review import documents
 from pipeline.review.flat_tiles import PHOTO, TILE_PX, FlatPicture, overlay_picture, photo_picture
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.papers.catalogue import PAPERS, paper_of
+from pipeline.review.quality import quality_document
 from pipeline.review.review import Review, State
 
 _SECTIONS = 400
@@ -66,6 +67,7 @@ def _data(review: Review, state: State, folder: Path) -> dict[str, Any]:
     return {
         "run": documents.run_document(review.files),
         "state": documents.state_document(state, review.files),
+        "quality": quality_document(review.files, review.wall()),
         "sections": [documents.section_document(review.wall(), overlays, s) for s in _stations(overlays)],
         "layers": {name: _tiles(name, picture, folder) for name, picture in pictures.items()},
         "model": _model(review),

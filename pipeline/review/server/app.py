@@ -24,6 +24,7 @@ from pipeline.review.flat_tiles import PHOTO, FlatPicture, overlay_picture, phot
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.measuring.tools import readings
 from pipeline.review.papers.catalogue import paper_of
+from pipeline.review.quality import quality_document
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.review import Review
 
@@ -50,6 +51,7 @@ class ReviewApp:
             Route("/api/measure", self._answering(self._measure), methods=["POST"]),
             Route("/api/section", self._answering(self._section)),
             Route("/api/profile", self._answering(self._profile)),
+            Route("/api/quality", self._answering(self._quality)),
             Route("/api/sights", self._answering(self._sights)),
             Route("/api/frames/{frame:int}.jpg", self._answering(self._frame)),
             Route("/api/tiles/{layer:str}", self._answering(self._layer)),
@@ -110,6 +112,9 @@ class ReviewApp:
     def _profile(self, request: Request, _: bytes) -> Response:
         at = _number(request, "distance"), _number(request, "azimuth"), _number(request, "half")
         return JSONResponse(documents.profile_document(self.review.wall(), *at))
+
+    def _quality(self, _: Request, __: bytes) -> Response:
+        return JSONResponse(quality_document(self.review.files, self.review.wall()))
 
     def _sights(self, request: Request, _: bytes) -> Response:
         found = finder_of(self.review.files).sights(_number(request, "distance"), _number(request, "azimuth"))

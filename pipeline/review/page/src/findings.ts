@@ -2,7 +2,9 @@
 import { chart } from "./chart";
 import { bySeverity, type Session } from "./session";
 import type { Finding } from "./types";
-import { clockOfHours, element, measured, number } from "./words";
+import { clockOfHours, depth, element, measured, moment, number } from "./words";
+
+const REASONS = ["reflection", "loose deposit", "shadow or stain, no relief", "part of the pipe (joint, branch, fitting)", "below the reporting limit"];
 
 export class FindingsPanel {
   readonly root = element("div", { class: "findings" });
@@ -13,6 +15,7 @@ export class FindingsPanel {
   constructor(private readonly session: Session) {
     this.root.append(this.progress, this.list, this.detail);
     session.on(["state", "selection"], () => this.paint());
+    session.on(["reject"], () => this.askReason());
     this.paint();
   }
 
@@ -32,16 +35,31 @@ export class FindingsPanel {
     const order = this.order;
     const open = order.filter((f) => f.status === "open").length;
     this.progress.textContent = !order.length ? "Nothing was found on this wall."
-      : open ? `${order.length - open} of ${order.length} decided, ${open} to go.` : `All ${order.length} decided.`;
+      : open ? `${order.length - open} of ${order.length} decided, ${open} to go.` : `All ${order.length} decided. Next: Sign-off.`;
+    const held = this.list.contains(document.activeElement);
     this.list.replaceChildren(...order.map((f) => this.row(f)));
-    this.describe();
+    if (held) this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus();
+    if (!this.isWriting) this.describe();
+  }
+
+  /** Whether a remark or a reason is being written, which news from elsewhere must not wipe out. */
+  private get isWriting(): boolean {
+    const at = document.activeElement;
+    return at instanceof HTMLInputElement && at.type === "text" && at.value !== "" && this.detail.contains(at)
+      && this.detail.dataset["finding"] === this.session.selected;
+  }
+
+  tick(id: string): void {
+    const { marked } = this.session;
+    if (!marked.delete(id)) marked.add(id);
+    this.paint();
   }
 
   private row(finding: Finding): HTMLElement {
     const { session } = this;
     const mark = element("input", {
-      type: "checkbox", checked: session.marked.has(finding.id), "aria-label": `mark ${finding.id} for merging`,
-      change: () => { session.marked.has(finding.id) ? session.marked.delete(finding.id) : session.marked.add(finding.id); this.describe(); },
+      type: "checkbox", checked: session.marked.has(finding.id), title: "tick two or more to merge them", "aria-label": `mark ${finding.id} for merging`,
+      change: () => this.tick(finding.id),
     });
     const size = finding.size;
     const face = element("button", {
@@ -49,13 +67,14 @@ export class FindingsPanel {
     },
       element("span", { class: `dot ${finding.status}` , title: finding.status }),
       element("strong", {}, `${finding.id} ${finding.kind}`),
-      element("span", {}, measured(size.depth_mm, size.depth_sigma_mm)),
-      element("span", { class: "quiet" }, `${number(size.distance_from_mm, 0)} mm, ${clockOfHours(size.clock_from)}`));
+      element("span", {}, finding.status),
+      element("span", { class: "quiet" }, `${depth(size.depth_mm, size.depth_sigma_mm)}; ${number(size.distance_from_mm, 0)} mm, ${clockOfHours(size.clock_from)}`));
     return element("li", {}, session.source.readOnly ? null : mark, face);
   }
 
   private describe(): void {
     const finding = this.session.finding;
+    this.detail.dataset["finding"] = finding?.id ?? "";
     if (!finding) {
       this.detail.replaceChildren(element("p", { class: "quiet" }, "Choose a finding, or press N for the next."));
       return;
@@ -75,7 +94,7 @@ export class FindingsPanel {
   private table(finding: Finding): HTMLElement {
     const s = finding.size;
     const rows: [string, string][] = [
-      ["depth into the wall", measured(s.depth_mm, s.depth_sigma_mm)],
+      ["depth", depth(s.depth_mm, s.depth_sigma_mm)],
       ["along × around", `${number(s.length_mm, 1)} × ${number(s.width_mm, 1)} mm`],
       ["distance", `${number(s.distance_from_mm, 1)} to ${number(s.distance_to_mm, 1)} mm`],
       ["clock", `${clockOfHours(s.clock_from)} to ${clockOfHours(s.clock_to)}`],
@@ -85,7 +104,7 @@ export class FindingsPanel {
       rows.push(["fails at, B31G", measured(finding.strength.b31g_mpa, finding.strength.b31g_sigma_mpa, "MPa")]);
       rows.push(["fails at, modified B31G", measured(finding.strength.modified_mpa, finding.strength.modified_sigma_mpa, "MPa")]);
     }
-    if (finding.decided_by) rows.push(["decided", `${finding.decided_by}, ${finding.decided_at.slice(0, 16).replace("T", " ")} UTC`]);
+    if (finding.decided_by) rows.push(["decided", `${finding.decided_by}, ${moment(finding.decided_at)}`]);
     if (finding.reason) rows.push(["reason", finding.reason]);
     if (finding.made_of.length) rows.push(["made of", finding.made_of.join(", ")]);
     return element("table", {}, ...rows.map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, v))));
@@ -99,27 +118,52 @@ export class FindingsPanel {
     }, ...session.run.kinds.map((k) => element("option", { value: k, selected: k === finding.kind }, k)));
     const marked = [...session.marked];
     return element("div", { class: "buttons" },
-      element("button", { class: "accept", click: () => act({ do: "accept" }), title: "A" }, "Accept"),
-      element("button", { class: "reject", click: () => this.reject(finding), title: "R" }, "Reject"),
+      finding.status !== "accepted" ? element("button", { class: "accept", click: () => act({ do: "accept" }), title: "key A" }, "Accept") : null,
+      finding.status !== "rejected" ? element("button", { class: "reject", click: () => this.askReason(), title: "key R" }, "Reject…") : null,
       finding.status !== "open" ? element("button", { click: () => act({ do: "reopen" }) }, "Reopen") : null,
       element("label", {}, "kind ", kind),
       element("button", { click: () => session.take("redraw") }, "Redraw"),
       element("button", { click: () => session.take("split") }, "Split"),
-      marked.length > 1 ? element("button", { click: () => void session.act({ do: "merge", findings: marked }) }, `Merge ${marked.join(" + ")}`) : null);
+      marked.length > 1 ? element("button", { title: "key M", click: () => void this.merge() }, `Merge ${marked.join(" + ")}`) : null);
   }
 
-  reject(finding: Finding): void {
-    const reason = window.prompt(`Why is ${finding.id} no defect?`, "");
-    if (reason !== null) void this.session.act({ do: "reject", finding: finding.id, reason });
+  /** Merge the ticked findings and go to what they have become. */
+  async merge(): Promise<void> {
+    const { session } = this;
+    if (session.marked.size < 2) { session.say("Tick two or more findings to merge them."); return; }
+    if (await session.act({ do: "merge", findings: [...session.marked] })) session.select(`m${session.state.revision}`);
+  }
+
+  /** Ask in place why the chosen finding is no defect. */
+  private askReason(): void {
+    const finding = this.session.finding;
+    if (!finding || this.detail.querySelector(".reason")) return;
+    const text = element("input", { type: "text", maxlength: "4000", id: "reason", list: "reasons", autocomplete: "off" });
+    const usual = element("datalist", { id: "reasons" }, ...REASONS.map((value) => element("option", { value })));
+    const leave = () => { form.remove(); this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus(); };
+    const form = element("form", {
+      class: "reason", submit: (e) => {
+        e.preventDefault();
+        form.remove();
+        void this.session.act({ do: "reject", finding: finding.id, reason: text.value.trim() });
+      },
+      keydown: (e) => { if ((e as KeyboardEvent).key === "Escape") leave(); },
+    }, element("label", { for: "reason" }, `Why is ${finding.id} no defect?`), text, usual,
+      element("button", { class: "accept" }, "Reject"), element("button", { type: "button", click: leave }, "Cancel"));
+    this.detail.querySelector(".buttons")?.after(form);
+    text.focus();
   }
 
   private remarks(finding: Finding): HTMLElement {
-    const said = finding.remarks.map((r) => element("p", { class: "remark" }, `${r.who}: ${r.text}`));
+    const said = finding.remarks.map((r) => element("p", { class: "remark" }, `${r.who}, ${moment(r.at)}: ${r.text}`));
     if (this.session.source.readOnly) return element("div", {}, ...said);
     const text = element("input", { type: "text", maxlength: "4000", "aria-label": "comment", placeholder: "Comment" });
     const form = element("form", { class: "comment", submit: (e) => {
       e.preventDefault();
-      if (text.value.trim()) void this.session.act({ do: "comment", finding: finding.id, text: text.value.trim() });
+      const said = text.value.trim();
+      if (!said) return;
+      text.blur();
+      void this.session.act({ do: "comment", finding: finding.id, text: said }).then((done) => { if (!done) text.value = said; });
     } }, text, element("button", {}, "Add"));
     return element("div", {}, ...said, form);
   }

@@ -1,11 +1,14 @@
 /** The unrolled wall: distance to the right, clock downward from 6 over 12 to 6, tiles loaded as they are seen. */
 import type { Session } from "./session";
-import type { Layer, Point } from "./types";
+import type { Finding, Layer, Point } from "./types";
 import { TURN, clock, element, wrapped } from "./words";
 
 const TILE = 512;
 const TOP = -1.5 * Math.PI; // 6 o'clock
 const MOST_TILES = 160;
+// Outlines lie on pictures of any colour, in light and dark alike: bright on a black casing.
+const [CASING, OUTLINE, CHOSEN] = ["#000000", "#ffffff", "#ffc400"];
+const MARKS: Record<string, string> = { open: "?", accepted: "✓", rejected: "✕" };
 
 interface View { distance: number; azimuth: number; mmPerPx: number }
 
@@ -13,10 +16,11 @@ export class FlatView {
   readonly root: HTMLElement;
   private readonly canvas = element("canvas", {
     tabindex: "0", role: "img",
-    "aria-label": "Unrolled wall. Arrow keys move the spot, plus and minus zoom.",
+    "aria-label": "Unrolled wall. Arrow keys move the spot, plus and minus zoom; with a tool, Enter sets a point, Backspace takes it back.",
   });
   private readonly tiles = new Map<string, HTMLImageElement>();
   private layer: Layer | null = null;
+  private shown = ""; // the layer whose levels are known
   private view: View;
   private drag: { x: number; y: number; view: View; moved: boolean } | null = null;
 
@@ -51,10 +55,15 @@ export class FlatView {
 
   private async load(): Promise<void> {
     const name = this.session.layer;
-    const layer = await this.session.source.layer(name);
-    if (name !== this.session.layer) return;
-    this.layer = layer;
-    this.paint();
+    try {
+      const layer = await this.session.source.layer(name);
+      if (name !== this.session.layer) return;
+      this.layer = layer;
+      this.shown = name;
+      this.paint();
+    } catch (error) {
+      this.session.say(error instanceof Error ? error.message : String(error));
+    }
   }
 
   private resize(): void {
@@ -98,9 +107,9 @@ export class FlatView {
     context.fillRect(0, 0, width, height);
     for (const turn of [-TURN, 0, TURN]) this.paintTiles(context, turn);
     this.paintGrid(context, style);
-    for (const turn of [-TURN, 0, TURN]) this.paintFindings(context, turn, style);
-    this.paintCursor(context, style);
-    this.paintShape(context, style);
+    for (const turn of [-TURN, 0, TURN]) this.paintFindings(context, turn);
+    this.paintCursor(context);
+    this.paintShape(context);
   }
 
   private paintTiles(context: CanvasRenderingContext2D, turn: number): void {
@@ -127,7 +136,7 @@ export class FlatView {
   }
 
   private tile(level: number, column: number, row: number): HTMLImageElement | null {
-    const address = this.session.source.tile(this.session.layer, level, column, row);
+    const address = this.session.source.tile(this.shown, level, column, row);
     const known = this.tiles.get(address);
     if (known) {
       this.tiles.delete(address);
@@ -168,25 +177,42 @@ export class FlatView {
     context.fillText(text, x, y);
   }
 
-  private paintFindings(context: CanvasRenderingContext2D, turn: number, style: CSSStyleDeclaration): void {
+  private paintFindings(context: CanvasRenderingContext2D, turn: number): void {
     for (const finding of this.session.standing) {
       const chosen = finding.id === this.session.selected;
       context.setLineDash(finding.status === "rejected" ? [4, 4] : []);
       this.trace(context, finding.outline.map(([s, a]) => [s, a + turn] as Point), true);
-      context.lineWidth = chosen ? 5 : 4;
-      context.strokeStyle = style.getPropertyValue("--halo");
-      context.stroke();
-      context.lineWidth = chosen ? 3 : 1.8;
-      context.strokeStyle = style.getPropertyValue(chosen ? "--chosen" : `--${finding.status}`);
-      context.stroke();
+      this.cased(context, chosen ? CHOSEN : OUTLINE, chosen ? 2.6 : 1.8);
+      context.setLineDash([]);
+      this.name(context, finding, turn, chosen);
     }
-    context.setLineDash([]);
   }
 
-  private paintCursor(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
+  /** Number and decision at the outline's upper right corner. */
+  private name(context: CanvasRenderingContext2D, finding: Finding, turn: number, chosen: boolean): void {
+    const x = this.x(Math.max(...finding.outline.map((p) => p[0]))) + 4;
+    const y = this.y(Math.min(...finding.outline.map((p) => p[1])) + turn);
+    context.font = "bold 12px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.lineWidth = 4;
+    context.strokeStyle = CASING;
+    context.fillStyle = chosen ? CHOSEN : OUTLINE;
+    const text = `${finding.id} ${MARKS[finding.status] ?? ""}`;
+    context.strokeText(text, x, y);
+    context.fillText(text, x, y);
+  }
+
+  private cased(context: CanvasRenderingContext2D, colour: string, width: number): void {
+    context.lineWidth = width + 2.4;
+    context.strokeStyle = CASING;
+    context.stroke();
+    context.lineWidth = width;
+    context.strokeStyle = colour;
+    context.stroke();
+  }
+
+  private paintCursor(context: CanvasRenderingContext2D): void {
     const [s, a] = this.session.cursor;
-    context.lineWidth = 1;
-    context.strokeStyle = style.getPropertyValue("--chosen");
     const x = Math.round(this.x(s)) + 0.5;
     context.beginPath();
     context.moveTo(x, 0);
@@ -196,18 +222,20 @@ export class FlatView {
       context.moveTo(x - 14, y);
       context.lineTo(x + 14, y);
     }
-    context.stroke();
+    this.cased(context, CHOSEN, 1);
   }
 
-  private paintShape(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
+  private paintShape(context: CanvasRenderingContext2D): void {
     const { drawn: points, tool } = this.session;
     if (!points.length) return;
     this.trace(context, points, !["distance", "point", "diameter"].includes(tool));
-    context.lineWidth = 2;
-    context.strokeStyle = style.getPropertyValue("--chosen");
-    context.stroke();
-    context.fillStyle = style.getPropertyValue("--chosen");
-    for (const [s, a] of points) context.fillRect(this.x(s) - 3, this.y(a) - 3, 6, 6);
+    this.cased(context, CHOSEN, 2);
+    for (const [s, a] of points) {
+      context.fillStyle = CASING;
+      context.fillRect(this.x(s) - 4, this.y(a) - 4, 8, 8);
+      context.fillStyle = CHOSEN;
+      context.fillRect(this.x(s) - 3, this.y(a) - 3, 6, 6);
+    }
   }
 
   private trace(context: CanvasRenderingContext2D, points: Point[], closed: boolean): void {
@@ -241,14 +269,19 @@ export class FlatView {
   private pick(at: Point): void {
     const { session } = this;
     if (session.tool !== "none") {
-      session.drawn = [...session.drawn, at];
-      session.tell("shape");
+      session.draw(at);
       return;
     }
     const found = session.standing.find((f) => [-TURN, 0, TURN].some((t) => inside([at[0], at[1] + t], f.outline)));
     if (found) session.selected = found.id;
     session.moveTo(at);
     if (found) session.tell("selection");
+  }
+
+  /** The azimuth, whole turns added, that lies next to the last drawn point. */
+  private beside(azimuth: number): number {
+    const last = this.session.drawn[this.session.drawn.length - 1];
+    return last ? last[1] + wrapped(azimuth - last[1]) : azimuth;
   }
 
   private wheel(event: WheelEvent): void {
@@ -281,8 +314,9 @@ export class FlatView {
       this.paint();
     } else if (event.key === "+" || event.key === "=") this.zoom(0.7);
     else if (event.key === "-") this.zoom(1.4);
-    else if (event.key === "Enter" && this.session.tool !== "none") {
-      this.session.drawn = [...this.session.drawn, [s, wrapped(a)]];
+    else if (event.key === "Enter" && this.session.tool !== "none") this.session.draw([s, this.beside(a)]);
+    else if (event.key === "Backspace" && this.session.drawn.length) {
+      this.session.drawn = this.session.drawn.slice(0, -1);
       this.session.tell("shape");
     } else return;
     event.preventDefault();

@@ -2,6 +2,7 @@
 import { FindingsPanel } from "./findings";
 import { FlatView } from "./flat";
 import { FrameView } from "./frame";
+import { keys, keysDialog } from "./keys";
 import { ModelView } from "./model";
 import { qualityPage } from "./quality";
 import { SectionView } from "./section";
@@ -22,35 +23,60 @@ async function start(): Promise<void> {
   document.title = `${run.name} · boresight review`;
   const tools = new ToolBar(session);
   const flat = new FlatView(session), model = new ModelView(session);
-  const findings = new FindingsPanel(session);
+  const findings = new FindingsPanel(session), frame = new FrameView(session), section = new SectionView(session);
   const inspect = element("main", { class: "inspect", id: "inspect" },
-    pane("Model", "view-model", model.root), pane("Unrolled wall", "view-flat", tools.root, flat.root, tools.status),
-    pane("Recorded frame", "view-frame", new FrameView(session).root), pane("Cross-section", "view-section", new SectionView(session).root),
-    pane("Findings", "view-findings", findings.root));
-  const pages: Record<string, HTMLElement> = { Inspect: inspect, Quality: qualityPage(session), "Sign-off": signPage(session) };
-  document.body.replaceChildren(header(session, pages), ...Object.values(pages));
-  open(pages, "Inspect");
-  keys(session, findings, tools);
-  if (!source.readOnly) window.setInterval(() => { if (!document.hidden) void session.refresh().catch((e: Error) => session.say(e.message)); }, REFRESH_MS);
+    pane("Model", "view-model", model.bar(), model.root),
+    pane("Unrolled wall", "view-flat", tools.bar(), tools.root, flat.root, tools.status),
+    pane("Recorded frame", "view-frame", frame.bar(), frame.root), pane("Cross-section", "view-section", section.bar(), section.root),
+    pane("Findings", "view-findings", null, findings.root));
+  const pages: Record<string, HTMLElement> = {
+    Inspect: inspect, Quality: qualityPage(session), "Sign-off": signPage(session),
+  };
+  const help = keysDialog();
+  document.body.replaceChildren(header(session, pages, help), notice(session), ...Object.values(pages), help);
+  const open = opener(pages);
+  open("Inspect");
+  keys(session, { findings, tools, help, open, pages: Object.keys(pages) });
+  if (!source.readOnly) window.setInterval(() => { if (!document.hidden) void session.refresh().catch((e: Error) => session.lose(e)); }, REFRESH_MS);
   window.boresight = { session, model };
   if (findings.order.length) session.select(findings.order[0]!.id);
 }
 
-function pane(title: string, id: string, ...content: HTMLElement[]): HTMLElement {
-  return element("section", { class: "pane", id, "aria-label": title }, element("h2", {}, title), ...content);
+function pane(title: string, id: string, bar: HTMLElement | null, ...content: HTMLElement[]): HTMLElement {
+  return element("section", { class: "pane", id, "aria-label": title },
+    element("div", { class: "head" }, element("h2", {}, title), bar), ...content);
 }
 
-function header(session: Session, pages: Record<string, HTMLElement>): HTMLElement {
-  const tabs = element("nav", {}, ...Object.keys(pages).map((name) =>
-    element("button", { class: "tab", "data-page": name, click: () => open(pages, name) }, name)));
-  const undo = element("button", { click: () => void session.act({ do: "undo" }), title: "Ctrl+Z" }, "Undo");
+/** What must be seen on every page: a refused action, a lost server, a run computed anew. */
+function notice(session: Session): HTMLElement {
+  const text = element("span", { role: "alert" });
+  const load = element("button", { hidden: true, click: () => window.location.reload() }, "Load the new results");
+  const root = element("div", { class: "notice", hidden: true }, text, load,
+    element("button", { click: () => { load.hidden = true; session.say(""); } }, "Close"));
+  session.on(["message"], () => { text.textContent = session.message; root.hidden = !session.message && load.hidden; });
+  session.on(["recomputed"], () => {
+    if (!load.hidden) return;
+    load.hidden = false;
+    session.say("The run has been computed again. Findings and decisions are those of the new results; pictures and model still those of the old.");
+  });
+  return root;
+}
+
+function header(session: Session, pages: Record<string, HTMLElement>, help: HTMLDialogElement): HTMLElement {
+  const open = opener(pages);
+  const tabs = element("nav", { "aria-label": "pages" }, ...Object.keys(pages).map((name) =>
+    element("button", { class: "tab", "data-page": name, click: () => open(name) }, name)));
+  const undo = element("button", { click: () => void session.act({ do: "undo" }) }, "Undo");
   const redo = element("button", { click: () => void session.act({ do: "redo" }), title: "Ctrl+Shift+Z" }, "Redo");
   const badge = element("span", { class: "badge" });
-  const who = element("input", { type: "text", value: session.who, placeholder: "Your name", "aria-label": "your name", maxlength: "200" });
+  const who = element("input", { type: "text", value: session.who, placeholder: "your name", id: "who", maxlength: "200", autocomplete: "name" });
   who.addEventListener("change", () => { session.who = who.value.trim(); session.say(""); });
+  session.on(["nameless"], () => who.focus());
   const paint = () => {
     undo.disabled = !session.state.may_undo;
     redo.disabled = !session.state.may_redo;
+    const last = session.state.history[session.state.history.length - 1];
+    undo.title = `${last ? `${last.action.do} ${String(last.action["finding"] ?? "")} by ${last.who}; ` : ""}Ctrl+Z`;
     badge.textContent = session.state.signed ? "signed" : session.state.signature ? "changed since signed" : "not signed";
     badge.className = `badge ${session.state.signed ? "signed" : "unsigned"}`;
   };
@@ -58,36 +84,16 @@ function header(session: Session, pages: Record<string, HTMLElement>): HTMLEleme
   paint();
   return element("header", {}, element("h1", {}, element("span", { class: "brand" }, "boresight"), ` ${session.run.name}`), tabs,
     element("span", { class: "space" }), badge,
-    ...(session.source.readOnly ? [element("span", { class: "quiet" }, "read-only copy")] : [undo, redo, who]));
+    ...(session.source.readOnly ? [element("span", { class: "quiet" }, "read-only copy")]
+      : [undo, redo, element("label", { for: "who" }, "Inspector ", who)]),
+    element("button", { click: () => help.showModal(), title: "?" }, "Keys"));
 }
 
-function open(pages: Record<string, HTMLElement>, name: string): void {
-  for (const [key, page] of Object.entries(pages)) page.hidden = key !== name;
-  for (const tab of document.querySelectorAll<HTMLElement>("[data-page]")) tab.setAttribute("aria-current", String(tab.dataset["page"] === name));
-}
-
-function keys(session: Session, findings: FindingsPanel, tools: ToolBar): void {
-  document.addEventListener("keydown", (event) => {
-    const target = event.target as HTMLElement;
-    const typing = ["INPUT", "TEXTAREA", "SELECT"].includes(target.tagName);
-    const flying = target.closest(".model") !== null;
-    if (event.key === "Escape") { tools.leave(); return; }
-    if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z" && !typing) {
-      event.preventDefault();
-      void session.act({ do: event.shiftKey ? "redo" : "undo" });
-      return;
-    }
-    if (typing || flying || event.ctrlKey || event.metaKey || event.altKey) return;
-    const chosen = session.finding;
-    const acts: Record<string, () => void> = {
-      n: () => findings.next(1), p: () => findings.next(-1),
-      a: () => { if (chosen) void session.act({ do: "accept", finding: chosen.id }); },
-      r: () => { if (chosen) findings.reject(chosen); },
-    };
-    const act = acts[event.key];
-    if (act && !session.source.readOnly) act();
-    else if (act && "np".includes(event.key)) act();
-  });
+function opener(pages: Record<string, HTMLElement>): (name: string) => void {
+  return (name) => {
+    for (const [key, page] of Object.entries(pages)) page.hidden = key !== name;
+    for (const tab of document.querySelectorAll<HTMLElement>("[data-page]")) tab.setAttribute("aria-current", String(tab.dataset["page"] === name));
+  };
 }
 
 start().catch((error: Error) => {

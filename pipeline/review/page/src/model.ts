@@ -20,15 +20,19 @@ export class ModelView {
     tabindex: "0", role: "img", "aria-label": "Model of the pipe. Inside: W and S fly along it, A and D turn the view.",
   });
   private readonly told = element("p", { class: "veil" }, "Loading the model…");
-  private readonly gain = element("input", { type: "range", min: "1", max: "20", value: "1", "aria-label": "exaggeration of depth" });
+  private readonly gain = element("input", { type: "range", min: "1", max: "20", value: "1", id: "gain" });
+  private readonly gained = element("output", { for: "gain" }, "1×");
   private readonly cut = element("input", { type: "checkbox", id: "cut" });
-  private readonly inside = element("input", { type: "checkbox", id: "inside", checked: true });
+  private readonly within = element("button", { "aria-pressed": "true", click: () => this.enter(true) }, "Inside");
+  private readonly without = element("button", { "aria-pressed": "false", click: () => this.enter(false) }, "Outside");
+  private readonly hint = element("p", { class: "hint" });
+  private isInside = true;
   private readonly pipe: Pipe;
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(80, 1, 1e-3, 1000);
   private readonly lamp = new THREE.PointLight(0xffffff, 0.012, 0, 2);
   private readonly marker = new THREE.Mesh(
-    new THREE.TorusGeometry(1, 0.14, 8, 32), new THREE.MeshBasicMaterial({ color: 0xffb000, depthTest: false }));
+    new THREE.TorusGeometry(1, 0.14, 8, 32), new THREE.MeshBasicMaterial({ color: 0xff8c00, depthTest: false, transparent: true }));
   private readonly plane = new THREE.Plane(new THREE.Vector3(1, 0, 0), 0);
   private renderer: THREE.WebGLRenderer | null = null;
   private controls: OrbitControls | null = null;
@@ -41,21 +45,32 @@ export class ModelView {
   constructor(private readonly session: Session) {
     this.pipe = new Pipe(session.run.axis);
     this.flown = session.run.distance_mm[0];
-    this.root.append(this.bar(), element("div", { class: "stage" }, this.canvas, this.told));
+    this.root.append(element("div", { class: "stage" }, this.canvas, this.told), this.hint);
+    this.marker.renderOrder = 1; // drawn after the wall, or the wall would cover it
+    this.explain();
     session.on(["layer"], () => this.dress());
     session.on(["cursor"], () => this.follow());
     void this.start();
   }
 
-  private bar(): HTMLElement {
-    const whole = element("button", { click: () => { this.inside.checked = false; this.stand(); } }, "Whole pipe");
-    this.gain.addEventListener("input", () => this.exaggerate());
+  /** What stands beside the pane's title. */
+  bar(): HTMLElement {
+    this.gain.addEventListener("input", () => { this.gained.textContent = `${this.gain.value}×`; this.exaggerate(); });
     this.cut.addEventListener("change", () => this.draw());
-    this.inside.addEventListener("change", () => this.stand());
     return element("div", { class: "bar" },
-      element("label", { for: "inside" }, this.inside, " inside"), whole,
-      element("label", { for: "cut" }, this.cut, " cut open"),
-      element("label", {}, "depth × ", this.gain));
+      element("span", { class: "joined", role: "group", "aria-label": "where the model is seen from" }, this.within, this.without),
+      element("label", { for: "cut", title: "take away the half toward the viewer" }, this.cut, " cut open"),
+      element("label", { for: "gain", title: "exaggerate how far the wall leaves the round pipe" }, "relief ", this.gain, " ", this.gained));
+  }
+
+  private enter(inside: boolean): void { this.isInside = inside; this.stand(); this.explain(); }
+
+  private explain(): void {
+    this.within.setAttribute("aria-pressed", String(this.isInside));
+    this.without.setAttribute("aria-pressed", String(!this.isInside));
+    this.cut.disabled = this.isInside;
+    this.hint.textContent = this.isInside ? "Wheel or W S flies, drag or A D looks around, a click moves the spot (orange ring)."
+      : "Drag turns, wheel zooms, right drag shifts, a click moves the spot (orange ring).";
   }
 
   private async start(): Promise<void> {
@@ -73,7 +88,7 @@ export class ModelView {
     this.canvas.addEventListener("pointerdown", (e) => { this.pressed = { x: e.clientX, y: e.clientY }; });
     this.canvas.addEventListener("pointermove", (e) => this.turn(e));
     this.canvas.addEventListener("pointerup", (e) => this.pick(e));
-    this.canvas.addEventListener("wheel", (e) => { if (this.inside.checked) { e.preventDefault(); this.fly(-e.deltaY / 20); } }, { passive: false });
+    this.canvas.addEventListener("wheel", (e) => { if (this.isInside) { e.preventDefault(); this.fly(-e.deltaY / 20); } }, { passive: false });
     this.canvas.addEventListener("keydown", (e) => this.key(e));
     new ResizeObserver(() => this.resize()).observe(this.root);
     try {
@@ -144,9 +159,9 @@ export class ModelView {
 
   private stand(): void {
     if (!this.controls) return;
-    this.controls.enabled = !this.inside.checked;
+    this.controls.enabled = !this.isInside;
     const [from, to] = this.session.run.distance_mm;
-    if (this.inside.checked) {
+    if (this.isInside) {
       this.fly(0);
       return;
     }
@@ -173,7 +188,7 @@ export class ModelView {
 
   private follow(): void {
     const [distance, azimuth] = this.session.cursor;
-    if (this.inside.checked && this.controls) {
+    if (this.isInside && this.controls) {
       this.flown = distance - this.session.run.radius_mm * 1.1;
       this.look = { yaw: 0, pitch: 0 };
       this.fly(0);
@@ -193,7 +208,7 @@ export class ModelView {
     };
     const act = keys[event.key];
     if (!act) return;
-    if (!this.inside.checked) { this.inside.checked = true; this.stand(); }
+    if (!this.isInside) this.enter(true);
     act();
     event.preventDefault();
   }
@@ -204,7 +219,7 @@ export class ModelView {
   }
 
   private turn(event: PointerEvent): void {
-    if (!this.inside.checked || event.buttons !== 1) return;
+    if (!this.isInside || event.buttons !== 1) return;
     this.glance(event.movementX * 0.004, -event.movementY * 0.004);
   }
 
@@ -218,14 +233,16 @@ export class ModelView {
     const caster = new THREE.Raycaster();
     caster.setFromCamera(at, this.camera);
     const hit = caster.intersectObjects(this.parts.map((p) => p.mesh), false)
-      .find((h) => !this.cut.checked || this.plane.distanceToPoint(h.point) >= 0);
+      .find((h) => !this.isCut || this.plane.distanceToPoint(h.point) >= 0);
     if (!hit) return;
     const { distance, azimuth } = this.pipe.coordinates(fromModel(hit.point));
     const stay = this.flown;
     this.session.moveTo([distance, azimuth]);
     this.flown = stay; // a click looks, it does not travel
-    if (this.inside.checked) this.fly(0);
+    if (this.isInside) this.fly(0);
   }
+
+  private get isCut(): boolean { return this.cut.checked && !this.isInside; }
 
   private resize(): void {
     const stage = this.canvas.parentElement!;
@@ -249,7 +266,7 @@ export class ModelView {
       const across = new THREE.Vector3(this.camera.position.x, this.camera.position.y, 0);
       if (across.lengthSq() < 1e-12) across.set(1, 0, 0);
       this.plane.normal.copy(across.normalize().negate());
-      const planes = this.cut.checked ? [this.plane] : [];
+      const planes = this.isCut ? [this.plane] : [];
       for (const part of this.parts) (part.mesh.material as THREE.Material).clippingPlanes = planes;
       this.renderer!.render(this.scene, this.camera);
     });

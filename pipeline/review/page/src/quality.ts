@@ -1,21 +1,43 @@
 /** How good the run is: coverage, what was not used and why, uncertainty, drift, the diagnosis. */
+import { plot } from "./plot";
 import type { Session } from "./session";
-import { element } from "./words";
+import type { Quality, Quantity } from "./types";
+import { element, number } from "./words";
 
 export function qualityPage(session: Session): HTMLElement {
   const { run } = session;
-  const shown = (v: number | string | null) => (v === null ? "–" : typeof v === "number" ? String(Math.round(v * 1e4) / 1e4) : v);
-  const rows = (numbers: { name: string; value: number | string | null; unit: string }[]) => numbers.map((n) =>
-    element("tr", {}, element("th", { scope: "row" }, n.name), element("td", {}, `${shown(n.value)} ${n.unit}`.trim())));
+  const measured = element("div", {}, element("p", { class: "quiet" }, "Loading…"));
+  const pictures = element("div", { class: "pictures" });
+  session.source.quality().then((quality) => {
+    measured.replaceChildren(...sections(quality));
+    pictures.replaceChildren(...quality.pictures.map((p) =>
+      element("figure", {}, element("img", { src: p.source, alt: p.title }), element("figcaption", {}, p.title))));
+  }).catch((error: Error) => measured.replaceChildren(element("p", { class: "unsigned" }, error.message)));
   const stages = run.numbers.filter((s) => s.numbers.length).map((s) =>
     element("section", {}, element("h3", {}, s.stage), element("table", {}, ...rows(s.numbers))));
   return element("div", { class: "page" },
-    element("section", {}, element("h2", {}, "The run in figures"), element("table", {}, ...rows(run.metrics))),
+    element("section", {}, element("h2", {}, "The run in figures"), element("table", { class: "wide" }, ...rows(run.metrics))),
+    measured,
     element("section", {}, element("h2", {}, "Left-out physics"), element("p", {}, run.diagnosis
       ? `${run.diagnosis.verdict}: ${run.diagnosis.statement}`
-      : "Not asked for. boresight diagnose compares this recording with what the stated probe predicts.")),
+      : "Not asked for. boresight diagnose compares this recording with what the stated probe predicts; lay its diagnosis.json and diagnosis.html into the run folder."), pictures),
     run.warnings.length ? element("section", {}, element("h2", {}, "Noticed while reading"), element("ul", {}, ...run.warnings.map((w) => element("li", {}, w)))) : null,
-    element("h2", {}, "What every stage reports"), element("div", { class: "columns" }, ...stages),
+    element("details", {}, element("summary", {}, "What every stage reports"), element("div", { class: "columns" }, ...stages)),
     element("section", {}, element("h2", {}, "Made from"), element("table", {},
       ...Object.entries(run.inputs).map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, `SHA-256 ${v}`))))));
+}
+
+function rows(numbers: Quantity[]): HTMLElement[] {
+  const shown = (v: number | string | null) => (v === null ? "–" : typeof v === "number" ? String(Number(v.toPrecision(5))) : v);
+  return numbers.map((n) => element("tr", {}, element("th", { scope: "row" }, n.name), element("td", {}, `${shown(n.value)} ${n.unit}`.trim())));
+}
+
+function sections({ plots, samples, facts }: Quality): HTMLElement[] {
+  return [
+    element("section", {}, element("h2", {}, "Along the pipe"), element("div", { class: "plots" }, ...plots.map(plot))),
+    element("section", {}, element("h2", {}, "Ring samples: used, and not used by reason"), element("table", {},
+      ...samples.map((s) => element("tr", {}, element("th", { scope: "row" }, s.reason),
+        element("td", {}, String(s.count)), element("td", {}, `${number(s.share_percent, 2)} %`))))),
+    element("section", {}, element("h2", {}, "Instrument"), element("table", {}, ...rows(facts))),
+  ];
 }

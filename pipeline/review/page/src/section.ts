@@ -16,19 +16,34 @@ export class SectionView {
   private current: Section | null = null;
 
   constructor(private readonly session: Session) {
-    this.root.append(element("div", { class: "bar" }, element("label", {}, "deviation ", this.gain)), this.picture, this.told);
+    this.root.append(this.picture, this.told);
     this.gain.addEventListener("change", () => this.paint());
     session.on(["cursor"], () => void this.load());
     this.picture.addEventListener("click", (e) => this.pick(e as MouseEvent));
     void this.load();
   }
 
+  /** What stands beside the pane's title. */
+  bar(): HTMLElement {
+    const key = (name: string, shown: string) => {
+      const line = drawn("svg", { viewBox: "0 0 26 8", class: "key", "aria-hidden": "true" });
+      line.append(drawn("line", { x1: 0, x2: 26, y1: 4, y2: 4, class: name }));
+      return element("span", { class: "quiet" }, line, ` ${shown}`);
+    };
+    return element("div", { class: "bar" }, element("label", { title: "deviations are drawn this much larger" }, "deviation ", this.gain),
+      key("nominal", "nominal"), key("fitted", "fitted"), key("measured", "measured"));
+  }
+
   private async load(): Promise<void> {
     const turn = ++this.wanted;
-    const section = await this.session.source.section(this.session.cursor[0]);
-    if (turn !== this.wanted) return;
-    this.current = section;
-    this.paint();
+    try {
+      const section = await this.session.source.section(this.session.cursor[0]);
+      if (turn !== this.wanted) return;
+      this.current = section;
+      this.paint();
+    } catch (error) {
+      this.told.textContent = error instanceof Error ? error.message : String(error);
+    }
   }
 
   private paint(): void {
@@ -58,8 +73,8 @@ export class SectionView {
     const k = (Math.round(((azimuth - section.azimuth_rad[0]!) / (2 * Math.PI)) * n) + n) % n;
     const seen = section.radius_mm.filter((r): r is number => r !== null);
     const mean = seen.length ? (2 * seen.reduce((sum, r) => sum + r, 0)) / seen.length : null;
-    return `${section.distance_mm.toFixed(1)} mm, ${clock(azimuth)}: radius ${measured(section.radius_mm[k] ?? null, section.sigma_mm[k] ?? null)}`
-      + `; mean diameter ${mean === null ? "not seen" : mean.toFixed(2) + " mm"}, nominal ${(2 * section.nominal_mm).toFixed(1)} mm`;
+    return `Radius at ${clock(azimuth)}: ${measured(section.radius_mm[k] ?? null, section.sigma_mm[k] ?? null)}. Mean diameter `
+      + `${mean === null ? "not seen" : mean.toFixed(2) + " mm"} (nominal ${(2 * section.nominal_mm).toFixed(1)}).`;
   }
 
   private pick(event: MouseEvent): void {

@@ -3,7 +3,7 @@ import { RefusedError, type Source } from "./source";
 import type { Finding, Point, ReviewState, Run, Tool } from "./types";
 import { wrapped } from "./words";
 
-export type Topic = "state" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape";
+export type Topic = "state" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "recomputed";
 
 export class Session {
   selected: string | null = null;
@@ -13,6 +13,7 @@ export class Session {
   tool: Tool = "none";
   drawn: Point[] = [];
   message = "";
+  private isLost = false;
   private readonly listeners = new Map<Topic, (() => void)[]>();
 
   constructor(readonly source: Source, readonly run: Run, public state: ReviewState) {
@@ -50,10 +51,19 @@ export class Session {
 
   take(tool: Tool): void { this.tool = tool; this.drawn = []; this.tell("tool"); this.tell("shape"); }
 
+  draw(at: Point): void { this.drawn = [...this.drawn, at]; this.tell("shape"); }
+
+  /** Ask for the reason why the chosen finding is no defect. */
+  askToReject(): void { if (this.finding) this.tell("reject"); }
+
   say(message: string): void { this.message = message; this.tell("message"); }
 
   async act(action: object): Promise<boolean> {
-    if (!this.who) { this.say("Give your name first, at the top right."); return false; }
+    if (!this.who) {
+      this.say("Give your name first: it is kept with every decision.");
+      this.tell("nameless");
+      return false;
+    }
     return this.change(() => this.source.act(action, this.who, this.state.revision));
   }
 
@@ -63,8 +73,13 @@ export class Session {
 
   async refresh(): Promise<void> {
     const state = await this.source.state();
+    if (this.isLost) { this.isLost = false; this.say(""); }
+    if (state.run_version !== this.run.version) this.tell("recomputed");
     if (state.revision !== this.state.revision || state.sha256 !== this.state.sha256) this.put(state);
   }
+
+  /** The server cannot be asked, or the run cannot be read just now: told until it can. */
+  lose(error: Error): void { this.isLost = true; this.say(error.message); }
 
   private async change(work: () => Promise<ReviewState>): Promise<boolean> {
     try {
@@ -92,7 +107,7 @@ export function middle(outline: Point[]): Point {
   return [sum[0] / outline.length, sum[1] / outline.length];
 }
 
-/** Worst first: metal loss and cracks before the rest, then by depth in σ-free size. */
+/** Worst first: cracks, metal loss, dents, deposits, welds, and in each the deepest. */
 export function bySeverity(findings: Finding[]): Finding[] {
   const rank: Record<string, number> = { crack: 0, pit: 1, corrosion: 1, gouge: 1, dent: 2, deposit: 3, weld: 4 };
   return [...findings].sort((a, b) =>

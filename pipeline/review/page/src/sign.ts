@@ -1,6 +1,6 @@
 /** Sign-off: what is assumed, who signs by which standard, history, and the papers. */
 import type { Session } from "./session";
-import { element } from "./words";
+import { element, moment } from "./words";
 
 const PAPERS: [string, string][] = [
   ["report.pdf", "Report, PDF"], ["report.html", "Report, HTML"], ["findings.csv", "Findings, CSV"],
@@ -9,28 +9,31 @@ const PAPERS: [string, string][] = [
 
 export function signPage(session: Session): HTMLElement {
   const root = element("div", { class: "page" });
-  const paint = () => root.replaceChildren(...parts(session));
+  const form = session.source.readOnly ? null : signature(session);
+  const assumed = session.source.readOnly ? null : assumptions(session);
+  const paint = () => root.replaceChildren(...parts(session, form, assumed));
   session.on(["state"], paint);
   paint();
   return root;
 }
 
-function parts(session: Session): HTMLElement[] {
+// The forms are kept, so that what is being written in them outlives news from elsewhere.
+function parts(session: Session, signing: HTMLElement | null, assumed: HTMLElement | null): HTMLElement[] {
   const { state } = session;
   const open = session.standing.filter((f) => f.status === "open").length;
   const last = state.signature;
   const standing = !last ? "Not signed." : state.signed
-    ? `Signed by ${last.name} on ${last.at.slice(0, 16).replace("T", " ")} UTC${last.standard ? `, ${last.standard}` : ""}.`
-    : `Changed since ${last.name} signed on ${last.at.slice(0, 16).replace("T", " ")} UTC: unsigned.`;
+    ? `Signed by ${last.name} on ${moment(last.at)}${last.standard ? `, ${last.standard}` : ""}.`
+    : `Changed since ${last.name} signed on ${moment(last.at)}: unsigned.`;
   const made = [
     element("section", {}, element("h2", {}, "Signature"),
       element("p", { class: state.signed ? "signed" : "unsigned" }, standing),
       last?.remarks ? element("p", {}, `Remarks: ${last.remarks}`) : null,
       element("p", { class: "quiet" }, `Inputs and decisions: SHA-256 ${state.sha256}`),
       open ? element("p", {}, `${open} findings are not decided yet; a signature covers them as undecided.`) : null,
-      session.source.readOnly ? null : form(session)),
+      signing),
   ];
-  if (!session.source.readOnly) made.push(assumptions(session));
+  if (assumed) made.push(assumed);
   const folder = session.source.readOnly ? "" : "/api/papers/";
   made.push(element("section", {}, element("h2", {}, "Papers"), element("ul", { class: "papers" },
     ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: folder + file, target: "_blank", rel: "noopener" }, name))))));
@@ -38,7 +41,7 @@ function parts(session: Session): HTMLElement[] {
   if (lost.length) made.push(element("section", {}, element("h2", {}, "Decisions without their finding"),
     element("p", {}, "The run was computed again and no longer shows what these were taken on."), element("ul", {}, ...lost)));
   made.push(element("section", {}, element("h2", {}, "History"), element("ol", { class: "history" },
-    ...state.history.map((e) => element("li", {}, `${e.at.slice(0, 16).replace("T", " ")} ${e.who}: ${told(e.action)}`)))));
+    ...state.history.map((e) => element("li", {}, `${moment(e.at)} ${e.who}: ${told(e.action)}`)))));
   return made;
 }
 
@@ -48,11 +51,12 @@ function told(action: Record<string, unknown> & { do: string }): string {
   return [action.do, about, more].filter((t) => t !== "").map(String).join(" ");
 }
 
-function form(session: Session): HTMLElement {
+function signature(session: Session): HTMLElement {
   const name = element("input", { type: "text", required: true, maxlength: "200", value: session.who, id: "sign-name" });
   const standard = element("input", { type: "text", maxlength: "200", id: "sign-standard", placeholder: "such as POF 100, EN 13508-2" });
   const remarks = element("textarea", { maxlength: "4000", rows: "3", id: "sign-remarks" });
   return element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.sign(name.value.trim(), standard.value.trim(), remarks.value.trim()); } },
+    element("p", { class: "quiet wide" }, "A signature binds the run's files and every decision as they are now. Any later change shows as unsigned."),
     element("label", { for: "sign-name" }, "Name"), name,
     element("label", { for: "sign-standard" }, "Standard applied"), standard,
     element("label", { for: "sign-remarks" }, "Remarks"), remarks,
@@ -65,6 +69,7 @@ function assumptions(session: Session): HTMLElement {
   const strength = element("input", { type: "number", min: "1", max: "5000", step: "any", id: "yield", value: String(assumed.yield_mpa ?? "") });
   const value = (input: HTMLInputElement) => (input.value ? Number(input.value) : null);
   return element("section", {}, element("h2", {}, "Taken for known"),
+    element("p", { class: "quiet" }, "Wall thickness gives wall loss and POF class; with the yield strength also the failure pressure by B31G."),
     element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "assume", wall_thickness_mm: value(wall), yield_mpa: value(strength) }); } },
       element("label", { for: "wall" }, "Wall thickness, mm"), wall,
       element("label", { for: "yield" }, "Yield strength, MPa"), strength,

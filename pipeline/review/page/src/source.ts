@@ -1,5 +1,5 @@
 /** Where the page gets its data: the local server, or the files of a read-only export. */
-import type { Layer, Point, Profile, Reading, ReviewState, Run, Section, Sight, Tool } from "./types";
+import type { Layer, Point, Profile, Quality, Reading, ReviewState, Run, Section, Sight, Tool } from "./types";
 
 export class RefusedError extends Error {
   constructor(message: string, readonly stale: boolean) { super(message); }
@@ -19,6 +19,7 @@ export interface Source {
   tile(layer: string, level: number, column: number, row: number): string;
   frame(frame: number): string;
   model(): Promise<ArrayBuffer>;
+  quality(): Promise<Quality>;
 }
 
 async function answer<T>(response: Response): Promise<T> {
@@ -64,11 +65,12 @@ export class Server implements Source {
     if (!response.ok) throw new RefusedError("The run has no model.", false);
     return response.arrayBuffer();
   };
+  quality = () => get<Quality>("/api/quality");
 }
 
 /** Data that an export puts beside the page, as a script, because a page from a file may not fetch. */
 export interface Exported {
-  run: Run; state: ReviewState; sections: Section[]; layers: Record<string, Layer>; model: string;
+  run: Run; state: ReviewState; quality: Quality; sections: Section[]; layers: Record<string, Layer>; model: string;
   spots: { distance_mm: number; azimuth_rad: number; sights: Sight[]; profile: Profile }[];
 }
 
@@ -95,5 +97,6 @@ export class Export implements Source {
   layer = async (name: string) => this.data.layers[name]!;
   tile = (layer: string, level: number, column: number, row: number) => `tiles/${layer}/${level}/${column}/${row}.png`;
   frame = (frame: number) => `frames/${frame}.jpg`;
+  quality = async () => this.data.quality;
   model = async () => Uint8Array.from(atob(this.data.model), (c) => c.charCodeAt(0)).buffer;
 }

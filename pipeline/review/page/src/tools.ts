@@ -7,10 +7,16 @@ const TOOLS: [Tool, string, number][] = [
   ["point", "Point", 1], ["distance", "Distance", 2], ["area", "Area", 3], ["depth", "Depth", 3], ["diameter", "Diameter", 1],
 ];
 const HELP: Partial<Record<Tool, string>> = {
-  redraw: "Click around the defect, then Done (Enter adds the spot, Esc leaves).",
-  add: "Click around the defect that was missed, then Done.",
-  split: "Click around the first part, Next part, then around the second, then Done.",
+  point: "Point: click the wall for radius, distance and clock.",
+  distance: "Distance: click two points.",
+  area: "Area: click three or more corners.",
+  depth: "Depth against the wall around: click three or more corners around it.",
+  diameter: "Diameter: click a point; it is measured through the axis.",
+  redraw: "New outline: click around the defect, then Done.",
+  add: "Missed defect: click around it, choose its kind, then Done.",
+  split: "Click around the first part, Next part, around the second, then Done.",
 };
+const KEYS_HINT = " Keyboard: arrows, Enter sets a point, Backspace takes it back, Esc leaves.";
 
 export class ToolBar {
   readonly root = element("div", { class: "tools" });
@@ -18,21 +24,27 @@ export class ToolBar {
   private readonly layers = element("select", { "aria-label": "what the wall shows" });
   private readonly legend = element("div", { class: "legend" });
   private readonly buttons = element("div", { class: "bar" });
+  private readonly kind = element("select", { "aria-label": "kind of the missed defect" });
   private parts: [number, number][][] = [];
 
   constructor(private readonly session: Session) {
     const titles: [string, string][] = [["photo", "Photo"], ...session.run.overlays.map((o) => [o.name, o.title] as [string, string])];
     this.layers.append(...titles.map(([name, title]) => element("option", { value: name }, title)));
     this.layers.addEventListener("change", () => session.show(this.layers.value));
-    this.root.append(this.layers, this.legend, this.buttons);
+    this.kind.append(element("option", { value: "" }, "kind…"), ...session.run.kinds.map((k) => element("option", { value: k }, k)));
+    this.root.append(this.buttons);
     session.on(["layer"], () => this.explain());
     session.on(["tool", "selection"], () => this.offer());
     session.on(["shape"], () => void this.drawn());
     session.on(["cursor"], () => this.place());
-    session.on(["message"], () => { if (session.message) this.status.textContent = session.message; else this.place(); });
     this.explain();
     this.offer();
     this.place();
+  }
+
+  /** What stands beside the pane's title: what both views of the wall show, and its colours. */
+  bar(): HTMLElement {
+    return element("div", { class: "bar" }, element("label", {}, "shows ", this.layers), this.legend);
   }
 
   private explain(): void {
@@ -44,26 +56,29 @@ export class ToolBar {
       step.style.background = colour;
       return step;
     }));
-    this.legend.replaceChildren(`${number(overlay.low_mm, 3)} `, bar, ` ${number(overlay.high_mm, 3)} mm`);
+    const ends = overlay.low_mm < 0 ? ["inward", "deep"] : ["", ""];
+    this.legend.replaceChildren(`${number(overlay.low_mm, 2)} ${ends[0]}`, bar, `${number(overlay.high_mm, 2)} ${ends[1]} mm; grey: not seen`);
   }
 
   private offer(): void {
     const { session } = this;
     const drawing = ["redraw", "add", "split"].includes(session.tool);
+    if (!drawing) this.parts = [];
     const toggles = session.source.readOnly ? [] : TOOLS.map(([tool, name]) => element("button", {
       "aria-pressed": String(session.tool === tool), click: () => session.take(session.tool === tool ? "none" : tool),
     }, name));
     const add = session.source.readOnly ? null : element("button", { "aria-pressed": String(session.tool === "add"), click: () => session.take("add") }, "Add defect");
-    this.buttons.replaceChildren(...toggles, add ?? "",
-      drawing ? element("button", { class: "accept", click: () => void this.finish() }, "Done") : "",
+    this.buttons.replaceChildren(toggles.length ? "Measure " : "", ...toggles, add ?? "",
+      session.tool === "add" ? this.kind : "", drawing ? element("button", { class: "accept", click: () => void this.finish() }, "Done") : "",
       session.tool === "split" ? element("button", { click: () => this.nextPart() }, "Next part") : "",
       session.tool !== "none" ? element("button", { click: () => this.leave() }, "Leave") : "");
-    if (drawing) this.status.textContent = HELP[session.tool] ?? "";
+    if (session.tool === "none") this.place();
+    else this.status.textContent = (HELP[session.tool] ?? "") + KEYS_HINT;
   }
 
-  leave(): void { this.parts = []; this.session.take("none"); this.place(); }
+  leave(): void { this.parts = []; this.kind.value = ""; this.session.take("none"); }
 
-  private nextPart(): void {
+  nextPart(): void {
     if (this.session.drawn.length < 3) { this.session.say("A part needs three points."); return; }
     this.parts.push(this.session.drawn);
     this.session.drawn = [];
@@ -74,8 +89,9 @@ export class ToolBar {
     const { session } = this;
     const outline = session.drawn;
     if (outline.length < 3) { session.say("An outline needs three points."); return; }
+    if (session.tool === "add" && !this.kind.value) { session.say("Choose the kind of the missed defect."); this.kind.focus(); return; }
     const done = session.tool === "redraw" ? await session.act({ do: "redraw", finding: session.selected, outline })
-      : session.tool === "add" ? await session.act({ do: "add", kind: "pit", outline })
+      : session.tool === "add" ? await session.act({ do: "add", kind: this.kind.value, outline })
         : await session.act({ do: "split", finding: session.selected, outlines: [...this.parts, outline] });
     if (done) this.leave();
   }
@@ -96,6 +112,6 @@ export class ToolBar {
 
   private place(): void {
     const [distance, azimuth] = this.session.cursor;
-    if (!this.session.message && this.session.tool === "none") this.status.textContent = `Spot at ${distance.toFixed(1)} mm, ${clock(azimuth)} o'clock.`;
+    if (this.session.tool === "none") this.status.textContent = `Spot at ${distance.toFixed(1)} mm, ${clock(azimuth)} o'clock.`;
   }
 }

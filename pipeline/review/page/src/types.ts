@@ -17,9 +17,15 @@ export interface Run {
   program: { name: string; version: string }; inputs: Record<string, string>; has_recording: boolean;
   nominal_diameter_mm: number; wall_thickness_mm: number | null; distance_mm: [number, number]; radius_mm: number;
   overlays: Overlay[]; kinds: string[]; defects: MeasuredDefect[]; axis: Axis; diagnosis: Diagnosis | null;
+  version: string;
 }
 
 export interface Diagnosis { verdict: string; statement: string; effects: string[] }
+
+/** Curves over one axis; gaps are null. */
+export interface Plot { title: string; x_label: string; unit: string; x: number[]; curves: { name: string; y: (number | null)[] }[] }
+export interface Count { reason: string; count: number; share_percent: number }
+export interface Quality { plots: Plot[]; samples: Count[]; facts: Quantity[]; pictures: { title: string; source: string }[] }
 
 export interface Size {
   distance_from_mm: number; distance_to_mm: number; clock_from: number; clock_to: number; length_mm: number;
@@ -42,7 +48,7 @@ export interface Signature { name: string; standard: string; remarks: string; at
 export interface ReviewState {
   revision: number; findings: Finding[]; may_undo: boolean; may_redo: boolean; lost: Entry[];
   assumed: { wall_thickness_mm: number | null; yield_mpa: number | null }; history: Entry[]; sha256: string;
-  signed: boolean; signature: Signature | null;
+  signed: boolean; signature: Signature | null; run_version: string;
 }
 
 export interface Section {

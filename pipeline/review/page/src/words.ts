@@ -15,13 +15,25 @@ export function number(value: number | null | undefined, digits = 2): string {
   return value === null || value === undefined || !Number.isFinite(value) ? "–" : value.toFixed(digits);
 }
 
-/** A value and its 1 σ, with as many digits as the σ bears. */
+const MOST_DIGITS = 3;
+
+/** A value and its 1 σ, with as many digits as the σ bears, and no more than anyone can use. */
 export function measured(value: number | null, sigma: number | null, unit = "mm"): string {
   if (value === null || !Number.isFinite(value)) return "not seen";
   if (sigma === null || !(sigma > 0)) return `${value.toPrecision(4)} ${unit}`.trim();
-  const digits = Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(sigma))));
-  return `${value.toFixed(digits)} ± ${sigma.toFixed(digits)} ${unit}`.trim();
+  const digits = Math.max(0, Math.min(MOST_DIGITS, 1 - Math.floor(Math.log10(sigma))));
+  const least = 10 ** -digits;
+  const spread = sigma < least / 2 ? `< ${least.toFixed(digits)}` : sigma.toFixed(digits);
+  return `${value.toFixed(digits)} ± ${spread} ${unit}`.trim();
 }
+
+/** A depth in words: metal that is missing is deep, what stands into the bore is inward. */
+export function depth(value: number | null, sigma: number | null): string {
+  if (value === null || !Number.isFinite(value)) return "depth not seen";
+  return `${measured(Math.abs(value), sigma)} ${value < 0 ? "inward" : "deep"}`;
+}
+
+export function moment(at: string): string { return `${at.slice(0, 16).replace("T", " ")} UTC`; }
 
 export function wrapped(azimuth: number): number {
   return ((((azimuth + Math.PI) % TURN) + TURN) % TURN) - Math.PI;
