@@ -54,17 +54,19 @@ def write_run_record(
         "stages": [_stage(s) for s in outcome.stages],
         "metrics": _numbers(outcome.metrics),
         "reader_warnings": list(recording.warnings),
-        "peak_memory_mib": {
-            "program": _peak_mib(resource.RUSAGE_SELF),
-            "largest_helper": _peak_mib(resource.RUSAGE_CHILDREN),
-        },
+        "peak_memory_mib": {"program": _peak_mib()},
     }
     with disk_errors_named(folder):
         replace_json(folder / "run.json", tree)
 
 
-def _peak_mib(whose: int) -> float:
-    return round(resource.getrusage(whose).ru_maxrss / 1024, 1)
+def _peak_mib() -> float:
+    # Linux hands a starting process its parent's ru_maxrss; VmHWM counts this program alone.
+    status = Path("/proc/self/status")
+    if not status.exists():
+        return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1)
+    peak = next(line for line in status.read_text("ascii").splitlines() if line.startswith("VmHWM:"))
+    return round(int(peak.split()[1]) / 1024, 1)
 
 
 def _stage(outcome: StageOutcome) -> Json:
