@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from stages.catalogue import PIPELINE
+from tests.sample_run import run_sample
 from tests.shared_data import PROJECT_ROOT
 
 FILES = (
@@ -31,23 +29,9 @@ FILES = (
 )
 
 
-def run_sample(folder: Path) -> str:
-    command = [sys.executable, "-m", "pipeline.cli", "run", "data/sample", "-o", str(folder)]
-    told = subprocess.run(command, cwd=PROJECT_ROOT, capture_output=True, text=True)
-    assert told.returncode == 0, told.stderr
-    return told.stdout
-
-
 def record(folder: Path) -> dict[str, Any]:
     content: dict[str, Any] = json.loads((folder / "run.json").read_text("utf-8"))
     return content
-
-
-@pytest.fixture(scope="module")
-def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sample") / "run"
-    run_sample(folder)
-    return folder
 
 
 def test_every_file_is_there(sample: Path) -> None:

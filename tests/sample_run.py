@@ -1,0 +1,15 @@
+"""The sample recording's run, by the command line."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.shared_data import PROJECT_ROOT
+
+
+def run_sample(folder: Path) -> str:
+    """Run, or run again; return what was told."""
+    command = [sys.executable, "-m", "pipeline.cli", "run", "data/sample", "-o", str(folder)]
+    told = subprocess.run(command, cwd=PROJECT_ROOT, capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    return told.stdout
