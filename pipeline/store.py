@@ -86,6 +86,20 @@ class Store:
             return None
         return Stored(artefact, provenance)
 
+    def look(self, stage: str, key: str, kind: type) -> Any | None:
+        """Return a result for showing it, None when it is not there as a whole.
+
+        Sizes are checked, not contents, and nothing is discarded: a run may be at work in the folder.
+        """
+        folder = self._place(stage, key)
+        try:
+            manifest = _read_manifest(folder)
+            made = decode(manifest["provenance"], _no_array, Provenance)
+            whole = made.key == key and self.has(stage, key)
+            return decode(manifest["artefact"], partial(_load, folder), kind) if whole else None
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
     def has(self, stage: str, key: str) -> bool:
         """Return whether a result is there, by manifest and sizes; `read` also checks the content."""
         folder = self._place(stage, key)

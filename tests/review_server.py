@@ -69,7 +69,7 @@ class ReviewServer:
 
     def ask(self, path: str, method: str = "GET", body: object = None, **headers: str) -> Answer:
         """Ask as the page does; ``headers`` replace the page's own, an empty one leaves it out."""
-        own = {"Host": f"127.0.0.1:{self.port}", "Cookie": f"boresight={self.token}"}
+        own = {"Host": f"127.0.0.1:{self.port}", "Cookie": f"boresight-{self.port}={self.token}"}
         own |= {"Origin": self.origin} if method != "GET" else {}
         sent = body if isinstance(body, bytes) else json.dumps(body).encode() if body is not None else b""
         own |= {"Content-Length": str(len(sent))} if sent else {}

@@ -16,8 +16,9 @@ from pipeline.model import Overlay, Overlays
 from pipeline.review.assessment import strength
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.replay import Finding
+from pipeline.review.flat_tiles import FlatPicture
 from pipeline.review.measuring.wall import MeasuredWall
-from pipeline.review.review import State
+from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
 
 Float = NDArray[np.float64]
@@ -51,8 +52,13 @@ def run_document(files: RunFiles) -> dict[str, Any]:
     }
 
 
+def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:
+    """Return by what the page sees that something has changed, and whether it is signed."""
+    return asdict(seal) | {"signed": seal.signed, "run_version": str(files.version)}
+
+
 def state_document(state: State, files: RunFiles) -> dict[str, Any]:
-    """Return the findings as they stand, and what is known of the signature."""
+    """Return the findings as they stand."""
     bore = 2 * files.artefact(Overlays).nominal_radius_mm
     return cleaned({
         "revision": state.revision,
@@ -62,11 +68,18 @@ def state_document(state: State, files: RunFiles) -> dict[str, Any]:
         "lost": [_entry(e) for e in state.lost],
         "assumed": state.assumed.model_dump(exclude={"do"}),
         "history": [_entry(e) for e in state.entries],
-        "sha256": state.sha256,
-        "signed": state.signed,
-        "signature": asdict(state.signature) if state.signature else None,
-        "run_version": str(files.version),
     })  # fmt: skip
+
+
+def layer_document(picture: FlatPicture) -> dict[str, Any]:
+    """Return a layer's size and place."""
+    return {
+        "levels": picture.levels,
+        "width": picture.width,
+        "height": picture.height,
+        "distance_mm": [picture.distance_from_mm, picture.distance_to_mm],
+        "azimuth_rad": picture.azimuth_from_rad,
+    }
 
 
 def section_document(wall: MeasuredWall, overlays: Overlays, distance_mm: float) -> dict[str, Any]:
@@ -154,7 +167,7 @@ def _overlay(overlay: Overlay) -> dict[str, Any]:
 
 def _diagnosis(files: RunFiles) -> dict[str, Any] | None:
     """Return what a diagnosis laid into the run folder says, None without one."""
-    file = files.path / "diagnosis.json"
+    file = files.file("diagnosis.json")
     if not file.is_file():
         return None
     told = json.loads(file.read_text("utf-8"))

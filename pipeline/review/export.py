@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.errors import InputError
 from pipeline.model import Overlays
 from pipeline.review import documents
-from pipeline.review.flat_tiles import PHOTO, TILE_PX, FlatPicture, overlay_picture, photo_picture
+from pipeline.review.flat_tiles import TILE_PX, FlatPicture, layers_of, picture_of
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.papers.catalogue import PAPERS, paper_of
 from pipeline.review.quality import quality_document
@@ -62,11 +62,11 @@ def _write(review: Review, page: Path, folder: Path) -> None:
 
 def _data(review: Review, state: State, folder: Path) -> dict[str, Any]:
     overlays = review.files.artefact(Overlays)
-    pictures = {PHOTO: photo_picture(review.files.path)}
-    pictures |= {o.name: overlay_picture(overlays, o.name) for o in overlays.pictures}
+    pictures = {name: picture_of(review.files, name) for name in layers_of(review.files)}
     return {
         "run": documents.run_document(review.files),
         "state": documents.state_document(state, review.files),
+        "seal": documents.seal_document(review.seal(state), review.files),
         "quality": quality_document(review.files, review.wall()),
         "sections": [documents.section_document(review.wall(), overlays, s) for s in _stations(overlays)],
         "layers": {name: _tiles(name, picture, folder) for name, picture in pictures.items()},
@@ -81,22 +81,18 @@ def _stations(overlays: Overlays) -> list[float]:
 
 
 def _tiles(name: str, picture: FlatPicture, folder: Path) -> dict[str, Any]:
-    height, width = picture.bgra.shape[:2]
     for level in range(picture.levels):
         size = TILE_PX << level
-        for column in range(-(-width // size)):
-            for row in range(-(-height // size)):
+        for column in range(-(-picture.width // size)):
+            for row in range(-(-picture.height // size)):
                 file = folder / "tiles" / name / str(level) / str(column) / f"{row}.png"
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(picture.tile(level, column, row))
-    return {
-        "levels": picture.levels, "width": width, "height": height,
-        "distance_mm": [picture.distance_from_mm, picture.distance_to_mm],
-    }  # fmt: skip
+    return documents.layer_document(picture)
 
 
 def _model(review: Review) -> str:
-    file = review.files.path / "model.glb"
+    file = review.files.file("model.glb")
     if file.stat().st_size > _LARGEST_MODEL:
         raise InputError(file, "is too large for a page without a server", hint="use boresight review")
     return base64.b64encode(file.read_bytes()).decode("ascii")

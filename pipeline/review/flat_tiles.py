@@ -2,42 +2,64 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts import WallTexture
 from pipeline.errors import InputError
-from pipeline.model import Overlays
-from pipeline.yaml_file import read_yaml
+from pipeline.export.unrolled import display_colours
+from pipeline.model import Overlay, Overlays
+from pipeline.review.run_files import RunFiles
 
 Byte = NDArray[np.uint8]
 TILE_PX = 512
 PHOTO = "photo"
+# A shrunk pixel is the mean of this many samples each way, so that an overview need not read everything.
+_SAMPLES = 4
 
 
 @dataclass(frozen=True)
 class FlatPicture:
-    """One layer of the flat view, distance to the right, azimuth downward from −π.
+    """One layer of the flat view, distance to the right, azimuth downward.
 
     Attributes
     ----------
-    bgra : (A, S, 4)
-    distance_from_mm, distance_to_mm : float
-        Edges of the picture, not centres of its pixels.
+    stored : (S, A) or (S, A, 4)
+        Rows along distance, possibly still on disk.
+    colours : callable
+        Gives BGRA of a part of it.
+    distance_from_mm, distance_to_mm, azimuth_from_rad : float
+        Edges of the picture, not centres of its pixels; it covers the whole turn.
     """
 
-    bgra: Byte
+    stored: Byte
+    colours: Callable[[Byte], Byte]
     distance_from_mm: float
     distance_to_mm: float
+    azimuth_from_rad: float
+
+    @property
+    def width(self) -> int:
+        """Pixels along the pipe."""
+        return len(self.stored)
+
+    @property
+    def height(self) -> int:
+        """Pixels around it."""
+        return int(self.stored.shape[1])
 
     @property
     def levels(self) -> int:
         """Number of levels; each is half the size of the one before, the last fits one tile."""
-        return max(int(np.ceil(np.log2(max(self.bgra.shape[:2]) / TILE_PX))), 0) + 1
+        return max(int(np.ceil(np.log2(max(self.width, self.height) / TILE_PX))), 0) + 1
+
+    def columns(self, first: int, last: int) -> Byte:
+        """Return a stretch (A, last - first, 4) in full size."""
+        return self._bgra(self.stored[first:last])
 
     def tile(self, level: int, column: int, row: int) -> bytes:
         """Return a tile as PNG.
@@ -47,59 +69,65 @@ class FlatPicture:
         InputError
             When there is no such tile.
         """
-        size = TILE_PX << level
         if not 0 <= level < self.levels or column < 0 or row < 0:
             raise InputError("tile", f"there is no tile {level}/{column}/{row}")
-        part = self.bgra[row * size : (row + 1) * size, column * size : (column + 1) * size]
+        size, step = TILE_PX << level, max((1 << level) // _SAMPLES, 1)
+        across, down = (slice(k * size, (k + 1) * size) for k in (column, row))
+        part = self.stored[across, down]
         if not part.size:
             raise InputError("tile", f"there is no tile {level}/{column}/{row}")
-        small = (max(part.shape[1] >> level, 1), max(part.shape[0] >> level, 1))
-        shrunk = cv2.resize(part, small, interpolation=cv2.INTER_AREA) if level else part
+        small = tuple(max(length >> level, 1) for length in part.shape[:2])
+        bgra = self._bgra(part[::step, ::step])
+        shrunk = cv2.resize(bgra, small, interpolation=cv2.INTER_AREA) if level else bgra
         encoded, png = cv2.imencode(".png", shrunk, [cv2.IMWRITE_PNG_COMPRESSION, 3])
         if not encoded:
             raise InputError("tile", f"tile {level}/{column}/{row} cannot be encoded")
         return png.tobytes()
 
+    def _bgra(self, part: Byte) -> Byte:
+        return np.ascontiguousarray(self.colours(np.asarray(part)).transpose(1, 0, 2))
 
-def overlay_picture(overlays: Overlays, name: str) -> FlatPicture:
-    """Return an overlay's colours.
+
+def picture_of(files: RunFiles, layer: str) -> FlatPicture:
+    """Return a layer of the flat view: the photo, or an overlay by its name.
 
     Raises
     ------
     InputError
-        When there is no such overlay.
+        When there is none of that name, or the run does not hold it any more.
     """
+    if layer == PHOTO:
+        return photo_picture(files.artefact(WallTexture))
+    overlays = files.artefact(Overlays)
     found = {o.name: o for o in overlays.pictures}
-    if name not in found:
-        raise InputError("overlay", f"there is no overlay {name!r}", expected=", ".join([PHOTO, *found]))
-    s = overlays.distance_mm
-    half = float(s[1] - s[0]) / 2
-    bgra = np.ascontiguousarray(found[name].bgra.transpose(1, 0, 2))
-    return FlatPicture(bgra, float(s[0]) - half, float(s[-1]) + half)
+    if layer not in found:
+        raise InputError("layer", f"there is no {layer[:40]!r}", expected=", ".join([PHOTO, *found]))
+    return overlay_picture(overlays, found[layer])
 
 
-def photo_picture(run: Path) -> FlatPicture:
-    """Return the wall's photo from unrolled.png and unrolled.json.
-
-    Raises
-    ------
-    InputError
-        When they are missing or broken.
-    """
-    file = run / "unrolled.png"
-    if not file.is_file():
-        raise InputError(file, "is missing", hint="finish the run: boresight run")
-    return _photo(run, file.stat().st_mtime_ns)
+def layers_of(files: RunFiles) -> tuple[str, ...]:
+    """Return the names of all layers."""
+    return (PHOTO, *(o.name for o in files.artefact(Overlays).pictures))
 
 
-@lru_cache(maxsize=2)
-def _photo(run: Path, _changed: int) -> FlatPicture:
-    file = run / "unrolled.png"
-    bgra = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-    if bgra is None or bgra.ndim != 3 or bgra.shape[2] != 4:
-        raise InputError(file, "is not a picture with transparency")
-    place = read_yaml(run / "unrolled.json")
-    step = float(str(place.values["mm_per_px"]))
-    start = float(str(place.values["distance_from_mm"])) - step / 2
-    turned = np.ascontiguousarray(bgra.transpose(1, 0, 2)).astype(np.uint8, copy=False)
-    return FlatPicture(turned, start, start + step * turned.shape[1])
+def overlay_picture(overlays: Overlays, overlay: Overlay) -> FlatPicture:
+    """Return an overlay's colours, clear where nothing was measured."""
+    s, psi = overlays.distance_mm, overlays.azimuth_rad
+    half_mm, half_rad = float(s[1] - s[0]) / 2, float(psi[1] - psi[0]) / 2
+    clear = np.append([0], np.full(255, 255)).astype(np.uint8)
+    palette = np.column_stack([overlay.palette_bgr, clear])
+    return FlatPicture(
+        overlay.level,
+        palette.__getitem__,
+        float(s[0]) - half_mm,
+        float(s[-1]) + half_mm,
+        float(psi[0]) - half_rad,
+    )
+
+
+def photo_picture(texture: WallTexture) -> FlatPicture:
+    """Return the wall's photo in display colours."""
+    start = texture.distance_from_mm - texture.mm_per_px / 2
+    end = start + texture.mm_per_px * len(texture.bgra)
+    top = texture.azimuth_from_rad - texture.rad_per_px / 2
+    return FlatPicture(texture.bgra, display_colours, start, end, top)

@@ -31,7 +31,7 @@ def quality_document(files: RunFiles, wall: MeasuredWall) -> dict[str, Any]:
         "plots": [*_wall_plots(wall), _diameters(files.artefact(Sections)), _drift(trajectory), _lost(rings)],
         "samples": _samples(rings),
         "facts": _instrument(files),
-        "pictures": _diagnosis_pictures(files.path / "diagnosis.html"),
+        "pictures": _diagnosis_pictures(files.file("diagnosis.html")),
     })  # fmt: skip
 
 
@@ -43,16 +43,17 @@ def _plot(title: str, unit: str, x_label: str, x: Float, **curves: Float) -> dic
 
 
 def _wall_plots(wall: MeasuredWall) -> list[dict[str, Any]]:
-    seen = np.isfinite(wall.radius_mm).mean(1)
-    total, random = (_median_of_rows(a) for a in (wall.sigma_mm, wall.sigma_random_mm))
-    s, where = wall.distance_mm, "distance, mm"
+    step = max(-(-len(wall.distance_mm) // _MOST_POINTS), 1)
+    seen = np.isfinite(wall.radius_mm[::step]).mean(1)
+    total, random = (_median_of_rows(a[::step]) for a in (wall.sigma_mm, wall.sigma_random_mm))
+    s, where = wall.distance_mm[::step], "distance, mm"
     return [
         _plot("Wall seen", "%", where, s, seen=100 * seen),
         _plot("1 σ of the radius, median around", "mm", where, s, total=total, random_part=random),
     ]
 
 
-def _median_of_rows(values: Float) -> Float:
+def _median_of_rows(values: NDArray[np.float32]) -> Float:
     out = np.full(len(values), np.nan)
     known = np.isfinite(values).any(1)
     out[known] = np.nanmedian(values[known], 1)

@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
 
+from pipeline.artefacts import Wall
 from pipeline.codec import Json, canonical
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.actions import Action
@@ -13,7 +14,7 @@ from pipeline.review.decisions.carry import carried, same_findings
 from pipeline.review.decisions.ledger import Entry, Ledger, Signature
 from pipeline.review.decisions.replay import Finding, counting, replay
 from pipeline.review.measuring.outline import OutlineGauge
-from pipeline.review.measuring.wall import MeasuredWall, read_wall
+from pipeline.review.measuring.wall import MeasuredWall, measured_wall
 from pipeline.review.run_files import RunFiles, measured_findings
 
 FOLDER = "review"
@@ -35,10 +36,6 @@ class State:
         Wall thickness and yield strength taken for known.
     entries : tuple of Entry
         Those that count, in order.
-    sha256 : str
-        Over inputs and decisions.
-    signature : Signature or None
-        The last one.
     """
 
     revision: int
@@ -48,6 +45,21 @@ class State:
     lost: tuple[Entry, ...]
     assumed: do.Assume
     entries: tuple[Entry, ...]
+
+
+@dataclass(frozen=True)
+class Seal:
+    """What a signature of a state binds, and the last signature that was given.
+
+    Attributes
+    ----------
+    revision : int
+    sha256 : str
+        Over the run's files and the decisions that count.
+    signature : Signature or None
+    """
+
+    revision: int
     sha256: str
     signature: Signature | None
 
@@ -80,7 +92,6 @@ class Review:
         every = self.ledger.entries()
         known, lost = carried(every, basis, self._translations(every, basis, findings))
         done, undone = counting(known)
-        signatures = self.ledger.signatures()
         assumed = [e.action for e in done if isinstance(e.action, do.Assume)]
         return State(
             revision=every[-1].id if every else 0,
@@ -90,9 +101,12 @@ class Review:
             lost=lost,
             assumed=assumed[-1] if assumed else do.Assume(),
             entries=done,
-            sha256=self._sha256(done),
-            signature=signatures[-1] if signatures else None,
         )
+
+    def seal(self, state: State) -> Seal:
+        """Return what a signature of a state binds; reads every file of the run once."""
+        signatures = self.ledger.signatures()
+        return Seal(state.revision, self._sha256(state.entries), signatures[-1] if signatures else None)
 
     def act(self, action: Action, who: str, revision: int) -> State:
         """Take an action and return the state after it.
@@ -110,6 +124,7 @@ class Review:
         )
         trial = Entry(revision + 1, basis, who, "", action)
         replay(findings, (*known, trial), OutlineGauge(self.wall()))
+        self.ledger.keep_basis(basis, self.files.defects_text())
         self.ledger.append(action, who, basis, revision)
         return self.state()
 
@@ -121,20 +136,17 @@ class Review:
         StaleError
             When it has changed since.
         """
-        self.ledger.sign(name, standard, remarks, revision, self.state().sha256)
+        self.ledger.sign(name, standard, remarks, revision, self.seal(self.state()).sha256)
         return self.state()
 
     def wall(self) -> MeasuredWall:
-        """Return the wall, read again when its file has changed."""
-        file = self.files.path / "radius_map.npz"
-        return _wall(self.files, file.stat().st_mtime_ns if file.exists() else 0)
+        """Return the wall as the run measured it."""
+        return measured_wall(self.files.artefact(Wall).radius_map)
 
     def _basis(self) -> tuple[str, tuple[Finding, ...]]:
-        """Return the hash of the findings as measured now, kept in the ledger, and the findings."""
-        text = self.files.defects_text()
-        sha256 = hashlib.sha256(text.encode()).hexdigest()
-        self.ledger.keep_basis(sha256, text)
-        return sha256, measured_findings(text, self.files.path / "defects.json")
+        """Return the hash of the findings as measured now, and the findings."""
+        file = self.files.file("defects.json")
+        return _measured(self.files, file.stat().st_mtime_ns if file.exists() else 0)
 
     def _translations(
         self, entries: tuple[Entry, ...], basis: str, findings: tuple[Finding, ...]
@@ -150,8 +162,10 @@ class Review:
 
 
 @lru_cache(maxsize=4)
-def _wall(files: RunFiles, _changed: int) -> MeasuredWall:
-    return read_wall(files.path)
+def _measured(files: RunFiles, _changed: int) -> tuple[str, tuple[Finding, ...]]:
+    text = files.defects_text()
+    found = measured_findings(text, files.path / "defects.json")
+    return hashlib.sha256(text.encode()).hexdigest(), found
 
 
 def open_review(files: RunFiles) -> Review:

@@ -9,9 +9,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pipeline.artefacts import RingSamples, Trajectory, Wall
+from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.errors import InputError
-from pipeline.findings import Sections
+from pipeline.findings import DefectKind, Sections
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.model import Overlays
@@ -23,7 +23,7 @@ from pipeline.run_folder import RunFolder
 _Artefact = TypeVar("_Artefact")
 _MAKERS: dict[type, str] = {
     Overlays: "overlays", Trajectory: "motion", Wall: "accumulate", RingSamples: "rings",
-    Sections: "sections",
+    Sections: "sections", WallTexture: "texture",
 }  # fmt: skip
 # What a signature binds: the results and the record of how they came about.
 _BOUND = ("run.json", "defects.json", "radius_map.npz", "unrolled.png", "model.glb", "sections.csv")
@@ -38,8 +38,21 @@ class RunFiles:
     @property
     def version(self) -> int:
         """Changes whenever the run is computed again."""
-        file = self.path / "run.json"
+        file = self.file("run.json")
         return file.stat().st_mtime_ns if file.is_file() else 0
+
+    def file(self, name: str) -> Path:
+        """Return where a file of the run lies.
+
+        Raises
+        ------
+        InputError
+            When it is a link out of the folder: a run from elsewhere must not show or export other files.
+        """
+        file = self.path / name
+        if not file.resolve().is_relative_to(self.path.resolve()):
+            raise InputError(file, "is a link out of the run's folder", hint="copy the file into the run")
+        return file
 
     def record(self) -> dict[str, Any]:
         """Return run.json.
@@ -80,18 +93,19 @@ class RunFiles:
 
     def defects_text(self) -> str:
         """Return defects.json as it stands."""
+        file = self.file("defects.json")
         try:
-            return (self.path / "defects.json").read_text("utf-8")
-        except OSError as error:
-            raise InputError(self.path / "defects.json", error.strerror or "cannot be read") from error
+            return file.read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(file, f"cannot be read: {error}") from error
 
     def fingerprint(self) -> dict[str, str]:
         """Return the SHA-256 of every file that a signature binds."""
-        present = (name for name in _BOUND if (self.path / name).is_file())
-        return {name: _hash_of(self.path / name) for name in present}
+        present = (name for name in _BOUND if self.file(name).is_file())
+        return {name: _hash_of(self.file(name)) for name in present}
 
     def _json(self, name: str) -> object:
-        file = self.path / name
+        file = self.file(name)
         try:
             return json.loads(file.read_text("utf-8"))
         except OSError as error:
@@ -105,10 +119,10 @@ class RunFiles:
 def _artefact(files: RunFiles, kind: type, _version: int) -> Any:
     stage = _MAKERS[kind]
     key = next((s["key"] for s in files.record()["stages"] if s["name"] == stage), "")
-    stored = RunFolder(files.path).store.read(stage, key, kind) if key else None
-    if stored is None:
+    found = RunFolder(files.path).store.look(stage, key, kind) if key else None
+    if found is None:
         raise InputError(files.path, f"has no result of stage {stage}", hint="run it again: boresight run")
-    return stored.artefact
+    return found
 
 
 def measured_findings(defects: str, file: Path) -> tuple[Finding, ...]:
@@ -130,7 +144,7 @@ def _finding(entry: dict[str, Any]) -> Finding:
     outline = tuple((float(s), float(a)) for s, a in entry["outline"])
     size = Measured(**{name: _number(entry[name]) for name in Measured.__dataclass_fields__})
     number = int(entry["id"])
-    return Finding(str(number), str(entry["kind"]), outline, size, original=number)
+    return Finding(str(number), DefectKind(entry["kind"]).value, outline, size, original=number)
 
 
 def _number(value: object) -> float:

@@ -58,7 +58,9 @@ class OutlineGauge:
         columns = (first + np.arange(count)) % len(wall.azimuth_rad)
         return rows, columns, inside, grown.astype(bool) & ~inside
 
-    def _depth(self, radius: Float, sigma: Float, inside: Bool, around: Bool) -> tuple[float, float]:
+    def _depth(
+        self, radius: Float, sigma: NDArray[np.float32], inside: Bool, around: Bool
+    ) -> tuple[float, float]:
         """Return the extreme of the smoothed radius within, less the median around, and its 1 σ."""
         known = around & np.isfinite(radius)
         seen = inside & np.isfinite(radius)

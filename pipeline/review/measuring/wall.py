@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.errors import InputError
+from pipeline.artefacts import RadiusMap
 
 Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
 
@@ -31,9 +30,9 @@ class MeasuredWall:
 
     distance_mm: Float
     azimuth_rad: Float
-    radius_mm: Float
-    sigma_mm: Float
-    sigma_random_mm: Float
+    radius_mm: Float32
+    sigma_mm: Float32
+    sigma_random_mm: Float32
 
     @property
     def step_mm(self) -> float:
@@ -67,24 +66,6 @@ class MeasuredWall:
         return float(self.radius_mm[at]), float(self.sigma_mm[at]), float(self.sigma_random_mm[at])
 
 
-def read_wall(run: Path) -> MeasuredWall:
-    """Read the wall of a run folder.
-
-    Raises
-    ------
-    InputError
-        When radius_map.npz is missing or broken.
-    """
-    file = run / "radius_map.npz"
-    hint = "finish the run first: boresight run"
-    try:
-        with np.load(file, allow_pickle=False) as arrays:
-            parts = {k: np.asarray(arrays[k], float) for k in MeasuredWall.__dataclass_fields__}
-    except OSError as error:
-        raise InputError(file, "cannot be read", expected="the radius map of a run", hint=hint) from error
-    except (KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise InputError(file, f"is not a radius map: {error}", hint=hint) from error
-    wall = MeasuredWall(**parts)
-    if wall.radius_mm.shape != (len(wall.distance_mm), len(wall.azimuth_rad)) or len(wall.distance_mm) < 2:
-        raise InputError(file, f"holds a radius of shape {wall.radius_mm.shape}", hint=hint)
-    return wall
+def measured_wall(radius_map: RadiusMap) -> MeasuredWall:
+    """Return the wall of a radius map; large arrays stay where they are, on disk."""
+    return MeasuredWall(**{name: getattr(radius_map, name) for name in MeasuredWall.__dataclass_fields__})

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.model import Overlays
 from pipeline.review.decisions.replay import Finding
-from pipeline.review.flat_tiles import photo_picture
+from pipeline.review.flat_tiles import PHOTO, FlatPicture, picture_of
 from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.run_files import RunFiles
 
@@ -26,7 +26,7 @@ _EXAGGERATION = 20.0
 
 def finding_picture(files: RunFiles, finding: Finding, radius_mm: float) -> bytes:
     """Return the wall about a finding, outlined, as JPEG; distance to the right, clock downward."""
-    photo = photo_picture(files.path)
+    photo = picture_of(files, PHOTO)
     outline = np.asarray(finding.outline)
     middle = outline.mean(0)
     half = max(
@@ -34,11 +34,10 @@ def finding_picture(files: RunFiles, finding: Finding, radius_mm: float) -> byte
     )
     half = min(half, np.pi * radius_mm)
     grid = (np.arange(_SIZE_PX) + 0.5) / _SIZE_PX * 2 - 1
-    height, width = photo.bgra.shape[:2]
-    per_mm = width / (photo.distance_to_mm - photo.distance_from_mm)
+    per_mm = photo.width / (photo.distance_to_mm - photo.distance_from_mm)
     column = (middle[0] + half * grid - photo.distance_from_mm) * per_mm - 0.5
-    row = (middle[1] + half / radius_mm * grid + np.pi) / (2 * np.pi) * height - 0.5
-    picture = _seen(photo.bgra, column, np.mod(row, height))
+    turns = (middle[1] + half / radius_mm * grid - photo.azimuth_from_rad) / (2 * np.pi)
+    picture = _seen(photo, column, np.mod(turns * photo.height - 0.5, photo.height))
     corner = (outline - middle) * [1, radius_mm] / half * _SIZE_PX / 2 + _SIZE_PX / 2
     for colour, thick in ((_HALO_BGR, 5), (_OUTLINE_BGR, 2)):
         cv2.polylines(picture, [np.round(corner * 8).astype(np.int32)], True, colour, thick, cv2.LINE_AA, 3)
@@ -67,13 +66,17 @@ def section_plot(wall: MeasuredWall, overlays: Overlays, distance_mm: float, azi
     return _svg(figure)
 
 
-def _seen(bgra: Byte, column: Float, row: Float) -> Byte:
+def _seen(photo: FlatPicture, column: Float, row: Float) -> Byte:
     """Return the picture at columns and rows, grey where nothing was textured."""
     x, y = np.meshgrid(column, row)
-    wide = np.concatenate([bgra, bgra[:1]])
-    first, last = int(np.clip(column.min() - 2, 0, bgra.shape[1] - 1)), int(max(column.max() + 3, 1))
-    part = np.ascontiguousarray(wide[:, first:last])
-    seen = cv2.remap(part, (x - first).astype(np.float32), y.astype(np.float32), cv2.INTER_LINEAR)
+    first, last = int(np.clip(column.min() - 2, 0, photo.width - 1)), int(max(column.max() + 3, 1))
+    part = photo.columns(first, last)
+    seen = cv2.remap(
+        np.concatenate([part, part[:1]]),
+        (x - first).astype(np.float32),
+        y.astype(np.float32),
+        cv2.INTER_LINEAR,
+    )
     alpha = seen[..., 3:].astype(float) / 255
     return np.ascontiguousarray(np.round(alpha * seen[..., :3] + (1 - alpha) * 200).astype(np.uint8))
 

@@ -28,7 +28,7 @@ _HEADLINE_METRICS = 14
 
 def report_data(review: Review, state: State) -> dict[str, Any]:
     """Return all that the report tells."""
-    run = run_document(review.files)
+    run, seal = run_document(review.files), review.seal(state)
     rows = findings_table(review, state)
     edited = {row["id"] for row in rows if row["edited"]}
     said = {str(d["id"]): d["statement"] for d in run["defects"] if str(d["id"]) not in edited}
@@ -41,9 +41,9 @@ def report_data(review: Review, state: State) -> dict[str, Any]:
         "diagnosis": run["diagnosis"],
         "assumed": state.assumed.model_dump(exclude={"do"}),
         "findings": [row | {"statement": said.get(row["id"], "")} for row in rows],
-        "signed": state.signed,
-        "signature": asdict(state.signature) if state.signature else None,
-        "sha256": state.sha256,
+        "signed": seal.signed,
+        "signature": asdict(seal.signature) if seal.signature else None,
+        "sha256": seal.sha256,
     })  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from pipeline.model import Overlays
 from pipeline.review import documents
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.decisions.ledger import StaleError
-from pipeline.review.flat_tiles import PHOTO, FlatPicture, overlay_picture, photo_picture
+from pipeline.review.flat_tiles import picture_of
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.measuring.tools import readings
 from pipeline.review.papers.catalogue import paper_of
@@ -46,6 +46,7 @@ class ReviewApp:
             Mount("/assets", StaticFiles(directory=self.page / "assets")),
             Route("/api/run", self._answering(self._run)),
             Route("/api/state", self._answering(self._state)),
+            Route("/api/seal", self._answering(self._seal)),
             Route("/api/actions", self._answering(self._act), methods=["POST"]),
             Route("/api/sign", self._answering(self._sign), methods=["POST"]),
             Route("/api/measure", self._answering(self._measure), methods=["POST"]),
@@ -78,7 +79,7 @@ class ReviewApp:
         return FileResponse(self.page / "index.html")
 
     async def _model(self, _: Request) -> Response:
-        file = self.review.files.path / "model.glb"
+        file = self.review.files.file("model.glb")
         if not file.is_file():
             return JSONResponse({"error": "the run has no model"}, _MISSING)
         return FileResponse(file, media_type="model/gltf-binary")
@@ -88,6 +89,10 @@ class ReviewApp:
 
     def _state(self, _: Request, __: bytes) -> Response:
         return JSONResponse(documents.state_document(self.review.state(), self.review.files))
+
+    def _seal(self, _: Request, __: bytes) -> Response:
+        seal = self.review.seal(self.review.state())
+        return JSONResponse(documents.seal_document(seal, self.review.files))
 
     def _act(self, _: Request, body: bytes) -> Response:
         deed = parsed(Deed, body)
@@ -125,16 +130,12 @@ class ReviewApp:
         return Response(jpeg, media_type="image/jpeg")
 
     def _layer(self, request: Request, _: bytes) -> Response:
-        picture = self._picture(request.path_params["layer"])
-        height, width = picture.bgra.shape[:2]
-        return JSONResponse({
-            "levels": picture.levels, "width": width, "height": height,
-            "distance_mm": [picture.distance_from_mm, picture.distance_to_mm],
-        })  # fmt: skip
+        picture = picture_of(self.review.files, request.path_params["layer"])
+        return JSONResponse(documents.layer_document(picture))
 
     def _tile(self, request: Request, _: bytes) -> Response:
         at: dict[str, Any] = request.path_params
-        picture = self._picture(at["layer"])
+        picture = picture_of(self.review.files, at["layer"])
         return Response(picture.tile(at["level"], at["column"], at["row"]), media_type="image/png")
 
     def _paper(self, request: Request, _: bytes) -> Response:
@@ -142,12 +143,6 @@ class ReviewApp:
         disposition = f'{"inline" if paper.shown else "attachment"}; filename="{paper.name}"'
         return Response(
             paper.content, media_type=paper.media_type, headers={"content-disposition": disposition}
-        )
-
-    def _picture(self, layer: str) -> FlatPicture:
-        files = self.review.files
-        return (
-            photo_picture(files.path) if layer == PHOTO else overlay_picture(files.artefact(Overlays), layer)
         )
 
 

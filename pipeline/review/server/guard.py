@@ -11,7 +11,6 @@ from starlette.datastructures import Headers
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-COOKIE = "boresight"
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
     "connect-src 'self' blob:; worker-src 'self' blob:; font-src 'self'; base-uri 'none'; "
@@ -45,10 +44,18 @@ class Guard:
     token: str
     port: int
 
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie; a browser sends it to every port of a host, so that each needs its own."""
+        return f"boresight-{self.port}"
+
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a request, or refuse it with the reason."""
-        if scope["type"] != "http":
+        if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            await send({"type": "websocket.close", "code": 1008})
             return
         refusal = self._refusal(scope)
         if refusal is not None:
@@ -63,11 +70,13 @@ class Guard:
             return PlainTextResponse("this server answers to 127.0.0.1 only", 421)
         if _token_in(scope) is not None:
             return self._first_visit(scope)
-        if not self._same(_cookie(headers)):
+        if not self._same(_cookie(headers, self.cookie)):
             return PlainTextResponse("open the address that boresight review printed", 403)
         origins = tuple(f"http://{host}" for host in hosts)
         if scope["method"] in _CHANGING and headers.get("origin", "") not in origins:
             return PlainTextResponse("this page is not the server's own", 403)
+        if "transfer-encoding" in headers:
+            return PlainTextResponse("say how long the body is", 411)
         if int(headers.get("content-length", "0") or 0) > _LARGEST_BODY:
             return PlainTextResponse("too large", 413)
         return None
@@ -76,8 +85,8 @@ class Guard:
         """Put the token of the address into a cookie that scripts cannot read, and out of the address."""
         if not self._same(_token_in(scope) or ""):
             return PlainTextResponse("the token is not that of this server; it changes at every start", 403)
-        response = RedirectResponse(scope["path"], 303)
-        response.set_cookie(COOKIE, self.token, httponly=True, samesite="strict", path="/")
+        response = RedirectResponse("/", 303)
+        response.set_cookie(self.cookie, self.token, httponly=True, samesite="strict", path="/")
         return response
 
     def _same(self, token: str) -> bool:
@@ -89,12 +98,12 @@ def _token_in(scope: Scope) -> str | None:
     return found[0] if found else None
 
 
-def _cookie(headers: Headers) -> str:
+def _cookie(headers: Headers, name: str) -> str:
     try:
         jar: SimpleCookie = SimpleCookie(headers.get("cookie", ""))
     except CookieError:
         return ""
-    return jar[COOKIE].value if COOKIE in jar else ""
+    return jar[name].value if name in jar else ""
 
 
 def _with_headers(send: Send) -> Send:

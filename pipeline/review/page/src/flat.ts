@@ -122,8 +122,8 @@ export class FlatView {
     const last = Math.min(Math.ceil(layer.width / span) - 1, Math.floor((right - layer.distance_mm[0]) / mmPerPixel / span));
     context.imageSmoothingEnabled = this.view.mmPerPx > mmPerPixel / 3;
     for (let row = 0; row * span < layer.height; row++) {
-      const from = -Math.PI + turn + (row * span * TURN) / layer.height;
-      const to = -Math.PI + turn + (Math.min((row + 1) * span, layer.height) * TURN) / layer.height;
+      const from = layer.azimuth_rad + turn + (row * span * TURN) / layer.height;
+      const to = layer.azimuth_rad + turn + (Math.min((row + 1) * span, layer.height) * TURN) / layer.height;
       if (this.y(to) < 0 || this.y(from) > this.size[1]) continue;
       for (let column = first; column <= last; column++) {
         const image = this.tile(level, column, row);
@@ -178,7 +178,9 @@ export class FlatView {
   }
 
   private paintFindings(context: CanvasRenderingContext2D, turn: number): void {
+    const [left, right] = [this.point(0, 0)[0], this.point(this.size[0], 0)[0]];
     for (const finding of this.session.standing) {
+      if (finding.size.distance_to_mm < left || finding.size.distance_from_mm > right) continue;
       const chosen = finding.id === this.session.selected;
       context.setLineDash(finding.status === "rejected" ? [4, 4] : []);
       this.trace(context, finding.outline.map(([s, a]) => [s, a + turn] as Point), true);

@@ -37,7 +37,9 @@ async function start(): Promise<void> {
   const open = opener(pages);
   open("Inspect");
   keys(session, { findings, tools, help, open, pages: Object.keys(pages) });
-  if (!source.readOnly) window.setInterval(() => { if (!document.hidden) void session.refresh().catch((e: Error) => session.lose(e)); }, REFRESH_MS);
+  const look = () => void session.refresh().catch((e: Error) => session.lose(e));
+  look();
+  if (!source.readOnly) window.setInterval(() => { if (!document.hidden) look(); }, REFRESH_MS);
   window.boresight = { session, model };
   if (findings.order.length) session.select(findings.order[0]!.id);
 }
@@ -77,10 +79,11 @@ function header(session: Session, pages: Record<string, HTMLElement>, help: HTML
     redo.disabled = !session.state.may_redo;
     const last = session.state.history[session.state.history.length - 1];
     undo.title = `${last ? `${last.action.do} ${String(last.action["finding"] ?? "")} by ${last.who}; ` : ""}Ctrl+Z`;
-    badge.textContent = session.state.signed ? "signed" : session.state.signature ? "changed since signed" : "not signed";
-    badge.className = `badge ${session.state.signed ? "signed" : "unsigned"}`;
+    const { seal } = session;
+    badge.textContent = !seal ? "checking…" : seal.signed ? "signed" : seal.signature ? "changed since signed" : "not signed";
+    badge.className = `badge ${!seal ? "quiet" : seal.signed ? "signed" : "unsigned"}`;
   };
-  session.on(["state"], paint);
+  session.on(["state", "seal"], paint);
   paint();
   return element("header", {}, element("h1", {}, element("span", { class: "brand" }, "boresight"), ` ${session.run.name}`), tabs,
     element("span", { class: "space" }), badge,

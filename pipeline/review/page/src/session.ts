@@ -1,9 +1,9 @@
 /** What the page shows now, and who wants to know when it changes. */
 import { RefusedError, type Source } from "./source";
-import type { Finding, Point, ReviewState, Run, Tool } from "./types";
+import type { Finding, Point, ReviewState, Run, Seal, Tool } from "./types";
 import { wrapped } from "./words";
 
-export type Topic = "state" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "recomputed";
+export type Topic = "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "recomputed";
 
 export class Session {
   selected: string | null = null;
@@ -13,7 +13,10 @@ export class Session {
   tool: Tool = "none";
   drawn: Point[] = [];
   message = "";
+  /** Null while the server still reads what a signature binds. */
+  seal: Seal | null = null;
   private isLost = false;
+  private isAsking = false;
   private readonly listeners = new Map<Topic, (() => void)[]>();
 
   constructor(readonly source: Source, readonly run: Run, public state: ReviewState) {
@@ -71,11 +74,20 @@ export class Session {
     return this.change(() => this.source.sign(name, standard, remarks, this.state.revision));
   }
 
+  /** See whether anything has changed, here or elsewhere. */
   async refresh(): Promise<void> {
-    const state = await this.source.state();
-    if (this.isLost) { this.isLost = false; this.say(""); }
-    if (state.run_version !== this.run.version) this.tell("recomputed");
-    if (state.revision !== this.state.revision || state.sha256 !== this.state.sha256) this.put(state);
+    if (this.isAsking) return;
+    this.isAsking = true;
+    try {
+      const seal = await this.source.seal();
+      if (this.isLost) { this.isLost = false; this.say(""); }
+      if (seal.run_version !== this.run.version) this.tell("recomputed");
+      const isNews = seal.revision !== this.state.revision || (this.seal !== null && seal.sha256 !== this.seal.sha256);
+      if (isNews) this.put(await this.source.state());
+      const isSeen = !isNews && this.seal?.sha256 === seal.sha256 && this.seal.signature?.id === seal.signature?.id;
+      this.seal = seal;
+      if (!isSeen) this.tell("seal");
+    } finally { this.isAsking = false; }
   }
 
   /** The server cannot be asked, or the run cannot be read just now: told until it can. */
@@ -83,8 +95,10 @@ export class Session {
 
   private async change(work: () => Promise<ReviewState>): Promise<boolean> {
     try {
+      this.seal = null;
       this.put(await work());
       this.say("");
+      void this.refresh().catch((e: Error) => this.lose(e));
       return true;
     } catch (error) {
       if (error instanceof RefusedError && error.stale) this.put(await this.source.state());

@@ -12,24 +12,24 @@ export function signPage(session: Session): HTMLElement {
   const form = session.source.readOnly ? null : signature(session);
   const assumed = session.source.readOnly ? null : assumptions(session);
   const paint = () => root.replaceChildren(...parts(session, form, assumed));
-  session.on(["state"], paint);
+  session.on(["state", "seal"], paint);
   paint();
   return root;
 }
 
 // The forms are kept, so that what is being written in them outlives news from elsewhere.
 function parts(session: Session, signing: HTMLElement | null, assumed: HTMLElement | null): HTMLElement[] {
-  const { state } = session;
+  const { state, seal } = session;
   const open = session.standing.filter((f) => f.status === "open").length;
-  const last = state.signature;
-  const standing = !last ? "Not signed." : state.signed
+  const last = seal?.signature;
+  const standing = !seal ? "Checking the run's files…" : !last ? "Not signed." : seal.signed
     ? `Signed by ${last.name} on ${moment(last.at)}${last.standard ? `, ${last.standard}` : ""}.`
     : `Changed since ${last.name} signed on ${moment(last.at)}: unsigned.`;
   const made = [
     element("section", {}, element("h2", {}, "Signature"),
-      element("p", { class: state.signed ? "signed" : "unsigned" }, standing),
+      element("p", { class: seal?.signed ? "signed" : "unsigned" }, standing),
       last?.remarks ? element("p", {}, `Remarks: ${last.remarks}`) : null,
-      element("p", { class: "quiet" }, `Inputs and decisions: SHA-256 ${state.sha256}`),
+      element("p", { class: "quiet" }, `Inputs and decisions: SHA-256 ${seal?.sha256 ?? "…"}`),
       open ? element("p", {}, `${open} findings are not decided yet; a signature covers them as undecided.`) : null,
       signing),
   ];

@@ -1,5 +1,5 @@
 /** Where the page gets its data: the local server, or the files of a read-only export. */
-import type { Layer, Point, Profile, Quality, Reading, ReviewState, Run, Section, Sight, Tool } from "./types";
+import type { Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Tool } from "./types";
 
 export class RefusedError extends Error {
   constructor(message: string, readonly stale: boolean) { super(message); }
@@ -9,6 +9,7 @@ export interface Source {
   readonly readOnly: boolean;
   run(): Promise<Run>;
   state(): Promise<ReviewState>;
+  seal(): Promise<Seal>;
   act(action: object, who: string, revision: number): Promise<ReviewState>;
   sign(name: string, standard: string, remarks: string, revision: number): Promise<ReviewState>;
   measure(tool: Tool, points: Point[]): Promise<Reading[]>;
@@ -47,6 +48,7 @@ export class Server implements Source {
   readonly readOnly = false;
   run = () => get<Run>("/api/run");
   state = () => get<ReviewState>("/api/state");
+  seal = () => get<Seal>("/api/seal");
   act = (action: object, who: string, revision: number) => post<ReviewState>("/api/actions", { action, who, revision });
   sign = (name: string, standard: string, remarks: string, revision: number) =>
     post<ReviewState>("/api/sign", { name, standard, remarks, revision });
@@ -70,7 +72,7 @@ export class Server implements Source {
 
 /** Data that an export puts beside the page, as a script, because a page from a file may not fetch. */
 export interface Exported {
-  run: Run; state: ReviewState; quality: Quality; sections: Section[]; layers: Record<string, Layer>; model: string;
+  run: Run; state: ReviewState; seal: Seal; quality: Quality; sections: Section[]; layers: Record<string, Layer>; model: string;
   spots: { distance_mm: number; azimuth_rad: number; sights: Sight[]; profile: Profile }[];
 }
 
@@ -79,6 +81,7 @@ export class Export implements Source {
   constructor(private readonly data: Exported) {}
   run = async () => this.data.run;
   state = async () => this.data.state;
+  seal = async () => this.data.seal;
   act = async (): Promise<ReviewState> => { throw new RefusedError("This copy is read-only.", false); };
   sign = this.act;
   measure = async (): Promise<Reading[]> => { throw new RefusedError("Measuring needs boresight review.", false); };

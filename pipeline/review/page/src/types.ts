@@ -43,13 +43,15 @@ export interface Finding {
 }
 
 export interface Entry { id: number; who: string; at: string; action: Record<string, unknown> & { do: string } }
-export interface Signature { name: string; standard: string; remarks: string; at: string; revision: number; sha256: string }
+export interface Signature { id: number; name: string; standard: string; remarks: string; at: string; revision: number; sha256: string }
 
 export interface ReviewState {
   revision: number; findings: Finding[]; may_undo: boolean; may_redo: boolean; lost: Entry[];
-  assumed: { wall_thickness_mm: number | null; yield_mpa: number | null }; history: Entry[]; sha256: string;
-  signed: boolean; signature: Signature | null; run_version: string;
+  assumed: { wall_thickness_mm: number | null; yield_mpa: number | null }; history: Entry[];
 }
+
+/** Of what state a signature would be, and the last one; changes whenever anything does. */
+export interface Seal { revision: number; sha256: string; signed: boolean; signature: Signature | null; run_version: string }
 
 export interface Section {
   distance_mm: number; azimuth_rad: number[]; radius_mm: (number | null)[]; sigma_mm: (number | null)[];
@@ -60,6 +62,6 @@ export interface Curve { mm: number[]; depth_mm: (number | null)[]; sigma_mm: (n
 export interface Profile { along: Curve; around: Curve }
 
 export interface Sight { frame: number; time_s: number; illumination: string; spot_px: Point; ring_px: Point[] }
-export interface Layer { levels: number; width: number; height: number; distance_mm: [number, number] }
+export interface Layer { levels: number; width: number; height: number; distance_mm: [number, number]; azimuth_rad: number }
 export interface Reading { name: string; value: number; sigma: number; unit: string }
 export type Tool = "none" | "point" | "distance" | "area" | "depth" | "diameter" | "redraw" | "add" | "split";
