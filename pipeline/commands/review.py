@@ -70,6 +70,7 @@ def _listening(port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind(("127.0.0.1", port))
+        listener.listen()  # before anyone is told the address: who comes early waits instead of being refused
     except OSError as error:
         listener.close()
         raise InputError(f"port {port}", error.strerror or "is taken", hint="leave out --port") from error
