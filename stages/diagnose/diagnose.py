@@ -14,6 +14,8 @@ from stages.calibrate.gauge.calibrate import measure_gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.diagnose.compose import composed
 from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.field.evidence import field_evidence
+from stages.diagnose.field.join import with_field
 from stages.diagnose.gauge.examine import examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.result import Diagnosis
@@ -36,8 +38,8 @@ def diagnose(
 ) -> Diagnosis:
     """Compare recordings of one probe with what the stated instrument predicts."""
     of_gauge = examine_gauge(gauge, probe, library, context) if gauge is not None else None
-    of_field = examine_field(field, probe, context) if field is not None else None
-    return composed(of_field, of_gauge, probe)
+    of_field = examine_field(field, probe, library, context) if field is not None else None
+    return with_field(composed(of_field, of_gauge, probe), of_field, of_gauge, probe, library)
 
 
 def examine_gauge(
@@ -58,11 +60,16 @@ def examine_gauge(
     return Seen(recording, geometry, travel, profile, tuple(missing))
 
 
-def examine_field(recording: Recording, probe: Probe, context: Context) -> Seen:
-    """Return what an inspection's motion and line profile say."""
+def examine_field(
+    recording: Recording, probe: Probe, library: Mapping[str, EffectModel], context: Context
+) -> Seen:
+    """Return what an inspection's rings, texture, motion and line profile say."""
     missing: list[str] = []
     rings = extract_rings(recording, probe, RingParameters.model_validate({}), context)
-    return Seen(recording, None, None, _profile(recording, rings, probe, context, missing), tuple(missing))
+    profile = _profile(recording, rings, probe, context, missing)
+    found = field_evidence(recording, probe, context, _of_geometry(library, profile), rings)
+    missing += found.channel.shortcomings
+    return Seen(recording, None, found.travel, profile, tuple(missing), found)
 
 
 def _profile(

@@ -14,6 +14,8 @@ from stages.diagnose.evidence import Evidence
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.points import ring_points
 from stages.diagnose.field.run import FieldRun
+from stages.diagnose.gauge.confirm import partial_of
+from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import DEGREES, Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
@@ -81,6 +83,22 @@ def confirm_in_field(
     return InField(
         confirmation, _rms(pattern @ own.amplitude), _rms(pattern @ gap), float(np.sqrt(np.mean(noise)))
     )
+
+
+def met_in_field(
+    examined: Examined, found: FieldEvidence, stated: Stated
+) -> tuple[InField | None, ...]:  # fmt: skip
+    """Return, for each effect of the gauge's likeliest hypothesis, whether the field says the same."""
+    best = examined.best
+    if best is None:
+        return ()
+    out: list[InField | None] = []
+    for term in best.fit.terms:
+        own = partial_of("all", best.evidence, best, term, stated)
+        known = own is not None and np.isfinite(own.covariance).all()
+        covariance = own.covariance if own is not None and known else np.zeros((len(term.amplitude),) * 2)
+        out.append(confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated))
+    return tuple(out)
 
 
 def ring_noise_px(run: FieldRun) -> float:

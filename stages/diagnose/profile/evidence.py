@@ -82,6 +82,10 @@ def profile_evidence(
         When too few frames are lit by the laser alone, or the ring never holds still for long enough.
     """
     profiles = measure_profiles(recording, rings)
+    if not len(profiles.row):
+        raise UnusableError(
+            "diagnose", "no frame shows the line alone", hint="record frames with the LEDs off"
+        )
     geometry = line_geometry(
         rings, profiles.row, profiles.time_s, profiles.azimuth_rad, profiles.clipped, probe
     )

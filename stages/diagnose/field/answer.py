@@ -1,0 +1,122 @@
+"""What a field recording comes to by itself: a class of effects, never one name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pipeline.physics.catalogue import EFFECTS
+from stages.diagnose.classes import classes_of, record_next
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.evidence import INSTRUMENT, Evidence
+from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.inference import Score, Stated, places_of, score
+from stages.diagnose.result import Location
+
+# Below this chance, corrected for all that was tried, something is there.
+DETECTED = 1e-4
+# Effects that explain almost as much as the best are not told from it: laws are good to a few per cent, and
+# what the recording's own unknowns take up differs little from one to the next.
+_ALMOST, _APART = 0.1, 20.0
+_SHOWN = 4
+
+
+@dataclass(frozen=True)
+class Shown:
+    """An effect at its best shape, as the field alone has it, and how many shapes were tried."""
+
+    model: EffectModel
+    shape: Shape
+    score: Score
+    tried: int
+
+    @property
+    def p_value(self) -> float:
+        """Chance of such a score at the best of the shapes tried when nothing is hidden."""
+        return min(self.score.p_value * self.tried, 1.0)
+
+    @property
+    def statement(self) -> str:
+        """Return the effect with its size, as if it were alone."""
+        return self.model.statement(self.shape, self.score.amplitude)
+
+
+@dataclass(frozen=True)
+class FieldAnswer:
+    """What a field recording by itself says.
+
+    Attributes
+    ----------
+    global_p : float
+        Chance of such measurements when nothing is hidden.
+    shown : tuple of Shown
+        Effects that would explain it about as well as the best, the best first; empty when nothing shows.
+    """
+
+    global_p: float
+    shown: tuple[Shown, ...]
+
+    @property
+    def members(self) -> tuple[str, ...]:
+        """The class: what explains it, and what no single kind of recording tells from that."""
+        return classes_of([s.model.name for s in self.shown])
+
+    @property
+    def identifiable(self) -> str:
+        """Return what is determined: the size that each single cause would have."""
+        return "; or ".join(s.statement.rstrip(".") for s in self.shown[:_SHOWN])
+
+    @property
+    def next(self) -> str:
+        """Return what to record: a gauge run, and what tells the members apart."""
+        more = record_next([s.model.name for s in self.shown]) if self.shown else ""
+        return f"A gauge run with this probe: known bores, driven off-centre, rolled and reversed. {more}"
+
+
+def field_answer(found: FieldEvidence, library: Mapping[str, EffectModel], stated: Stated) -> FieldAnswer:
+    """Return what the field's rings and texture show beyond the stated instrument's uncertainty."""
+    scores = scores_of(found.channel.whole, library, stated)
+    p_value = min((s.p_value for s in scores), default=1.0) * max(len(scores), 1)
+    if p_value > DETECTED:
+        return FieldAnswer(min(p_value, 1.0), ())
+    return FieldAnswer(p_value, _about_as_good(scores))
+
+
+def scores_of(
+    whole: Evidence, library: Mapping[str, EffectModel], stated: Stated
+) -> list[Shown]:  # fmt: skip
+    """Return every effect's score at its best shape, the most telling first."""
+    best: dict[str, Shown] = {}
+    tried: dict[str, int] = {}
+    for name, shape in sorted({(c.effect, c.shape) for c in whole.columns if c.effect != INSTRUMENT}):
+        if name not in library:
+            continue
+        result = score(whole, stated, places_of(whole, library[name], shape))
+        if result is None or not library[name].possible(shape, result.amplitude):
+            continue
+        tried[name] = tried.get(name, 0) + 1
+        if name not in best or result.statistic > best[name].score.statistic:
+            best[name] = Shown(library[name], shape, result, 1)
+    counted = [Shown(s.model, s.shape, s.score, tried[name]) for name, s in best.items()]
+    return sorted(counted, key=lambda s: -s.score.statistic)
+
+
+def location_in_field(found: FieldEvidence, shown: Sequence[Shown]) -> Location | None:
+    """Return where and when the field shows it; one diameter gives no exponent."""
+    if not shown or found.run is None:
+        return None
+    first = EFFECTS[shown[0].model.name]
+    same_order = all(EFFECTS[s.model.name].harmonic == first.harmonic for s in shown)
+    trajectory = found.run.trajectory
+    distance = trajectory.T_pc[:, 2, 3]
+    return Location(
+        str(first.channel), str(first.fixed_to), first.time, first.harmonic if same_order else None,
+        frames=(int(trajectory.frame[0]), int(trajectory.frame[-1])),
+        distance_mm=(float(distance.min()), float(distance.max())),
+        azimuth_deg=(-180.0, 180.0),
+    )  # fmt: skip
+
+
+def _about_as_good(scores: Sequence[Shown]) -> tuple[Shown, ...]:
+    top = scores[0].score.statistic
+    return tuple(s for s in scores if s.score.statistic > top - max(_APART, _ALMOST * top))
