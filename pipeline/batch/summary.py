@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from importlib.resources import files
 from pathlib import Path
-
-from jinja2 import Environment, StrictUndefined
 
 from pipeline.batch.work import Ending
 from pipeline.codec import Json
 from pipeline.disk import replace_json
+from pipeline.pages import page_template
 
 SHOWN_METRICS = ("inspected length", "wall seen", "mean diameter", "defects", "deepest defect")
 
@@ -21,10 +19,8 @@ def write_summary(endings: Iterable[Ending], folder: Path) -> None:
     ordered = sorted(endings, key=lambda e: e.name)
     runs: list[Json] = [_document(e) for e in ordered]
     replace_json(folder / "batch.json", {"format": 1, "runs": runs, "states": dict(_states(ordered))})
-    page = files("pipeline.batch").joinpath("page.html").read_text("utf-8")
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
     rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
-    text = environment.from_string(page).render(rows=rows, states=_states(ordered), metrics=SHOWN_METRICS)
+    text = page_template("pipeline.batch").render(rows=rows, states=_states(ordered), metrics=SHOWN_METRICS)
     temporary = folder / ".new-batch.html"
     temporary.write_text(text, "utf-8")
     temporary.replace(folder / "batch.html")

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import base64
 import json
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 
 from pipeline.commands.calibrate_camera_figures import (
@@ -20,6 +18,7 @@ from pipeline.commands.calibrate_camera_figures import (
 )
 from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
+from pipeline.pages import page_template
 
 Float = NDArray[np.float64]
 
@@ -71,10 +70,8 @@ def report_page(report: CalibrationReport, document: dict[str, Any]) -> str:
     pictures = {"uncertainty": png(uncertainty_figure(report)), "residuals": png(residual_figure(report))}
     if report.displacement is not None:
         pictures["displacement"] = png(displacement_figure(report))
-    template = (files("pipeline.commands.calibrate_camera_page") / "page.html").read_text("utf-8")
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
     encoded = {name: base64.b64encode(data).decode("ascii") for name, data in pictures.items()}
-    return environment.from_string(template).render(d=document, pictures=encoded)
+    return page_template("pipeline.commands.calibrate_camera_page").render(d=document, pictures=encoded)
 
 
 def _board(report: CalibrationReport) -> dict[str, Any]:

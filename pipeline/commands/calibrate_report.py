@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import base64
 import json
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 
 from pipeline.commands.calibrate_figures import (
@@ -20,6 +18,7 @@ from pipeline.commands.calibrate_figures import (
     run_figure,
 )
 from pipeline.instrument.probe import Probe
+from pipeline.pages import page_template
 from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
 
 Float = NDArray[np.float64]
@@ -87,10 +86,8 @@ def report_page(result: GaugeCalibration, document: dict[str, Any]) -> str:
         "radius": radius_figure(result),
         "correlations": correlation_figure(document["correlations"]),
     }
-    template = (files("pipeline.commands.calibrate_page") / "page.html").read_text("utf-8")
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
     encoded = {name: base64.b64encode(png(figure)).decode("ascii") for name, figure in figures.items()}
-    return environment.from_string(template).render(d=document, pictures=encoded)
+    return page_template("pipeline.commands.calibrate_page").render(d=document, pictures=encoded)
 
 
 def advice(names: tuple[str, ...]) -> str:

@@ -7,13 +7,11 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -26,6 +24,7 @@ from pipeline.instrument.budget.design import BaselineStudy, Tolerance, dominant
 from pipeline.instrument.budget.monte_carlo import MonteCarlo
 from pipeline.instrument.budget.scan import Pose
 from pipeline.instrument.budget.sources import NOT_IN_RADIUS, Kind
+from pipeline.pages import page_template
 
 Float = NDArray[np.float64]
 _COLOURS = ("#0a5ea8", "#b04a00", "#1d6f42", "#7a3e9d", "#8a6d00")
@@ -100,11 +99,8 @@ def write_budget(document: dict[str, Any], budget: Budget, study: BaselineStudy,
 
 def budget_page(document: dict[str, Any], chart_svg: bytes) -> str:
     """Return the page as one file that needs nothing else."""
-    template = (files("pipeline.commands.error_budget_page") / "page.html").read_text("utf-8")
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
-    environment.filters |= {"um": lambda mm: f"{1000 * mm:.1f}", "number": lambda value: f"{value:.4g}"}
     chart = base64.b64encode(chart_svg).decode("ascii")
-    return environment.from_string(template).render(d=document, chart=chart)
+    return page_template("pipeline.commands.error_budget_page").render(d=document, chart=chart)
 
 
 def budget_figure(budget: Budget, study: BaselineStudy) -> Figure:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import base64
 import json
-from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import binned_statistic_2d
 
+from pipeline.pages import page_template
 from stages.verify.accuracy import Differences
 
 Float = NDArray[np.float64]
@@ -36,14 +35,8 @@ def write_certificate(document: dict[str, Any], differences: Differences, folder
 
 def certificate_page(document: dict[str, Any], picture_png: bytes) -> str:
     """Return the certificate as one file that needs nothing else."""
-    template = (files("pipeline.commands.verify_page") / "page.html").read_text("utf-8")
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
-    environment.filters |= {
-        "um": lambda mm: f"{1000 * mm:.1f} µm" if abs(mm) < 0.1 else f"{mm:.3f} mm",
-        "percent": lambda share: "not stated" if share is None else f"{100 * share:.1f} %",
-    }
     picture = base64.b64encode(picture_png).decode("ascii")
-    return environment.from_string(template).render(d=document, picture=picture)
+    return page_template("pipeline.commands.verify_page").render(d=document, picture=picture)
 
 
 def differences_figure(differences: Differences) -> Figure:
