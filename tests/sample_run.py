@@ -13,3 +13,10 @@ def run_sample(folder: Path) -> str:
     told = subprocess.run(command, cwd=PROJECT_ROOT, capture_output=True, text=True)
     assert told.returncode == 0, told.stderr
     return told.stdout
+
+
+def rerun_sample(folder: Path, *settings: str) -> subprocess.Popen[bytes]:
+    """Start the run again with other parameters."""
+    command = [sys.executable, "-m", "pipeline.cli", "run", "data/sample", "-o", str(folder)]
+    given = [part for setting in settings for part in ("--set", setting)]
+    return subprocess.Popen([*command, *given], cwd=PROJECT_ROOT, stdout=subprocess.DEVNULL)

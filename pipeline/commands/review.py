@@ -15,7 +15,7 @@ import uvicorn
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
 from pipeline.review.export import export_review
-from pipeline.review.review import Review, open_review
+from pipeline.review.review import FOLDER, Review, open_review
 from pipeline.review.run_files import RunFiles
 from pipeline.review.server.app import application
 from pipeline.review.server.guard import Guard
@@ -23,7 +23,9 @@ from pipeline.review.server.guard import Guard
 
 def review(
     run: Annotated[Path, typer.Argument(help="folder of a finished run")],
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port on 127.0.0.1; 0 takes a free one")] = 0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="port on 127.0.0.1; 0 takes that of last time, or a free one")
+    ] = 0,
     export: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="write the page as files, read-only, and end")
     ] = None,
@@ -53,8 +55,10 @@ def serve(opened: Review, page: Path, port: int, browser: bool) -> None:
     InputError
         When the port is taken.
     """
-    with _listening(port) as listener:
+    last = opened.files.path / FOLDER / "port"
+    with _listening(port) if port else _listening_again(last) as listener:
         number = int(listener.getsockname()[1])
+        last.write_text(f"{number}\n", "ascii")
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{number}/?token={token}"
         typer.echo(f"Review of {opened.files.path.name}: {address}\nStop with Ctrl-C.")
@@ -63,6 +67,14 @@ def serve(opened: Review, page: Path, port: int, browser: bool) -> None:
         guarded = Guard(application(opened, page), token, number)
         server = uvicorn.Server(uvicorn.Config(guarded, log_level="warning", server_header=False))
         server.run(sockets=[listener])
+
+
+def _listening_again(last: Path) -> socket.socket:
+    """Listen where the last server did, so that a page left open finds its server again."""
+    try:
+        return _listening(int(last.read_text("ascii")))
+    except (OSError, ValueError, OverflowError, InputError):
+        return _listening(0)
 
 
 def _listening(port: int) -> socket.socket:

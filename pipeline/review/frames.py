@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts import RingSamples, Trajectory
 from pipeline.errors import BoresightError
-from pipeline.geometry.axis import from_pipe
+from pipeline.geometry.axis import from_pipe, to_pipe
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.model import Overlays
@@ -22,8 +22,8 @@ Float = NDArray[np.float64]
 _QUALITY = 88
 # A wall spot is seen best well off the axis, where texture is largest, yet away from the picture's rim.
 _BEST_POLAR_RAD = 1.05
-
-
+# How far a pixel's ray is followed to the wall, in radii and steps of 0.5 %.
+_NEAREST_RADII, _FARTHEST_RADII, _REACHES = 0.3, 30.0, 900
 _KEPT = 2
 
 
@@ -82,6 +82,27 @@ class FrameFinder:
         if not found:
             raise UnseenError("no frame shows this spot")
         return found
+
+    def spot(self, frame: int, uv: tuple[float, float]) -> tuple[float, float]:
+        """Return distance and azimuth of the wall that a pixel of a frame shows.
+
+        Raises
+        ------
+        UnseenError
+            When the pixel shows no wall, or the frame has no pose.
+        """
+        at = np.flatnonzero(self.trajectory.frame == frame)
+        rays = self.probe.camera.unproject(np.array([uv]))
+        if not len(at) or not rays.valid[0]:
+            raise UnseenError("no wall is seen there")
+        T_pc = self.trajectory.T_pc[at[0]]
+        reach = self.radius_mm * np.geomspace(_NEAREST_RADII, _FARTHEST_RADII, _REACHES)
+        along_p = T_pc[:3, 3] + reach[:, None] * (T_pc[:3, :3] @ rays.ray[0])
+        distance, azimuth, radius = to_pipe(self.trajectory.axis, along_p)
+        outside = np.flatnonzero(radius >= self.radius_mm)
+        if not len(outside):
+            raise UnseenError("no wall is seen there")
+        return float(distance[outside[0]]), float(azimuth[outside[0]])
 
     def picture(self, frame: int) -> bytes:
         """Return a frame as JPEG.

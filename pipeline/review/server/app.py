@@ -54,6 +54,7 @@ class ReviewApp:
             Route("/api/profile", self._answering(self._profile)),
             Route("/api/quality", self._answering(self._quality)),
             Route("/api/sights", self._answering(self._sights)),
+            Route("/api/frames/{frame:int}/spot", self._answering(self._spot)),
             Route("/api/frames/{frame:int}.jpg", self._answering(self._frame)),
             Route("/api/tiles/{layer:str}", self._answering(self._layer)),
             Route(
@@ -124,6 +125,11 @@ class ReviewApp:
     def _sights(self, request: Request, _: bytes) -> Response:
         found = finder_of(self.review.files).sights(_number(request, "distance"), _number(request, "azimuth"))
         return JSONResponse(documents.cleaned({"sights": [vars(s) for s in found]}))
+
+    def _spot(self, request: Request, _: bytes) -> Response:
+        uv = _number(request, "u"), _number(request, "v")
+        found = finder_of(self.review.files).spot(request.path_params["frame"], uv)
+        return JSONResponse({"point": found})
 
     def _frame(self, request: Request, _: bytes) -> Response:
         jpeg = finder_of(self.review.files).picture(request.path_params["frame"])

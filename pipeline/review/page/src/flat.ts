@@ -1,7 +1,7 @@
 /** The unrolled wall: distance to the right, clock downward from 6 over 12 to 6, tiles loaded as they are seen. */
 import type { Session } from "./session";
 import type { Finding, Layer, Point } from "./types";
-import { TURN, clock, element, wrapped } from "./words";
+import { TURN, clock, element } from "./words";
 
 const TILE = 512;
 const TOP = -1.5 * Math.PI; // 6 o'clock
@@ -280,12 +280,6 @@ export class FlatView {
     if (found) session.tell("selection");
   }
 
-  /** The azimuth, whole turns added, that lies next to the last drawn point. */
-  private beside(azimuth: number): number {
-    const last = this.session.drawn[this.session.drawn.length - 1];
-    return last ? last[1] + wrapped(azimuth - last[1]) : azimuth;
-  }
-
   private wheel(event: WheelEvent): void {
     event.preventDefault();
     this.zoom(Math.exp(event.deltaY * 0.0015), event.offsetX, event.offsetY);
@@ -303,6 +297,7 @@ export class FlatView {
   }
 
   private key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const [s, a] = this.session.cursor;
     const step = (event.shiftKey ? 40 : 4) * this.view.mmPerPx;
     const turn = step / this.session.run.radius_mm;
@@ -316,7 +311,7 @@ export class FlatView {
       this.paint();
     } else if (event.key === "+" || event.key === "=") this.zoom(0.7);
     else if (event.key === "-") this.zoom(1.4);
-    else if (event.key === "Enter" && this.session.tool !== "none") this.session.draw([s, this.beside(a)]);
+    else if (event.key === "Enter" && this.session.tool !== "none") this.session.draw([s, this.session.beside(a)]);
     else if (event.key === "Backspace" && this.session.drawn.length) {
       this.session.drawn = this.session.drawn.slice(0, -1);
       this.session.tell("shape");

@@ -23,6 +23,7 @@ export class FrameView {
     this.root.append(element("div", { class: "picture" }, this.frame), this.told);
     this.close.addEventListener("change", () => this.zoom());
     this.light.addEventListener("input", () => { this.image.style.filter = `brightness(${this.light.value})`; });
+    this.frame.addEventListener("click", (e) => void this.pick(e));
     new ResizeObserver(() => this.zoom()).observe(this.root);
     session.on(["cursor"], () => this.later());
     this.later();
@@ -70,6 +71,18 @@ export class FrameView {
     this.put(chosen);
   }
 
+  /** Move the spot to what was clicked. */
+  private async pick(event: MouseEvent): Promise<void> {
+    const matrix = (this.marks as SVGSVGElement).getScreenCTM();
+    if (!this.shown || !matrix) return;
+    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
+    try {
+      this.session.moveTo(await this.session.source.spot(this.shown.frame, at.x, at.y));
+    } catch (error) {
+      this.told.textContent = error instanceof Error ? error.message : String(error);
+    }
+  }
+
   private put(sight: Sight): void {
     this.shown = sight;
     this.image.onload = () => {
@@ -83,6 +96,6 @@ export class FrameView {
     };
     this.image.src = this.session.source.frame(sight.frame);
     this.image.alt = `Recorded frame ${sight.frame}, the spot circled`;
-    this.told.textContent = `Frame ${sight.frame}, ${sight.time_s.toFixed(2)} s; the spot is circled${sight.ring_px.length ? ", the measured laser line dotted" : ""}.`;
+    this.told.textContent = `Frame ${sight.frame}, ${sight.time_s.toFixed(2)} s; a click moves the spot (circled)${sight.ring_px.length ? ", the measured laser line dotted" : ""}.`;
   }
 }

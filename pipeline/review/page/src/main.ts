@@ -14,7 +14,7 @@ import { element } from "./words";
 
 const REFRESH_MS = 4000;
 
-declare global { interface Window { BORESIGHT?: Exported; boresight?: { session: Session; model: ModelView } } }
+declare global { interface Window { BORESIGHT?: Exported; boresight?: { session: Session; model: ModelView; flat: FlatView } } }
 
 async function start(): Promise<void> {
   const source: Source = window.BORESIGHT ? new Export(window.BORESIGHT) : new Server();
@@ -40,7 +40,7 @@ async function start(): Promise<void> {
   const look = () => void session.refresh().catch((e: Error) => session.lose(e));
   look();
   if (!source.readOnly) window.setInterval(() => { if (!document.hidden) look(); }, REFRESH_MS);
-  window.boresight = { session, model };
+  window.boresight = { session, model, flat };
   if (findings.order.length) session.select(findings.order[0]!.id);
 }
 

@@ -33,6 +33,9 @@ export class ModelView {
   private readonly lamp = new THREE.PointLight(0xffffff, 0.012, 0, 2);
   private readonly marker = new THREE.Mesh(
     new THREE.TorusGeometry(1, 0.14, 8, 32), new THREE.MeshBasicMaterial({ color: 0xff8c00, depthTest: false, transparent: true }));
+  private readonly line = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: 0xff8c00, depthTest: false, transparent: true }));
+  private readonly corners = new THREE.Points(
+    new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: 0xff8c00, size: 9, sizeAttenuation: false, depthTest: false, transparent: true }));
   private readonly plane = new THREE.Plane(new THREE.Vector3(1, 0, 0), 0);
   private renderer: THREE.WebGLRenderer | null = null;
   private controls: OrbitControls | null = null;
@@ -50,6 +53,7 @@ export class ModelView {
     this.explain();
     session.on(["layer"], () => this.dress());
     session.on(["cursor"], () => this.follow());
+    session.on(["shape"], () => this.trace());
     void this.start();
   }
 
@@ -82,7 +86,7 @@ export class ModelView {
     }
     this.renderer.localClippingEnabled = true;
     this.scene.background = new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue("--ground").trim());
-    this.scene.add(new THREE.AmbientLight(0xffffff, 1.1), this.lamp, this.marker);
+    this.scene.add(new THREE.AmbientLight(0xffffff, 1.1), this.lamp, this.marker, this.line, this.corners);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.draw());
     this.canvas.addEventListener("pointerdown", (e) => { this.pressed = { x: e.clientX, y: e.clientY }; });
@@ -200,13 +204,27 @@ export class ModelView {
     this.draw();
   }
 
+  /** What is being drawn or measured, on the wall. */
+  private trace(): void {
+    const { drawn, run } = this.session;
+    const at = drawn.map(([s, a]) => toModel(this.pipe.point(s, a, run.radius_mm * 0.99)).multiplyScalar(MM));
+    for (const shape of [this.line, this.corners]) {
+      shape.geometry.dispose();
+      shape.geometry = new THREE.BufferGeometry().setFromPoints(at);
+      shape.renderOrder = 1;
+      shape.frustumCulled = false;
+    }
+    this.draw();
+  }
+
   private key(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     const step = event.shiftKey ? 5 * FLIGHT_MM : FLIGHT_MM;
     const keys: Record<string, () => void> = {
       w: () => this.fly(step), s: () => this.fly(-step), ArrowUp: () => this.fly(step), ArrowDown: () => this.fly(-step),
       a: () => this.glance(0.08, 0), d: () => this.glance(-0.08, 0), ArrowLeft: () => this.glance(0.08, 0), ArrowRight: () => this.glance(-0.08, 0),
     };
-    const act = keys[event.key];
+    const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act) return;
     if (!this.isInside) this.enter(true);
     act();
@@ -236,6 +254,10 @@ export class ModelView {
       .find((h) => !this.isCut || this.plane.distanceToPoint(h.point) >= 0);
     if (!hit) return;
     const { distance, azimuth } = this.pipe.coordinates(fromModel(hit.point));
+    if (this.session.tool !== "none") {
+      this.session.draw([distance, this.session.beside(azimuth)]);
+      return;
+    }
     const stay = this.flown;
     this.session.moveTo([distance, azimuth]);
     this.flown = stay; // a click looks, it does not travel

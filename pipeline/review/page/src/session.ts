@@ -56,6 +56,12 @@ export class Session {
 
   draw(at: Point): void { this.drawn = [...this.drawn, at]; this.tell("shape"); }
 
+  /** The azimuth, whole turns added, that lies next to the last drawn point. */
+  beside(azimuth: number): number {
+    const last = this.drawn[this.drawn.length - 1];
+    return last ? last[1] + wrapped(azimuth - last[1]) : azimuth;
+  }
+
   /** Ask for the reason why the chosen finding is no defect. */
   askToReject(): void { if (this.finding) this.tell("reject"); }
 

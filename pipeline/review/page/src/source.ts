@@ -19,6 +19,7 @@ export interface Source {
   layer(name: string): Promise<Layer>;
   tile(layer: string, level: number, column: number, row: number): string;
   frame(frame: number): string;
+  spot(frame: number, u: number, v: number): Promise<Point>;
   model(): Promise<ArrayBuffer>;
   quality(): Promise<Quality>;
 }
@@ -62,6 +63,8 @@ export class Server implements Source {
   layer = (name: string) => get<Layer>(`/api/tiles/${name}`);
   tile = (layer: string, level: number, column: number, row: number) => `/api/tiles/${layer}/${level}/${column}/${row}.png`;
   frame = (frame: number) => `/api/frames/${frame}.jpg`;
+  spot = async (frame: number, u: number, v: number) =>
+    (await get<{ point: Point }>(`/api/frames/${frame}/spot?u=${u}&v=${v}`)).point;
   model = async () => {
     const response = await reached("/api/model.glb");
     if (!response.ok) throw new RefusedError("The run has no model.", false);
@@ -100,6 +103,7 @@ export class Export implements Source {
   layer = async (name: string) => this.data.layers[name]!;
   tile = (layer: string, level: number, column: number, row: number) => `tiles/${layer}/${level}/${column}/${row}.png`;
   frame = (frame: number) => `frames/${frame}.jpg`;
+  spot = async (): Promise<Point> => { throw new RefusedError("Moving by the frame needs boresight review.", false); };
   quality = async () => this.data.quality;
   model = async () => Uint8Array.from(atob(this.data.model), (c) => c.charCodeAt(0)).buffer;
 }
