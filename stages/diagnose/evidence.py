@@ -76,6 +76,13 @@ class Evidence:
         right[here] = self.right[own]
         return Evidence(tuple(columns), information, right, covariance, self.misfit, self.cells)
 
+    def deflated(self, alike: float) -> Evidence:
+        """Return the evidence when ``alike`` measurements that err alike count as one."""
+        return Evidence(
+            self.columns, self.information / alike, self.right / alike, self.score_covariance / alike**2,
+            self.misfit / alike, self.cells,
+        )  # fmt: skip
+
 
 def total(parts: Sequence[Evidence]) -> Evidence:
     """Return the sum of independent evidence over the union of its columns."""

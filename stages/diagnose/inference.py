@@ -20,7 +20,7 @@ DEGREES = 60.0
 _TIED = 1e-6
 _SEEN = 1e-9
 # An amplitude's 1 σ beforehand, in plausible sizes.
-PRIOR_PLAUSIBLE = 10.0
+PRIOR_PLAUSIBLE = 5.0
 
 
 @dataclass(frozen=True)
@@ -93,21 +93,27 @@ def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = No
     free = free[np.diag(evidence.information)[free] > 0]
     prior = stated.over(evidence.columns)
     a, b = evidence.information, evidence.right
-    response = np.linalg.lstsq(
-        a[np.ix_(free, free)] + prior[np.ix_(free, free)], a[np.ix_(free, block)], rcond=1e-13
-    )[0]
+    response = np.asarray(
+        np.linalg.lstsq(
+            a[np.ix_(free, free)] + prior[np.ix_(free, free)], a[np.ix_(free, block)], rcond=1e-13
+        )[0],
+        np.float64,
+    )
     right = b[block] - response.T @ b[free]
     own = a[np.ix_(block, block)] - a[np.ix_(block, free)] @ response
     size = np.sqrt(np.maximum(np.diag(a)[block], 1e-300))
     value = np.linalg.eigvalsh(own / np.outer(size, size))
     if not np.all(value > _SEEN):
         return None
+    # Neighbours that err alike widen what the data say, not what was stated beforehand.
     inflation = np.sqrt(np.diag(evidence.score_covariance)[block] / np.diag(a)[block])
-    amplitude, inverse = np.linalg.solve(own, right), np.linalg.inv(own)
-    covariance = inverse * np.outer(inflation, inflation)
-    statistic = float(amplitude @ np.linalg.solve(covariance, amplitude))
+    from_stated = response.T @ prior[np.ix_(free, free)] @ response
+    spread = (own - from_stated) * np.outer(inflation, inflation) + from_stated
+    inverse = np.linalg.inv(own)
+    amplitude, covariance = inverse @ right, np.asarray(inverse @ spread @ inverse, np.float64)
+    statistic = float(right @ np.linalg.solve(spread, right))
     p_value = float(stats.f.sf(statistic / len(block), len(block), DEGREES))
-    return Score(amplitude, covariance, statistic, p_value, float(right @ amplitude))  # type: ignore[arg-type]
+    return Score(np.asarray(amplitude, np.float64), covariance, statistic, p_value, float(right @ amplitude))
 
 
 def instrument_places(evidence: Evidence) -> Int:
@@ -148,15 +154,11 @@ def estimate(evidence: Evidence, stated: Stated, prior_sigma: Float) -> Estimate
     value = np.maximum(value, 1e-14)
     covariance = (vector / value) @ vector.T / np.outer(scale, scale)
     best = covariance @ evidence.right
-    known = np.isfinite(prior_sigma)
     occam = float(np.sum(np.log(value)) + 2 * np.sum(np.log(scale))) - _log_det(prior)
-    return Estimate(
-        best, covariance, evidence.misfit - float(evidence.right @ best) + occam + 0.0 * known.sum()
-    )
+    return Estimate(best, covariance, evidence.misfit - float(evidence.right @ best) + occam)
 
 
 def _log_det(matrix: Float) -> float:
-    value = np.linalg.eigvalsh(matrix)
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     value = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
     return float(np.sum(np.log(np.maximum(value, 1e-14))) + 2 * np.sum(np.log(scale)))

@@ -9,7 +9,7 @@ clustering", 2011).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
@@ -59,9 +59,13 @@ class Equations:
     kind: Int
 
     def of(self, part: Part) -> Equations:
-        """Return the same measurements, without weight outside a part of the run."""
+        """Return the measurements of a part of the run."""
         use = part.frames[self.frame] & np.isin(self.kind, part.kinds)
-        return replace(self, weight=np.where(use, self.weight, 0.0))
+        return self.at(np.flatnonzero(use))
+
+    def at(self, rows: Int) -> Equations:
+        """Return the measurements at these rows."""
+        return Equations(*(getattr(self, f.name)[rows] for f in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -97,14 +101,19 @@ class Reduced:
 def eliminate_poses(equations: Equations, motion: MotionPrior, frames: int) -> Reduced:
     """Return the normal equations over the globals at the best poses."""
     size = equations.by_global.shape[1]
-    root = np.sqrt(equations.weight)
-    by_pose, wide = equations.by_pose * root[:, None], equations.by_global * root[:, None]
-    residual = equations.residual * root
-    wide = np.concatenate([wide, residual[:, None]], 1)
-    corner = wide.T @ wide
+    corner = np.zeros((size + 1, size + 1))
     blocks, mixed = np.zeros((frames, POSE, POSE)), np.zeros((frames, POSE, size + 1))
-    for k, (own, _) in enumerate(_by_frame(equations, frames)):
-        blocks[k], mixed[k] = by_pose[own].T @ by_pose[own], by_pose[own].T @ wide[own]
+    for rows, used in _by_kind(equations):
+        part = equations.at(rows)
+        root = np.sqrt(part.weight)[:, None]
+        used = np.append(used, size)
+        by_pose = part.by_pose * root
+        wide = np.concatenate([part.by_global[:, used[:-1]], part.residual[:, None]], 1) * root
+        corner[np.ix_(used, used)] += wide.T @ wide
+        for k, (own, _) in enumerate(_by_frame(part, frames)):
+            if len(own):
+                blocks[k] += by_pose[own].T @ by_pose[own]
+                mixed[k][:, used] += by_pose[own].T @ wide[own]
     band, pull, motion_misfit = _band(blocks, motion)
     mixed[:, :, -1] += pull
     factor = cholesky_banded(band, lower=True, check_finite=False)
@@ -128,7 +137,7 @@ def _band(blocks: Float, motion: MotionPrior) -> tuple[Float, Float, float]:
         np.add.at(pull, motion.frame[:, i], motion.by_pose[:, i] * (motion.weight * motion.residual)[:, None])
         for j in range(i + 1):
             part = np.einsum("s,si,sj->sij", motion.weight, motion.by_pose[:, i], motion.by_pose[:, j])
-            np.add.at(full, (motion.frame[:, j], i - j), part)  # type: ignore[arg-type]
+            np.add.at(full[:, i - j], motion.frame[:, j], part)
     band = np.zeros((POSE * _REACH, POSE * frames))
     row, column = np.meshgrid(np.arange(POSE), np.arange(POSE), indexing="ij")
     for gap in range(_REACH):
@@ -197,8 +206,10 @@ def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> Left:
 def score_inflation(equations: Equations, reduced: Reduced, left: Left) -> Float:
     """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1."""
     pose_by_kept = reduced.pose_by_global @ left.follow
-    follow = equations.by_global @ left.follow
-    step = equations.by_global @ left.step
+    follow, step = np.zeros((len(equations.frame), left.follow.shape[1])), np.zeros(len(equations.frame))
+    for rows, used in _by_kind(equations):
+        by_used = equations.by_global[np.ix_(rows, used)]
+        follow[rows], step[rows] = by_used @ left.follow[used], by_used @ left.step[used]
     for k, (own, by_pose) in enumerate(_by_frame(equations, len(pose_by_kept))):
         follow[own] -= by_pose @ pose_by_kept[k]
         step[own] += by_pose @ (reduced.pose_step[k] - reduced.pose_by_global[k] @ left.step)
@@ -209,6 +220,13 @@ def score_inflation(equations: Equations, reduced: Reduced, left: Left) -> Float
     both = np.unique(cells * (frames.max(initial=0) + 1) + frames, return_inverse=True)[1]
     robust = _clustered(scores, cells) + _clustered(scores, frames) - _clustered(scores, both)
     return np.asarray(np.sqrt(np.maximum(robust / np.maximum(plain, 1e-300), 1.0)))
+
+
+def _by_kind(equations: Equations) -> Iterator[tuple[Int, Int]]:
+    """Yield the rows of each kind and the globals that they depend on at all."""
+    for kind in np.unique(equations.kind):
+        rows = np.flatnonzero(equations.kind == kind)
+        yield rows, np.flatnonzero(np.any(equations.by_global[rows] != 0, axis=0))
 
 
 def _by_frame(equations: Equations, frames: int) -> Iterator[tuple[Int, Float]]:
@@ -222,5 +240,5 @@ def _by_frame(equations: Equations, frames: int) -> Iterator[tuple[Int, Float]]:
 def _clustered(scores: Float, place: Int) -> Float:
     count = int(place.max(initial=-1)) + 1
     member = csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(count, len(place)))
-    summed = member @ scores
-    return np.asarray(np.sum(summed**2, 0) * count / max(count - 1, 1))  # type: ignore[arg-type]
+    summed = np.asarray(member @ scores)
+    return np.asarray(np.square(summed).sum(0) * count / max(count - 1, 1))

@@ -70,8 +70,8 @@ def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int =
     for _ in range(iterations):
         prior, pull, _ = _prior(found.state, found.terms, run)
         information = found.reduced.information + prior
-        step = np.linalg.solve(information, found.reduced.right - pull)
-        better = _shortened(run, found, step)  # type: ignore[arg-type]
+        step = np.asarray(np.linalg.solve(information, found.reduced.right - pull), np.float64)
+        better = _shortened(run, found, step)
         if better is None:
             return found
         gain, found = found.cost - better.cost, better

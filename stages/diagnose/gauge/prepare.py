@@ -79,7 +79,8 @@ def _freed(state: Unknowns) -> Unknowns:
 
 def _ring_sigma_mm(rings: BoreRings, state: Unknowns) -> Float:
     by_pixel = state.probe.triangulate_jacobian(rings.uv)[0]
-    return rings.sigma_px * np.linalg.norm(np.einsum("mij,mj->mi", by_pixel, rings.outward), axis=1)  # type: ignore[no-any-return]
+    way = np.einsum("mij,mj->mi", by_pixel, rings.outward)
+    return np.asarray(rings.sigma_px * np.linalg.norm(way, axis=1))
 
 
 def _weight(frame: NDArray[np.int64], residual: Float, sigma: Float) -> Float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,7 +156,7 @@ def _ring_part(
 ) -> Equations:  # fmt: skip
     made = ring_equations(state, rings)
     mm_per_px = ring_mm_per_px(points)
-    shift = [_term_slope(t, lambda a, t=t: ring_shift_px(t.model, points, t.shape, a)) for t in terms]  # type: ignore[misc]
+    shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
     shift += [columns(model, points, shape) for model, shape in asked]
     return _with_effects(made.rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster, RING)
 
@@ -169,10 +170,10 @@ def _edge_part(
     def across(shift: Float) -> Float:
         return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
 
-    shift = [
-        _term_slope(t, lambda a, t=t: across(texture_shift_px(t.model, points, t.shape, a)))  # type: ignore[misc]
-        for t in terms
-    ]
+    def texture_shift(term: Term, amplitude: Float) -> Float:
+        return across(texture_shift_px(term.model, points, term.shape, amplitude))
+
+    shift = [_term_slope(t, partial(texture_shift, t)) for t in terms]
     shift += [across(texture_columns(model, points, shape)) for model, shape in asked]
     # Cells of fiducials count on where those of wall end.
     return _with_effects(
@@ -194,6 +195,10 @@ def _with_effects(
         rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual,
         np.where(usable, weight, 0.0), cell, np.full(len(cell), kind),
     )  # fmt: skip
+
+
+def _ring_shift(term: Term, points: ImagePoints, amplitude: Float) -> Float:
+    return ring_shift_px(term.model, points, term.shape, amplitude)
 
 
 def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
@@ -220,7 +225,7 @@ def _encoder_part(
     by_pose[:, 2] = 1
     by_border = np.zeros((count, state.border_size))
     by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
-    shift = [_term_slope(t, lambda a, t=t: t.model.reading_shift_mm(travel, t.shape, a)) for t in terms]  # type: ignore[misc]
+    shift = [_term_slope(t, partial(t.model.reading_shift_mm, travel, t.shape)) for t in terms]
     shift += [reading_columns(model, travel, shape) for model, shape in asked]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
     cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
