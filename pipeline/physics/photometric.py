@@ -28,7 +28,7 @@ PHOTOMETRIC_EFFECTS = (
         "ghost_ring", "photometric",
         (Quantity("relative", "", 0.1, 0.0, 1.0, "height of the ghost over that of the line"),),
         None, None, FixedTo.LASER, Channel.PROFILE, "static",
-        "bounced across the bore, apart by tilt −4 r φ cos(ψ − ψ₀), cone 2 r ε₀, m even 2 r ε_m, odd 4 r ε_m",
+        "bounced over the bore, apart by tilt −4 r φ cos(ψ − ψ₀), cone 2 r ε₀, m even 2 r ε_m, odd −4 r ε_m",
         None, ("tube_ghost", "line_skew"), "its separation grows with the bore",
     ),
     Effect(
@@ -45,7 +45,7 @@ PHOTOMETRIC_EFFECTS = (
         "line_skew", "photometric",
         (Quantity("skewness", "", 0.3, -2.0, 2.0, "skewness of the sheet's own profile"),),
         0, 1.0, FixedTo.LASER, Channel.PROFILE, "static",
-        "δr of the peak about (r/l) σ × skewness", None,
+        "δr of the peak of the order of (r/l) σ × skewness, at most half of it", None,
         ("subsurface",), "a second line width",
     ),
     Effect(
@@ -73,7 +73,7 @@ PHOTOMETRIC_EFFECTS = (
         "vignetting", "photometric",
         (Quantity("falloff", "", 0.5, 0.0, 5.0, "light falls as cos^k θ beyond the stated, exponent k"),),
         0, None, FixedTo.CAMERA, Channel.PROFILE, "static",
-        "δr = −(S/f) σ_px² ∂ ln V/∂ρ", 0.008,
+        "δr = (S/f) σ_px² ∂ ln V/∂ρ, σ of the line before the lens blurs it", 0.008,
         ("baseline",), "regression on the line's width",
     ),
     Effect(

@@ -55,7 +55,7 @@ POSE_EFFECTS = (
     ),
     Effect(
         "time_offset", "pose",
-        (Quantity("delay_s", "s", 0.02, -1.0, 1.0, "by which the encoder's clock is behind the camera's"),),
+        (Quantity("delay_s", "s", 0.02, -1.0, 1.0, "by which the encoder's readings are late"),),
         None, None, FixedTo.TIME, Channel.MOTION, "speed",
         "visual − encoder = v τ", None,
         ("encoder_backlash",), "changes of |v|",

@@ -25,7 +25,8 @@ WINDOW_EFFECTS = (
         "tube_tilt", "window",
         (Quantity("tilt_deg", "deg", 1.0, 0.0, 10.0, "tilt of a coaxial glass tube 2 mm thick"), DIRECTION),
         1, 0.26, FixedTo.CAMERA, Channel.RING, "static",
-        "change of d(i)/sin θ; sheet side −(r/l) t χ (1 − 1/n) cos(ψ − ψ₀)", 0.035,
+        "δr = (d′(i)/sin i − (r/l) t (1 − 1/n)) χ cos(ψ − ψ₀), sin i = cos θ; exponent and size: first part",
+        0.035,
         ("dome_lateral",), "pose known from texture, several diameters",
     ),
     Effect(

@@ -27,7 +27,7 @@ def odometry_checks() -> Iterator[Check]:
     yield _scale()
     yield _slip()
     yield _backlash()
-    yield _late()
+    yield from _late()
     yield from _bend()
 
 
@@ -63,13 +63,18 @@ def _backlash() -> Check:
     return Check("encoder_backlash", "✓", law, "b = 0.5 mm", switch.values[0], apart, "mm", _READING_MM)
 
 
-def _late() -> Check:
+def _late() -> Iterator[Check]:
+    """Check readings that are late by τ, and stamps of a clock behind by τ: the signs are opposite."""
     switch = typical_switch("time_offset")
-    truth = _travelling([switch])
-    first = _way(truth, -switch.values[0])
-    computed = _way(truth, 5.0) - first - _reading(truth, 5.0)
-    predicted, law = _SPEED_MM_S * switch.values[0], "visual − encoder = v τ"
-    return Check("time_offset", "✓", law, "20 ms at 15 mm/s", predicted, computed, "mm", _READING_MM)
+    delay, predicted = switch.values[0], _SPEED_MM_S * switch.values[0]
+    late, punctual = _travelling([switch]), _travelling([])
+    computed = _way(late, 5.0) - _way(late, -delay) - _reading(late, 5.0)
+    law = "visual − encoder = v τ, the reading at t being that of t − τ"
+    yield Check("time_offset", "✓", law, "20 ms at 15 mm/s", predicted, computed, "mm", _READING_MM)
+    # a stamp t of a clock that is behind was made at t + τ
+    computed = _way(punctual, 5.0) - _way(punctual, 0.0) - _reading(punctual, 5.0 + delay)
+    law = "visual − encoder = −v τ where the encoder's clock is behind by τ: its readings are early"
+    yield Check("time_offset", "", law, "20 ms at 15 mm/s", -predicted, computed, "mm", _READING_MM)
 
 
 def _bend() -> Iterator[Check]:

@@ -24,7 +24,15 @@ _CHECKED = (
 )  # fmt: skip
 # Of the size: laws of first order leave out terms of the size's square, at most 1.5 % at typical sizes.
 SHARE = 0.02
-_MENDED = {"tube_tilt": ("d′(i) χ c₁ / sin i, sin i = cos θ; the sheet's part holds", mended_tube_tilt)}
+# The notes' own words where the catalogue has the law that holds.
+_NOTED = {"tube_tilt": "change of d(i)/sin θ; sheet side −(r/l) t χ (1 − 1/n) cos(ψ − ψ₀)"}
+_MENDED = {
+    "tube_tilt": (
+        "(d′(i)/sin i − (r/l) t (1 − 1/n)) χ c₁, sin i = cos θ; "
+        "the notes' size and exponent are those of the viewing ray alone",
+        mended_tube_tilt,
+    )
+}
 
 
 def radius_checks() -> Iterator[Check]:
@@ -47,8 +55,9 @@ def radius_check(switch: Switch) -> Check:
     stated = effect.radial_exponent
     mended, mended_law = _MENDED.get(switch.name, ("", None))
     predicted = _along(harmonic(psi, law(RADII_MM[-1], psi, **switch.quantities), order), crest)
+    words = _NOTED.get(switch.name, effect.law)
     return Check(
-        switch.name, "✓", effect.law, f"δr, {_quantity_text(switch)}, 4 inch", predicted,
+        switch.name, "✓", words, f"δr, {_quantity_text(switch)}, 4 inch", predicted,
         _along(sizes[-1], crest), "mm", SHARE * abs(predicted),
         (order, strongest(psi, rings[-1].error_mm)),
         None if stated is None else (stated, exponent(np.array(RADII_MM), np.abs(sizes))),

@@ -1,0 +1,67 @@
+"""Shipped scenes rendered, run by the whole pipeline, and held against their truth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.artefacts import RadiusMap
+from pipeline.config import resolve
+from pipeline.display import SilentDisplay
+from pipeline.export.catalogue import EXPORTERS
+from pipeline.job import open_job, run_job
+from pipeline.runner import Selection
+from pipeline.simulator.scene import Scene
+from stages.catalogue import PIPELINE
+from tests.simulated import rendered
+from tests.truth_comparison import compare_wall
+
+
+@dataclass(frozen=True)
+class SceneScore:
+    """How well a run measured a scene; ``stated_mm`` is the median stated 1 σ of a cell's radius.
+
+    ``distance_percent`` is the camera's way along z from first to last frame against the true one, of the
+    path driven; ``distance_sigma_percent`` what the run states for it.
+    """
+
+    bias_mm: float
+    rms_mm: float
+    stated_mm: float
+    inside_95: float
+    coverage: float
+    distance_percent: float
+    distance_sigma_percent: float
+
+
+def run_scene(scene: Scene, folder: Path) -> SceneScore:
+    """Render, run and score a scene below ``folder``."""
+    recording, truth = rendered(scene, folder)
+    run = folder / f"{scene.name}-run"
+    job = open_job(recording, run, None, PIPELINE, EXPORTERS, resolve(PIPELINE, None, ()))
+    run_job(job, Selection(), SilentDisplay())
+    return score(run, truth)
+
+
+def score(run: Path, truth: Path) -> SceneScore:
+    """Return how a run folder compares with a folder of truth."""
+    with np.load(run / "radius_map.npz") as file:
+        found = RadiusMap(**{f.name: file[f.name] for f in fields(RadiusMap)})
+    wall = compare_wall(found, truth)
+    return SceneScore(
+        float(wall.error_mm.mean()), float(np.sqrt(np.mean(wall.error_mm**2))),
+        float(np.median(wall.sigma_mm)), wall.inside_95, wall.coverage, *_distance(run, truth),
+    )  # fmt: skip
+
+
+def _distance(run: Path, truth: Path) -> tuple[float, float]:
+    rows = np.genfromtxt(run / "trajectory.csv", delimiter=",", names=True)
+    poses = np.array(json.loads((truth / "truth.json").read_text())["camera_pose_in_pipe"])
+    true = poses[rows["frame"].astype(int), 2, 3]
+    path = float(np.sum(np.abs(np.diff(true))))
+    off = (rows["z_mm"][-1] - rows["z_mm"][0]) - (true[-1] - true[0])
+    told = {m["name"]: m["value"] for m in json.loads((run / "run.json").read_text())["metrics"]}
+    return 100 * float(off) / path, 100 * told["relative 1 sigma of the distance scale"]
