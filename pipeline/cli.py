@@ -46,6 +46,7 @@ _ATTACHED = (
     _Attached("simulate", "Render recordings from a scene, with their truth apart."),
     _Attached("open-seal", "Verify that a truth is the one a recording was sealed with."),
     _Attached("review", "Go through a run in the browser: decide on each finding, measure, sign."),
+    _Attached("reproduce", "Compute a run again from what its record names, and compare every file."),
     _Attached("verify", "Compare a run with a known bore, a reference model or truth: a certificate."),
 )
 

@@ -85,6 +85,10 @@ class Plan:
         """Return the step that makes artefacts of class ``kind``, None for a source."""
         return next((s for s in self.steps if s.output is kind), None)
 
+    def input_hashes(self) -> dict[str, str]:
+        """Return the hash of every source by what it is: ``recording``, ``probe``."""
+        return {s.kind.__name__.lower(): s.key for s in self.sources}
+
     def keys(self) -> dict[type, str]:
         """Return the key of every source and result by its class."""
         return {s.kind: s.key for s in self.sources} | {s.output: s.key for s in self.steps}

@@ -81,6 +81,11 @@ def published_key(exporter: Exporter, run: RunFolder) -> str:
     return _read_receipt(exporter, run)[0]
 
 
+def published_files(exporter: Exporter, run: RunFolder) -> dict[str, FileRecord]:
+    """Return size and hash of an exporter's files as they were put in place, by name."""
+    return _read_receipt(exporter, run)[1]
+
+
 def withdraw(exporter: Exporter, run: RunFolder) -> None:
     """Remove an exporter's files, so that a folder never mixes the results of two configurations."""
     _, files = _read_receipt(exporter, run)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import platform
 import resource
 from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError, version
@@ -16,6 +17,11 @@ from pipeline.plan import Plan
 from pipeline.recording.base import Recording
 
 _FORMAT = 1
+# What computes; another version of these may change a result's last digits.
+_LIBRARIES = (
+    "av", "matplotlib", "numba", "numpy", "open3d", "opencv-contrib-python-headless", "pillow", "pymeshlab",
+    "scipy", "xatlas", "zarr",
+)  # fmt: skip
 
 
 def program_version() -> str:
@@ -41,15 +47,15 @@ def write_run_record(
     InputError
         When the disk is full or cannot be written.
     """
-    inputs: dict[str, Json] = {s.kind.__name__.lower(): s.key for s in plan.sources}
     tree: Json = {
         "format": _FORMAT,
         "program": {"name": "boresight", "version": program_version()},
+        "libraries": dict(library_versions()),
         "state": outcome.state.value,
         "problem": outcome.problem,
         "recording": {"name": recording.name, "kind": recording.kind, "path": str(recording.path.resolve())},
         "probe": {"path": str(probe_file.resolve())},
-        "input_sha256": inputs,
+        "input_sha256": dict(plan.input_hashes()),
         "configuration": {c.stage: c.parameters.model_dump(mode="json") for c in configuration.stages},
         "stages": [_stage(s) for s in outcome.stages],
         "metrics": _numbers(outcome.metrics),
@@ -58,6 +64,11 @@ def write_run_record(
     }
     with disk_errors_named(folder):
         replace_json(folder / "run.json", tree)
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that compute."""
+    return {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES}
 
 
 def _peak_mib() -> float:

@@ -1,0 +1,81 @@
+"""``boresight reproduce``: compute a run again from what its record names, and compare every file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+import yaml
+from rich.console import Console
+
+from pipeline.config import resolve
+from pipeline.display import ProgressDisplay
+from pipeline.errors import BoresightError
+from pipeline.export.catalogue import EXPORTERS
+from pipeline.export.run_record import library_versions
+from pipeline.job import Job, open_job, run_job
+from pipeline.reproduce import (
+    Agreement,
+    Compared,
+    RunRecord,
+    check_inputs_unchanged,
+    compare_runs,
+    read_run_record,
+)
+from pipeline.run_folder import RunFolder
+from pipeline.runner import Selection
+from stages.catalogue import PIPELINE
+
+
+class NotReproducedError(BoresightError):
+    """A run whose results did not come out the same again."""
+
+
+def reproduce(
+    run: Annotated[Path, typer.Argument(help="Run folder of a completed run.")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="RUN", help="Keep the run computed again here."),
+    ] = None,
+) -> None:
+    """Compute a run again from its recording, probe and parameters; fail when a file differs."""
+    record = read_run_record(run)
+    with TemporaryDirectory(prefix="boresight-") as temporary:
+        again = output or Path(temporary) / "run"
+        job = _job(record, again, Path(temporary))
+        check_inputs_unchanged(record, job.plan().input_hashes())
+        with ProgressDisplay(Console(stderr=True)) as display:
+            run_job(job, Selection("", "", True), display)
+        compared = compare_runs(RunFolder(run), RunFolder(again), EXPORTERS)
+    _tell(compared, record)
+
+
+def _job(record: RunRecord, folder: Path, temporary: Path) -> Job:
+    parameters = temporary / "configuration.yaml"
+    parameters.write_text(yaml.safe_dump({s: dict(p) for s, p in record.configuration.items()}), "utf-8")
+    configuration = resolve(PIPELINE, parameters)
+    return open_job(record.recording, folder, record.probe, PIPELINE, EXPORTERS, configuration)
+
+
+def _tell(compared: tuple[Compared, ...], record: RunRecord) -> None:
+    for file in compared:
+        if file.agreement is not Agreement.SAME:
+            typer.echo(f"{file.file:<48} {file.agreement}")
+    counts = Counter(c.agreement for c in compared)
+    typer.echo(", ".join(f"{count} {state}" for state, count in counts.items()))
+    if counts[Agreement.SAME] < len(compared):
+        raise NotReproducedError(f"not reproduced; {_versions(record)}")
+
+
+def _versions(record: RunRecord) -> str:
+    """Return which libraries are others than those of the run."""
+    now = library_versions()
+    changed = [
+        f"{name} {was} then, {now.get(name)} now"
+        for name, was in record.libraries.items()
+        if now.get(name) != was
+    ]
+    return "; ".join(changed) or "the libraries are those of the run"
