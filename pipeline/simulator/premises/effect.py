@@ -25,6 +25,8 @@ _TIMES_THE_FLOOR = 3.0
 _HARMONICS = 36
 _AZIMUTHS, _REACH_PX = 720, 12
 _FAINT = 0.1
+# beyond the picture's edge is black, and not whatever the memory held
+_POLAR = cv2.INTER_LINEAR | cv2.WARP_FILL_OUTLIERS
 
 
 @dataclass(frozen=True)
@@ -130,7 +132,7 @@ def _ring(renderer: Renderer, frame: int) -> SeenRing:
     camera = truth.stated.camera
     centre = camera.project(np.array([0.0, 0.0, 1.0])).uv
     size = (int(np.hypot(*camera.image_size) / 2), _AZIMUTHS)
-    polar = cv2.warpPolar(counted, size, tuple(map(float, centre)), size[0], cv2.INTER_LINEAR)
+    polar = cv2.warpPolar(counted, size, tuple(map(float, centre)), size[0], _POLAR)
     return _measured(np.asarray(polar, float), sensor)
 
 

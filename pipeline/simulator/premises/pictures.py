@@ -20,6 +20,8 @@ _LEAST_WALL, _LEAST_TEXTURE = 8.0, 1.0
 _LEAST_MARKERS, _LEAST_FRAMES_WITH = 3, 0.3
 _CLIPPED = 254
 _AZIMUTHS, _TEXTURE_PX = 360, 8
+# beyond the picture's edge is black, and not whatever the memory held
+_POLAR = cv2.INTER_LINEAR | cv2.WARP_FILL_OUTLIERS
 _LED_LOOKED_AT, _LASER_LOOKED_AT = 6, 4
 
 
@@ -104,7 +106,7 @@ def _peaks(truth: SceneTruth, picture: Image) -> Float:
     camera = truth.stated.camera
     centre = camera.project(np.array([0.0, 0.0, 1.0])).uv
     size = (int(np.hypot(*camera.image_size) / 2), _AZIMUTHS)
-    polar = cv2.warpPolar(picture, size, tuple(map(float, centre)), size[0], cv2.INTER_LINEAR)
+    polar = cv2.warpPolar(picture, size, tuple(map(float, centre)), size[0], _POLAR)
     return np.asarray(polar.max((1, 2)), float)
 
 

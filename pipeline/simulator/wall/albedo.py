@@ -88,6 +88,8 @@ def _stain_weld(albedo: Float32, grid: Grid, weld: Weld, random: np.random.Gener
     half = weld.width_mm / 2
     across, _ = weld_across(grid, weld, random)
     rows = np.flatnonzero(np.abs(grid.distance_mm - weld.distance_mm) <= 2 * half + 3 * weld.heat_mm)
+    if rows.size == 0:
+        return
     part, off = albedo[rows], half * np.abs(across[rows])
     heat = 0.7 * np.exp(-((np.maximum(off - half, 0) / max(weld.heat_mm, 0.1)) ** 2))
     texture = part[..., 1] / max(float(part[..., 1].mean()), 1e-6)
