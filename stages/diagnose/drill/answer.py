@@ -54,6 +54,24 @@ class Fit(BaseModel):
     noise_floor: float
 
 
+class Feasibility(BaseModel):
+    """What a diagnosis says beforehand that the recording could show of one effect.
+
+    Attributes
+    ----------
+    detectable : float
+        Size that would stand out by 5 σ.
+    left : float
+        Share of its information that is left when its closest rival is free.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    name: str
+    detectable: float | None
+    left: float | None = 1.0
+
+
 class Answer(BaseModel):
     """What is scored of a diagnosis.json; further keys are left alone."""
 
@@ -65,6 +83,7 @@ class Answer(BaseModel):
     effects: tuple[NamedEffect, ...] = ()
     members: tuple[str, ...] = Field((), alias="class")
     fit: Fit | None = None
+    feasibility: tuple[Feasibility, ...] = ()
 
 
 class Concealed(BaseModel):

@@ -13,6 +13,8 @@ from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.drill.answer import Answer, Concealed, NamedEffect
 
 _95 = 1.959964
+_STANDS_OUT = 5.0
+SNR = 8.0
 _FOUND = ("named", "class", "unexplained")
 NOTHING = "nothing"
 _PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 1.0001)
@@ -29,12 +31,35 @@ class Trial:
     answer : Answer
     left_out : tuple of str
         Effects that the library had to do without.
+    oracle_snr : float or None
+        True size over the 1 σ of one who knows the name; None where only the answer's own feasibility tells.
     """
 
     name: str
     concealed: tuple[Concealed, ...]
     answer: Answer
     left_out: tuple[str, ...] = ()
+    oracle_snr: float | None = None
+
+    @property
+    def snr(self) -> float | None:
+        """SNR of the weakest concealed effect, by the oracle or else by the answer's feasibility."""
+        if self.oracle_snr is not None:
+            return self.oracle_snr
+        each = [_feasible_snr(c, self.answer) for c in self.concealed]
+        known = [snr for snr in each if snr is not None]
+        return min(known) if known and len(known) == len(each) else None
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether every concealed effect stands out by 5 σ even with its closest rival free.
+
+        By the answer's feasibility; where that is silent, by the oracle's SNR alone.
+        """
+        if not self.concealed:
+            return False
+        likes = [_left_of(c.name, self.answer) for c in self.concealed]
+        return self.snr is not None and all(self.snr * np.sqrt(left) >= _STANDS_OUT for left in likes)
 
     @property
     def truth(self) -> frozenset[str]:
@@ -103,18 +128,24 @@ class Scores:
 
     false_alarms: Rate
     detected: Rate
+    detected_any: Rate
+    located: Rate
     channel_right: Rate
     fixed_to_right: Rate
     time_right: Rate
+    named_identifiable: Rate
     named_exactly: Rate
     contained: Rate
     misnamed: Rate
     pairs_named: Rate
+    pairs_identifiable: Rate
     unknown_owned: Rate
     unknown_misnamed: Rate
     size_in_95: Rate
+    size_count: int
     size_bias_sigma: float
     heldout_removed: float
+    heldout_count: int
 
 
 def score(trials: Iterable[Trial]) -> Scores:
@@ -125,23 +156,30 @@ def score(trials: Iterable[Trial]) -> Scores:
     unknown = [t for t in listed if t.truth & set(t.left_out)]
     single = [t for t in known if len(t.concealed) == 1]
     found = [t for t in single if t.found]
+    clear = [t for t in known if t.snr is not None and t.snr >= SNR]
     z = [s for t in known for s in size_errors(t)]
     removed = [r for t in known if (r := heldout_removed(t.answer)) is not None]
     return Scores(
         false_alarms=rate(t.found for t in null),
-        detected=rate(t.found for t in known),
+        detected=rate(t.found for t in clear),
+        detected_any=rate(t.found for t in known),
+        located=rate(all(_located(t, what) for what in ("channel", "fixed_to", "time")) for t in found),
         channel_right=rate(_located(t, "channel") for t in found),
         fixed_to_right=rate(_located(t, "fixed_to") for t in found),
         time_right=rate(_located(t, "time") for t in found),
+        named_identifiable=rate(t.exact for t in single if t.identifiable),
         named_exactly=rate(t.exact for t in single),
         contained=rate(t.contained for t in single if t.found),
         misnamed=rate(t.misnamed for t in [*null, *known]),
         pairs_named=rate(t.exact for t in known if len(t.concealed) > 1),
+        pairs_identifiable=rate(t.exact for t in known if len(t.concealed) > 1 and t.identifiable),
         unknown_owned=rate(owned(t) for t in unknown),
         unknown_misnamed=rate(t.misnamed for t in unknown),
         size_in_95=rate(abs(s) < _95 for s in z),
+        size_count=len(z),
         size_bias_sigma=float(np.mean(z)) if z else float("nan"),
         heldout_removed=float(np.median(removed)) if removed else float("nan"),
+        heldout_count=len(removed),
     )
 
 
@@ -180,6 +218,18 @@ def calibration(trials: Iterable[Trial]) -> list[tuple[float, Rate]]:
     bins = pairwise(_PROBABILITIES)
     inside = ([(p, hit) for p, hit in pairs if low <= p < high] for low, high in bins)
     return [(float(np.mean([p for p, _ in part])), rate(h for _, h in part)) for part in inside if part]
+
+
+def _feasible_snr(concealed: Concealed, answer: Answer) -> float | None:
+    for one in answer.feasibility:
+        if one.name == concealed.name and one.detectable and concealed.values:
+            return _STANDS_OUT * abs(concealed.values[0]) / one.detectable
+    return None
+
+
+def _left_of(name: str, answer: Answer) -> float:
+    found = [one.left for one in answer.feasibility if one.name == name and one.left is not None]
+    return found[0] if found else 1.0
 
 
 def _located(trial: Trial, what: str) -> bool:

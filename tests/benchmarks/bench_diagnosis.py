@@ -1,0 +1,226 @@
+"""Counts of the diagnosis on drawn gauge runs at ring level, one case after the other, to be gone on with.
+
+``python -m tests.benchmarks.bench_diagnosis run RESULTS.jsonl --mode nulls --first 0 --count 300`` appends
+one line a case and leaves out those that are there; modes are nulls, singles, pairs and leftout.
+``python -m tests.benchmarks.bench_diagnosis summary RESULTS.jsonl... [--proof PROOF.json]...`` prints the
+table of figures, those of rendered recordings (``boresight prove``) beside those of ring level.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from scipy.stats import kstest
+
+from pipeline.errors import UnusableError
+from pipeline.physics.catalogue import effect
+from pipeline.simulator.effects.switch import Switch, switches_from_mapping
+from pipeline.simulator.prior import draw_pair, read_prior
+from pipeline.simulator.scene import Scene
+from stages.diagnose.compose import composed
+from stages.diagnose.diagnose import TRAVEL_EFFECTS
+from stages.diagnose.drill.answer import Answer, Concealed
+from stages.diagnose.drill.figures import figures
+from stages.diagnose.drill.score import Trial
+from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.effects.library import LIBRARY, without
+from stages.diagnose.gauge.examine import Examined, examine
+from stages.diagnose.result import to_json
+from stages.diagnose.seen import Seen
+from stages.diagnose.travel.evidence import TravelEvidence
+from stages.diagnose.travel.gauge import gauge_travel
+from tests.benchmarks.ring_level import Noise, ring_level_run
+
+PRIOR = Path(__file__).with_name("ring_level.yaml")
+# Fewer frames at a lower rate: the same way and time, for less computing.
+_FRAMES = 2 / 3
+_KEPT = ("verdict", "global_p", "location", "effects", "class", "fit", "feasibility", "identifiable")
+app = typer.Typer()
+
+
+class Mode(StrEnum):
+    """What is concealed, and whether the library knows it."""
+
+    NULLS = "nulls"
+    SINGLES = "singles"
+    PAIRS = "pairs"
+    LEFTOUT = "leftout"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A case: its gauge scene, what is switched on, and the noise of its measurements."""
+
+    scene: Scene
+    file: Path
+    switches: tuple[Switch, ...]
+    noise: Noise
+
+
+def drawn(mode: Mode, seed: int) -> Drawn:
+    """Return case ``seed`` of a mode; single effects take their turns, so that all come equally often."""
+    prior = read_prior(PRIOR)
+    turn = prior.effects[seed % len(prior.effects)]
+    concealed = {Mode.NULLS: (1.0,), Mode.PAIRS: (0.0, 0.0, 1.0)}.get(mode, (0.0, 1.0))
+    changes: dict[str, object] = {"concealed": concealed}
+    if mode in (Mode.SINGLES, Mode.LEFTOUT):
+        changes["effects"] = (turn,)
+    pair = draw_pair(prior.model_copy(update=changes), PRIOR, seed, list(Mode).index(mode))
+    random = np.random.default_rng([seed, 11])
+    louder = random.uniform(0.7, 1.5, 3)
+    noise = Noise(0.05 * louder[0], 0.02 * louder[1], 0.07 * louder[2], 0.05 * louder[1])
+    frames = round(_FRAMES * pair.gauge.frames)
+    scene = pair.gauge.model_copy(
+        update={"frames": frames, "frame_rate": _FRAMES * pair.gauge.frame_rate, "effects": {}}
+    )
+    return Drawn(scene, pair.folder / "scene.yaml", switches_from_mapping(pair.gauge.effects, PRIOR), noise)
+
+
+def of_positions(library: Mapping[str, EffectModel]) -> dict[str, EffectModel]:
+    """Return what rings and fiducials are asked about when the profile shows nothing."""
+    return {
+        name: model
+        for name, model in library.items()
+        if name not in TRAVEL_EFFECTS and effect(name).family != "photometric"
+    }
+
+
+def diagnosed(case: Drawn, library: Mapping[str, EffectModel]) -> dict[str, Any]:
+    """Return the answer as in diagnosis.json, and the SNR that an oracle sees."""
+    simulated = ring_level_run(case.scene, case.file, case.switches, case.noise)
+    stated = simulated.truth.stated
+    geometry, travel = None, None
+    missing: tuple[str, ...] = ()
+    try:
+        geometry = examine(simulated.measured, of_positions(library), stated)
+        travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
+    except UnusableError as error:
+        missing = (str(error),)
+    found = to_json(composed(None, Seen(simulated.recording, geometry, travel, None, missing), stated))
+    answer = {k: found[k] for k in _KEPT if k in found}
+    answer["candidates"] = [c for c in found["candidates"] if c["probability"] > 1e-3]  # type: ignore[attr-defined]
+    answer["shortcomings"] = list(missing)
+    return {"answer": answer, "snr": [oracle_snr(s, geometry, travel) for s in case.switches]}
+
+
+def oracle_snr(switch: Switch, geometry: Examined | None, travel: TravelEvidence | None) -> float | None:
+    """Return the true size over the 1 σ of one who knows the effect's name; None where it was not scored.
+
+    The 1 σ is that of the score about the stated instrument, poses and stated uncertainty free.
+    """
+    name, size = switch.name, abs(switch.values[0])
+    estimate = travel.estimate(name) if travel is not None else None
+    if estimate is not None:
+        return float(size / np.hypot(estimate.sigma, estimate.stated_sigma))
+    for s in geometry.searched.steps[0].scores if geometry is not None else ():
+        if s.model.name == name:
+            found = abs(s.model.quantities(s.shape, s.score.amplitude)[switch.effect.quantities[0].name])
+            return float(np.sqrt(s.score.statistic) * size / max(found, 1e-12))
+    return None
+
+
+def _line(mode: Mode, seed: int, version: str) -> dict[str, Any]:
+    case = drawn(mode, seed)
+    names = tuple(s.name for s in case.switches)
+    left_out = names if mode is Mode.LEFTOUT else ()
+    start = time.process_time()
+    told = diagnosed(case, without(left_out) if left_out else LIBRARY)
+    return {
+        "mode": mode.value, "seed": seed, "version": version, "scene": case.scene.summary,
+        "concealed": [s.truth for s in case.switches], "left_out": list(left_out),
+        "cpu_s": round(time.process_time() - start, 1), **told,
+    }  # fmt: skip
+
+
+@app.command()
+def run(
+    results: Path,
+    mode: Annotated[Mode, typer.Option()] = Mode.NULLS,
+    first: Annotated[int, typer.Option(help="first seed")] = 0,
+    count: Annotated[int, typer.Option()] = 1,
+    seconds: Annotated[float, typer.Option(help="begin no case after so long")] = 1e9,
+    version: Annotated[str, typer.Option(help="of the code; else as git describes it")] = "",
+) -> None:
+    """Diagnose drawn cases and append a line each; those that are there are left out."""
+    done = {(r["mode"], r["seed"]) for r in _lines([results])} if results.exists() else set()
+    version = version or _described()
+    end = time.monotonic() + seconds
+    for seed in range(first, first + count):
+        if (mode.value, seed) in done:
+            continue
+        if time.monotonic() > end:
+            break
+        line = _line(mode, seed, version)
+        with results.open("a", encoding="utf-8") as out:
+            out.write(json.dumps(line) + "\n")
+        _tell(line)
+
+
+def _described() -> str:
+    words = ["git", "describe", "--always", "--dirty"]
+    return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def _tell(line: dict[str, Any]) -> None:
+    answer = line["answer"]
+    said = ", ".join(f"{e['name']} {e['probability']:.3f}" for e in answer["effects"]) or ", ".join(
+        answer["class"]
+    )
+    told = " ".join(f"{n} {v[0]:.4g}" for n, v in line["concealed"]) or "nothing"
+    typer.echo(
+        f"{line['mode']} {line['seed']}: {told} (snr {line['snr']}) -> {answer['verdict']} {said} "
+        f"p {answer['global_p']:.2g} {line['cpu_s']} s"
+    )
+
+
+def trial_from(line: dict[str, Any]) -> Trial:
+    """Return the trial of one line of results."""
+    concealed = tuple(Concealed(name=n, values=tuple(map(float, v))) for n, v in line["concealed"])
+    seen = [s for s in line["snr"] if s is not None]
+    snr = min(seen) if seen and len(seen) == len(concealed) else None
+    name = f"{line['mode']}-{line['seed']}"
+    return Trial(name, concealed, Answer.model_validate(line["answer"]), tuple(line["left_out"]), snr)
+
+
+@app.command()
+def summary(
+    results: list[Path],
+    proof: Annotated[list[Path] | None, typer.Option(help="proof.json of rendered recordings")] = None,
+) -> None:
+    """Print the table of figures with 95 % intervals, and the distribution of the nulls' p."""
+    lines = list(_lines(results))
+    trials = [trial_from(line) for line in lines]
+    for row in figures(trials):
+        typer.echo(f"ring level | {row.text}")
+    for file in proof or ():
+        for rate in json.loads(file.read_text("utf-8"))["figures"]:
+            typer.echo(f"rendered   | {rate['text']}")
+    p_values = [line["answer"]["global_p"] for line in lines if not line["concealed"]]
+    if p_values:
+        below = " ".join(f"{q:g}: {np.mean(np.array(p_values) < q):.3f}" for q in (0.5, 0.2, 0.1, 0.05, 0.01))
+        # Corrected for all that is tried, p may be conservative, never the other way.
+        test = kstest(p_values, "uniform", alternative="greater").pvalue
+        typer.echo(
+            f"share of {len(p_values)} nulls with p below {below}; chance of so many small ones {test:.2g}"
+        )
+    typer.echo(f"CPU s a case: {np.median([line['cpu_s'] for line in lines]):.0f} (median)")
+    typer.echo(f"versions: {', '.join(sorted({line['version'] for line in lines}))}")
+
+
+def _lines(files: list[Path]) -> Iterator[dict[str, Any]]:
+    for file in files:
+        for text in file.read_text("utf-8").splitlines():
+            yield json.loads(text)
+
+
+if __name__ == "__main__":
+    app()
