@@ -15,7 +15,8 @@ from pipeline.findings import DefectKind
 from pipeline.model import Overlay, Overlays
 from pipeline.review.assessment import strength
 from pipeline.review.decisions.ledger import Entry
-from pipeline.review.decisions.replay import Finding
+from pipeline.review.decisions.overlap import covered
+from pipeline.review.decisions.replay import GONE, Finding
 from pipeline.review.flat_tiles import FlatPicture
 from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.review import Seal, State
@@ -60,9 +61,10 @@ def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:
 def state_document(state: State, files: RunFiles) -> dict[str, Any]:
     """Return the findings as they stand."""
     bore = 2 * files.artefact(Overlays).nominal_radius_mm
+    standing = [f for f in state.findings if f.status != GONE]
     return cleaned({
         "revision": state.revision,
-        "findings": [_finding(f, state, bore) for f in state.findings],
+        "findings": [_finding(f, state, bore) | {"covers": _covers(f, standing)} for f in state.findings],
         "may_undo": state.may_undo,
         "may_redo": state.may_redo,
         "lost": [_entry(e) for e in state.lost],
@@ -148,6 +150,10 @@ def _finding(finding: Finding, state: State, bore_mm: float) -> dict[str, Any]:
         "wall_loss_sigma_percent": 100 * size.depth_sigma_mm / wall if loss is not None and wall else None,
         "strength": asdict(remaining) if remaining else None,
     }
+
+
+def _covers(finding: Finding, standing: list[Finding]) -> tuple[str, ...]:
+    return covered(finding, standing) if finding.edited and finding.status != GONE else ()
 
 
 def _entry(entry: Entry) -> dict[str, Any]:

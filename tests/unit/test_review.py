@@ -1,5 +1,7 @@
 """The review: what is decided is kept, undone and refused as it should be; strangers are turned away."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from pipeline.errors import InputError
 from pipeline.review.assessment import b31g, strength
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.ledger import Ledger, StaleError
+from pipeline.review.decisions.overlap import covered
 from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, replay
 from pipeline.review.measuring.outline import OutlineGauge
 from pipeline.review.measuring.tools import readings
@@ -60,6 +63,25 @@ def test_what_is_gone_cannot_be_decided(ledger):
     ledger.append(do.Accept(finding="1"), "ann", "b", 1)
     with pytest.raises(ImpossibleError, match="not there any more"):
         after(ledger)
+
+
+def square(name, s, a, half_s, half_a):
+    outline = (
+        (s - half_s, a - half_a),
+        (s + half_s, a - half_a),
+        (s + half_s, a + half_a),
+        (s - half_s, a + half_a),
+    )
+    return Finding(
+        name, "pit", outline, replace(SIZE, distance_from_mm=s - half_s, distance_to_mm=s + half_s)
+    )
+
+
+def test_what_a_merged_outline_covers_besides_its_own_is_told():
+    wide = square("m7", 50, 3.1, 20, 0.3)
+    within, around = square("1", 45, 3.1 - 2 * np.pi, 2, 0.1), square("2", 50, 3.1, 30, 0.5)
+    beyond, behind = square("3", 90, 3.1, 5, 0.1), square("4", 50, 0.0, 5, 0.1)
+    assert covered(wide, [wide, within, around, beyond, behind]) == ("1", "2")
 
 
 def test_a_file_that_is_no_ledger_is_refused(tmp_path):

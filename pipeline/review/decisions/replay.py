@@ -163,7 +163,7 @@ def _changed(old: Finding, entry: Entry, gauge: Gauge) -> Finding:
 
 
 def _merged(parts: list[Finding], entry: Entry, gauge: Gauge) -> dict[str, Finding]:
-    outline = hull([point for part in parts for point in _beside(part.outline, parts[0].outline)])
+    outline = hull([point for part in parts for point in beside(part.outline, parts[0].outline)])
     deepest = max(parts, key=lambda f: abs(np.nan_to_num(f.size.depth_mm)))
     made = Finding(
         f"m{entry.id}", deepest.kind, outline, gauge.measure(outline), edited=True,
@@ -180,8 +180,8 @@ def _split(old: Finding, outlines: tuple[Outline, ...], entry: Entry, gauge: Gau
     return {old.id: replace(old, status=GONE)} | {f.id: f for f in made}
 
 
-def _beside(outline: Outline, other: Outline) -> Outline:
-    """Return the outline turned by whole circles so that it lies next to another."""
+def beside(outline: Outline, other: Outline) -> Outline:
+    """Return an outline turned by whole circles so that it lies next to another."""
     apart = np.mean([a for _, a in outline]) - np.mean([a for _, a in other])
     turns = 2 * np.pi * np.round(apart / (2 * np.pi))
     return tuple((s, float(a - turns)) for s, a in outline)

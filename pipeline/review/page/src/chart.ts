@@ -1,14 +1,14 @@
 /** A small line chart with its 1 σ band. */
 import type { Curve } from "./types";
-import { drawn } from "./words";
+import { drawn, element } from "./words";
 
 const [WIDTH, HEIGHT, LEFT, BOTTOM] = [300, 110, 40, 22];
 
-export function chart(curve: Curve, title: string): SVGElement {
+export function chart(curve: Curve, title: string): HTMLElement {
   const seen = curve.mm.map((x, k) => [x, curve.depth_mm[k] ?? null, curve.sigma_mm[k] ?? 0] as const)
     .filter((p): p is readonly [number, number, number] => p[1] !== null);
   const root = drawn("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title, class: "chart" });
-  if (!seen.length) return root;
+  if (!seen.length) return element("figure", {}, element("figcaption", {}, `${title}: not seen`));
   const reach = Math.max(0.1, ...seen.map((p) => Math.abs(p[1]) + p[2]));
   const [x0, x1] = [curve.mm[0]!, curve.mm[curve.mm.length - 1]!];
   const x = (v: number) => LEFT + ((WIDTH - LEFT - 6) * (v - x0)) / (x1 - x0);
@@ -22,7 +22,6 @@ export function chart(curve: Curve, title: string): SVGElement {
     drawn("text", { x: LEFT - 4, y: y(reach) , "text-anchor": "end" }, `+${reach.toFixed(1)}`),
     drawn("text", { x: LEFT, y: HEIGHT - 5 }, `${x0.toFixed(0)} mm`),
     drawn("text", { x: WIDTH - 6, y: HEIGHT - 5, "text-anchor": "end" }, `${x1.toFixed(0)} mm`),
-    drawn("text", { x: WIDTH / 2, y: HEIGHT - 5, "text-anchor": "middle" }, `${title}, into the wall downward`),
   );
-  return root;
+  return element("figure", {}, element("figcaption", {}, `${title}; depth in mm, into the wall downward`), root);
 }

@@ -83,6 +83,7 @@ export class FindingsPanel {
     this.detail.replaceChildren(
       element("h3", {}, `${finding.id}: ${finding.kind}, ${finding.status}`),
       this.session.source.readOnly ? "" : this.buttons(finding),
+      finding.covers.length ? element("p", { class: "caution" }, `Its outline also covers ${finding.covers.join(", ")}, so that its depth and extent may be theirs. Redraw it, or merge them too.`) : "",
       this.table(finding),
       wrong && finding.edited ? element("p", { class: "original" }, `As measured: ${wrong.statement}`)
         : element("p", {}, wrong?.statement ?? "Made by hand."),
@@ -174,7 +175,7 @@ export class FindingsPanel {
     const half = Math.max(finding.size.length_mm, finding.size.width_mm) / 2 + 8;
     const [distance, azimuth] = this.session.cursor;
     void this.session.source.profile(distance, azimuth, Math.min(half, 40)).then((profile) => {
-      if (turn === this.wanted) place.replaceChildren(chart(profile.along, "along"), chart(profile.around, "around"));
+      if (turn === this.wanted) place.replaceChildren(chart(profile.along, "Along the pipe"), chart(profile.around, "Around it"));
     }).catch((error: Error) => place.replaceChildren(element("p", { class: "quiet" }, error.message)));
     return place;
   }

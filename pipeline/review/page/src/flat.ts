@@ -43,6 +43,8 @@ export class FlatView {
   private get perRad(): number { return this.session.run.radius_mm / this.view.mmPerPx; }
   private get size(): [number, number] { return [this.canvas.clientWidth, this.canvas.clientHeight]; }
 
+  private get textPx(): number { return 0.9 * parseFloat(getComputedStyle(this.root).fontSize); }
+
   private x(distance: number): number { return this.size[0] / 2 + (distance - this.view.distance) / this.view.mmPerPx; }
   private y(azimuth: number): number { return this.size[1] / 2 + (azimuth - this.view.azimuth) * this.perRad; }
 
@@ -156,15 +158,15 @@ export class FlatView {
 
   private paintGrid(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
     const [width, height] = this.size;
-    context.font = "12px system-ui, sans-serif";
+    context.font = `${this.textPx}px system-ui, sans-serif`;
     context.textBaseline = "middle";
     for (let hour = -12; hour < 24; hour += 3) {
       const azimuth = TOP + (hour * Math.PI) / 6;
       this.label(context, style, clock(azimuth).replace(":00", " h"), 4, this.y(azimuth), "left");
     }
-    const step = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000].find((s) => s / this.view.mmPerPx > 90) ?? 20000;
+    const step = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000].find((s) => s / this.view.mmPerPx > 7 * this.textPx) ?? 20000;
     for (let s = Math.ceil(this.point(0, 0)[0] / step) * step; s < this.point(width, 0)[0]; s += step) {
-      this.label(context, style, `${s} mm`, this.x(s), height - 10, "center");
+      this.label(context, style, `${s} mm`, this.x(s), height - this.textPx, "center");
     }
   }
 
@@ -194,7 +196,7 @@ export class FlatView {
   private name(context: CanvasRenderingContext2D, finding: Finding, turn: number, chosen: boolean): void {
     const x = this.x(Math.max(...finding.outline.map((p) => p[0]))) + 4;
     const y = this.y(Math.min(...finding.outline.map((p) => p[1])) + turn);
-    context.font = "bold 12px system-ui, sans-serif";
+    context.font = `bold ${this.textPx}px system-ui, sans-serif`;
     context.textAlign = "left";
     context.lineWidth = 4;
     context.strokeStyle = CASING;

@@ -15,7 +15,7 @@ export class FrameView {
   private timer = 0;
   private readonly close = element("input", { type: "checkbox", id: "close-up", checked: true });
   private readonly light = element("input", { type: "range", min: "1", max: "8", step: "0.5", value: "1", id: "brighten" });
-  private readonly frame = element("div", { class: "zoomed" }, this.image, this.marks);
+  private readonly frame = element("div", { class: "zoomed", title: "a click moves the spot" }, this.image, this.marks);
   private kind = "";
   private shown: Sight | null = null;
 
@@ -96,6 +96,6 @@ export class FrameView {
     };
     this.image.src = this.session.source.frame(sight.frame);
     this.image.alt = `Recorded frame ${sight.frame}, the spot circled`;
-    this.told.textContent = `Frame ${sight.frame}, ${sight.time_s.toFixed(2)} s; a click moves the spot (circled)${sight.ring_px.length ? ", the measured laser line dotted" : ""}.`;
+    this.told.textContent = `Frame ${sight.frame}, ${sight.time_s.toFixed(2)} s; spot circled${sight.ring_px.length ? ", measured laser line dotted" : ""}.`;
   }
 }

@@ -25,7 +25,7 @@ export class ModelView {
   private readonly cut = element("input", { type: "checkbox", id: "cut" });
   private readonly within = element("button", { "aria-pressed": "true", click: () => this.enter(true) }, "Inside");
   private readonly without = element("button", { "aria-pressed": "false", click: () => this.enter(false) }, "Outside");
-  private readonly hint = element("p", { class: "hint" });
+  private readonly hint = element("p", { class: "hint view-hint" });
   private isInside = true;
   private readonly pipe: Pipe;
   private readonly scene = new THREE.Scene();
@@ -73,7 +73,7 @@ export class ModelView {
     this.within.setAttribute("aria-pressed", String(this.isInside));
     this.without.setAttribute("aria-pressed", String(!this.isInside));
     this.cut.disabled = this.isInside;
-    this.hint.textContent = this.isInside ? "Wheel or W S flies, drag or A D looks around, a click moves the spot (orange ring)."
+    this.canvas.title = this.hint.textContent = this.isInside ? "Wheel or W S flies, drag or A D looks around, a click moves the spot (orange ring)."
       : "Drag turns, wheel zooms, right drag shifts, a click moves the spot (orange ring).";
   }
 

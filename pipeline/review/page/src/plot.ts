@@ -8,7 +8,8 @@ export function plot({ title, x_label, unit, x, curves }: Plot): HTMLElement {
   const root = drawn("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": title, class: "chart" });
   const all = curves.flatMap((c) => c.y).filter((v): v is number => v !== null);
   if (!all.length || !x.length) return element("figure", {}, element("figcaption", {}, `${title}: nothing was measured.`));
-  const [low, high] = range(Math.min(...all), Math.max(...all));
+  const [low, most] = range(Math.min(...all), Math.max(...all));
+  const high = unit === "%" ? Math.min(most, 100) : most;
   const [first, last] = [x[0]!, x[x.length - 1]!];
   const px = (v: number) => LEFT + ((WIDTH - LEFT - RIGHT) * (v - first)) / (last - first || 1);
   const py = (v: number) => HEIGHT - BOTTOM - ((HEIGHT - TOP - BOTTOM) * (v - low)) / (high - low);

@@ -3,7 +3,7 @@ import { RefusedError, type Source } from "./source";
 import type { Finding, Point, ReviewState, Run, Seal, Tool } from "./types";
 import { wrapped } from "./words";
 
-export type Topic = "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "recomputed";
+export type Topic = "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "named" | "recomputed";
 
 export class Session {
   selected: string | null = null;
@@ -32,7 +32,7 @@ export class Session {
   }
 
   get who(): string { return localStorage.getItem("boresight-who") ?? ""; }
-  set who(name: string) { localStorage.setItem("boresight-who", name); }
+  set who(name: string) { localStorage.setItem("boresight-who", name); this.tell("named"); }
 
   get standing(): Finding[] { return this.state.findings.filter((f) => f.status !== "gone"); }
   get finding(): Finding | null { return this.standing.find((f) => f.id === this.selected) ?? null; }
@@ -113,9 +113,15 @@ export class Session {
     }
   }
 
+  /** What a finding that is gone has become, or was made of. */
+  private heir(gone: Finding): string | null {
+    return this.standing.find((f) => f.made_of.includes(gone.id) || gone.made_of.includes(f.id))?.id ?? null;
+  }
+
   private put(state: ReviewState): void {
+    const before = this.finding;
     this.state = state;
-    if (this.selected && !this.finding) this.selected = null;
+    if (before && !this.finding) this.selected = this.heir(before);
     this.marked = new Set([...this.marked].filter((id) => this.standing.some((f) => f.id === id)));
     this.tell("state");
     this.tell("selection");

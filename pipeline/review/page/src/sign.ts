@@ -13,6 +13,10 @@ export function signPage(session: Session): HTMLElement {
   const assumed = session.source.readOnly ? null : assumptions(session);
   const paint = () => root.replaceChildren(...parts(session, form, assumed));
   session.on(["state", "seal"], paint);
+  session.on(["named"], () => {
+    const name = root.querySelector<HTMLInputElement>("#sign-name");
+    if (name && !name.value) name.value = session.who;
+  });
   paint();
   return root;
 }

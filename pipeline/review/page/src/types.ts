@@ -39,7 +39,7 @@ export type Status = "open" | "accepted" | "rejected" | "gone";
 export interface Finding {
   id: string; kind: string; outline: Point[]; size: Size; status: Status; original: number | null; edited: boolean;
   decided_by: string; decided_at: string; reason: string; remarks: { who: string; at: string; text: string }[];
-  made_of: string[]; wall_loss_percent: number | null; wall_loss_sigma_percent: number | null; strength: Strength | null;
+  made_of: string[]; covers: string[]; wall_loss_percent: number | null; wall_loss_sigma_percent: number | null; strength: Strength | null;
 }
 
 export interface Entry { id: number; who: string; at: string; action: Record<string, unknown> & { do: string } }
