@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.instrument.probe import Probe
-from stages.diagnose.effects.base import Shape
+from stages.diagnose.effects.base import Amplitude, Shape
+from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
+from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.fit import evidence
+from stages.diagnose.gauge.judge import prior_sigma
+from stages.diagnose.gauge.run import Term
+from stages.diagnose.inference import Stated, estimate
 
 Float = NDArray[np.float64]
 Change = Callable[[dict[str, float], Float, Shape], None]
@@ -68,41 +75,94 @@ CHANGES: Mapping[str, Change] = MappingProxyType({
 })  # fmt: skip
 
 
-def corrected(
-    probe: Probe,
-    instrument: Float,
-    effects: Sequence[tuple[str, Float, Shape]],
-    covariance: Float,
-    source: str,
-) -> tuple[Probe, tuple[str, ...]]:
-    """Return the probe with the instrument's corrections (P,) and effects put in, and effects it cannot say.
+@dataclass(frozen=True)
+class Correction:
+    """The stated probe with what a gauge run found put in.
 
-    ``covariance`` (P, P) is of the result's parameters.
+    Attributes
+    ----------
+    probe : Probe
+    put_in, unsaid : tuple of str
+        Effects that the probe now has, and those that a probe file cannot express.
     """
-    values = dict(zip(probe.parameter_names, probe.parameters + instrument, strict=True))
-    unsaid = []
-    for name, amplitude, shape in effects:
-        change = CHANGES.get(name)
-        known = {"fx", "fy", "cx", "cy", "k1"} <= set(values) or name not in _OF_CAMERA
-        if change is None or not known:
-            unsaid.append(name)
-            continue
-        change(values, amplitude, shape)
-    parameters = np.array([values[n] for n in probe.parameter_names])
-    made = probe.with_parameters(parameters, (covariance + covariance.T) / 2)
-    return _from(made, source), tuple(unsaid)
+
+    probe: Probe
+    put_in: tuple[str, ...]
+    unsaid: tuple[str, ...]
+
+
+def correction_by_gauge(examined: Examined, probe: Probe, stated: Stated, source: str) -> Correction:
+    """Return the probe as the gauge run's likeliest explanation has it, with what that is worth."""
+    found = examined.best.fit if examined.best is not None else examined.searched.found
+    names = [t.model.name for t in found.terms]
+    known = evidence(examined.searched.run, found, ())[0]
+    at = _Parameters(probe, known.columns, found.terms)
+    middle = at.middle(found.state.probe.parameters - probe.parameters)
+    spread = _spread(known, stated, found.terms)
+    slope = at.slope(middle, np.sqrt(np.diag(spread)))
+    covariance = slope @ spread @ slope.T
+    made = probe.with_parameters(at.of(middle), (covariance + covariance.T) / 2)
+    return Correction(
+        replace(made, calibrated_from=source),
+        tuple(n for n in names if at.sayable(n)), tuple(n for n in names if not at.sayable(n)),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Parameters:
+    """The probe's parameters as a function of evidence's columns, true − stated."""
+
+    probe: Probe
+    columns: tuple[Column, ...]
+    terms: tuple[Term, ...]
+
+    def sayable(self, name: str) -> bool:
+        """Whether a file of this probe can express the effect."""
+        known = {"fx", "fy", "cx", "cy", "k1"} <= set(self.probe.parameter_names)
+        return name in CHANGES and (known or name not in _OF_CAMERA)
+
+    def middle(self, instrument: Float) -> Float:
+        """Return the columns' values (K,) of the instrument's corrections (P,) and the terms."""
+        of_instrument = dict(zip(self.probe.parameter_names, instrument, strict=True))
+        of_terms = {
+            (t.model.name, a.name): float(v)
+            for t in self.terms
+            for a, v in zip(t.model.amplitudes, t.amplitude, strict=True)
+        }
+        return np.array([
+            of_instrument.get(c.amplitude, 0.0) if c.effect == INSTRUMENT else of_terms[c.effect, c.amplitude]
+            for c in self.columns
+        ])  # fmt: skip
+
+    def of(self, x: Float) -> Float:
+        """Return the parameters (P,) at values (K,) of the columns."""
+        values = dict(zip(self.probe.parameter_names, self.probe.parameters.tolist(), strict=True))
+        for c, value in zip(self.columns, x, strict=True):
+            if c.effect == INSTRUMENT and c.amplitude in values:
+                values[c.amplitude] += float(value)
+        for t in self.terms:
+            if self.sayable(t.model.name):
+                own = [
+                    k for a in t.model.amplitudes for k, c in enumerate(self.columns) if c == _column(t, a)
+                ]
+                CHANGES[t.model.name](values, x[own], t.shape)
+        return np.array([values[n] for n in self.probe.parameter_names])
+
+    def slope(self, x: Float, step: Float) -> Float:
+        """Return (P, K) derivatives, over ± ``step`` (K,)."""
+        moves = np.diag(np.maximum(step, 1e-12))
+        return np.stack([(self.of(x + m) - self.of(x - m)) / (2 * m.sum()) for m in moves], axis=1)
+
+
+def _column(term: Term, amplitude: Amplitude) -> Column:
+    return Column(term.model.name, amplitude.name, term.shape)
+
+
+def _spread(known: Evidence, stated: Stated, terms: Sequence[Term]) -> Float:
+    """Return the true covariance (K, K) of the estimate: neighbours that err alike counted once."""
+    found = estimate(known, stated, prior_sigma(known, terms)).covariance
+    excess = known.score_covariance - known.information
+    return np.asarray(found + found @ excess @ found)
 
 
 _OF_CAMERA = frozenset({"principal_point", "focal_scale", "pixel_aspect", "radial_distortion"})
-
-
-def _from(probe: Probe, source: str) -> Probe:
-    return Probe(
-        probe.camera,
-        probe.laser,
-        probe.covariance,
-        probe.shutter,
-        probe.lighting,
-        probe.encoder_scale_sigma,
-        source,
-    )

@@ -89,6 +89,11 @@ def evidence_of(system: FieldSystem, found: Reduced, ring_cell: Int, landmark_ce
     return Evidence(system.names, found.information, right, covariance, misfit + rest, float(len(total)))
 
 
+def rings_after(rows: Rows, found: Reduced, named: Float) -> Float:
+    """Return the rings' residuals (M,) after a step ``named`` (K,), all other unknowns at their best."""
+    return np.asarray(rows.residual + _after_step(rows, found) + _by_named(rows, found) @ named)
+
+
 def _corner(factor: Factor) -> Float:
     """Return the border's information with the frames eliminated."""
     upper, lower = factor.corner

@@ -92,15 +92,50 @@ def field_run(
     measured = Measurements(tracks, bins, frames.time_s, None, probe, unsure, motion._LOOSE)
     T_pc = predictor.between(tracks.frames, tracks.T_pc, len(frames.frame))
     start = motion._first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
+    encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
+    source = _Source(recording, rings, encoder, np.asarray(ring_frames), parameters)
+    return _adjusted(source, measured, start, radius_mm, context)
+
+
+def with_probe(run: FieldRun, probe: Probe, context: Context) -> FieldRun:
+    """Return the run adjusted anew with another probe, from the same ring samples and texture tracks.
+
+    Raises
+    ------
+    UnusableError
+        When rings and texture do not determine the motion with that probe.
+    """
+    parameters, unsure = run.parameters, probe.principal_uncertainties()
+    bins = ring_bins(run.rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
+    bins = replace(bins, frame=np.searchsorted(run.recording.frames.frame, bins.frame))
+    measured = replace(run.measured, rings=bins, probe=probe, unsure=unsure, smooth_sigma=motion._LOOSE)
+    points = triangulate_rings(run.rings, probe, TriangulateParameters.model_validate({}), context)
+    start = replace(run.state, instrument=np.zeros(unsure.shape[1] + MATCH_BIASES))
+    source = _Source(run.recording, run.rings, run.encoder, run.ring_frames, parameters)
+    return _adjusted(source, measured, start, motion._pipe_in_rings(points)[1], context)
+
+
+@dataclass(frozen=True)
+class _Source:
+    recording: Recording
+    rings: RingSamples
+    encoder: EncoderReadings | None
+    ring_frames: Int
+    parameters: MotionParameters
+
+
+def _adjusted(
+    source: _Source, measured: Measurements, start: State, radius_mm: float, context: Context
+) -> FieldRun:
+    recording, parameters = source.recording, source.parameters
     estimate = motion._adjusted(start, measured, parameters)
     motion._require_convergence(estimate, radius_mm, context)
-    trajectory = in_pipe_frame(estimate, frames, measured)
-    events = find_events(frames, trajectory, tracks, estimate.state.slip, False)
-    encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
+    trajectory = in_pipe_frame(estimate, recording.frames, measured)
+    events = find_events(recording.frames, trajectory, measured.tracks, estimate.state.slip, False)
     return FieldRun(
-        recording, probe, rings, measured, estimate.state, estimate.adjusted.equations,
-        replace(trajectory, events=events), encoder, np.asarray(ring_frames), parameters,
+        recording, measured.probe, source.rings, measured, estimate.state, estimate.adjusted.equations,
+        replace(trajectory, events=events), source.encoder, source.ring_frames, parameters,
     )  # fmt: skip
 
 
-__all__ = ["FieldRun", "UnusableError", "field_run"]
+__all__ = ["FieldRun", "UnusableError", "field_run", "with_probe"]
