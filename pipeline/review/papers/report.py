@@ -20,7 +20,7 @@ from pipeline.model import Overlays
 from pipeline.review.decisions.replay import REJECTED, Finding
 from pipeline.review.documents import cleaned, run_document
 from pipeline.review.papers.pictures import finding_picture, section_plot
-from pipeline.review.papers.tables import findings_table
+from pipeline.review.papers.tables import clock_text, findings_table
 from pipeline.review.review import Review, State
 
 _HEADLINE_METRICS = 14
@@ -87,7 +87,9 @@ def html_report(review: Review, state: State) -> str:
     page = files("pipeline.review.papers").joinpath("report.html").read_text("utf-8")
     shown = {k: base64.b64encode(v).decode("ascii") for k, v in pictures(review, state).items()}
     environment = Environment(undefined=StrictUndefined, autoescape=True)
-    return environment.from_string(page).render(d=_with_pictures(review, state), pictures=shown)
+    return environment.from_string(page).render(
+        d=_with_pictures(review, state), pictures=shown, hour=clock_text
+    )
 
 
 def pictures_archive(review: Review, state: State) -> bytes:

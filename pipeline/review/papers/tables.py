@@ -93,7 +93,7 @@ def _pof_row(row: dict[str, Any], wall_mm: float | None) -> dict[str, Any]:
     return {
         "feature_id": row["id"], "log_distance_m": round(row["distance_from_mm"] / 1000, 4),
         "feature_type": _POF_FEATURE[kind], "feature_identification": _POF_TYPE[kind],
-        "dimension_class": row["pof_class"], "clock_position": _clock(row["clock_from"]),
+        "dimension_class": row["pof_class"], "clock_position": clock_text(row["clock_from"]),
         "depth_percent": percent, "depth_mm": depth,
         "depth_tolerance_mm_80": None if sigma is None else round(_80_PERCENT * sigma, 3),
         "length_mm": row["length_mm"], "width_mm": row["width_mm"], "surface_location": "INT",
@@ -101,7 +101,8 @@ def _pof_row(row: dict[str, Any], wall_mm: float | None) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _clock(hours: float) -> str:
+def clock_text(hours: float) -> str:
+    """Return a clock position as ``hh:mm``."""
     minutes = round(hours * 60) % 720
     return f"{minutes // 60 or 12:02d}:{minutes % 60:02d}"
 
