@@ -26,7 +26,8 @@ _BLUR_PX = 1.2  # keeps noise finer than a strip sample from folding into it
 _SMOOTH_PX = 0.7
 _IMAGE_BLUR_PX = 1.5  # lens, pixel and the blur above
 _BLURS = 4
-_MEAN_PX = 41
+_HARMONICS = 3
+_LEAST_LIGHT = 0.05
 _COURSE_PX = 3.0
 _DARKEST, _BRIGHTEST = 5.0, 250.0
 
@@ -128,8 +129,9 @@ def _without_light(grey: Float32, usable: Mask) -> Float32:
     """Return grey over the light that fell there, minus 1; 0 where unusable.
 
     A slope of the light within a patch shifts its match by half the slope times the squared length of the
-    texture, always the same way. So the light's course along the pipe, the same all round, is divided out
-    before the local mean, which leaves slopes near borders.
+    texture, always the same way. So the light's course along the pipe, the same all round, and then its
+    slow changes around it are divided out. A local mean would do that too, but near borders it sees one side
+    only, and shifts the texture with the light.
     """
     count = usable.sum(1)
     course = np.where(usable, grey, 0).sum(1) / np.maximum(count, 1)
@@ -138,11 +140,23 @@ def _without_light(grey: Float32, usable: Mask) -> Float32:
     if not known.any():
         return np.zeros_like(grey)
     course = gaussian_filter1d(np.interp(row, row[known], course[known]), _COURSE_PX)[:, None]
-    flat = np.where(usable, grey / np.maximum(course, 1.0), 0).astype(np.float32)
-    size = (_MEAN_PX, _MEAN_PX)
-    share = cv2.blur(usable.astype(np.float32), size)
-    mean = cv2.blur(flat, size) / np.maximum(share, 1e-3)
-    return np.where(usable, flat / np.maximum(mean, 0.05) - 1, 0).astype(np.float32)
+    flat = np.where(usable, grey / np.maximum(course, 1.0), 1).astype(np.float32)
+    return np.where(usable, flat / _slow_around(flat, usable) - 1, 0).astype(np.float32)
+
+
+def _slow_around(flat: Float32, usable: Mask) -> Float32:
+    """Return the mean (H, W) of ``flat`` over low harmonics around, each linear along."""
+    rows, columns = flat.shape
+    psi = 2 * np.pi * np.arange(columns) / columns
+    order = np.arange(1, _HARMONICS + 1)[:, None]
+    around = np.concatenate([np.ones((1, columns)), np.cos(order * psi), np.sin(order * psi)])
+    along = np.stack([np.ones(rows), np.linspace(-1, 1, rows)])
+    some = (slice(_COARSE // 2, None, _COARSE),) * 2
+    ok = usable[some]
+    design = np.einsum("ih,jw->hwij", along[:, some[0]], around[:, some[1]])[ok].reshape(int(ok.sum()), -1)
+    normal = design.T @ design + 1e-3 * ok.size * np.eye(design.shape[1])
+    size = np.linalg.solve(normal, design.T @ (flat[some][ok] - 1)).reshape(len(along), -1)
+    return np.maximum(1 + along.T @ size @ around, _LEAST_LIGHT).astype(np.float32)
 
 
 def _equally_sharp(contrast: Float32, coarse_uv: Float32) -> Float32:

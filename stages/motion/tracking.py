@@ -26,6 +26,7 @@ _FEWEST = 12
 _FEWEST_ALIKE = 0.4
 _ALIKE_PX = 1.5
 _MOST_MISSES = 8
+_BORDER_PX = 3
 
 
 @dataclass(frozen=True)
@@ -135,16 +136,27 @@ class TextureTracker:
 
     def _search(self, strip: Strip, frame: int) -> _Found:
         """Match every landmark that should be in the strip."""
-        m, half = self._map, self._map.half
+        m = self._map
         guess = np.stack([m.row - strip.first_row, m.column], -1) + m.offset
         young = frame - m.born < self._parameters.max_track_frames
-        inside = (guess[:, 0] > half + 1) & (guess[:, 0] < strip.contrast.shape[0] - half - 2)
-        near = np.flatnonzero(inside & young & ~m.retired)
+        near = np.flatnonzero(self._in_view(strip, guess) & young & ~m.retired)
         found = match(strip.contrast, strip.usable, m.gather(near), guess[near, 0], guess[near, 1])
         at = guess[near] + found.offset + np.array([strip.first_row, 0])
         good = (found.correlation > self._parameters.min_correlation) & np.isfinite(at).all(1)
         good &= found.sigma < 3 * self._parameters.landmark_sigma_px
         return _Found(near, good, at, found.offset, found.sigma)
+
+    def _in_view(self, strip: Strip, guess: Float) -> Mask:
+        """Return whether patches at strip positions (L, 2) may err by some σ and still be seen whole.
+
+        At a border only those would be found that err inward, and all of them together would pull.
+        """
+        margin = self._map.half + _BORDER_PX
+        whole = cv2.erode(strip.usable.astype(np.uint8), np.ones((2 * margin + 1,) * 2)) > 0
+        whole[:margin], whole[-margin - 1 :] = False, False
+        row, column = np.rint(guess).astype(np.int64).T
+        ahead = (row >= 0) & (row < len(whole))
+        return ahead & whole[np.where(ahead, row, 0), np.mod(column, whole.shape[1])]
 
     def _note(self, found: _Found, strip: Strip, frame: int) -> tuple[Float, bool]:
         """Keep the pixels of matched landmarks; return the strip's common displacement (2,) and if lost."""
