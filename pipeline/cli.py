@@ -44,6 +44,7 @@ _ATTACHED = (
     _Attached("diagnose", "Find what physics was left out, where it shows, and what bears it out."),
     _Attached("prove", "Conceal effects in recordings, diagnose them, open the truth, and score."),
     _Attached("simulate", "Render recordings from a scene, with their truth apart."),
+    _Attached("gallery", "What each known effect does: picture, residual, law, size, likeness; a page."),
     _Attached("open-seal", "Verify that a truth is the one a recording was sealed with."),
     _Attached("review", "Go through a run in the browser: decide on each finding, measure, sign."),
     _Attached("reproduce", "Compute a run again from what its record names, and compare every file."),

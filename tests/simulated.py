@@ -24,6 +24,7 @@ def smaller(scene: Scene, shrink: int, frames: int, **changes: Any) -> Scene:
     camera["focal_px"] = [f / shrink for f in camera["focal_px"]]
     camera["centre_px"] = [(c + 0.5) / shrink - 0.5 for c in camera["centre_px"]]
     unsure["focal_px"], unsure["centre_px"] = unsure["focal_px"] / shrink, unsure["centre_px"] / shrink
+    values["probe"]["laser"]["line_sigma_mm"] *= shrink
     values["pipe"] |= {"texel_mm": 0.11 * shrink, "to_mm": min(values["pipe"]["to_mm"], 200.0)}
     return scene_from(values | {"frames": frames} | changes, SCENES / "scene.yaml")
 

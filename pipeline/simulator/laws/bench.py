@@ -21,7 +21,7 @@ Float = NDArray[np.float64]
 
 # The instrument of the notes: baseline 22 mm, equidistant lens of 360 px/rad, 2 MP.
 BASELINE_MM, FOCAL_PX = 22.0, 360.0
-IMAGE_SIZE, CENTRE_PX = (1600, 1200), (799.5, 599.5)
+IMAGE_SIZE = (1600, 1200)
 LINE_SIGMA_MM = 0.15
 # 2, 3 and 4 inch.
 RADII_MM = (25.4, 38.1, 50.8)
@@ -30,15 +30,18 @@ _FROM_MM, _TO_MM, _STEP_MM, _COLUMNS = -20.0, 120.0, 0.5, 256
 _FRAME_RATE = 30.0
 
 
-def bench_probe() -> Probe:
-    """Return the probe of the notes, without any uncertainty."""
-    camera = KannalaBrandt(IMAGE_SIZE, (FOCAL_PX, FOCAL_PX), CENTRE_PX)
+def bench_probe(image_size: tuple[int, int] = IMAGE_SIZE) -> Probe:
+    """Return the probe of the notes, without any uncertainty; its optical axis is the picture's middle."""
+    middle = ((image_size[0] - 1) / 2, (image_size[1] - 1) / 2)
+    camera = KannalaBrandt(image_size, (FOCAL_PX, FOCAL_PX), middle)
     laser = LaserSheet(BASELINE_MM, line_sigma_mm=LINE_SIGMA_MM)
     size = len(camera.parameter_names) + len(LaserSheet.PARAMETER_NAMES)
     return Probe(camera, laser, np.zeros((size, size)), Shutter())
 
 
-def bench_truth(radius_mm: float, motion: Motion | None = None, frames: int = 1) -> SceneTruth:
+def bench_truth(
+    radius_mm: float, motion: Motion | None = None, frames: int = 1, image_size: tuple[int, int] = IMAGE_SIZE
+) -> SceneTruth:
     """Return a scene in which the true instrument is the stated one, in a smooth pipe.
 
     Parameters
@@ -48,8 +51,9 @@ def bench_truth(radius_mm: float, motion: Motion | None = None, frames: int = 1)
         At rest on the axis at distance 0 where none is given.
     frames : int
         At 30 frames a second, from time 0.
+    image_size : (int, int)
     """
-    stated = bench_probe()
+    stated = bench_probe(image_size)
     instrument = TrueInstrument(
         TrueCamera(stated.camera),
         TrueLaser(stated.laser, profile=LineProfile(LINE_SIGMA_MM)),

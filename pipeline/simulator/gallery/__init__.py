@@ -1,0 +1,1 @@
+"""What each effect of the catalogue does to picture, ring and encoder: all computed, for the gallery page."""
