@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
@@ -12,11 +11,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from pipeline.commands.prove_cases import Drawing, Worked, draw_case, require_seal, worked
 from pipeline.commands.prove_report import write_report
 from pipeline.disk import disk_errors_named
-from pipeline.errors import BoresightError, InputError
-from stages.diagnose.drill.cases import Case, DiagnosisFailedError, diagnose_apart, find_cases, trial_of
-from stages.diagnose.drill.score import Rate, Trial, score
+from pipeline.errors import InputError
+from stages.diagnose.drill.cases import find_cases
+from stages.diagnose.drill.figures import figures
+
+_PRIOR = Path(__file__).resolve().parents[2] / "configs" / "priors" / "pairs.yaml"
 
 
 def prove(
@@ -28,7 +30,9 @@ def prove(
         Path | None, typer.Option(metavar="DIR", help="their opened truth, NAME-gauge/truth.json and so on")
     ] = None,
     cases: Annotated[int, typer.Option(min=1, help="how many probes to draw, without --sealed")] = 10,
-    prior: Annotated[Path | None, typer.Option(metavar="FILE", help="what to draw them from")] = None,
+    prior: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="what to draw from; else configs/priors/pairs.yaml")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="of the draw")] = 0,
     leave_out: Annotated[
         bool,
@@ -36,87 +40,65 @@ def prove(
             "--leave-out", help="diagnose each concealed effect again with it left out of the library"
         ),
     ] = False,
+    workers: Annotated[int, typer.Option(min=1, help="cases that are worked on at a time")] = 1,
 ) -> None:
     """Prove the diagnosis on recordings in which an effect is concealed.
 
     Without --sealed, probes are drawn, effects concealed, and recordings rendered and sealed. Each is
-    diagnosed by a process that is given the recordings only; then the truth is opened and scored. Answers
-    that are there already are kept: an interrupted proof goes on where it stopped.
+    diagnosed by a process that is given the recordings only; then the seal is checked, the truth opened and
+    scored. What is there already is kept: an interrupted proof goes on where it stopped.
     """
     console = Console(stderr=True)
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
-        recordings, opened = _recordings(output, sealed, truth, cases, prior, seed, console)
-        trials = list(_trials(find_cases(recordings), output, opened, leave_out, console))
-        write_report(trials, output)
-    _show(trials, console)
+        if sealed is None:
+            drawing = Drawing(prior or _PRIOR, seed, output / "recordings", output / "truth")
+            done = _drawn_and_worked(drawing, cases, output, leave_out, workers, console)
+        else:
+            done = _sealed_and_worked(sealed, truth, output, leave_out, workers, console)
+        write_report(done, output)
+    _show(done, console)
     console.print(f"Report: {output / 'proof.html'}")
 
 
-def _recordings(
-    output: Path,
-    sealed: Path | None,
-    truth: Path | None,
-    cases: int,
-    prior: Path | None,
-    seed: int,
-    console: Console,
-) -> tuple[Path, Path]:
-    """Return the folders of recordings and of their truth, drawn first where none are given."""
-    if sealed is not None:
-        if truth is None:
-            raise InputError(
-                sealed, "its truth is not given", hint="give the folder of opened truth, --truth"
-            )
-        return sealed, truth
-    folder, opened = output / "recordings", output / "truth"
-    words = ["simulate", "--draw", str(cases), "--seed", str(seed), "--seal", "-o", str(folder)]
-    words += ["--truth", str(opened), *(("--prior", str(prior)) if prior else ())]
-    with console.status(f"rendering {cases} probes"):
-        done = subprocess.run([sys.executable, "-m", "pipeline.cli", *words], check=False)
-    if done.returncode:
-        raise BoresightError(f"the recordings could not be rendered: simulate ended with {done.returncode}")
-    return folder, opened
+def _drawn_and_worked(
+    drawing: Drawing, cases: int, output: Path, leave_out: bool, workers: int, console: Console
+) -> list[Worked]:
+    """Draw, render and diagnose one case after the other, several at a time."""
+
+    def work(index: int) -> Worked:
+        return _told(worked(draw_case(drawing, index), output, drawing.truth, leave_out), console)
+
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(work, range(cases)))
 
 
-def _trials(
-    cases: tuple[Case, ...], output: Path, opened: Path, leave_out: bool, console: Console
-) -> Iterator[Trial]:
-    for number, case in enumerate(cases, 1):
-        answer = output / "answers" / case.name
-        with console.status(f"diagnosing {case.name}, {number} of {len(cases)}"):
-            if not _answered(case, answer, (), console):
-                continue
-        trial = trial_of(case, answer, opened)
-        yield trial
-        if leave_out and len(trial.truth) == 1:
-            without = tuple(trial.truth)
-            answer = output / "answers-without" / case.name
-            with console.status(f"diagnosing {case.name} without {without[0]}"):
-                if _answered(case, answer, without, console):
-                    yield trial_of(case, answer, opened, without)
+def _sealed_and_worked(
+    sealed: Path, truth: Path | None, output: Path, leave_out: bool, workers: int, console: Console
+) -> list[Worked]:
+    if truth is None:
+        raise InputError(sealed, "its truth is not given", hint="give the folder of opened truth, --truth")
+    cases = find_cases(sealed)
+    for case in cases:
+        require_seal(case, truth)
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(lambda case: _told(worked(case, output, truth, leave_out), console), cases))
 
 
-def _answered(case: Case, answer: Path, without: tuple[str, ...], console: Console) -> bool:
-    """Diagnose; a case that gives no answer is told and left out of no count silently."""
-    try:
-        diagnose_apart(case, answer, without)
-    except DiagnosisFailedError as error:
-        console.print(f"no answer: {error}", style="red", highlight=False)
-        return False
-    return True
+def _told(done: Worked, console: Console) -> Worked:
+    """Tell on the console of a case that gave no answer."""
+    for failure in done.failures:
+        console.print(f"no answer: {failure}", style="red", highlight=False)
+    return done
 
 
-def _show(trials: list[Trial], console: Console) -> None:
+def _show(done: Sequence[Worked], console: Console) -> None:
+    trials = [trial for case in done for trial in case.trials]
     table = Table(title=f"{len(trials)} diagnoses against what was concealed")
-    for heading in ("", "share", "of", "95 % interval"):
+    for heading in ("", "value", "of", "95 % interval", "goal"):
         table.add_column(heading)
-    for name, value in vars(score(trials)).items():
-        if isinstance(value, Rate):
-            low, high = value.interval
-            table.add_row(
-                name.replace("_", " "), f"{value.share:.3f}", str(value.of), f"{low:.3f}–{high:.3f}"
-            )
-        else:
-            table.add_row(name.replace("_", " "), f"{value:.3f}", "", "")
+    for row in figures(trials):
+        value = "none" if row.value is None else f"{row.value:.3f}"
+        interval = "" if row.interval is None else f"{row.interval[0]:.3f}–{row.interval[1]:.3f}"
+        table.add_row(row.words, value, str(row.of), interval, row.goal)
     console.print(table)

@@ -38,6 +38,7 @@ def simulate(
     ] = None,
     frames: Annotated[int | None, typer.Option(min=1, help="render only so many, from the first")] = None,
     draw: Annotated[int, typer.Option(min=0, help="draw so many pairs of gauge run and inspection")] = 0,
+    first: Annotated[int, typer.Option(min=0, help="pairs of the draw that are left out before these")] = 0,
     prior: Annotated[
         Path | None, typer.Option(metavar="FILE", help="what to draw from; else configs/priors/pairs.yaml")
     ] = None,
@@ -52,7 +53,7 @@ def simulate(
     """
     console = Console(stderr=True)
     if draw:
-        jobs = _drawn(draw, prior or _PRIOR, seed or 0, output, truth, seal, frames)
+        jobs = _drawn(range(first, first + draw), prior or _PRIOR, seed or 0, output, truth, seal, frames)
         if scene or effects:
             raise InputError("--draw", "draws scene and effects itself", hint="leave out SCENE and --with")
     else:
@@ -77,7 +78,7 @@ def _single(
 
 
 def _drawn(
-    count: int,
+    which: range,
     prior_file: Path,
     seed: int,
     folder: Path,
@@ -87,7 +88,7 @@ def _drawn(
 ) -> Iterator[Job]:
     prior = read_prior(prior_file)
     truths = truth or beside(folder)
-    for index in range(count):
+    for index in which:
         pair = draw_pair(prior, prior_file, seed, index)
         for scene in (pair.gauge, pair.field):
             places = Places(folder / scene.name, truths / scene.name, sealed)

@@ -8,12 +8,14 @@ from pipeline.errors import InputError
 from stages.diagnose.drill.answer import (
     Answer,
     Concealed,
+    Feasibility,
     Fit,
     Location,
     NamedEffect,
     read_answer,
     read_concealed,
 )
+from stages.diagnose.drill.figures import figures
 from stages.diagnose.drill.score import Rate, Trial, calibration, confusion, heldout_removed, score
 
 TILT = Concealed(name="laser_tilt", values=(0.6, 40.0))
@@ -135,3 +137,50 @@ def test_answers_and_truth_are_read_and_refused(tmp_path):
     truth.write_text('{"effects": [7]}')
     with pytest.raises(InputError, match="effects"):
         read_concealed(truth)
+
+
+def feasible(answer, detectable, left=1.0):
+    entry = {"name": "laser_tilt", "detectable": detectable, "left": left, "typical": 0.05}
+    return answer.model_copy(update={"feasibility": (Feasibility.model_validate(entry),)})
+
+
+def test_detection_is_asked_where_an_oracle_would_be_sure():
+    trials = [
+        Trial("a", (TILT,), CONSISTENT, oracle_snr=7.9),
+        Trial("b", (TILT,), CONSISTENT, oracle_snr=8.0),
+        Trial("c", (TILT,), named("laser_tilt"), oracle_snr=30.0),
+        Trial("d", (TILT,), CONSISTENT),
+    ]
+    result = score(trials)
+    assert (result.detected.count, result.detected.of) == (1, 2)
+    assert (result.detected_any.count, result.detected_any.of) == (1, 4)
+
+
+def test_without_an_oracle_the_feasibility_of_the_answer_tells_the_snr():
+    assert Trial("a", (TILT,), feasible(CONSISTENT, 0.3)).snr == pytest.approx(10.0)
+    assert Trial("a", (TILT, CONE), feasible(CONSISTENT, 0.3)).snr is None
+    assert Trial("a", (TILT,), feasible(CONSISTENT, None)).snr is None
+
+
+def test_identifiable_is_what_stands_out_with_its_closest_rival_free():
+    assert Trial("a", (TILT,), feasible(CONSISTENT, 0.3, left=0.26)).identifiable
+    assert not Trial("a", (TILT,), feasible(CONSISTENT, 0.3, left=0.24)).identifiable
+    assert not Trial("a", (), feasible(CONSISTENT, 0.3)).identifiable
+    told = [Trial("a", (TILT,), feasible(named("laser_tilt"), 0.3, left=x)) for x in (0.9, 0.01)]
+    assert score(told).named_identifiable.of == 1
+
+
+def test_a_location_counts_when_channel_anchor_and_time_are_all_right():
+    wrong = named("laser_tilt").model_copy(update={"location": LASER.model_copy(update={"time": "drift"})})
+    result = score([Trial("a", (TILT,), named("laser_tilt")), Trial("b", (TILT,), wrong)])
+    assert (result.located.count, result.channel_right.count, result.time_right.count) == (1, 2, 1)
+
+
+def test_the_table_has_every_figure_of_the_demand_once_and_names_its_count():
+    rows = {row.name: row for row in figures([Trial("a", (TILT,), named("laser_tilt"), oracle_snr=20.0)])}
+    assert {
+        "false_alarms", "detected", "located", "named_identifiable", "contained", "misnamed", "pairs_named",
+        "unknown_owned", "unknown_misnamed", "size_in_95", "size_bias_sigma", "heldout_removed",
+    } <= set(rows)  # fmt: skip
+    assert rows["detected"].text.startswith("Detected at SNR ≥ 8: 1 of 1, 100.0% [20.")
+    assert rows["false_alarms"].text.startswith("False alarms where nothing is hidden: none to count")

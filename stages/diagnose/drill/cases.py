@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pipeline
 from pipeline.errors import BoresightError, InputError
-from stages.diagnose.drill.answer import Concealed, read_answer, read_concealed
+from stages.diagnose.drill.answer import Answer, Concealed, read_answer, read_concealed
 from stages.diagnose.drill.score import Trial
 
+TIMING = "timing.json"
 _KINDS = ("gauge", "field")
 
 
@@ -53,7 +57,7 @@ def find_cases(folder: Path) -> tuple[Case, ...]:
 def diagnose_apart(case: Case, output: Path, without: tuple[str, ...] = ()) -> None:
     """Diagnose a case in a process of its own that is told the recordings and nothing else.
 
-    An answer that is there already is kept.
+    It is given them in a folder beside which there is no truth. An answer that is there already is kept.
 
     Raises
     ------
@@ -63,25 +67,50 @@ def diagnose_apart(case: Case, output: Path, without: tuple[str, ...] = ()) -> N
     if (output / "diagnosis.json").is_file():
         return
     environment = os.environ | {"PYTHONPATH": str(Path(pipeline.__file__).resolve().parents[1])}
-    with tempfile.TemporaryDirectory() as elsewhere:
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=output.parent, prefix=".apart-") as elsewhere:
+        alone, answer = _alone(case, Path(elsewhere)), Path(elsewhere) / "answer"
+        start = time.monotonic()
         done = subprocess.run(
-            _command(case, output.resolve(), without),
+            _command(alone, answer.resolve(), without),
             cwd=elsewhere, env=environment, capture_output=True, text=True, check=False,
         )  # fmt: skip
-    if done.returncode:
-        last = "\n".join(done.stderr.strip().splitlines()[-6:])
-        raise DiagnosisFailedError(f"{case.name}: the diagnosis ended with {done.returncode}\n{last}")
+        if done.returncode:
+            last = "\n".join(done.stderr.strip().splitlines()[-6:])
+            raise DiagnosisFailedError(f"{case.name}: the diagnosis ended with {done.returncode}\n{last}")
+        (answer / TIMING).write_text(json.dumps({"seconds": round(time.monotonic() - start, 1)}), "utf-8")
+        shutil.rmtree(output, ignore_errors=True)
+        answer.rename(output)
+
+
+def _alone(case: Case, folder: Path) -> Case:
+    """Return the case with its recordings in a folder of their own, by hard links where they can be made."""
+    parts = {}
+    for kind, path in (("gauge", case.gauge), ("field", case.field)):
+        parts[kind] = None if path is None else folder / path.name
+        if path is not None:
+            shutil.copytree(path, folder / path.name, copy_function=_link)
+    return Case(case.name, parts["gauge"], parts["field"])
+
+
+def _link(source: str, target: str) -> None:
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
 
 
 def trial_of(case: Case, answer: Path, truth: Path, left_out: tuple[str, ...] = ()) -> Trial:
-    """Open the truth of a case and put it beside the answer.
+    """Open the truth of a case and put it beside the answer; without an answer, nothing was identified.
 
     Raises
     ------
     InputError
         When either cannot be read.
     """
-    return Trial(case.name, concealed_in(case, truth), read_answer(answer / "diagnosis.json"), left_out)
+    file = answer / "diagnosis.json"
+    said = read_answer(file) if file.is_file() else Answer.model_validate({"verdict": "not_identifiable"})
+    return Trial(case.name, concealed_in(case, truth), said, left_out)
 
 
 def concealed_in(case: Case, truth: Path) -> tuple[Concealed, ...]:

@@ -1,0 +1,131 @@
+"""Cases of a proof: drawn, rendered, sealed, diagnosed apart; the seal checked before the truth is read."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.errors import BoresightError, InputError
+from pipeline.simulator.prior import draw_pair, read_prior
+from pipeline.simulator.seal import SEAL_FILE, open_seal
+from stages.diagnose.drill.cases import (
+    TIMING,
+    Case,
+    DiagnosisFailedError,
+    concealed_in,
+    diagnose_apart,
+    trial_of,
+)
+from stages.diagnose.drill.score import Trial
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Where pairs are drawn from and where recordings and truth go."""
+
+    prior: Path
+    seed: int
+    recordings: Path
+    truth: Path
+
+
+@dataclass(frozen=True)
+class Worked:
+    """A case diagnosed, its truth opened.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+        With the whole library and, where asked for, without the concealed effect.
+    seconds : float or None
+        That the diagnosis with the whole library took.
+    failures : tuple of str
+        Diagnoses that ended without an answer; they are scored as having identified nothing.
+    """
+
+    trials: tuple[Trial, ...]
+    seconds: float | None
+    failures: tuple[str, ...]
+
+
+def draw_case(drawing: Drawing, index: int) -> Case:
+    """Return pair number ``index`` of a draw, rendered and sealed unless it is there already.
+
+    Raises
+    ------
+    BoresightError
+        When it cannot be rendered.
+    """
+    pair = draw_pair(read_prior(drawing.prior), drawing.prior, drawing.seed, index)
+    names = (pair.gauge.name, pair.field.name)
+    folders = [root / name for name in names for root in (drawing.recordings, drawing.truth)]
+    if not all(folder.is_dir() for folder in folders):
+        for folder in folders:
+            shutil.rmtree(folder, ignore_errors=True)
+        _render(drawing, index)
+    gauge, field = (drawing.recordings / name for name in names)
+    return Case(gauge.name.removesuffix("-gauge"), gauge, field)
+
+
+def _render(drawing: Drawing, index: int) -> None:
+    words = ["simulate", "--draw", "1", "--first", str(index), "--seed", str(drawing.seed), "--seal"]
+    words += ["--prior", str(drawing.prior), "-o", str(drawing.recordings), "--truth", str(drawing.truth)]
+    command = [sys.executable, "-m", "pipeline.cli", *words]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    if done.returncode:
+        last = "\n".join(done.stderr.strip().splitlines()[-6:])
+        raise BoresightError(
+            f"pair {index} could not be rendered: simulate ended with {done.returncode}\n{last}"
+        )
+
+
+def require_seal(case: Case, truth: Path) -> None:
+    """Refuse a recording that is sealed and not as it was sealed, or whose truth is not.
+
+    Raises
+    ------
+    InputError
+        Naming the files that were changed.
+    """
+    for path in (case.gauge, case.field):
+        if path is None or not (path / SEAL_FILE).is_file():
+            continue
+        broken = [f"{c.file} {c.problem}" for c in open_seal(path, truth / path.name) if c.problem]
+        if broken:
+            raise InputError(
+                path, f"does not agree with its seal: {'; '.join(broken)}",
+                hint="neither the recording nor its truth may be changed between sealing and scoring",
+            )  # fmt: skip
+
+
+def worked(case: Case, output: Path, truth: Path, leave_out: bool) -> Worked:
+    """Diagnose a case, check its seal, open its truth; where asked, diagnose it without what it conceals."""
+    answer, failures = output / "answers" / case.name, []
+    failures += _answered(case, answer, ())
+    require_seal(case, truth)
+    trials = [trial_of(case, answer, truth)]
+    concealed = concealed_in(case, truth)
+    if leave_out and len(concealed) == 1:
+        without = (concealed[0].name,)
+        second = output / "answers-without" / case.name
+        failures += _answered(case, second, without)
+        trials.append(trial_of(case, second, truth, without))
+    return Worked(tuple(trials), _seconds(answer), tuple(failures))
+
+
+def _answered(case: Case, answer: Path, without: tuple[str, ...]) -> list[str]:
+    """Diagnose; return why there is no answer, if there is none."""
+    try:
+        diagnose_apart(case, answer, without)
+    except DiagnosisFailedError as error:
+        return [str(error)]
+    return []
+
+
+def _seconds(answer: Path) -> float | None:
+    file = answer / TIMING
+    return float(json.loads(file.read_text("utf-8"))["seconds"]) if file.is_file() else None
