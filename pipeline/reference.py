@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +18,7 @@ from pipeline.native import open3d
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 _MAP_KEYS = ("distance_mm", "azimuth_rad", "radius_mm")
+_POINT_FIELDS = ("x", "y", "z", "nx", "ny", "nz", "sigma_mm", "distance_mm", "azimuth_rad")
 SURFACE_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".pcd", ".xyz")
 
 
@@ -90,8 +94,13 @@ def read_wall_points(run: Path, at_most: int = 200_000) -> WallPoints:
 
     try:
         vertex = PlyData.read(str(file))["vertex"].data
-    except (PlyParseError, OSError, KeyError) as error:
+    except (PlyParseError, OSError, KeyError, ValueError, EOFError, MemoryError) as error:
         raise InputError(file, f"is no point cloud: {error}") from error
+    missing = [name for name in _POINT_FIELDS if name not in (vertex.dtype.names or ())]
+    if missing:
+        raise InputError(
+            file, f"lacks {', '.join(missing)}", expected=f"points with {' '.join(_POINT_FIELDS)}"
+        )
     vertex = vertex[:: max(1, -(-len(vertex) // at_most))]
     azimuth = np.asarray(vertex["azimuth_rad"], float)
     normal = np.stack([vertex[f"n{axis}"] for axis in "xyz"], -1).astype(float)
@@ -142,14 +151,18 @@ def _only_map(folder: Path) -> Path:
     return found[0]
 
 
-def _opened(file: Path) -> np.lib.npyio.NpzFile:
+@contextmanager
+def _opened(file: Path) -> Iterator[np.lib.npyio.NpzFile]:
+    """Open an archive of arrays; whatever is wrong with it, here or when an array is read, names the file."""
+    expected = "a NumPy .npz archive"
     try:
-        content = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as error:
-        raise InputError(file, f"cannot be read: {error}", expected="a NumPy .npz archive") from error
-    if not isinstance(content, np.lib.npyio.NpzFile):
-        raise InputError(file, "is no archive", expected="a NumPy .npz archive")
-    return content
+        with file.open("rb") as stream:
+            content = np.load(stream, allow_pickle=False)
+            if not isinstance(content, np.lib.npyio.NpzFile):
+                raise InputError(file, "is no archive", expected=expected)
+            yield content
+    except (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, MemoryError) as error:
+        raise InputError(file, f"cannot be read: {error}", expected=expected) from error
 
 
 def _check_grid(file: Path, distance: Float, azimuth: Float, radius: Float) -> None:

@@ -160,6 +160,9 @@ def _prepare(container: av.container.InputContainer) -> av.VideoStream:
     if not container.streams.video:
         raise ValueError("no video stream in it")
     stream = container.streams.video[0]
+    # PyAV gives no context for a codec that FFmpeg does not know.
+    if stream.codec_context is None:
+        raise ValueError("a codec that FFmpeg does not know")
     stream.codec_context.thread_type = "AUTO"
     stream.codec_context.thread_count = _THREADS
     stream.codec_context.options = {"err_detect": "crccheck+explode"}
