@@ -19,6 +19,7 @@ from pipeline.review.decisions.overlap import covered
 from pipeline.review.decisions.replay import GONE, Finding
 from pipeline.review.flat_tiles import FlatPicture
 from pipeline.review.measuring.wall import MeasuredWall
+from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
 
@@ -82,6 +83,11 @@ def layer_document(picture: FlatPicture) -> dict[str, Any]:
         "distance_mm": [picture.distance_from_mm, picture.distance_to_mm],
         "azimuth_rad": picture.azimuth_from_rad,
     }
+
+
+def model_document(model: StretchedModel) -> list[dict[str, Any]]:
+    """Return where each stretch of the model lies, and how large it is."""
+    return [asdict(stretch) for stretch in model.stretches()]
 
 
 def section_document(wall: MeasuredWall, overlays: Overlays, distance_mm: float) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from pipeline.model import Overlays
 from pipeline.review import documents
 from pipeline.review.flat_tiles import TILE_PX, FlatPicture, layers_of, picture_of
 from pipeline.review.frames import UnseenError, finder_of
+from pipeline.review.model_stretches import model_of
 from pipeline.review.papers.catalogue import PAPERS, paper_of
 from pipeline.review.quality import quality_document
 from pipeline.review.review import Review, State
@@ -91,11 +92,13 @@ def _tiles(name: str, picture: FlatPicture, folder: Path) -> dict[str, Any]:
     return documents.layer_document(picture)
 
 
-def _model(review: Review) -> str:
-    file = review.files.file("model.glb")
+def _model(review: Review) -> dict[str, Any]:
+    file, model = review.files.file("model.glb"), model_of(review.files)
     if file.stat().st_size > _LARGEST_MODEL:
         raise InputError(file, "is too large for a page without a server", hint="use boresight review")
-    return base64.b64encode(file.read_bytes()).decode("ascii")
+    stretches = documents.model_document(model)
+    parts = [base64.b64encode(model.stretch(k)).decode("ascii") for k in range(len(stretches))]
+    return {"stretches": stretches, "parts": parts}
 
 
 def _spots(review: Review, state: State, folder: Path) -> Iterator[dict[str, Any]]:

@@ -15,7 +15,7 @@ from tests.review_server import ReviewServer
 
 HOSTILE = "<img src=x onerror=alert(1)><script>alert(2)</script>"
 SECRET = "the inspector's own"
-READ = ("/", "/api/run", "/api/state", "/api/seal", "/api/quality", "/api/model.glb", "/assets/page.js",
+READ = ("/", "/api/run", "/api/state", "/api/seal", "/api/quality", "/api/model", "/api/model/0.glb", "/assets/page.js",
         "/api/tiles/photo", "/api/tiles/photo/0/0/0.png", "/api/frames/0.jpg", "/api/papers/findings.csv",
         "/api/section?distance=40", "/api/profile?distance=40&azimuth=0&half=10",
         "/api/sights?distance=40&azimuth=0")  # fmt: skip
@@ -128,7 +128,7 @@ def test_a_linked_model_is_not_served(server: ReviewServer) -> None:
     kept = model.rename(model.with_suffix(".kept"))
     model.symlink_to(server.run.parent / "secret.txt")
     try:
-        answer = server.ask("/api/model.glb")
+        answer = server.ask("/api/model/0.glb")
     finally:
         model.unlink()
         kept.rename(model)

@@ -23,6 +23,7 @@ from pipeline.review.decisions.ledger import StaleError
 from pipeline.review.flat_tiles import picture_of
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.measuring.tools import readings
+from pipeline.review.model_stretches import model_of
 from pipeline.review.papers.catalogue import paper_of
 from pipeline.review.quality import quality_document
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
@@ -61,7 +62,8 @@ class ReviewApp:
                 "/api/tiles/{layer:str}/{level:int}/{column:int}/{row:int}.png", self._answering(self._tile)
             ),
             Route("/api/papers/{name:str}", self._answering(self._paper)),
-            Route("/api/model.glb", self._model),
+            Route("/api/model", self._answering(self._model)),
+            Route("/api/model/{stretch:int}.glb", self._answering(self._stretch)),
         ]
 
     def _answering(self, work: Callable[[Request, bytes], Response]) -> Handler:
@@ -79,11 +81,12 @@ class ReviewApp:
     async def _index(self, _: Request) -> Response:
         return FileResponse(self.page / "index.html")
 
-    async def _model(self, _: Request) -> Response:
-        file = self.review.files.file("model.glb")
-        if not file.is_file():
-            return JSONResponse({"error": "the run has no model"}, _MISSING)
-        return FileResponse(file, media_type="model/gltf-binary")
+    def _model(self, _: Request, __: bytes) -> Response:
+        return JSONResponse(documents.model_document(model_of(self.review.files)))
+
+    def _stretch(self, request: Request, _: bytes) -> Response:
+        part = model_of(self.review.files).stretch(request.path_params["stretch"])
+        return Response(part, media_type="model/gltf-binary")
 
     def _run(self, _: Request, __: bytes) -> Response:
         return JSONResponse(documents.run_document(self.review.files))

@@ -1,17 +1,18 @@
 /** The 3D model: every material variant, depth exaggerated, cut open, seen from outside or flown through. */
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
+import { CoarseWall } from "./coarse";
 import { Pipe, type Vector } from "./pipe";
 import type { Session } from "./session";
+import { Stretches } from "./stretches";
 import { element } from "./words";
 
 const MM = 1e-3;
-const VARIANTS: Record<string, string> = { deviation_nominal: "deviation" };
 const FLIGHT_MM = 6;
 const MOST_PIXELS = 1280 * 720;
 
-interface Part { mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material> }
+// From outside, no more of a long pipe is shown than this many radii: it would be a thread.
+const OUTSIDE_RADII = 16;
 
 export class ModelView {
   readonly root = element("div", { class: "model" });
@@ -39,15 +40,19 @@ export class ModelView {
   private readonly plane = new THREE.Plane(new THREE.Vector3(1, 0, 0), 0);
   private renderer: THREE.WebGLRenderer | null = null;
   private controls: OrbitControls | null = null;
-  private parts: Part[] = [];
+  private readonly fine: Stretches;
+  private readonly coarse: CoarseWall;
   private flown: number;
   private look = { yaw: 0, pitch: 0 };
   private asked = false;
+  private seen = NaN; // where the eye was when stretches were last asked for
   private pressed: { x: number; y: number } | null = null;
 
   constructor(private readonly session: Session) {
     this.pipe = new Pipe(session.run.axis);
     this.flown = session.run.distance_mm[0];
+    this.fine = new Stretches(session, this.pipe, () => this.grown());
+    this.coarse = new CoarseWall(session, this.pipe, () => this.draw());
     this.root.append(element("div", { class: "stage" }, this.canvas, this.told), this.hint);
     this.marker.renderOrder = 1; // drawn after the wall, or the wall would cover it
     this.explain();
@@ -95,83 +100,51 @@ export class ModelView {
     this.canvas.addEventListener("wheel", (e) => { if (this.isInside) { e.preventDefault(); this.fly(-e.deltaY / 20); } }, { passive: false });
     this.canvas.addEventListener("keydown", (e) => this.key(e));
     new ResizeObserver(() => this.resize()).observe(this.root);
+    this.scene.add(this.fine.group, this.coarse.group);
+    this.stand();
     try {
-      const loaded = await new GLTFLoader().parseAsync(await this.session.source.model(), "");
-      await this.take(loaded);
-      this.told.remove();
+      await this.fine.start();
+      if (!this.fine.isAll) void this.coarse.dress().catch((e: Error) => this.session.say(e.message));
+      await this.fine.around(this.eye);
     } catch (error) {
       this.told.textContent = error instanceof Error ? error.message : String(error);
     }
   }
 
-  private async take(gltf: GLTF): Promise<void> {
-    const names: string[] = ((gltf.userData["gltfExtensions"] as Record<string, { variants?: { name: string }[] }> | undefined)
-      ?.["KHR_materials_variants"]?.variants ?? []).map((v) => v.name);
-    const meshes: THREE.Mesh[] = [];
-    gltf.scene.traverse((node) => { if (node instanceof THREE.Mesh) meshes.push(node as THREE.Mesh); });
-    for (const mesh of meshes) this.parts.push(await this.part(mesh, gltf, names));
-    this.scene.add(gltf.scene);
-    this.scene.updateMatrixWorld(true);
-    this.dress();
-    this.stand();
-  }
+  get parts() { return this.fine.parts; }
+  get isReady(): boolean { return this.fine.isReady; }
 
-  private async part(mesh: THREE.Mesh, gltf: GLTF, names: string[]): Promise<Part> {
-    const variants = new Map<string, THREE.Material>([["photo", mesh.material as THREE.Material]]);
-    const extension = mesh.userData["gltfExtensions"]?.["KHR_materials_variants"] as
-      { mappings: { material: number; variants: number[] }[] } | undefined;
-    for (const mapping of extension?.mappings ?? []) {
-      const material = (await gltf.parser.getDependency("material", mapping.material)) as THREE.Material;
-      gltf.parser.assignFinalMaterial(mesh);
-      for (const k of mapping.variants) variants.set(names[k] ?? "", material);
-    }
-    for (const material of variants.values()) {
-      material.side = THREE.DoubleSide;
-      material.clippingPlanes = [];
-    }
-    const position = mesh.geometry.getAttribute("position") as THREE.BufferAttribute;
-    const base = Float32Array.from(position.array);
-    const away = new Float32Array(base.length);
-    for (let k = 0; k < base.length; k += 3) {
-      // vertices are stored in the pipe's own frame; only the node above turns them for glTF
-      const at = this.pipe.coordinates([base[k]! / MM, base[k + 1]! / MM, base[k + 2]! / MM]);
-      const off = (at.radius - this.session.run.radius_mm) * MM;
-      away.set(at.outward.map((n) => n * off), k);
-    }
-    return { mesh, base, away, variants };
+  /** The distance next to which detail is wanted. */
+  private get eye(): number { return this.isInside ? this.flown : this.session.cursor[0]; }
+
+  /** A stretch has come or gone. */
+  private grown(): void {
+    this.coarse.hide(this.fine.span);
+    if (!this.fine.isAll || this.fine.isReady) this.told.remove();
+    this.draw();
   }
 
   private dress(): void {
-    const wanted = VARIANTS[this.session.layer] ?? this.session.layer;
-    for (const part of this.parts) {
-      const material = part.variants.get(wanted) ?? part.variants.get("photo");
-      if (material) part.mesh.material = material;
-    }
+    this.fine.dress();
+    if (!this.fine.isAll) void this.coarse.dress().then(() => this.draw()).catch((e: Error) => this.session.say(e.message));
     this.draw();
   }
 
-  private exaggerate(): void {
-    const more = Number(this.gain.value) - 1;
-    for (const { mesh, base, away } of this.parts) {
-      const position = mesh.geometry.getAttribute("position") as THREE.BufferAttribute;
-      const array = position.array as Float32Array;
-      for (let k = 0; k < array.length; k++) array[k] = base[k]! + more * away[k]!;
-      position.needsUpdate = true;
-    }
-    this.draw();
-  }
+  private exaggerate(): void { this.fine.exaggerate(Number(this.gain.value)); this.draw(); }
 
   private stand(): void {
     if (!this.controls) return;
     this.controls.enabled = !this.isInside;
-    const [from, to] = this.session.run.distance_mm;
+    const { radius_mm: radius, distance_mm: [from, to] } = this.session.run;
     if (this.isInside) {
       this.fly(0);
       return;
     }
-    const centre = toModel(this.pipe.at((from + to) / 2).origin).multiplyScalar(MM);
+    const length = Math.min(to - from, OUTSIDE_RADII * radius);
+    const middle = Math.min(Math.max(this.session.cursor[0], from + length / 2), to - length / 2);
+    const centre = toModel(this.pipe.at(middle).origin).multiplyScalar(MM);
     this.camera.up.set(0, 1, 0);
-    const far = ((to - from) * 0.75 + this.session.run.radius_mm * 3) * MM;
+    const far = (length * 0.75 + radius * 3) * MM;
     this.camera.position.copy(centre).add(new THREE.Vector3(0.75, 0.5, 0.55).normalize().multiplyScalar(far));
     this.controls.target.copy(centre);
     this.controls.update();
@@ -197,6 +170,7 @@ export class ModelView {
       this.look = { yaw: 0, pitch: 0 };
       this.fly(0);
     }
+    else if (!this.fine.isAll) this.stand();
     const at = this.pipe.point(distance, azimuth, this.session.run.radius_mm * 0.995);
     this.marker.position.copy(toModel(at).multiplyScalar(MM));
     this.marker.lookAt(toModel(this.pipe.at(distance).origin).multiplyScalar(MM));
@@ -250,7 +224,7 @@ export class ModelView {
       ((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
     const caster = new THREE.Raycaster();
     caster.setFromCamera(at, this.camera);
-    const hit = caster.intersectObjects(this.parts.map((p) => p.mesh), false)
+    const hit = caster.intersectObjects([...this.fine.meshes, ...this.coarse.group.children.filter((c) => c.visible)], false)
       .find((h) => !this.isCut || this.plane.distanceToPoint(h.point) >= 0);
     if (!hit) return;
     const { distance, azimuth } = this.pipe.coordinates(fromModel(hit.point));
@@ -278,6 +252,11 @@ export class ModelView {
   }
 
   private draw(): void {
+    if (this.eye !== this.seen) {
+      this.seen = this.eye;
+      this.coarse.around(this.eye);
+      void this.fine.around(this.eye).catch((e: Error) => this.session.say(e.message));
+    }
     if (this.asked || !this.renderer) return;
     this.asked = true;
     requestAnimationFrame((now) => {
@@ -289,7 +268,7 @@ export class ModelView {
       if (across.lengthSq() < 1e-12) across.set(1, 0, 0);
       this.plane.normal.copy(across.normalize().negate());
       const planes = this.isCut ? [this.plane] : [];
-      for (const part of this.parts) (part.mesh.material as THREE.Material).clippingPlanes = planes;
+      this.fine.clip(planes);
       this.renderer!.render(this.scene, this.camera);
     });
   }

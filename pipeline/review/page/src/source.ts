@@ -1,5 +1,5 @@
 /** Where the page gets its data: the local server, or the files of a read-only export. */
-import type { Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Tool } from "./types";
+import type { Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Stretch, Tool } from "./types";
 
 export class RefusedError extends Error {
   constructor(message: string, readonly stale: boolean) { super(message); }
@@ -20,7 +20,8 @@ export interface Source {
   tile(layer: string, level: number, column: number, row: number): string;
   frame(frame: number): string;
   spot(frame: number, u: number, v: number): Promise<Point>;
-  model(): Promise<ArrayBuffer>;
+  stretches(): Promise<Stretch[]>;
+  stretch(number: number): Promise<ArrayBuffer>;
   quality(): Promise<Quality>;
 }
 
@@ -65,9 +66,10 @@ export class Server implements Source {
   frame = (frame: number) => `/api/frames/${frame}.jpg`;
   spot = async (frame: number, u: number, v: number) =>
     (await get<{ point: Point }>(`/api/frames/${frame}/spot?u=${u}&v=${v}`)).point;
-  model = async () => {
-    const response = await reached("/api/model.glb");
-    if (!response.ok) throw new RefusedError("The run has no model.", false);
+  stretches = () => get<Stretch[]>("/api/model");
+  stretch = async (number: number) => {
+    const response = await reached(`/api/model/${number}.glb`);
+    if (!response.ok) throw new RefusedError("The model cannot be read.", false);
     return response.arrayBuffer();
   };
   quality = () => get<Quality>("/api/quality");
@@ -75,7 +77,7 @@ export class Server implements Source {
 
 /** Data that an export puts beside the page, as a script, because a page from a file may not fetch. */
 export interface Exported {
-  run: Run; state: ReviewState; seal: Seal; quality: Quality; sections: Section[]; layers: Record<string, Layer>; model: string;
+  run: Run; state: ReviewState; seal: Seal; quality: Quality; sections: Section[]; layers: Record<string, Layer>; model: { stretches: Stretch[]; parts: string[] };
   spots: { distance_mm: number; azimuth_rad: number; sights: Sight[]; profile: Profile }[];
 }
 
@@ -105,5 +107,6 @@ export class Export implements Source {
   frame = (frame: number) => `frames/${frame}.jpg`;
   spot = async (): Promise<Point> => { throw new RefusedError("Moving by the frame needs boresight review.", false); };
   quality = async () => this.data.quality;
-  model = async () => Uint8Array.from(atob(this.data.model), (c) => c.charCodeAt(0)).buffer;
+  stretches = async () => this.data.model.stretches;
+  stretch = async (number: number) => Uint8Array.from(atob(this.data.model.parts[number]!), (c) => c.charCodeAt(0)).buffer;
 }

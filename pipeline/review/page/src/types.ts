@@ -63,5 +63,7 @@ export interface Profile { along: Curve; around: Curve }
 
 export interface Sight { frame: number; time_s: number; illumination: string; spot_px: Point; ring_px: Point[] }
 export interface Layer { levels: number; width: number; height: number; distance_mm: [number, number]; azimuth_rad: number }
+/** A part of the model between two distances. */
+export interface Stretch { from_mm: number; to_mm: number; triangles: number }
 export interface Reading { name: string; value: number; sigma: number; unit: string }
 export type Tool = "none" | "point" | "distance" | "area" | "depth" | "diameter" | "redraw" | "add" | "split";

@@ -1,0 +1,180 @@
+"""The model by stretches: each of model.glb's primitives as a file, so that long pipes load near the eye.
+
+The container is glTF 2.0's binary form (Khronos, 2021, § 4): a header, a JSON chunk, a binary chunk.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import PipeAxis, Trajectory
+from pipeline.errors import InputError
+from pipeline.geometry.axis import to_pipe
+from pipeline.review.run_files import RunFiles
+
+Json = dict[str, Any]
+_GLTF, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+_LARGEST_DOCUMENT = 256 << 20
+_VARIANTS = "KHR_materials_variants"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of the model between two distances; ``triangles`` say how much it costs to draw."""
+
+    from_mm: float
+    to_mm: float
+    triangles: int
+
+
+@dataclass(frozen=True)
+class StretchedModel:
+    """A binary glTF whose one mesh has a primitive for each stretch.
+
+    Attributes
+    ----------
+    document : dict
+        Its JSON.
+    binary : (B,) uint8
+        Its buffer, mapped from the file.
+    axis : PipeAxis
+    """
+
+    document: Json
+    binary: NDArray[np.uint8]
+    axis: PipeAxis
+
+    def stretches(self) -> tuple[Stretch, ...]:
+        """Return where each primitive lies along the pipe."""
+        return tuple(self._stretch(p) for p in self._primitives)
+
+    def stretch(self, number: int) -> bytes:
+        """Return one primitive with its materials and pictures as binary glTF.
+
+        Raises
+        ------
+        InputError
+            When there is no such stretch.
+        """
+        if not 0 <= number < len(self._primitives):
+            raise InputError("model", f"there is no stretch {number}")
+        return _packed(*_alone(self.document, self._primitives[number], self.binary))
+
+    @property
+    def _primitives(self) -> list[Json]:
+        found: list[Json] = self.document["meshes"][0]["primitives"]
+        return found
+
+    def _stretch(self, primitive: Json) -> Stretch:
+        accessors = self.document["accessors"]
+        place = accessors[primitive["attributes"]["POSITION"]]
+        corners = 1000 * np.array(list(product(*zip(place["min"], place["max"], strict=True))))
+        distance, _, _ = to_pipe(self.axis, corners)
+        return Stretch(
+            float(distance.min()), float(distance.max()), accessors[primitive["indices"]]["count"] // 3
+        )
+
+
+def model_of(files: RunFiles) -> StretchedModel:
+    """Return a run's model.
+
+    Raises
+    ------
+    InputError
+        When there is none, or it is not one that boresight wrote.
+    """
+    file = files.file("model.glb")
+    if not file.is_file():
+        raise InputError(file, "is missing", hint="finish the run: boresight run")
+    return _model(file, file.stat().st_mtime_ns, files)
+
+
+@lru_cache(maxsize=2)
+def _model(file: Path, _changed: int, files: RunFiles) -> StretchedModel:
+    with file.open("rb") as stream:
+        head = stream.read(20)
+        if len(head) < 20:
+            raise InputError(file, "is no binary glTF")
+        magic, version, _, length, kind = struct.unpack("<5I", head)
+        if (magic, version, kind) != (_GLTF, 2, _JSON) or length > _LARGEST_DOCUMENT:
+            raise InputError(file, "is no binary glTF 2.0")
+        document = _document(file, stream.read(length))
+    binary: NDArray[np.uint8] = np.memmap(file, np.uint8, "r", offset=20 + length + 8)
+    return StretchedModel(document, binary, files.artefact(Trajectory).axis)
+
+
+def _document(file: Path, text: bytes) -> Json:
+    try:
+        document: Json = json.loads(text)
+        if not document["meshes"][0]["primitives"]:
+            raise InputError(file, "is a model without a wall")
+    except (ValueError, KeyError, IndexError, TypeError) as error:
+        raise InputError(file, f"is not a model of boresight: {error!r}") from error
+    return document
+
+
+def _alone(document: Json, primitive: Json, binary: NDArray[np.uint8]) -> tuple[Json, bytes]:
+    """Return a document with one primitive and nothing that it does not use, and its buffer."""
+    mappings = primitive["extensions"][_VARIANTS]["mappings"]
+    materials = [m["material"] for m in mappings]
+    images = [_image_of(document, document["materials"][m]) for m in materials]
+    used = [*primitive["attributes"].values(), primitive["indices"]]
+    views = [document["accessors"][a]["bufferView"] for a in used]
+    views += [document["images"][i]["bufferView"] for i in images]
+    buffer, packed = _buffer(document, views, binary)
+    names = list(primitive["attributes"])
+    own = {
+        "attributes": {name: k for k, name in enumerate(names)}, "indices": len(names), "material": 0,
+        "extensions": {_VARIANTS: {"mappings": [m | {"material": k} for k, m in enumerate(mappings)]}},
+    }  # fmt: skip
+    kept = {k: v for k, v in document.items() if k in ("asset", "nodes", "scenes", "scene", "samplers")}
+    return kept | {
+        "extensions": document["extensions"], "extensionsUsed": document["extensionsUsed"],
+        "meshes": [{"name": "stretch", "primitives": [primitive | own]}],
+        "accessors": [document["accessors"][a] | {"bufferView": k} for k, a in enumerate(used)],
+        "materials": [_with_texture(document["materials"][m], k) for k, m in enumerate(materials)],
+        "textures": [{"sampler": 0, "source": k} for k in range(len(images))],
+        "images": [document["images"][i] | {"bufferView": len(used) + k} for k, i in enumerate(images)],
+        "bufferViews": packed, "buffers": [{"byteLength": len(buffer)}],
+    }, buffer  # fmt: skip
+
+
+def _image_of(document: Json, material: Json) -> int:
+    texture = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+    return int(document["textures"][texture]["source"])
+
+
+def _with_texture(material: Json, index: int) -> Json:
+    return material | {
+        "pbrMetallicRoughness": material["pbrMetallicRoughness"] | {"baseColorTexture": {"index": index}}
+    }
+
+
+def _buffer(document: Json, views: list[int], binary: NDArray[np.uint8]) -> tuple[bytes, list[Json]]:
+    """Return the bytes of views, aligned to four, and the views of the new buffer."""
+    parts, packed, at = [], [], 0
+    for number in views:
+        view = document["bufferViews"][number]
+        start = view.get("byteOffset", 0)
+        part = binary[start : start + view["byteLength"]].tobytes()
+        packed.append(view | {"buffer": 0, "byteOffset": at})
+        parts.append(part + b"\0" * (-len(part) % 4))
+        at += len(parts[-1])
+    return b"".join(parts), packed
+
+
+def _packed(document: Json, buffer: bytes) -> bytes:
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    total = 12 + 8 + len(text) + 8 + len(buffer)
+    head = struct.pack("<3I", _GLTF, 2, total) + struct.pack("<2I", len(text), _JSON)
+    return head + text + struct.pack("<2I", len(buffer), _BINARY) + buffer

@@ -1,0 +1,151 @@
+/** The detailed model, stretch by stretch: those next to the eye are loaded, those far from it are let go. */
+import * as THREE from "three";
+import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
+import type { Pipe } from "./pipe";
+import type { Session } from "./session";
+import type { Stretch } from "./types";
+
+const MM = 1e-3;
+const VARIANTS: Record<string, string> = { deviation_nominal: "deviation" };
+// What a browser without a graphics card can still turn, and what keeps the tab's memory small.
+const MOST_TRIANGLES = 700_000;
+const AT_ONCE = 2;
+
+interface Part { mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material> }
+
+export class Stretches {
+  readonly group = new THREE.Group();
+  private list: Stretch[] = [];
+  private readonly held = new Map<number, Part[]>();
+  private readonly coming = new Set<number>();
+  private at = 0;
+  private gain = 1;
+
+  constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly changed: () => void) {}
+
+  async start(): Promise<void> { this.list = await this.session.source.stretches(); }
+
+  get parts(): Part[] { return [...this.held.values()].flat(); }
+  get meshes(): THREE.Mesh[] { return this.parts.map((p) => p.mesh); }
+  get isAll(): boolean { return this.wanted().length === this.list.length; }
+  get isReady(): boolean { return this.wanted().every((k) => this.held.has(k)); }
+
+  /** The distances between which everything is there in detail. */
+  get span(): [number, number] | null {
+    const there = [...this.held.keys()].sort((a, b) => a - b).map((k) => this.list[k]!);
+    return there.length ? [there[0]!.from_mm, there[there.length - 1]!.to_mm] : null;
+  }
+
+  /** Load what lies next to a distance, nearest first. */
+  async around(distance: number): Promise<void> {
+    this.at = distance;
+    const wanted = this.wanted();
+    for (const k of [...this.held.keys()]) if (!wanted.includes(k)) this.drop(k);
+    const next = wanted.filter((k) => !this.held.has(k) && !this.coming.has(k)).slice(0, AT_ONCE - this.coming.size);
+    if (next.length) await Promise.all(next.map((k) => this.load(k)));
+  }
+
+  dress(): void {
+    const wanted = VARIANTS[this.session.layer] ?? this.session.layer;
+    for (const { mesh, variants } of this.parts) mesh.material = variants.get(wanted) ?? variants.get("photo") ?? mesh.material;
+  }
+
+  exaggerate(gain: number): void {
+    this.gain = gain;
+    for (const part of this.parts) shape(part, gain);
+  }
+
+  clip(planes: THREE.Plane[]): void {
+    for (const { mesh } of this.parts) (mesh.material as THREE.Material).clippingPlanes = planes;
+  }
+
+  private wanted(): number[] {
+    const ahead = this.at + this.session.run.radius_mm;
+    const off = (k: number) => Math.max(this.list[k]!.from_mm - ahead, ahead - this.list[k]!.to_mm, 0);
+    const near = [...this.list.keys()].sort((a, b) => off(a) - off(b));
+    let sum = 0;
+    return near.filter((k, rank) => (sum += this.list[k]!.triangles) <= MOST_TRIANGLES || !rank);
+  }
+
+  private async load(k: number): Promise<void> {
+    this.coming.add(k);
+    try {
+      const gltf = await new GLTFLoader().parseAsync(await this.session.source.stretch(k), "");
+      const parts = await this.taken(gltf);
+      if (!this.wanted().includes(k)) parts.forEach(free);
+      else {
+        this.held.set(k, parts);
+        this.group.add(gltf.scene);
+        this.group.updateMatrixWorld(true);
+        this.dress();
+      }
+    } finally { this.coming.delete(k); }
+    this.changed();
+    await this.around(this.at);
+  }
+
+  private drop(k: number): void {
+    for (const part of this.held.get(k)!) {
+      part.mesh.parent?.removeFromParent();
+      free(part);
+    }
+    this.held.delete(k);
+    this.changed();
+  }
+
+  private async taken(gltf: GLTF): Promise<Part[]> {
+    const names: string[] = ((gltf.userData["gltfExtensions"] as Record<string, { variants?: { name: string }[] }> | undefined)
+      ?.["KHR_materials_variants"]?.variants ?? []).map((v) => v.name);
+    const meshes: THREE.Mesh[] = [];
+    gltf.scene.traverse((node) => { if (node instanceof THREE.Mesh) meshes.push(node as THREE.Mesh); });
+    return Promise.all(meshes.map((mesh) => this.part(mesh, gltf, names)));
+  }
+
+  private async part(mesh: THREE.Mesh, gltf: GLTF, names: string[]): Promise<Part> {
+    const variants = new Map<string, THREE.Material>([["photo", mesh.material as THREE.Material]]);
+    const extension = mesh.userData["gltfExtensions"]?.["KHR_materials_variants"] as
+      { mappings: { material: number; variants: number[] }[] } | undefined;
+    for (const mapping of extension?.mappings ?? []) {
+      const material = (await gltf.parser.getDependency("material", mapping.material)) as THREE.Material;
+      gltf.parser.assignFinalMaterial(mesh);
+      for (const k of mapping.variants) variants.set(names[k] ?? "", material);
+    }
+    for (const material of variants.values()) {
+      material.side = THREE.DoubleSide;
+      material.clippingPlanes = [];
+    }
+    const part = { mesh, base: Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array), away: this.away(mesh), variants };
+    if (this.gain !== 1) shape(part, this.gain);
+    return part;
+  }
+
+  /** How far each vertex lies off the round pipe, as a vector. */
+  private away(mesh: THREE.Mesh): Float32Array {
+    const base = (mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array;
+    const away = new Float32Array(base.length);
+    for (let k = 0; k < base.length; k += 3) {
+      // vertices are stored in the pipe's own frame; only the node above turns them for glTF
+      const at = this.pipe.coordinates([base[k]! / MM, base[k + 1]! / MM, base[k + 2]! / MM]);
+      const off = (at.radius - this.session.run.radius_mm) * MM;
+      away.set(at.outward.map((n) => n * off), k);
+    }
+    return away;
+  }
+}
+
+function shape({ mesh, base, away }: Part, gain: number): void {
+  const position = mesh.geometry.getAttribute("position") as THREE.BufferAttribute;
+  const array = position.array as Float32Array;
+  for (let k = 0; k < array.length; k++) array[k] = base[k]! + (gain - 1) * away[k]!;
+  position.needsUpdate = true;
+}
+
+function free({ mesh, variants }: Part): void {
+  mesh.geometry.dispose();
+  for (const material of new Set(variants.values())) {
+    const map = (material as THREE.MeshStandardMaterial).map;
+    map?.dispose();
+    (map?.source.data as ImageBitmap | undefined)?.close?.();
+    material.dispose();
+  }
+}
