@@ -10,6 +10,8 @@ import numpy as np
 
 from pipeline.recording.base import FrameTable
 from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects.parts import with_laser
+from pipeline.simulator.effects.photometric import line_peak
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.laws.bench import BASELINE_MM, bench_truth
 from pipeline.simulator.motion import Motion, Signal, constant
@@ -20,6 +22,8 @@ from pipeline.simulator.wall.description import Pipe
 
 # The smallest square picture in which the ring of a 4 inch pipe fits at 360 px/rad.
 SIDE_PX = 880
+# The line's peak before blur, full scales.
+_PEAK = 0.8
 # A vibration of 0.2 mm at 5.3 Hz at its fastest, to the lower right.
 _RATE_MM_S = 2 * math.pi * 5.3 * 0.2
 _SHAKEN = frozenset({"rolling_shutter", "motion_blur"})
@@ -44,7 +48,7 @@ def surroundings(name: str) -> str:
 
 def scene_pair(switch: Switch, radius_mm: float) -> tuple[SceneTruth, SceneTruth]:
     """Return the scene without and with an effect, at the moment when it is largest or typical."""
-    base = bench_truth(radius_mm, image_size=(SIDE_PX, SIDE_PX))
+    base = _exposed(bench_truth(radius_mm, image_size=(SIDE_PX, SIDE_PX)))
     if switch.name in _ROUGH:
         base = replace(base, wall=_rough_wall(radius_mm))
     if switch.name in _SHAKEN:
@@ -62,6 +66,11 @@ def moment_s(switch: Switch) -> float:
     if "frequency_hz" in sizes:
         return 0.25 / sizes["frequency_hz"]
     return sizes["time_s"] if switch.effect.time == "drift" else 0.0
+
+
+def _exposed(truth: SceneTruth) -> SceneTruth:
+    """Return the scene with the line equally bright in every bore, and not clipped."""
+    return with_laser(truth, power_mm=truth.instrument.laser.power_mm * _PEAK / line_peak(truth))
 
 
 def _shaken() -> Motion:
