@@ -1,0 +1,88 @@
+"""Gauge runs at ring level: exact by the simulator's own roots, the same from the same seed."""
+
+import numpy as np
+import pytest
+
+from pipeline.geometry.rigid import inverse, transform
+from pipeline.physics.catalogue import effect
+from pipeline.simulator.build import plain_truth
+from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects.switch import parse_switch
+from pipeline.simulator.exact import exact_rings
+from pipeline.simulator.prior import read_prior
+from stages.calibrate.gauge.geometry import gauge_of
+from stages.diagnose.effects.library import without
+from tests.benchmarks.bench_diagnosis import PRIOR, Mode, drawn, of_positions
+from tests.benchmarks.ring_level import Eye, Noise, ring_level_run, seen_at, traced_ring
+
+AZIMUTH = np.linspace(-np.pi, np.pi, 24, endpoint=False)
+OUTWARD = np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)], -1)
+QUIET = Noise(1e-6, 1e-6, 1e-6, 1e-6, 1e-6)
+
+
+def scene_of(seed):
+    """Return a drawn scene and its file, few frames of it."""
+    case = drawn(Mode.NULLS, seed)
+    return case.scene.model_copy(update={"frames": 24}), case.file
+
+
+@pytest.mark.parametrize("text", [None, "laser_tilt=0.5@40", "dome_lateral=2@10", "rolling_shutter=0.02"])
+def test_a_traced_ring_lies_where_the_simulator_finds_it_by_roots(text):
+    scene, file = scene_of(3)
+    truth = switch_on(plain_truth(scene, file), [parse_switch(text)] if text else ())
+    gauge, frame = gauge_of(truth.facts, truth.facts.fiducials), 8
+    centre = truth.stated.camera.centre_px
+    rho, _ = traced_ring(Eye.at(truth, float(truth.frames.time_s[frame])), gauge, centre, OUTWARD)
+    expected = exact_rings(truth, [frame], AZIMUTH, centre)[0]
+    assert np.isfinite(rho).sum() > 18
+    # The rendered wall has relief of a few µm, which the known bore has not.
+    assert np.nanmax(np.abs(rho - expected)) < 0.06
+
+
+def test_a_wall_point_is_seen_where_its_ray_passes_it():
+    scene, file = scene_of(4)
+    truth = plain_truth(scene, file)
+    eye = Eye.at(truth, float(truth.frames.time_s[5]))
+    xyz_c = np.array([[30.0, 10.0, 25.0], [-20.0, 35.0, 40.0]])
+    uv = truth.instrument.camera.model.project(xyz_c).uv
+    seen = seen_at(eye, transform(eye.T_pc[0], xyz_c), uv + 2.0)
+    assert np.abs(seen - uv).max() < 1e-6
+    assert np.abs(transform(inverse(eye.T_pc[0]), transform(eye.T_pc[0], xyz_c)) - xyz_c).max() < 1e-9
+
+
+def test_the_same_seed_gives_the_same_case_and_another_another():
+    one, again, other = drawn(Mode.PAIRS, 7), drawn(Mode.PAIRS, 7), drawn(Mode.PAIRS, 8)
+    assert one == again
+    assert one.scene.probe != other.scene.probe
+    assert len(one.switches) == 2
+    assert not drawn(Mode.NULLS, 7).switches
+
+
+def test_an_effect_moves_the_measurements_and_noise_is_what_it_is_told_to_be():
+    scene, file = scene_of(5)
+    plain, loud, tilted = (
+        ring_level_run(scene, file, switches, noise).measured.source.rings.radius_px
+        for switches, noise in (((), QUIET), ((), Noise()), ([parse_switch("laser_tilt=0.3@40")], QUIET))
+    )
+    spread = np.nanstd(loud - plain)
+    assert 0.9 < spread / np.hypot(Noise().ring_px, Noise().ring_cell_px) < 1.1
+    assert np.nanstd(tilted - plain) > 5 * spread
+
+
+def test_effects_left_out_are_not_asked_about():
+    name = drawn(Mode.LEFTOUT, 0).switches[0].name
+    assert name == "laser_tilt"
+    assert name in of_positions(without([]))
+    assert name not in of_positions(without([name]))
+
+
+def test_every_effect_of_the_draw_can_be_measured_in_rings_or_travel():
+    channels = {effect(e.name).channel for e in read_prior(PRIOR).effects}
+    assert channels == {"ring", "motion"}
+
+
+def test_a_field_scene_is_refused():
+    scene, file = scene_of(6)
+    facts = scene.model_copy(update={"pipe": scene.pipe.model_copy(update={"fiducials": None})})
+    with pytest.raises(ValueError, match="no gauge run"):
+        ring_level_run(facts, file, ())
