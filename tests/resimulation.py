@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from pipeline.artefacts import PipeAxis, RingSamples
-from pipeline.geometry.axis import frames_at, straight_axis, to_pipe
-from pipeline.geometry.rigid import rotation_from_vector
+from pipeline.artefacts import RingSamples
+from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from pipeline.simulator.exact import room_mm
 from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueLaser, TrueSensor
-from pipeline.simulator.motion import Motion, Signal
+from pipeline.simulator.path import motion_through
 from pipeline.simulator.profile import LineProfile
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
@@ -66,21 +65,6 @@ def wall_of(folder: Path, told: dict) -> Wall:
         axis, WallGrid(ends[0], float(np.diff(s).mean()), *radius.shape), radius.astype(np.float32),
         WallGrid(first + step / 2, step, *albedo.shape[:2]), albedo,
     )  # fmt: skip
-
-
-def motion_through(T_pc: Float, time_s: Float, axis: PipeAxis) -> Motion:
-    """Return the motion that passes through poses (N, 4, 4) at their times."""
-    s, psi, r = to_pipe(axis, T_pc[:, :3, 3])
-    R = np.swapaxes(frames_at(axis, s)[1], -1, -2) @ T_pc[:, :3, :3]
-    forward = R[:, :, 2]
-    across = np.hypot(forward[:, 0], forward[:, 1])
-    angle = np.arctan2(across, forward[:, 2]) / np.maximum(across, 1e-12)
-    pitch, yaw = -forward[:, 1] * angle, forward[:, 0] * angle
-    lean = rotation_from_vector(np.stack([pitch, yaw, 0 * yaw], -1))
-    turn = np.swapaxes(lean, -1, -2) @ R
-    roll = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
-    values = (s, r * np.cos(psi), r * np.sin(psi), yaw, pitch, roll)
-    return Motion(*(Signal(time_s, value) for value in values))
 
 
 def fitted_probe(truth: SceneTruth, rings: RingSamples, every: int = 12, columns: int = 48) -> Probe:

@@ -10,15 +10,20 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from pipeline.commands.diagnose_report import write_page
+from pipeline.commands.diagnose_apply import apply_correction, consequence
+from pipeline.commands.diagnose_files import write_files
+from pipeline.commands.diagnose_image import image_of
+from pipeline.commands.diagnose_report import Shown, write_page
+from pipeline.commands.diagnose_resimulate import resimulate
+from pipeline.config import resolve
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
-from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits
 from pipeline.stage import quiet_context
+from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import diagnose as diagnose_recordings
 from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.result import Diagnosis, to_json
@@ -37,40 +42,53 @@ def diagnose(
         list[str] | None,
         typer.Option("--without", metavar="NAME", help="leave an effect out of the library; repeatable"),
     ] = None,
+    apply: Annotated[
+        bool, typer.Option("--apply", help="reconstruct the inspection with the corrected probe")
+    ] = False,
 ) -> None:
     """Find what physics was left out, from an inspection and a gauge run of one probe; either may be missing.
 
-    Writes diagnosis.json, diagnosis.html, arrays.npz, and probe.yaml with what was found put in.
+    Writes diagnosis.json, diagnosis.html, arrays.npz, and probe.yaml with what was found put in; with --apply
+    also the inspection reconstructed with that probe, in run.
     """
     if field is None and gauge is None:
         raise InputError("diagnose", "is given no recording", hint="give FIELD, or --gauge GAUGE, or both")
+    if apply and (field is None or gauge is None):
+        raise InputError("diagnose", "--apply needs an inspection and a gauge run", hint="give both")
     recordings = [open_recording(path) if path is not None else None for path in (field, gauge)]
-    stated = _stated_probe(recordings, probe)
+    file = _probe_file(recordings, probe)
+    stated = read_probe(file)
+    for recording in (r for r in recordings if r is not None):
+        check_probe_fits(recording, stated)
     console = Console(stderr=True)
     with console.status("comparing the recordings with the stated instrument"):
-        found = diagnose_recordings(
-            recordings[0], recordings[1], stated, library_without(without or ()), quiet_context()
-        )
+        library = library_without(without or ())
+        examination = diagnose_recordings(recordings[0], recordings[1], stated, library, quiet_context())
+        simulated = resimulate(examination)
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
-        _write(found, output)
-    _show(found, output, console)
+        write_files(examination, stated, output)
+        change = None
+        if apply and recordings[0] is not None:
+            configuration = resolve(PIPELINE, None, ())
+            change = apply_correction(examination, recordings[0], file, configuration, output, console)
+        write_page(examination.found, Shown(simulated, change, image_of(examination)), output)
+        _write(examination.found, output)
+    _show(examination.found, output, console)
+    if change is not None:
+        console.print(consequence(change))
 
 
-def _stated_probe(recordings: Sequence[Recording | None], probe: Path | None) -> Probe:
+def _probe_file(recordings: Sequence[Recording | None], probe: Path | None) -> Path:
     given = [r for r in recordings if r is not None]
     file = probe or next((r.probe_file for r in given if r.probe_file is not None), None)
     if file is None:
         raise InputError(given[0].path, "names no probe", hint="give one with --probe FILE")
-    stated = read_probe(file)
-    for recording in given:
-        check_probe_fits(recording, stated)
-    return stated
+    return file
 
 
 def _write(found: Diagnosis, output: Path) -> None:
     """Write the answer last: where it is, all of it is."""
-    write_page(found, "", output)
     text = json.dumps(to_json(found), indent=1, ensure_ascii=False)
     unfinished = output / "diagnosis.json.part"
     unfinished.write_text(text + "\n", "utf-8")

@@ -7,15 +7,20 @@ from io import BytesIO
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pipeline.commands.diagnose_image import OnImage
+from pipeline.commands.diagnose_resimulate import Resimulated
 from stages.diagnose.result import Candidate, Picture, WallPicture
 
 Float = NDArray[np.float64]
 _SHOWN = 10
 _QUANTILE = 98.0
 _UM = 1000.0
+_LONGEST_PX = 60.0
 _ACCENT, _MUTED = "#0a5ea8", "#9aa7b4"
 
 
@@ -48,6 +53,57 @@ def azimuth_figure(picture: Picture) -> bytes:
         xlabel="azimuth in C, °", ylabel="residual radius, µm", xlim=(-180, 180), xticks=range(-180, 181, 45)
     )
     _finish(axes)
+    return _png(figure)
+
+
+def image_figure(shown: OnImage) -> bytes:
+    """Return the residual on the image, before and after, drawn outward so many times as large."""
+    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+    both = figure.subplots(1, 2, sharex=True, sharey=True)
+    limit = max(float(np.percentile(np.abs(shown.before_px), _QUANTILE)), 0.05)
+    longer = _LONGEST_PX / limit
+    centre = (shown.uv_before.min(0) + shown.uv_before.max(0)) / 2
+    for axes, uv, off, title in zip(
+        both, (shown.uv_before, shown.uv_after), (shown.before_px, shown.after_px), ("Before", "After"),
+        strict=True,
+    ):  # fmt: skip
+        axes.imshow(255 - shown.grey, cmap="gray", vmin=0, vmax=255)
+        away = uv - centre
+        tip = uv + longer * off[:, None] * away / np.linalg.norm(away, axis=1)[:, None]
+        ends = np.stack([uv, tip], 1)
+        lines = LineCollection(list(ends), cmap="RdBu_r", norm=Normalize(-limit, limit), linewidths=1.6)
+        lines.set_array(off)
+        axes.add_collection(lines)
+        axes.set(xlabel="u, px")
+        axes.set_title(f"{title}, frame {shown.frame}, ×{longer:.0f}", fontsize=11, loc="left")
+    reach = 1.15 * float(np.max(np.abs(shown.uv_before - centre))) + _LONGEST_PX
+    both[0].set(
+        xlim=(centre[0] - reach, centre[0] + reach),
+        ylim=(centre[1] + reach, centre[1] - reach),
+        ylabel="v, px",
+    )
+    figure.colorbar(lines, ax=both, label="ring farther out than texture has it, px")
+    return _png(figure)
+
+
+def simulated_figure(simulated: Resimulated) -> bytes:
+    """Return measured less simulated rings of the held-out frames, without and with what was found."""
+    figure = Figure(figsize=(9.6, 3.6), layout="constrained")
+    both = figure.subplots(1, 2, sharex=True)
+    order = np.argsort(simulated.azimuth_rad)
+    degrees = np.degrees(simulated.azimuth_rad[order])
+    for axes, off, title in zip(
+        both, (simulated.without_px, simulated.with_px), ("Stated instrument", "With what was found"),
+        strict=True,
+    ):  # fmt: skip
+        axes.axhspan(-simulated.floor_px, simulated.floor_px, color="#e0a030", alpha=0.35, lw=0)
+        axes.scatter(degrees, off[order], s=4, color=_ACCENT, lw=0)
+        rms = float(np.sqrt(np.mean(off**2)))
+        axes.set_title(f"{title}: {rms:.3f} px r.m.s.", fontsize=11, loc="left")
+        axes.set(xlabel="azimuth in the image, °", xlim=(-180, 180), xticks=range(-180, 181, 90))
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+    both[0].set_ylabel("measured − simulated ring, px")
     return _png(figure)
 
 

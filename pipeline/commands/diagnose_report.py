@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import base64
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
 from jinja2 import Environment, StrictUndefined
 
-from pipeline.commands.diagnose_figures import azimuth_figure, candidates_figure, frames_figure, wall_figure
+from pipeline.commands.diagnose_apply import GeometryChange, consequence
+from pipeline.commands.diagnose_figures import (
+    azimuth_figure,
+    candidates_figure,
+    frames_figure,
+    image_figure,
+    simulated_figure,
+    wall_figure,
+)
+from pipeline.commands.diagnose_image import OnImage
+from pipeline.commands.diagnose_resimulate import Resimulated
 from stages.diagnose.result import Diagnosis, Verdict, to_json
 
 _HEADLINES = {
@@ -19,8 +31,17 @@ _HEADLINES = {
 }
 
 
-def write_page(found: Diagnosis, consequence: str, folder: Path) -> None:
-    """Write diagnosis.html; ``consequence`` says what the finding means for the inspection.
+@dataclass(frozen=True)
+class Shown:
+    """What a page shows beside the answer; None where there is nothing to show."""
+
+    simulated: Resimulated | None = None
+    change: GeometryChange | None = None
+    image: OnImage | None = None
+
+
+def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
+    """Write diagnosis.html.
 
     Raises
     ------
@@ -29,9 +50,12 @@ def write_page(found: Diagnosis, consequence: str, folder: Path) -> None:
     """
     page = files("pipeline.commands.diagnose_page").joinpath("page.html").read_text("utf-8")
     environment = Environment(undefined=StrictUndefined, autoescape=True)
+    change = shown.change
     text = environment.from_string(page).render(
-        d=to_json(found), headline=headline(found), consequence=consequence, pictures=_pictures(found)
-    )
+        d=to_json(found), headline=headline(found), simulated=shown.simulated, change=change,
+        consequence=consequence(change) if change is not None else "",
+        hours=_by_hour(change) if change is not None else (), pictures=_pictures(found, shown),
+    )  # fmt: skip
     (folder / "diagnosis.html").write_text(text, "utf-8")
 
 
@@ -42,7 +66,15 @@ def headline(found: Diagnosis) -> str:
     return _HEADLINES[found.verdict]
 
 
-def _pictures(found: Diagnosis) -> dict[str, str]:
+def _by_hour(change: GeometryChange) -> list[tuple[int, float | None, float | None]]:
+    """Return each clock position with mean and largest change, None where nothing was seen."""
+    return [
+        (k or 12, float(mean) if np.isfinite(mean) else None, float(most) if np.isfinite(most) else None)
+        for k, (mean, most) in enumerate(zip(change.mean_mm, change.max_mm, strict=True))
+    ]
+
+
+def _pictures(found: Diagnosis, shown: Shown) -> dict[str, str]:
     """Return the pictures that there is something for, as base64."""
     made: dict[str, bytes] = {}
     if found.ring_picture is not None:
@@ -50,6 +82,10 @@ def _pictures(found: Diagnosis) -> dict[str, str]:
         made["azimuth"] = azimuth_figure(found.ring_picture)
     if found.wall_picture is not None:
         made["wall"] = wall_figure(found.wall_picture)
+    if shown.image is not None:
+        made["image"] = image_figure(shown.image)
+    if shown.simulated is not None:
+        made["simulated"] = simulated_figure(shown.simulated)
     if found.candidates:
         made["candidates"] = candidates_figure(found.candidates)
     return {name: base64.b64encode(png).decode("ascii") for name, png in made.items()}

@@ -7,6 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts import PipeAxis
+from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.simulator.motion import Motion, Signal, Wave
 from pipeline.simulator.scene import MotionScene, SwayScene
 
@@ -50,3 +53,18 @@ def _sway(scene: SwayScene, until_s: float, unit: float = 1.0) -> Signal:
     )  # fmt: skip
     ends = np.array([0.0, max(until_s, 1e-3)])
     return Signal(ends, unit * (scene.mean + scene.trend_per_s * ends), waves)
+
+
+def motion_through(T_pc: Float, time_s: Float, axis: PipeAxis) -> Motion:
+    """Return the motion that passes through poses (N, 4, 4) at their times."""
+    s, psi, r = to_pipe(axis, T_pc[:, :3, 3])
+    R = np.swapaxes(frames_at(axis, s)[1], -1, -2) @ T_pc[:, :3, :3]
+    forward = R[:, :, 2]
+    across = np.hypot(forward[:, 0], forward[:, 1])
+    angle = np.arctan2(across, forward[:, 2]) / np.maximum(across, 1e-12)
+    pitch, yaw = -forward[:, 1] * angle, forward[:, 0] * angle
+    lean = rotation_from_vector(np.stack([pitch, yaw, 0 * yaw], -1))
+    turn = np.swapaxes(lean, -1, -2) @ R
+    roll = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+    values = (s, r * np.cos(psi), r * np.sin(psi), yaw, pitch, roll)
+    return Motion(*(Signal(time_s, value) for value in values))

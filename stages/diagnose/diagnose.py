@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 from pipeline.artefacts import RingSamples
 from pipeline.errors import UnusableError
@@ -12,14 +13,19 @@ from pipeline.recording.base import Recording
 from pipeline.stage import Context
 from stages.calibrate.gauge.calibrate import measure_gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.diagnose.compared import Compared, compared, with_pictures
 from stages.diagnose.compose import composed
+from stages.diagnose.correct import Correction, correction_by_gauge
 from stages.diagnose.effects.base import EffectModel
-from stages.diagnose.field.evidence import field_evidence
+from stages.diagnose.field.evidence import field_evidence, travel_of_run
 from stages.diagnose.field.join import with_field
+from stages.diagnose.field.run import FieldRun, with_probe
 from stages.diagnose.gauge.examine import examine
+from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.result import Diagnosis
 from stages.diagnose.seen import Seen
+from stages.diagnose.travel.evidence import TravelEvidence
 from stages.diagnose.travel.gauge import gauge_travel
 from stages.rings import RingParameters, extract_rings
 
@@ -29,17 +35,72 @@ TRAVEL_EFFECTS = frozenset(
 )
 
 
+@dataclass(frozen=True)
+class Examination:
+    """A diagnosis with what it rests on.
+
+    Attributes
+    ----------
+    found : Diagnosis
+    correction : Correction or None
+        None without a gauge run that tells the instrument.
+    compared : Compared or None
+        Residuals before and after.
+    field, gauge : Seen or None
+    corrected : FieldRun or None
+        The field adjusted anew with the corrected probe.
+    """
+
+    found: Diagnosis
+    correction: Correction | None
+    compared: Compared | None
+    field: Seen | None
+    gauge: Seen | None
+    corrected: FieldRun | None
+
+
 def diagnose(
     field: Recording | None,
     gauge: Recording | None,
     probe: Probe,
     library: Mapping[str, EffectModel],
     context: Context,
-) -> Diagnosis:
+) -> Examination:
     """Compare recordings of one probe with what the stated instrument predicts."""
     of_gauge = examine_gauge(gauge, probe, library, context) if gauge is not None else None
     of_field = examine_field(field, probe, library, context) if field is not None else None
-    return with_field(composed(of_field, of_gauge, probe), of_field, of_gauge, probe, library)
+    correction = _correction(of_gauge, probe)
+    corrected = _corrected(of_field, correction, context)
+    if of_field is not None and corrected is not None:
+        # The scale of the way seen is the instrument's: what is wrong with that is not the encoder's.
+        of_field = _with_travel(of_field, travel_of_run(corrected, "field with the corrected probe"))
+    found = with_field(composed(of_field, of_gauge, probe), of_field, of_gauge, probe, library)
+    run = of_field.field.run if of_field is not None and of_field.field is not None else None
+    seen = compared(run, corrected, of_gauge, correction)
+    return Examination(with_pictures(found, seen), correction, seen, of_field, of_gauge, corrected)
+
+
+def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
+    old = seen.travel.shortcomings if seen.travel is not None else ()
+    new = travel.shortcomings if travel is not None else ()
+    kept = tuple(s for s in seen.shortcomings if s not in old)
+    return replace(seen, travel=travel, shortcomings=(*kept, *new))
+
+
+def _correction(gauge: Seen | None, probe: Probe) -> Correction | None:
+    if gauge is None or gauge.geometry is None:
+        return None
+    return correction_by_gauge(gauge.geometry, probe, stated_belief(probe), gauge.recording.name)
+
+
+def _corrected(field: Seen | None, correction: Correction | None, context: Context) -> FieldRun | None:
+    """Return the field adjusted with the corrected probe; None where there is none or it fails."""
+    if field is None or field.field is None or field.field.run is None or correction is None:
+        return None
+    try:
+        return with_probe(field.field.run, correction.probe, context)
+    except UnusableError:
+        return None
 
 
 def examine_gauge(

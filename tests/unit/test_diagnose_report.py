@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.commands.diagnose_report import headline, write_page
+from pipeline.commands.diagnose_apply import DefectChange, GeometryChange
+from pipeline.commands.diagnose_image import OnImage
+from pipeline.commands.diagnose_report import Shown, headline, write_page
+from pipeline.commands.diagnose_resimulate import Resimulated
 from stages.diagnose.result import (
     Candidate,
     Confirmation,
@@ -20,6 +23,7 @@ from stages.diagnose.result import (
 
 AZIMUTH = np.linspace(-np.pi, np.pi, 24, endpoint=False)
 WAVE = 0.1 * np.cos(AZIMUTH)[None] * np.ones((5, 1))
+RING = [40.0, 30.0] + 20 * np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)], 1)
 HOLED = np.where(np.arange(24) == 3, np.nan, 0.01 * WAVE)
 TILT = EffectFound(
     "laser_tilt", 0.99, {"tilt_deg": Value(0.6, 0.01)}, "The sheet leans by 0.600 ± 0.010°.", "δr = −r x",
@@ -35,22 +39,32 @@ WHOLE = Diagnosis(
     wall_picture=WallPicture(np.arange(5.0), AZIMUTH, WAVE, HOLED),
 )  # fmt: skip
 
+SHOWN = Shown(
+    Resimulated(np.arange(24), AZIMUTH, WAVE[0], 0.1 * WAVE[1], 0.01, ("laser_tilt=0.6@40",)),
+    GeometryChange(
+        np.full(12, 0.1), np.where(np.arange(12) == 3, np.nan, 0.2), 0.1,
+        (DefectChange("pit", 133.0, 3.1, 0.8, 1.01, 0.03),),
+    ),
+    OnImage(4, np.zeros((60, 80), np.uint8), RING, RING, WAVE[0], 0.1 * WAVE[1]),
+)  # fmt: skip
+
 
 def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
-    write_page(WHOLE, "Wall loss at 3 o'clock was understated by 0.21 mm.", tmp_path)
+    write_page(WHOLE, SHOWN, tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
     assert headline(WHOLE) == "Left out: laser tilt"
-    assert page.count("data:image/png;base64,") == 4
+    assert page.count("data:image/png;base64,") == 6
     assert "does not agree" in page
     assert "<b>ghost" not in page
-    assert "understated by 0.21 mm" in page
+    assert "understated by 0.21 mm: the pit is 1.01 ± 0.03 mm, not 0.80 mm" in page
+    assert "laser_tilt=0.6@40" in page
     assert "below 10⁻⁹" in page
 
 
 @pytest.mark.parametrize("verdict", [v for v in Verdict if v is not Verdict.NAMED])
 def test_every_other_verdict_has_its_page(tmp_path, verdict):
     bare = Diagnosis(recording="", gauge="gauge", verdict=verdict, global_p=float("nan"), members=("a", "b"))
-    write_page(bare, "", tmp_path)
+    write_page(bare, Shown(), tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
     assert headline(bare) in page
     assert "nan" not in page

@@ -3,59 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.recording.base import Illumination
 from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.predict import columns
 from stages.diagnose.field.points import ring_points
 from stages.diagnose.field.reduce import reduced, rings_after
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.system import field_system
+from stages.diagnose.residual import RingResidual
 
 Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 # Rings count so little less that poses and wall are those of the texture.
 _RELAXED = 1e3
-
-
-@dataclass(frozen=True)
-class RingsAgainstTexture:
-    """By how much ring bins lie farther out than texture, poses and a smooth pipe have them.
-
-    Attributes
-    ----------
-    frame : (M,) int
-        Places in the frame table.
-    azimuth_c_rad, azimuth_p_rad, distance_mm : (M,)
-        Azimuth in C, azimuth and distance of the wall point in P.
-    residual_mm, residual_px : (M,)
-        As radius, and as outward shift in the image.
-    uv : (M, 2)
-    usable : (M,) bool
-        False where the adjustment found an outlier.
-    """
-
-    frame: Int
-    azimuth_c_rad: Float
-    azimuth_p_rad: Float
-    distance_mm: Float
-    residual_mm: Float
-    residual_px: Float
-    uv: Float
-    usable: NDArray[np.bool_]
-
-    @property
-    def rms_px(self) -> float:
-        """R.m.s. of what is usable, px."""
-        return float(np.sqrt(np.mean(self.residual_px[self.usable] ** 2)))
+_OUTLIER = 0.1
 
 
 def rings_against_texture(
     run: FieldRun, terms: Sequence[tuple[EffectModel, Shape, Float]] = ()
-) -> RingsAgainstTexture:
+) -> RingResidual:
     """Return the rings' residual with the probe as stated and poses by texture.
+
+    The pipe's radius is not known beforehand: the mean residual is taken out. Ring frames before the first
+    lit frame and after the last have no pose by texture and do not count.
 
     Parameters
     ----------
@@ -70,19 +44,35 @@ def rings_against_texture(
     system = field_system(run, [(model, shape) for model, shape, _ in terms], np.zeros(0, np.int64))
     rings = system.rows[0]
     relaxed = replace(system, rows=(replace(rings, sigma=_RELAXED * rings.sigma), *system.rows[1:]))
-    found = reduced(relaxed, len(run.state.T_pc))
     # From the instrument as this run would bend it back to the stated one.
     to = -system.value
     if terms:
         amplitude = np.concatenate([a for _, _, a in terms])
         to[len(to) - len(amplitude) :] = amplitude
-    residual = rings_after(rings, found, to)
+    residual = rings_after(rings, reduced(relaxed, len(run.state.T_pc)), to)
     points = ring_points(run)
     assert points.distance_mm is not None
     by_pixel = run.probe.triangulate_jacobian(points.uv)[0]
     mm_per_px = np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward)
-    weight = run.equations.rings.weight
-    return RingsAgainstTexture(
-        run.measured.rings.frame, points.azimuth_rad, points.azimuth_p_rad, points.distance_mm,
-        residual, residual / mm_per_px, points.uv, np.asarray(weight > 0.1 * np.median(weight)),
+    frame, weight = run.recording.frames.frame[run.measured.rings.frame], run.equations.rings.weight
+    usable = (weight > _OUTLIER * np.median(weight)) & _between_lit(run, frame)
+    residual = residual - np.mean(residual[usable])
+    return RingResidual(
+        "field", frame, points.azimuth_rad, points.azimuth_p_rad, points.distance_mm, points.uv,
+        residual, residual / mm_per_px, usable,
     )  # fmt: skip
+
+
+def floor_px(run: FieldRun, left: RingResidual, terms: Sequence[tuple[EffectModel, Shape, Float]]) -> float:
+    """Return the r.m.s., px, that is left when the effects' sizes are fitted to these very rings."""
+    points = ring_points(run)
+    patterns = [columns(model, points, shape) for model, shape, _ in terms]
+    design = np.concatenate([np.ones((len(left.frame), 1)), *patterns], 1)
+    keep = left.usable & np.isfinite(design).all(1)
+    found = np.linalg.lstsq(design[keep], left.residual_px[keep], rcond=None)[0]
+    return float(np.sqrt(np.mean((left.residual_px[keep] - design[keep] @ found) ** 2)))
+
+
+def _between_lit(run: FieldRun, frame: NDArray[np.int64]) -> NDArray[np.bool_]:
+    lit = run.recording.frames.of(Illumination.LED, Illumination.BOTH)
+    return np.asarray((frame >= lit[0]) & (frame <= lit[-1]))

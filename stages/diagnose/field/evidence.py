@@ -78,8 +78,7 @@ def field_evidence(
         run = field_run(recording, probe, context, rings)
     except UnusableError as error:
         return FieldEvidence(None, None, nothing_said(recording, error))
-    sight = sight_of_trajectory(recording, run.trajectory)
-    travel = _travel(run) if len(sight.frame) else None
+    travel = travel_of_run(run)
     asked, slips = asked_of(library, run, travel), _slips(run, travel)
     try:
         whole = _evidence(run, asked, slips)
@@ -114,11 +113,14 @@ def asked_of(
     return out
 
 
-def _travel(run: FieldRun) -> TravelEvidence:
+def travel_of_run(run: FieldRun, source: str = "field") -> TravelEvidence | None:
+    """Return what the run's motion and encoder say; None where no frame shows the way."""
     sight = sight_of_trajectory(run.recording, run.trajectory)
+    if not len(sight.frame):
+        return None
     first, last = np.searchsorted(run.trajectory.frame, sight.frame[[0, -1]])
     return travel_evidence(
-        "field", run.recording, sight, run.trajectory.T_pc[first : last + 1], run.probe.encoder_scale_sigma
+        source, run.recording, sight, run.trajectory.T_pc[first : last + 1], run.probe.encoder_scale_sigma
     )
 
 

@@ -12,7 +12,7 @@ from stages.diagnose.field.answer import FieldAnswer, field_answer, location_in_
 from stages.diagnose.field.confirm import InField, met_in_field
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.inference import stated_belief
-from stages.diagnose.result import Diagnosis, EffectFound, FitQuality, Verdict
+from stages.diagnose.result import Diagnosis, EffectFound, Verdict
 from stages.diagnose.seen import Seen
 
 _BY_FIELD = "The field, by itself, shows: "
@@ -45,10 +45,7 @@ def _met(found: Diagnosis, met: Mapping[str, InField | None]) -> Diagnosis:
     silent = [name for name, each in met.items() if each is None and not name.startswith("decoy")]
     missing = tuple(f"The field by itself tells too little of {name} to bear it out." for name in silent)
     known = [each for each in met.values() if each is not None]
-    found = replace(
-        found, effects=effects, shortcomings=(*found.shortcomings, *missing),
-        fit=_fit(found.fit, known[0]) if len(known) == 1 else found.fit,
-    )  # fmt: skip
+    found = replace(found, effects=effects, shortcomings=(*found.shortcomings, *missing))
     if found.verdict is not Verdict.NAMED or all(each.confirmation.agrees for each in known):
         return found
     names = [e.name for e in effects]
@@ -63,13 +60,6 @@ def _confirmed(effect: EffectFound, met: InField | None) -> EffectFound:
     if met is None:
         return effect
     return replace(effect, confirmed_by=(*effect.confirmed_by, met.confirmation))
-
-
-def _fit(fit: FitQuality | None, met: InField) -> FitQuality | None:
-    """Return the quality of fit with the field, unknown to the gauge, as what is held out."""
-    if fit is None:
-        return None
-    return replace(fit, heldout_before=met.before_px, heldout_after=met.after_px, noise_floor=met.noise_px)
 
 
 def _alone(found: Diagnosis, alone: FieldAnswer, field: FieldEvidence, with_gauge: bool) -> Diagnosis:

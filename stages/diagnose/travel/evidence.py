@@ -134,7 +134,7 @@ def travel_evidence(
     steps = steps_found(fit, encoder)
     slips = tuple(s for s in steps if not s.rivals)
     doubtful = tuple(s for s in steps if s.rivals)
-    estimates = _estimates(fit, scale_sigma_stated)
+    estimates = _estimates(source, fit, scale_sigma_stated)
     anomalies = (*_of_estimates(source, estimates, sight), *_of_steps(steps, sight), *_of_lines(lines, sight))
     return TravelEvidence(
         source, estimates, slips, doubtful, lines, fit, anomalies, (*missing, *_blind(estimates, sight))
@@ -149,7 +149,7 @@ def _covered(sight: Sight, encoder: Encoder) -> Sight:
     )
 
 
-def _estimates(fit: TravelFit, scale_sigma_stated: float) -> tuple[TravelEstimate, ...]:
+def _estimates(source: str, fit: TravelFit, scale_sigma_stated: float) -> tuple[TravelEstimate, ...]:
     quantum = max(fit.noise.white_mm, 1e-6)
     stated = {SCALE: scale_sigma_stated, DELAY: _STAMP_SIGMA_S, PLAY: _QUANTUM_SHARE * quantum}
     smooth = np.arange(4)
@@ -170,6 +170,9 @@ def _estimates(fit: TravelFit, scale_sigma_stated: float) -> tuple[TravelEstimat
             for j in stated
             if j != k and usable[j] and usable[k] and abs(correlation[k, j]) > _INSEPARABLE
         )
+        if k == SCALE and source == "field":
+            # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.
+            alike = (*alike, ("baseline", 1.0))
         out.append(
             TravelEstimate(
                 name, quantity.name, quantity.unit, value, sigma, allowed, p, _DETECTED * total, alike
@@ -180,12 +183,10 @@ def _estimates(fit: TravelFit, scale_sigma_stated: float) -> tuple[TravelEstimat
 
 def _of_estimates(source: str, estimates: tuple[TravelEstimate, ...], sight: Sight) -> tuple[Anomaly, ...]:
     ends = (int(sight.frame[0]), int(sight.frame[-1]))
-    # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.
-    scaled_by = {"encoder_scale": ("baseline",)} if source == "field" else {}
     return tuple(
         Anomaly(
             Channel.MOTION, e.p_value, e.statement, ends,
-            (e.effect, *scaled_by.get(e.effect, ()), *(name for name, _ in e.alike)),
+            (e.effect, *(name for name, _ in e.alike)),
         )
         for e in estimates
         if e.p_value < _REPORTED

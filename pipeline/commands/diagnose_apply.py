@@ -1,0 +1,189 @@
+"""``boresight diagnose --apply``: the run reconstructed with the corrected probe, and what that changes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from pipeline.codec import digest
+from pipeline.config import Configuration
+from pipeline.display import ProgressDisplay
+from pipeline.export.catalogue import EXPORTERS
+from pipeline.instrument.probe_file import read_probe
+from pipeline.job import Job, run_job
+from pipeline.recording.base import Recording
+from pipeline.runner import Selection
+from stages.catalogue import PIPELINE
+from stages.diagnose.diagnose import Examination
+from stages.diagnose.encoder import encoder_effects, with_true_readings
+
+Float = NDArray[np.float64]
+_NEAR_MM, _NEAR_HOURS = 8.0, 1.5
+# What shows the geometry; the model is made of the corrected run alone.
+_GEOMETRY = frozenset({"rings", "triangulate", "motion", "accumulate", "texture", "defects"})
+_FILES = frozenset({"radius_map.npz", "defects.json"})
+
+
+@dataclass(frozen=True)
+class DefectChange:
+    """One defect's depth, mm, positive into the wall, with the stated and with the corrected instrument."""
+
+    kind: str
+    distance_mm: float
+    clock: float
+    before_mm: float
+    after_mm: float
+    sigma_mm: float
+
+
+@dataclass(frozen=True)
+class GeometryChange:
+    """What the correction changes of the pipe.
+
+    Attributes
+    ----------
+    mean_mm, max_mm : (12,)
+        Change of radius (corrected less stated) about clock positions 12, 1 … 11: mean, and the largest in
+        size with its sign; NaN where nothing was seen.
+    rms_mm : float
+    defects : tuple of DefectChange
+    """
+
+    mean_mm: Float
+    max_mm: Float
+    rms_mm: float
+    defects: tuple[DefectChange, ...]
+
+
+def apply_correction(
+    examination: Examination, field: Recording, stated_file: Path, configuration: Configuration,
+    folder: Path, console: Console,
+) -> GeometryChange:  # fmt: skip
+    """Reconstruct the field with the stated and the corrected instrument, into run-stated and run.
+
+    Raises
+    ------
+    BoresightError
+        As a run raises it.
+    """
+    stated = _job(field, stated_file, configuration, folder / "run-stated")
+    stated = replace(
+        stated, stages=tuple(s for s in PIPELINE if s.name in _GEOMETRY),
+        exporters=tuple(e for e in EXPORTERS if e.name in _FILES),
+    )  # fmt: skip
+    corrected = _job(_true_field(examination, field), folder / "probe.yaml", configuration, folder / "run")
+    with ProgressDisplay(console) as display:
+        run_job(stated, Selection(), display)
+        run_job(corrected, Selection(), display)
+    return geometry_change(stated.folder, corrected.folder)
+
+
+def _job(recording: Recording, probe_file: Path, configuration: Configuration, folder: Path) -> Job:
+    return Job(recording, read_probe(probe_file), probe_file, PIPELINE, EXPORTERS, configuration, folder)
+
+
+def _true_field(examination: Examination, field: Recording) -> Recording:
+    """Return the field with its encoder's readings put right."""
+    of_encoder = encoder_effects(examination.found.effects)
+    if not of_encoder:
+        return field
+    true = with_true_readings(field, of_encoder)
+    readings = true.encoder.distance_mm.tobytes() if true.encoder is not None else b""
+    return replace(true, content_key=digest((field.content_key, readings.hex())))
+
+
+def geometry_change(before: Path, after: Path) -> GeometryChange:
+    """Return what changes from one run folder to another of the same recording."""
+    change, azimuth = _radius_change(before, after)
+    hour = np.round(clock_of(azimuth)).astype(int) % 12
+    mean, largest = np.full(12, np.nan), np.full(12, np.nan)
+    for k in range(12):
+        here = change[:, hour == k]
+        here = here[np.isfinite(here)]
+        if here.size:
+            mean[k], largest[k] = here.mean(), here[np.argmax(np.abs(here))]
+    seen = change[np.isfinite(change)]
+    rms = float(np.sqrt(np.mean(seen**2))) if seen.size else float("nan")
+    return GeometryChange(mean, largest, rms, _defect_changes(before, after))
+
+
+def clock_of(azimuth_rad: Float) -> Float:
+    """Return clock positions, hours in [0, 12), of azimuths in P."""
+    return np.asarray((np.degrees(azimuth_rad) + 90.0) / 30.0 % 12.0)
+
+
+def consequence(change: GeometryChange) -> str:
+    """Return what the correction means for the inspection, in a sentence."""
+    told = [d for d in change.defects if abs(d.after_mm - d.before_mm) > max(2 * d.sigma_mm, 0.01)]
+    if told:
+        worst = max(told, key=lambda d: abs(d.after_mm - d.before_mm))
+        return _of_defect(worst)
+    if not np.isfinite(change.max_mm).any():
+        return ""
+    k = int(np.nanargmax(np.abs(change.mean_mm)))
+    size = float(change.mean_mm[k])
+    if abs(size) < 0.005:
+        return f"The geometry changes by {change.rms_mm:.3f} mm (r.m.s.): of no consequence for depths."
+    seemed = "understated" if size > 0 else "overstated"
+    return (
+        f"The radius at {k or 12} o'clock was {seemed} by {abs(size):.2f} mm on average "
+        f"({change.rms_mm:.2f} mm r.m.s. all round); no defect's depth changes beyond its own σ."
+    )
+
+
+def _of_defect(d: DefectChange) -> str:
+    more = abs(d.after_mm) > abs(d.before_mm)
+    sense = "understated" if more else "overstated"
+    what = "Wall loss" if d.after_mm > 0 else "Intrusion"
+    return (
+        f"{what} at {round(d.clock) % 12 or 12} o'clock, {d.distance_mm:.0f} mm, was "
+        f"{sense} by {abs(d.after_mm - d.before_mm):.2f} mm: the {d.kind} is "
+        f"{abs(d.after_mm):.2f} ± {d.sigma_mm:.2f} mm, not {abs(d.before_mm):.2f} mm."
+    )
+
+
+def _radius_change(before: Path, after: Path) -> tuple[Float, Float]:
+    """Return (S, A) and azimuth (A,), on the corrected run's grid; NaN where either saw nothing."""
+    old, new = (np.load(folder / "radius_map.npz") for folder in (before, after))
+    row = np.clip(np.searchsorted(old["distance_mm"], new["distance_mm"]), 0, len(old["distance_mm"]) - 1)
+    change = new["radius_mm"].astype(float) - old["radius_mm"].astype(float)[row]
+    outside = (new["distance_mm"] < old["distance_mm"][0]) | (new["distance_mm"] > old["distance_mm"][-1])
+    change[outside] = np.nan
+    return change, np.asarray(new["azimuth_rad"], float)
+
+
+def _defect_changes(before: Path, after: Path) -> tuple[DefectChange, ...]:
+    old, new = (_defects(folder) for folder in (before, after))
+    out = []
+    for d in new:
+        matches = [o for o in old if _same(o, d)]
+        if matches:
+            match = min(matches, key=lambda o: abs(o.distance_mm - d.distance_mm))
+            out.append(replace(d, before_mm=match.after_mm))
+    return tuple(out)
+
+
+def _defects(folder: Path) -> list[DefectChange]:
+    """Return a run's defects, their depths as those after."""
+    entries = json.loads((folder / "defects.json").read_text("utf-8"))
+    return [_defect(entry) for entry in entries]
+
+
+def _defect(entry: dict[str, Any]) -> DefectChange:
+    span = (entry["clock_to"] - entry["clock_from"]) % 12 or 12.0
+    return DefectChange(
+        str(entry["kind"]), (entry["distance_from_mm"] + entry["distance_to_mm"]) / 2,
+        (entry["clock_from"] + span / 2) % 12, np.nan, entry["depth_mm"], entry["depth_sigma_mm"],
+    )  # fmt: skip
+
+
+def _same(one: DefectChange, other: DefectChange) -> bool:
+    hours = abs((one.clock - other.clock + 6) % 12 - 6)
+    near = abs(one.distance_mm - other.distance_mm) < _NEAR_MM
+    return near and (hours < _NEAR_HOURS or one.kind == other.kind == "weld")

@@ -1,0 +1,107 @@
+"""Residuals before and after the correction, on the recording that had no say in it where there is one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from stages.diagnose.correct import Correction
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.field.against import floor_px, rings_against_texture
+from stages.diagnose.field.run import FieldRun
+from stages.diagnose.gauge.against import GaugeResiduals, rings_against_fiducials
+from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.residual import RingResidual, azimuths_rad, wall_distances_mm
+from stages.diagnose.result import Diagnosis, FitQuality, Picture, WallPicture
+from stages.diagnose.seen import Seen
+
+Float = NDArray[np.float64]
+Linear = tuple[tuple[EffectModel, Shape, Float], ...]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Residuals of the same rings without and with the correction, and the quality of fit they make.
+
+    Attributes
+    ----------
+    before, after : RingResidual
+    fit : FitQuality
+    """
+
+    before: RingResidual
+    after: RingResidual
+    fit: FitQuality
+
+
+def compared(
+    field: FieldRun | None, corrected: FieldRun | None, gauge: Seen | None, correction: Correction | None
+) -> Compared | None:
+    """Return the residuals of the field, else of the gauge; None where neither has any.
+
+    Parameters
+    ----------
+    field, corrected
+        The field with the stated and with the corrected probe.
+    """
+    try:
+        # More threads gain nothing on blocks this small, and stall when the machine is busy.
+        with threadpool_limits(1):
+            examined = gauge.geometry if gauge is not None else None
+            of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
+            linear = _beyond_probe(examined, correction)
+            if field is None:
+                return _gauge_alone(of_gauge) if of_gauge is not None else None
+            return _in_field(field, corrected or field, linear, examined, of_gauge)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def with_pictures(found: Diagnosis, seen: Compared | None) -> Diagnosis:
+    """Return the answer with the pictures of the residuals, and how well they fit."""
+    if seen is None:
+        return found
+    frames = np.unique(seen.before.frame)
+    distance = wall_distances_mm(seen.before)
+    over_frames = [r.over_frames(frames) for r in (seen.before, seen.after)]
+    over_wall = [r.over_wall(distance) for r in (seen.before, seen.after)]
+    return replace(
+        found, fit=seen.fit, ring_picture=Picture(frames, azimuths_rad(), *over_frames),
+        wall_picture=WallPicture(distance, azimuths_rad(), *over_wall),
+    )  # fmt: skip
+
+
+def _of_gauge(gauge: Seen, examined: Examined) -> GaugeResiduals:
+    searched = examined.searched
+    terms = examined.best.fit.terms if examined.best is not None else ()
+    frames = gauge.recording.frames.frame
+    return rings_against_fiducials(searched.run, searched.nothing.state, terms, frames)
+
+
+def _gauge_alone(of: GaugeResiduals) -> Compared:
+    before, after = of.before.rms_px, of.after.rms_px
+    return Compared(of.before, of.after, FitQuality("px", before, after, before, of.heldout.rms_px, after))
+
+
+def _in_field(
+    field: FieldRun, corrected: FieldRun, linear: Linear, examined: Examined | None, of: GaugeResiduals | None
+) -> Compared:
+    """Return the field's residuals; it was not used for the correction, so it is what is held out."""
+    before = rings_against_texture(field)
+    after = rings_against_texture(corrected, linear)
+    best = examined.best if examined is not None else None
+    terms = tuple((t.model, t.shape, t.amplitude) for t in best.fit.terms) if best is not None else ()
+    floor = floor_px(corrected, after, terms)
+    every = (of.before.rms_px, of.after.rms_px) if of is not None else (before.rms_px, after.rms_px)
+    return Compared(before, after, FitQuality("px", *every, before.rms_px, after.rms_px, floor))
+
+
+def _beyond_probe(examined: Examined | None, correction: Correction | None) -> Linear:
+    """Return the effects found that a probe file cannot express."""
+    best = examined.best if examined is not None else None
+    if best is None or correction is None:
+        return ()
+    return tuple((t.model, t.shape, t.amplitude) for t in best.fit.terms if t.model.name in correction.unsaid)
