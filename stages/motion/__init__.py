@@ -117,7 +117,7 @@ def _tracked(
     # The line is a few σ wide on the wall; its glow is a slope that the normalisation takes out.
     half = 12 * probe.laser.line_sigma_mm if both else 0.0
     blocked = (probe.laser.baseline_mm - half, probe.laser.baseline_mm + half)
-    tracker = TextureTracker(probe.camera, grid, parameters, blocked)
+    tracker = TextureTracker(probe, grid, parameters, blocked)
     images = zip(_index_of(recording, lit), _wall_images(recording, lit, both, probe), strict=False)
     return track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from pipeline.geometry.rigid import inverse, transform
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.probe import Probe
+from stages.texture.light import irradiance
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -26,7 +27,6 @@ _BLUR_PX = 1.2  # keeps noise finer than a strip sample from folding into it
 _SMOOTH_PX = 0.7
 _IMAGE_BLUR_PX = 1.5  # lens, pixel and the blur above
 _BLURS = 4
-_HARMONICS = 3
 _LEAST_LIGHT = 0.05
 _COURSE_PX = 3.0
 _DARKEST, _BRIGHTEST = 5.0, 250.0
@@ -109,19 +109,19 @@ class Strip:
 
 
 def unroll(
-    image: NDArray[np.uint8], camera: Camera, T_pc: Float, grid: StripGrid, blocked_mm: tuple[float, float]
+    image: NDArray[np.uint8], probe: Probe, T_pc: Float, grid: StripGrid, blocked_mm: tuple[float, float]
 ) -> Strip:
     """Unroll a grey image (H, W) as seen from pose ``T_pc`` (4, 4) in the straightened pipe.
 
     ``blocked_mm`` is the range of wall ahead of the camera hidden under the laser line; empty if equal.
     """
     first_row = int(np.ceil((T_pc[2, 3] + grid.near_mm) / grid.step_mm))
-    coarse_uv = _coarse_pixels(camera, T_pc, grid, first_row)
+    coarse_uv, light = _coarse_view(probe, T_pc, grid, first_row)
     grey, seen = _sample(cv2.GaussianBlur(image, (0, 0), _BLUR_PX), coarse_uv, _COARSE)
     ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
     seen[(ahead > blocked_mm[0]) & (ahead < blocked_mm[1])] = False
     usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST)
-    contrast = _equally_sharp(_without_light(grey, usable), coarse_uv)
+    contrast = _equally_sharp(_without_light(grey / _refined(light), usable), coarse_uv)
     return Strip(first_row, contrast, usable, coarse_uv, _noise_of(contrast, usable))
 
 
@@ -129,9 +129,9 @@ def _without_light(grey: Float32, usable: Mask) -> Float32:
     """Return grey over the light that fell there, minus 1; 0 where unusable.
 
     A slope of the light within a patch shifts its match by half the slope times the squared length of the
-    texture, always the same way. So the light's course along the pipe, the same all round, and then its
-    slow changes around it are divided out. A local mean would do that too, but near borders it sees one side
-    only, and shifts the texture with the light.
+    texture, always the same way. Divided out are the light predicted and the course along the pipe, the same
+    all round, of what that leaves. A local mean would follow the light too, but at borders, where it sees one
+    side only, it shifts the texture.
     """
     count = usable.sum(1)
     course = np.where(usable, grey, 0).sum(1) / np.maximum(count, 1)
@@ -140,23 +140,7 @@ def _without_light(grey: Float32, usable: Mask) -> Float32:
     if not known.any():
         return np.zeros_like(grey)
     course = gaussian_filter1d(np.interp(row, row[known], course[known]), _COURSE_PX)[:, None]
-    flat = np.where(usable, grey / np.maximum(course, 1.0), 1).astype(np.float32)
-    return np.where(usable, flat / _slow_around(flat, usable) - 1, 0).astype(np.float32)
-
-
-def _slow_around(flat: Float32, usable: Mask) -> Float32:
-    """Return the mean (H, W) of ``flat`` over low harmonics around, each linear along."""
-    rows, columns = flat.shape
-    psi = 2 * np.pi * np.arange(columns) / columns
-    order = np.arange(1, _HARMONICS + 1)[:, None]
-    around = np.concatenate([np.ones((1, columns)), np.cos(order * psi), np.sin(order * psi)])
-    along = np.stack([np.ones(rows), np.linspace(-1, 1, rows)])
-    some = (slice(_COARSE // 2, None, _COARSE),) * 2
-    ok = usable[some]
-    design = np.einsum("ih,jw->hwij", along[:, some[0]], around[:, some[1]])[ok].reshape(int(ok.sum()), -1)
-    normal = design.T @ design + 1e-3 * ok.size * np.eye(design.shape[1])
-    size = np.linalg.solve(normal, design.T @ (flat[some][ok] - 1)).reshape(len(along), -1)
-    return np.maximum(1 + along.T @ size @ around, _LEAST_LIGHT).astype(np.float32)
+    return np.where(usable, grey / np.maximum(course, 1.0) - 1, 0).astype(np.float32)
 
 
 def _equally_sharp(contrast: Float32, coarse_uv: Float32) -> Float32:
@@ -186,11 +170,28 @@ def _blur_of(coarse_uv: Float32, axis: int) -> Float:
     return np.asarray(np.interp(rows, np.arange(len(variance)) + (0.5 if axis == 0 else 0.0), variance))
 
 
-def _coarse_pixels(camera: Camera, T_pc: Float, grid: StripGrid, first_row: int) -> Float32:
+def _coarse_view(probe: Probe, T_pc: Float, grid: StripGrid, first_row: int) -> tuple[Float32, Float32]:
+    """Return pixels (H/4 + 1, W/4 + 1, 2) of every fourth row and column, and the light that falls there.
+
+    The LEDs' light is predicted, up to a factor: off the axis it is uneven around the wall.
+    """
     rows = first_row + _COARSE * np.arange(grid.rows // _COARSE + 1.0)
     columns = _COARSE * np.arange(grid.columns // _COARSE + 1.0)
     xyz = grid.wall(*np.meshgrid(rows, columns, indexing="ij"))
-    return camera.project(transform(inverse(T_pc), xyz)).uv.astype(np.float32)
+    T_cp = inverse(T_pc)
+    xyz_c = transform(T_cp, xyz)
+    normal_c = (xyz * [-1 / grid.radius_mm, -1 / grid.radius_mm, 0.0]) @ T_cp[:3, :3].T
+    light = irradiance(probe.lighting, xyz_c, normal_c)
+    light = np.maximum(light, _LEAST_LIGHT * light.max(initial=1e-12)) / light.mean()
+    return probe.camera.project(xyz_c).uv.astype(np.float32), light.astype(np.float32)
+
+
+def _refined(coarse: Float32) -> Float32:
+    """Return the bilinear refinement (H, W) of values (H/4 + 1, W/4 + 1) at every fourth row and column."""
+    part = np.arange(_COARSE, dtype=np.float32) / _COARSE
+    down = coarse[:-1, None] * (1 - part[:, None]) + coarse[1:, None] * part[:, None]
+    down = down.reshape(-1, coarse.shape[1])
+    return np.asarray((down[:, :-1, None] * (1 - part) + down[:, 1:, None] * part).reshape(len(down), -1))
 
 
 def _noise_of(contrast: Float32, usable: Mask) -> Float32:

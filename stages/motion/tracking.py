@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.probe import Probe
 from stages.motion.landmarks import LandmarkMap
 from stages.motion.matching import cut, match
 from stages.motion.parameters import MotionParameters
@@ -91,9 +91,9 @@ class TextureTracker:
     """
 
     def __init__(
-        self, camera: Camera, grid: StripGrid, parameters: MotionParameters, blocked_mm: tuple[float, float]
+        self, probe: Probe, grid: StripGrid, parameters: MotionParameters, blocked_mm: tuple[float, float]
     ) -> None:
-        self._camera, self._grid, self._parameters, self._blocked = camera, grid, parameters, blocked_mm
+        self._probe, self._grid, self._parameters, self._blocked = probe, grid, parameters, blocked_mm
         self._map = LandmarkMap(parameters.patch_half_px)
         self._rows: list[tuple[Int, Int, Float, Float]] = []
         self._poses: list[tuple[int, Float, bool]] = []
@@ -101,11 +101,11 @@ class TextureTracker:
 
     def follow(self, frame: int, image: Image, T_pc: Float) -> Float:
         """Track one frame from its predicted pose and return the better one (4, 4)."""
-        strip = unroll(image, self._camera, T_pc, self._grid, self._blocked)
+        strip = unroll(image, self._probe, T_pc, self._grid, self._blocked)
         found = self._search(strip, frame)
         if found.alike < _FEWEST_ALIKE and self._last is not None:
             T_moved = self._shifted(T_pc, _displacement(self._last, strip))
-            other = unroll(image, self._camera, T_moved, self._grid, self._blocked)
+            other = unroll(image, self._probe, T_moved, self._grid, self._blocked)
             found_there = self._search(other, frame)
             if found_there.alike > max(found.alike, _FEWEST_ALIKE):
                 T_pc, strip, found = T_moved, other, found_there

@@ -153,7 +153,7 @@ def true_contrast(strip: Strip, wall: StripGrid) -> Float32:
 def test_unrolled_texture_lies_where_the_wall_has_it() -> None:
     probe, wall = small_probe(), grid()
     image = draw(probe, pose())[..., 1]
-    strip = unroll(image, probe.camera, pose(), wall, (0.0, 0.0))
+    strip = unroll(image, probe, pose(), wall, (0.0, 0.0))
     wanted = true_contrast(strip, wall)
     inner = (slice(22, -22), slice(22, -22))
     assert strip.usable.mean() > 0.9
@@ -165,7 +165,7 @@ def test_unrolled_texture_lies_where_the_wall_has_it() -> None:
 
 def test_the_strip_knows_the_pixels_it_looked_at() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(draw(probe, pose())[..., 1], probe.camera, pose(), wall, (0.0, 0.0))
+    strip = unroll(draw(probe, pose())[..., 1], probe, pose(), wall, (0.0, 0.0))
     row, column = strip.first_row + np.array([5.0, 30.3, 50.9]), np.array([2.0, 100.7, 479.5])
     T = pose()
     xyz_c = (wall.wall(row, column) - T[:3, 3]) @ T[:3, :3]
@@ -174,7 +174,7 @@ def test_the_strip_knows_the_pixels_it_looked_at() -> None:
 
 def test_the_wall_under_the_laser_line_is_not_usable() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(draw(probe, pose())[..., 1], probe.camera, pose(), wall, (20.0, 24.0))
+    strip = unroll(draw(probe, pose())[..., 1], probe, pose(), wall, (20.0, 24.0))
     ahead = (strip.first_row + np.arange(strip.usable.shape[0])) * wall.step_mm - 7.0
     hidden = (ahead > 20.0) & (ahead < 24.0)
     assert hidden.any()
