@@ -161,7 +161,8 @@ def _opened(file: Path) -> Iterator[np.lib.npyio.NpzFile]:
             if not isinstance(content, np.lib.npyio.NpzFile):
                 raise InputError(file, "is no archive", expected=expected)
             yield content
-    except (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, MemoryError) as error:
+    except (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, MemoryError,
+            NotImplementedError) as error:  # fmt: skip
         raise InputError(file, f"cannot be read: {error}", expected=expected) from error
 
 
