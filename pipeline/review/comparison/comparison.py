@@ -1,0 +1,131 @@
+"""A run compared with an earlier one of the same pipe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pipeline.artefacts import RingSamples, Trajectory, WallTexture
+from pipeline.findings import DefectKind
+from pipeline.review.comparison.changes import Change, changes
+from pipeline.review.comparison.growth import Resolution, Value
+from pipeline.review.comparison.paired import PairedWalls
+from pipeline.review.comparison.places import put_together
+from pipeline.review.comparison.registration import register
+from pipeline.review.comparison.surface import Surface
+from pipeline.review.decisions.replay import GONE, REJECTED, Finding
+from pipeline.review.measuring.wall import MeasuredWall
+from pipeline.review.review import Review, State
+
+_ROWS_AT_ONCE = 512
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A review's run and an earlier run, registered when first asked for.
+
+    Attributes
+    ----------
+    now, earlier : Review
+    years : float or None
+        Time between them, where it is known.
+    """
+
+    now: Review
+    earlier: Review
+    years: float | None = None
+
+    @cached_property
+    def pair(self) -> PairedWalls:
+        """Both walls and how they lie on each other.
+
+        Raises
+        ------
+        UnusableError
+            When the runs do not show the same wall.
+        """
+        before, after = _surface(self.earlier), _surface(self.now)
+        welds = [_middle_mm(f) for f in self.earlier_findings if f.kind == DefectKind.WELD]
+        return PairedWalls(before.wall, after.wall, register(before, after, np.array(welds)))
+
+    @cached_property
+    def earlier_findings(self) -> tuple[Finding, ...]:
+        """The earlier run's findings as its own review left them."""
+        return _standing(self.earlier.state())
+
+    @cached_property
+    def diameter(self) -> Value:
+        """Growth of the mean diameter over all rings that both saw, mm."""
+        wall = self.pair.now
+        grown = np.concatenate([
+            self.pair.stretch(i, i + _ROWS_AT_ONCE).diameter_mm
+            for i in range(0, len(wall.distance_mm), _ROWS_AT_ONCE)
+        ])  # fmt: skip
+        known = grown[np.isfinite(grown)]
+        wander = float(known.std()) / np.sqrt(max(len(known) * wall.step_mm / _CORRELATED_MM, 1.0))
+        systematic = 2 * np.sqrt(2) * _calibration_mm(wall)
+        return Value(
+            float(np.median(known)), float(np.hypot(wander, 0.0 if self.is_one_calibration else systematic))
+        )
+
+    @property
+    def is_one_calibration(self) -> bool:
+        """Whether both runs were measured with the same numbers, whose error then drops out.
+
+        A run that found its instrument to differ from what is stated has numbers of its own.
+        """
+        both = (self.now, self.earlier)
+        probes = {r.files.record()["input_sha256"]["probe"] for r in both}
+        return len(probes) == 1 and all(r.files.artefact(Trajectory).instrument is None for r in both)
+
+    def changes(self, state: State) -> tuple[Change, ...]:
+        """Return what became of every finding, given the later review's state."""
+        pair = self.pair
+        radius = float(np.nanmedian(pair.now.radius_mm[:: max(len(pair.now.distance_mm) // 200, 1)]))
+        places = put_together(self.earlier_findings, _standing(state), pair.registration, radius)
+        return changes(places, pair, self._resolution(radius))
+
+    def _resolution(self, radius_mm: float) -> Resolution:
+        own = max(_smoothing_mm(r) for r in (self.now, self.earlier))
+        spacing = max(_ring_spacing_mm(r) for r in (self.now, self.earlier))
+        along = float(np.hypot(own, spacing / np.sqrt(6)))
+        relative = _calibration_mm(self.pair.now) / radius_mm
+        return Resolution(along, own, relative, self.is_one_calibration)
+
+
+_CORRELATED_MM = 10.0
+
+
+def _surface(review: Review) -> Surface:
+    return Surface(review.wall(), review.files.artefact(WallTexture))
+
+
+def _standing(state: State) -> tuple[Finding, ...]:
+    return tuple(f for f in state.findings if f.status not in (GONE, REJECTED))
+
+
+def _middle_mm(finding: Finding) -> float:
+    return (finding.size.distance_from_mm + finding.size.distance_to_mm) / 2
+
+
+def _smoothing_mm(review: Review) -> float:
+    """Return the 1 σ with which a run's map was smoothed, as its record says."""
+    return float(review.files.record()["configuration"]["accumulate"]["smoothing_mm"])
+
+
+def _ring_spacing_mm(review: Review) -> float:
+    """Return the median distance between neighbouring rings; a triangle of that foot joins them."""
+    trajectory, rings = review.files.artefact(Trajectory), review.files.artefact(RingSamples)
+    z = trajectory.T_pc[np.isin(trajectory.frame, rings.frame), 2, 3]
+    step = np.abs(np.diff(z))
+    moving = step[step > 0]
+    return float(np.median(moving)) if len(moving) else 0.0
+
+
+def _calibration_mm(wall: MeasuredWall) -> float:
+    """Return the median of the radius' 1 σ from calibration."""
+    thin = slice(None, None, max(len(wall.distance_mm) // 200, 1))
+    total, random = (np.asarray(v[thin], float) for v in (wall.sigma_mm, wall.sigma_random_mm))
+    return float(np.sqrt(np.nanmedian(np.maximum(total**2 - random**2, 0.0))))

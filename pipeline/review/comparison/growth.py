@@ -1,0 +1,192 @@
+"""How much a defect has grown, measured on both walls alike, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, shift
+
+from pipeline.review.comparison.patch import Patch, at_its_peak, smoothed
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+# Where one wall is no deeper than this share of the other, it shows no defect of its own.
+_ALIKE = 0.5
+# The common level at which extents are read, as a share of the lesser depth.
+_LEVEL = 0.5
+_BASE_MM = 1.0
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number and its 1 σ."""
+
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What has become of a defect from the earlier run to the later one.
+
+    Attributes
+    ----------
+    depth_now_mm, depth_before_mm : float
+        On both walls with one method, within one outline; positive into the wall.
+    depth_mm, length_mm, width_mm : Value
+        Growth of the depth (positive into the wall) and of the extents at ``level_mm``.
+    area_mm2 : Value
+    level_mm : float
+        Depth at which the extents are read on both walls.
+    """
+
+    depth_now_mm: float
+    depth_before_mm: float
+    depth_mm: Value
+    length_mm: Value
+    width_mm: Value
+    area_mm2: Value
+    level_mm: float
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """What limits the maps: 1 σ of their own smoothing along and around, and calibration of heights.
+
+    Attributes
+    ----------
+    along_mm, around_mm : float
+    relative : float
+        1 σ of the radius from calibration over the radius.
+    is_common : bool
+        Whether both runs share that calibration, so that it acts on the growth alone.
+    """
+
+    along_mm: float
+    around_mm: float
+    relative: float
+    is_common: bool
+
+
+def measure_growth(
+    patch: Patch, sign: int, resolution: Resolution, place_sigma_mm: tuple[float, float]
+) -> Growth:
+    """Return a defect's growth; ``sign`` +1 for one that goes into the wall, −1 inward.
+
+    A defect that only one wall shows is read on the other at the place of its peak, as the extreme of mere
+    noise is no depth. What the maps' resolution takes off a peak is taken for what smoothing once more takes,
+    give or take as much. Noise is what the same reading makes of the walls' difference over clean wall, piece
+    by piece; the registration's σ and calibration are added.
+    """
+    now, before = sign * patch.now_mm, sign * patch.before_mm
+    extremes = [float(h[patch.inside].max()) for h in (now, before)]
+    in_both = min(extremes) > _ALIKE * max(extremes)
+    peaks = _peaks(now, before, patch.inside, in_both)
+    lost = _lost_of_both(now, before, peaks, patch, resolution, in_both)
+    depth = [h[p] + part for h, p, part in zip((now, before), peaks, lost, strict=True)]
+    level = _LEVEL * max(min(depth) if in_both else max(depth), 1e-6)
+    size = _size(now, patch, level, peaks[0]) - _size(before, patch, level, peaks[1])
+    spread = _spread(now, before, patch, level, in_both)
+    placed = _misplaced(before, peaks, patch, place_sigma_mm, in_both)
+    growth = depth[0] - depth[1]
+    calibration = resolution.relative * (
+        abs(growth) if resolution.is_common else float(np.linalg.norm(depth))
+    )
+    sigma = float(np.linalg.norm([spread[0], *lost, placed, calibration]))
+    edge = np.array(patch.cell_mm) / np.sqrt(6)
+    length, width = (Value(float(size[k]), float(np.hypot(spread[k + 1], edge[k]))) for k in (0, 1))
+    cell = patch.cell_mm[0] * patch.cell_mm[1]
+    area = Value(float(size[2]), float(np.hypot(spread[3], cell)))
+    return Growth(
+        sign * float(depth[0]),
+        sign * float(depth[1]),
+        Value(sign * float(growth), sigma),
+        length,
+        width,
+        area,
+        level,
+    )
+
+
+def _peaks(now: Float, before: Float, inside: Bool, in_both: bool) -> list[tuple[int, int]]:
+    """Return the cell of each wall's extreme; of one that has no defect of its own, the other's."""
+    own = [_argmax(h, inside) for h in (now, before)]
+    if in_both:
+        return own
+    deeper = own[0] if now[own[0]] >= before[own[1]] else own[1]
+    return [deeper, deeper]
+
+
+def _argmax(height: Float, inside: Bool) -> tuple[int, int]:
+    r, c = np.unravel_index(int(np.argmax(np.where(inside, height, -np.inf))), height.shape)
+    return int(r), int(c)
+
+
+def _lost_of_both(
+    now: Float,
+    before: Float,
+    peaks: list[tuple[int, int]],
+    patch: Patch,
+    resolution: Resolution,
+    in_both: bool,
+) -> Float:
+    """Return what the maps' resolution takes off each wall's peak; nothing where there is none."""
+    lost = np.array([_lost(h, p, patch, resolution) for h, p in zip((now, before), peaks, strict=True)])
+    has_peak = in_both or np.array([now[peaks[0]] >= before[peaks[1]], now[peaks[0]] < before[peaks[1]]])
+    return np.where(has_peak, lost, 0.0)
+
+
+def _lost(height: Float, peak: tuple[int, int], patch: Patch, resolution: Resolution) -> float:
+    """Return by how much smoothing once more as the map did lowers a peak."""
+    kernel = [s / c for s, c in zip((resolution.along_mm, resolution.around_mm), patch.cell_mm, strict=True)]
+    reach = [int(np.ceil(4 * k)) + 1 for k in kernel]
+    near = tuple(slice(max(p - r, 0), p + r + 1) for p, r in zip(peak, reach, strict=True))
+    at = tuple(min(p, r) for p, r in zip(peak, reach, strict=True))
+    return float(max(height[peak] - gaussian_filter(height[near], kernel)[at], 0.0))
+
+
+def _size(height: Float, patch: Patch, level: float, peak: tuple[int, int]) -> Float:
+    """Return length, width and area of what lies beyond a level about a peak."""
+    part = at_its_peak((height > level) & patch.inside, peak)
+    if not part.any():
+        return np.zeros(3)
+    extent = [_extent(height.max(axis=1 - k, where=part, initial=0.0), level) for k in (0, 1)]
+    cell = np.array(patch.cell_mm)
+    return np.array([*(extent * cell), part.sum() * cell.prod()])
+
+
+def _extent(profile: Float, level: float) -> float:
+    """Return cells over which a profile, 0 outside the part, is beyond a level, ends to a part of a cell."""
+    at = np.flatnonzero(profile > level)
+    return float(at[-1] - at[0] + 1)
+
+
+def _spread(now: Float, before: Float, patch: Patch, level: float, in_both: bool) -> Float:
+    """Return 1 σ of growth of depth, length, width and area where the walls differ as clean wall does."""
+    base = smoothed((now + before) / 2 if in_both else np.maximum(now, before), patch.cell_mm, _BASE_MM)
+    at = _argmax(base, patch.inside)
+    without = np.array([base[at], *_size(base, patch, level, at)])
+    drawn = []
+    for piece in patch.noise_mm:
+        other = base + piece
+        peak = _argmax(other, patch.inside) if in_both else at
+        drawn.append(np.array([other[peak], *_size(other, patch, level, peak)]) - without)
+    errors = np.array(drawn)
+    errors[:, 0] -= errors[:, 0].mean() if in_both else 0.0
+    return np.asarray(np.sqrt((errors**2).mean(0)))
+
+
+def _misplaced(
+    before: Float, peaks: list[tuple[int, int]], patch: Patch, sigma_mm: tuple[float, float], in_both: bool
+) -> float:
+    """Return 1 σ of the earlier reading from the registration's own."""
+    changes = []
+    for axis in (0, 1):
+        move = [0.0, 0.0]
+        move[axis] = sigma_mm[axis] / patch.cell_mm[axis]
+        moved = shift(before, move, order=1, mode="nearest")
+        peak = _argmax(moved, patch.inside) if in_both else peaks[1]
+        changes.append(float(moved[peak] - before[peaks[1]]))
+    return float(np.linalg.norm(changes))

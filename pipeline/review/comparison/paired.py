@@ -1,0 +1,132 @@
+"""Two registered walls on one grid, and their difference freed of what single rings do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from pipeline.review.comparison.registration import Registration
+from pipeline.review.measuring.wall import MeasuredWall
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+_SECTORS = 90
+_ROUNDS = 8
+_TUKEY = 4.685
+_LEAST_SEEN = 0.5
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rows of both walls on the later run's grid.
+
+    Attributes
+    ----------
+    distance_mm : (R,)
+    now_mm, before_mm : (R, A)
+        Radius. The earlier one is raised by what its rings differ in mean, centre and ovality from the
+        later ones, so that neither motion nor calibration shows as growth. NaN where not seen.
+    sigma_mm : (R, A)
+        Random 1 σ of their difference.
+    diameter_mm : (R,)
+        Later mean diameter less earlier one; NaN where too little was seen.
+    """
+
+    distance_mm: Float
+    now_mm: Float
+    before_mm: Float
+    sigma_mm: Float
+    diameter_mm: Float
+
+    @property
+    def difference_mm(self) -> Float:
+        """(R, A) later less earlier, positive where wall was lost."""
+        return self.now_mm - self.before_mm
+
+
+@dataclass(frozen=True)
+class PairedWalls:
+    """An earlier and a later wall and how they lie on each other."""
+
+    earlier: MeasuredWall
+    now: MeasuredWall
+    registration: Registration
+
+    def stretch(self, first: int, last: int) -> Stretch:
+        """Return the later wall's rows from ``first`` to before ``last``."""
+        rows = slice(max(first, 0), max(last, 0))
+        s = self.now.distance_mm[rows]
+        now = np.asarray(self.now.radius_mm[rows], float)
+        before, sigma = self._before(s)
+        rings = ring_shape(now - before, self.now.azimuth_rad)
+        basis = _basis(self.now.azimuth_rad)
+        random = np.hypot(np.asarray(self.now.sigma_random_mm[rows], float), sigma)
+        return Stretch(s, now, before + rings @ basis.T, random, 2 * rings[:, 0])
+
+    def _before(self, s: Float) -> tuple[Float, Float]:
+        """Return the earlier wall's radius and random σ at the later grid's rows (R,) and all azimuths."""
+        wall = self.earlier
+        at, psi = self.registration.to_earlier(s[:, None], self.now.azimuth_rad[None])
+        row = (at - wall.distance_mm[0]) / wall.step_mm
+        first = int(np.clip(np.floor(row.min()) - 2, 0, len(wall.distance_mm) - 1))
+        last = int(np.clip(np.ceil(row.max()) + 3, first + 1, len(wall.distance_mm)))
+        column = np.mod((psi - wall.azimuth_rad[0]) / wall.step_rad, len(wall.azimuth_rad))
+        row = np.broadcast_to(row - first, column.shape)
+        radius, sigma = (np.asarray(v[first:last], float) for v in (wall.radius_mm, wall.sigma_random_mm))
+        return _between(radius, row, column), _between(sigma, row, column)
+
+
+def _between(values: Float, row: Float, column: Float) -> Float:
+    """Return values at fractional rows and columns, linear; NaN next to what was not seen."""
+    wide = np.concatenate([values, values[:, :1]], 1)
+    return np.asarray(map_coordinates(wide, [row, column], order=1, mode="constant", cval=np.nan))
+
+
+def ring_shape(rows: Float, azimuth_rad: Float) -> Float:
+    """Return (R, 5) mean, cos ψ, sin ψ, cos 2ψ, sin 2ψ of rows (R, A), fitted so that defects do not pull.
+
+    Redescending weights (Beaton & Tukey, Technometrics 16, 1974); NaN for rows seen to less than a half.
+    """
+    values, basis = _sectors(rows), _sectors(_basis(azimuth_rad).T).T
+    seen = np.isfinite(values)
+    usable = seen.mean(1) >= _LEAST_SEEN
+    out = np.full((len(rows), basis.shape[1]), np.nan)
+    if not usable.any():
+        return out
+    y, known = np.where(seen, values, 0.0)[usable], seen[usable]
+    found = np.zeros((len(y), basis.shape[1]))
+    found[:, 0] = np.nanmedian(values[usable], 1)
+    products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
+    for _ in range(_ROUNDS):
+        left = np.where(known, y - found @ basis.T, np.nan)
+        scale = 1.4826 * np.nanmedian(np.abs(left), axis=1)
+        u = np.nan_to_num(left / (_TUKEY * np.maximum(scale, 1e-6))[:, None], nan=2.0)
+        weight = np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
+        normal = (weight @ products).reshape(-1, basis.shape[1], basis.shape[1])
+        normal += 1e-6 * np.eye(basis.shape[1])
+        found = np.linalg.solve(normal, ((weight * y) @ basis)[..., None])[..., 0]
+    out[usable] = found
+    return out
+
+
+def ring_values(rows: Float, azimuth_rad: Float) -> Float:
+    """Return the smooth shape (R, A) of rings; NaN for rows seen to less than a half."""
+    return np.asarray(ring_shape(rows, azimuth_rad) @ _basis(azimuth_rad).T)
+
+
+def _basis(azimuth_rad: Float) -> Float:
+    waves = [f(m * azimuth_rad) for m in (1, 2) for f in (np.cos, np.sin)]
+    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
+
+
+def _sectors(rows: Float) -> Float:
+    """Return means of neighbouring columns, about `_SECTORS` of them; NaN where half was not seen."""
+    width = next(k for k in range(max(1, rows.shape[1] // _SECTORS), 0, -1) if rows.shape[1] % k == 0)
+    blocks = rows.reshape(len(rows), -1, width)
+    count = np.isfinite(blocks).sum(2)
+    return np.asarray(
+        np.where(2 * count > width, np.nan_to_num(blocks).sum(2) / np.maximum(count, 1), np.nan)
+    )
