@@ -12,11 +12,10 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.commands.prove_cases import Drawing, Worked, draw_case, require_seal, worked
-from pipeline.commands.prove_report import write_report
+from pipeline.commands.prove_report import rows_of, write_report
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
 from stages.diagnose.drill.cases import find_cases
-from stages.diagnose.drill.figures import figures
 
 _PRIOR = Path(__file__).resolve().parents[2] / "configs" / "priors" / "pairs.yaml"
 
@@ -97,7 +96,7 @@ def _show(done: Sequence[Worked], console: Console) -> None:
     table = Table(title=f"{len(trials)} diagnoses against what was concealed")
     for heading in ("", "value", "of", "95 % interval", "goal"):
         table.add_column(heading)
-    for row in figures(trials):
+    for row in rows_of(done):
         value = "none" if row.value is None else f"{row.value:.3f}"
         interval = "" if row.interval is None else f"{row.interval[0]:.3f}–{row.interval[1]:.3f}"
         table.add_row(row.words, value, str(row.of), interval, row.goal)

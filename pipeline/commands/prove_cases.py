@@ -9,6 +9,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.commands.prove_geometry import WallErrors, wall_errors
 from pipeline.errors import BoresightError, InputError
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.seal import SEAL_FILE, open_seal
@@ -45,11 +46,14 @@ class Worked:
         That the diagnosis with the whole library took.
     failures : tuple of str
         Diagnoses that ended without an answer; they are scored as having identified nothing.
+    wall : WallErrors or None
+        Of the inspection, where its truth tells the scene.
     """
 
     trials: tuple[Trial, ...]
     seconds: float | None
     failures: tuple[str, ...]
+    wall: WallErrors | None
 
 
 def draw_case(drawing: Drawing, index: int) -> Case:
@@ -114,7 +118,7 @@ def worked(case: Case, output: Path, truth: Path, leave_out: bool) -> Worked:
         second = output / "answers-without" / case.name
         failures += _answered(case, second, without)
         trials.append(trial_of(case, second, truth, without))
-    return Worked(tuple(trials), _seconds(answer), tuple(failures))
+    return Worked(tuple(trials), _seconds(answer), tuple(failures), wall_errors(case, answer, truth))
 
 
 def _answered(case: Case, answer: Path, without: tuple[str, ...]) -> list[str]:

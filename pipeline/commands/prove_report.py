@@ -12,7 +12,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from pipeline.commands.prove_cases import Worked
-from stages.diagnose.drill.figures import figures
+from stages.diagnose.drill.figures import Figure, figures
 from stages.diagnose.drill.score import Trial, calibration, confusion
 
 
@@ -32,7 +32,7 @@ def report_document(done: Sequence[Worked]) -> dict[str, Any]:
     seconds = [case.seconds for case in done if case.seconds is not None]
     return {
         "format": 2,
-        "figures": [vars(row) | {"text": row.text} for row in figures(trials)],
+        "figures": [vars(row) | {"text": row.text} for row in rows_of(done)],
         "seconds": {"median": median(seconds), "most": max(seconds), "of": len(seconds)} if seconds else None,
         "unanswered": [failure for case in done for failure in case.failures],
         "confusion": [
@@ -44,7 +44,21 @@ def report_document(done: Sequence[Worked]) -> dict[str, Any]:
             for mean, r in calibration(trials)
         ],
         "trials": [_trial(t) for t in trials],
+        "wall_errors_mm": {c.trials[0].name: vars(c.wall) for c in done if c.wall is not None},
     }
+
+
+def rows_of(done: Sequence[Worked]) -> tuple[Figure, ...]:
+    """Return the rows of the table, the wall's error among them."""
+    ratios = [
+        case.wall.corrected_mm / case.wall.oracle_mm
+        for case in done
+        if case.wall is not None and case.trials[0].concealed
+    ]
+    words = "Wall error after correction, of the oracle's, median"
+    value = median(ratios) if ratios else None
+    wall = Figure("wall_error", words, "≤ 1.1", value, len(ratios), None)
+    return (*figures([trial for case in done for trial in case.trials]), wall)
 
 
 def _trial(trial: Trial) -> dict[str, Any]:

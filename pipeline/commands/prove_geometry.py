@@ -1,0 +1,96 @@
+"""Wall errors of an inspection by the stated, the corrected and the true instrument."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import RingSamples
+from pipeline.geometry.axis import to_pipe
+from pipeline.geometry.rigid import transform
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import read_probe
+from pipeline.recording import open_recording
+from pipeline.simulator.build import build_truth
+from pipeline.simulator.exact import room_mm, wall_radius
+from pipeline.simulator.scene import read_scene
+from pipeline.simulator.truth import SceneTruth
+from pipeline.stage import quiet_context
+from stages.diagnose.drill.cases import Case
+from stages.rings import RingParameters, extract_rings
+
+Float = NDArray[np.float64]
+_SCENE = "truth_scene.yaml"
+_CACHE = "wall_errors.json"
+# Samples beside the wall's own edges are no matter of the instrument.
+_OUTLYING = 5.0
+_EVERY = 4
+
+
+@dataclass(frozen=True)
+class WallErrors:
+    """R.m.s. radius errors of ring samples at the true poses, mm.
+
+    Attributes
+    ----------
+    stated_mm, corrected_mm : float
+        By the stated probe and by the one that the diagnosis wrote.
+    oracle_mm : float
+        By the true instrument with all that is concealed in it: what the extraction of the line leaves.
+    """
+
+    stated_mm: float
+    corrected_mm: float
+    oracle_mm: float
+
+
+def wall_errors(case: Case, answer: Path, truth: Path) -> WallErrors | None:
+    """Return the wall errors of a case's inspection; they are kept beside the answer.
+
+    None without an inspection, a corrected probe, or the scene that it was rendered from.
+    """
+    probe_file, kept = answer / "probe.yaml", answer / _CACHE
+    if kept.is_file():
+        return WallErrors(**json.loads(kept.read_text("utf-8")))
+    if case.field is None or not probe_file.is_file():
+        return None
+    scene_file = truth / case.field.name / _SCENE
+    if not scene_file.is_file():
+        return None
+    found = _errors(case.field, read_probe(probe_file), build_truth(read_scene(scene_file), scene_file))
+    kept.write_text(json.dumps(vars(found)) + "\n", "utf-8")
+    return found
+
+
+def _errors(field: Path, corrected: Probe, truth: SceneTruth) -> WallErrors:
+    recording = open_recording(field)
+    rings = extract_rings(recording, truth.stated, RingParameters.model_validate({}), quiet_context())
+    uv = _uv(rings)
+    oracle = np.stack([-room_mm(truth, int(frame), uv[k]) for k, frame in enumerate(rings.frame)])
+    each = [oracle, *(_by_probe(truth, rings.frame, uv, probe) for probe in (truth.stated, corrected))]
+    usable = rings.valid[:, ::_EVERY] & np.all(np.isfinite(each), axis=0)
+    spread = 1.4826 * np.median(np.abs(oracle[usable] - np.median(oracle[usable])))
+    usable &= np.abs(oracle) < _OUTLYING * spread
+    oracle_mm, stated_mm, corrected_mm = (float(np.sqrt(np.mean(e[usable] ** 2))) for e in each)
+    return WallErrors(stated_mm, corrected_mm, oracle_mm)
+
+
+def _uv(rings: RingSamples) -> Float:
+    """Return (F, A, 2) the ring samples in the image."""
+    azimuth = rings.azimuth_rad[::_EVERY]
+    outward = np.stack([np.cos(azimuth), np.sin(azimuth)], -1)
+    return np.asarray(rings.centre_px + rings.radius_px[:, ::_EVERY, None].astype(float) * outward)
+
+
+def _by_probe(truth: SceneTruth, frames: NDArray[np.int64], uv: Float, probe: Probe) -> Float:
+    """Return (F, A) by how much the samples lie outside the true wall when ``probe`` triangulates them."""
+    out = []
+    for frame, at in zip(frames, uv, strict=True):
+        T_pc = truth.motion.pose(truth.frames.time_s[frame], truth.wall.axis)
+        s, psi, r = to_pipe(truth.wall.axis, transform(T_pc, probe.triangulate(at)))
+        out.append(r - wall_radius(truth.wall, s, psi))
+    return np.stack(out)
