@@ -199,7 +199,7 @@ def _report(context: Context, estimate: Estimate, tracks: Tracks, trajectory: Tr
 
 MOTION = Stage(
     "motion",
-    "1",
+    "2",
     MotionParameters,
     estimate_motion,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

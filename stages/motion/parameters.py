@@ -54,7 +54,7 @@ class MotionParameters(Parameters):
         16, ge=3, le=1000, description="observations of one landmark that enter the adjustment"
     )
     match_bias_px: float = Field(
-        0.2, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
+        0.1, gt=0, le=2, description="1 σ, px, by which texture matching may err alike all round the image"
     )
     turn_sigma_rad: float = Field(
         0.1, gt=0, le=1, description="1 σ, rad, of a turn from frame to frame where no texture shows it"

@@ -156,7 +156,7 @@ class TextureTracker:
         whole[:margin], whole[-margin - 1 :] = False, False
         row, column = np.rint(guess).astype(np.int64).T
         ahead = (row >= 0) & (row < len(whole))
-        return ahead & whole[np.where(ahead, row, 0), np.mod(column, whole.shape[1])]
+        return np.asarray(ahead & whole[np.where(ahead, row, 0), np.mod(column, whole.shape[1])])
 
     def _note(self, found: _Found, strip: Strip, frame: int) -> tuple[Float, bool]:
         """Keep the pixels of matched landmarks; return the strip's common displacement (2,) and if lost."""
