@@ -18,7 +18,7 @@ Int = NDArray[np.int64]
 # Scores are sums over so many independent cells that χ² has heavier tails: those of F.
 DEGREES = 60.0
 _TIED = 1e-6
-_SEEN = 1e-9
+_SEEN = 1e-8
 # An amplitude's 1 σ beforehand, in plausible sizes.
 PRIOR_PLAUSIBLE = 5.0
 
@@ -87,33 +87,39 @@ def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = No
 
     None when the columns cannot be seen.
     """
-    free = instrument_places(evidence)
-    if given is not None:
-        free = np.union1d(free, given)
-    free = free[np.diag(evidence.information)[free] > 0]
-    prior = stated.over(evidence.columns)
-    a, b = evidence.information, evidence.right
-    response = np.asarray(
-        np.linalg.lstsq(
-            a[np.ix_(free, free)] + prior[np.ix_(free, free)], a[np.ix_(free, block)], rcond=1e-13
-        )[0],
-        np.float64,
-    )
-    right = b[block] - response.T @ b[free]
-    own = a[np.ix_(block, block)] - a[np.ix_(block, free)] @ response
+    a = evidence.information
+    free = instrument_places(evidence) if given is None else np.union1d(instrument_places(evidence), given)
+    own, right, from_stated = eliminated(evidence, stated, block, free)
     size = np.sqrt(np.maximum(np.diag(a)[block], 1e-300))
     value = np.linalg.eigvalsh(own / np.outer(size, size))
     if not np.all(value > _SEEN):
         return None
     # Neighbours that err alike widen what the data say, not what was stated beforehand.
     inflation = np.sqrt(np.diag(evidence.score_covariance)[block] / np.diag(a)[block])
-    from_stated = response.T @ prior[np.ix_(free, free)] @ response
     spread = (own - from_stated) * np.outer(inflation, inflation) + from_stated
     inverse = np.linalg.inv(own)
     amplitude, covariance = inverse @ right, np.asarray(inverse @ spread @ inverse, np.float64)
     statistic = float(right @ np.linalg.solve(spread, right))
     p_value = float(stats.f.sf(statistic / len(block), len(block), DEGREES))
     return Score(np.asarray(amplitude, np.float64), covariance, statistic, p_value, float(right @ amplitude))
+
+
+def eliminated(evidence: Evidence, stated: Stated, block: Int, free: Int) -> tuple[Float, Float, Float]:
+    """Return information (Q, Q) and right side (Q,) of columns ``block``, columns ``free`` eliminated.
+
+    The third, (Q, Q), is what of the information comes from the stated instrument's uncertainty.
+    """
+    a, b = evidence.information, evidence.right
+    free = free[np.diag(a)[free] > 0]
+    prior = stated.over(evidence.columns)[np.ix_(free, free)]
+    within = a[np.ix_(free, free)] + prior
+    scale = np.sqrt(np.diag(within))
+    scaled = np.linalg.lstsq(
+        within / np.outer(scale, scale), a[np.ix_(free, block)] / scale[:, None], rcond=1e-13
+    )[0]
+    response = np.asarray(scaled / scale[:, None], np.float64)
+    own = a[np.ix_(block, block)] - a[np.ix_(block, free)] @ response
+    return (own + own.T) / 2, b[block] - response.T @ b[free], response.T @ prior @ response
 
 
 def instrument_places(evidence: Evidence) -> Int:

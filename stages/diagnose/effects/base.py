@@ -51,6 +51,8 @@ class ImagePoints:
     wall_azimuth_rad, distance_mm : (M,), optional
         Azimuth and distance of the wall point in P; without them P is taken to have the camera's roll, and
         effects that follow the distance predict nothing.
+    per_px_c : (M, 3), optional
+        Way of the line's point in C, mm per px that it is found farther out; none off the line.
     albedo_slope_per_mm : (M,), optional
         ∂ ln A of the wall's albedo along the pipe; without it the albedo moves no line.
     """
@@ -69,6 +71,7 @@ class ImagePoints:
     wall_azimuth_rad: Float | None = None
     distance_mm: Float | None = None
     albedo_slope_per_mm: Float | None = None
+    per_px_c: Float | None = None
 
     @cached_property
     def theta(self) -> Float:

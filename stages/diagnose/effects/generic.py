@@ -7,22 +7,26 @@ from enum import StrEnum
 
 import numpy as np
 
-from stages.diagnose.effects.base import Amplitude, Float, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
 from stages.diagnose.effects.nameless import Nameless, growth, two_parts
 from stages.diagnose.effects.predict import columns, texture_columns
 
 _HARMONICS = (0, 1, 2, 3, 4)
 _EXPONENTS = (0, 1, 2, 3)
-_REFERENCE_S = 10.0
+_REFERENCE_S, _REFERENCE_MM_S, _REFERENCE_MM = 10.0, 20.0, 50.0
+# Shapes of a term: which coordinate its size is proportional to.
+STEADY, WITH_TIME, WITH_SPEED, WITH_DISTANCE = (0.0,), (1.0,), (2.0,), (3.0,)
+_COURSES = ("", " t/10", " v/20", " s/50")
 
 
 class Moves(StrEnum):
-    """What a generic term moves: the line on the wall, or every image outward or around."""
+    """What a generic term moves: the line on the wall, every image outward or around, or the wall itself."""
 
     LINE = "line"
     OUTWARD = "outward"
     AROUND = "around"
+    WALL = "wall"
 
 
 @dataclass(frozen=True)
@@ -40,14 +44,17 @@ class GenericTerm(Nameless):
         return ((0.0,), (1.0,))
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return a (r/50)^p cos m(ψ − ψ₀) on the line."""
+        """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a cos m(ψ_P − ψ₀)."""
+        if self.moves is Moves.WALL:
+            parts = np.array([*amplitude, 0.0])[:2]
+            return self._course(points, shape) * cosine(points.azimuth_p_rad, parts, self.harmonic)
         if self.moves is not Moves.LINE or not points.on_line:
             return np.zeros(len(points.uv))
         return np.asarray(growth(points, self.exponent) * self._pattern(points, shape, amplitude))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a θ^p cos m(ψ − ψ₀) outward or around."""
-        if self.moves is Moves.LINE:
+        if self.moves in (Moves.LINE, Moves.WALL):
             return np.zeros((len(points.uv), 2))
         heading = points.outward if self.moves is Moves.OUTWARD else points.outward[:, ::-1] * [-1.0, 1.0]
         size = points.theta**self.exponent * self._pattern(points, shape, amplitude)
@@ -56,14 +63,43 @@ class GenericTerm(Nameless):
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
         wave = f" cos {self.harmonic}(ψ − ψ₀)" if self.harmonic else ""
-        course = " t/10" if shape[0] else ""
+        course = _COURSES[int(shape[0])]
+        if self.moves is Moves.WALL:
+            return f"wall: a cos {self.harmonic}(ψ_P − ψ₀){course}"
         if self.moves is Moves.LINE:
             return f"δr = a (r/50)^{self.exponent}{wave}{course}"
         return f"image {self.moves}: a θ^{self.exponent}{wave}{course}"
 
     def _pattern(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         parts = np.array([*amplitude, 0.0])[:2]
-        return (points.time_s / _REFERENCE_S) ** shape[0] * cosine(points.azimuth_rad, parts, self.harmonic)
+        return self._course(points, shape) * cosine(points.azimuth_rad, parts, self.harmonic)
+
+    def _course(self, points: ImagePoints, shape: Shape) -> Float:
+        if shape == WITH_TIME:
+            return points.time_s / _REFERENCE_S
+        if shape == WITH_SPEED:
+            return points.speed_mm_s / _REFERENCE_MM_S
+        if shape == WITH_DISTANCE and points.distance_mm is not None:
+            return points.distance_mm / _REFERENCE_MM
+        return np.full(len(points.uv), float(shape == STEADY))
+
+
+@dataclass(frozen=True)
+class RowTerm(Nameless):
+    """A delay that grows down the rows: the image moves by its own velocity, in proportion to the row."""
+
+    name: str = "generic_rows"
+    harmonic: int = 0
+    amplitudes: tuple[Amplitude, ...] = (Amplitude("delay", "s", 0.01),)
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return a (v/H − 1/2) times the image's velocity."""
+        row = (points.uv[:, 1] + 0.5) / points.probe.camera.image_size[1] - 0.5
+        return np.asarray(amplitude[0] * row[:, None] * points.velocity_px)
+
+    def formula(self, shape: Shape) -> str:
+        """Return the pattern as a formula."""
+        return "image: a (row/H − 1/2) × velocity"
 
 
 def smooth_columns(points: ImagePoints) -> Float:
@@ -79,11 +115,26 @@ def smooth_texture_columns(points: ImagePoints) -> Float:
 
 
 def _term(moves: Moves, harmonic: int, exponent: int) -> GenericTerm:
-    amplitudes = two_parts("mm", 0.05) if moves is Moves.LINE else two_parts("px", 0.2)
+    in_mm = moves in (Moves.LINE, Moves.WALL)
+    amplitudes = two_parts("mm", 0.05) if in_mm else two_parts("px", 0.2)
     kept = amplitudes if harmonic else amplitudes[:1]
     return GenericTerm(f"generic_{moves}_{harmonic}_{exponent}", moves, harmonic, exponent, kept)
 
 
 GENERIC: tuple[GenericTerm, ...] = tuple(
-    _term(moves, harmonic, exponent) for moves in Moves for harmonic in _HARMONICS for exponent in _EXPONENTS
+    _term(moves, harmonic, exponent)
+    for moves in (Moves.LINE, Moves.OUTWARD, Moves.AROUND)
+    for harmonic in _HARMONICS
+    for exponent in _EXPONENTS
 )
+
+
+def _vocabulary() -> tuple[tuple[EffectModel, Shape], ...]:
+    courses = {Moves.LINE: (STEADY, WITH_TIME, WITH_SPEED), Moves.OUTWARD: (STEADY, WITH_TIME)}
+    moving = [(t, course) for t in GENERIC for course in courses.get(t.moves, (STEADY,))]
+    wall = [(_term(Moves.WALL, m, 0), course) for m in (1, 2, 3, 4) for course in (STEADY, WITH_DISTANCE)]
+    return (*moving, *wall, (RowTerm(), STEADY))
+
+
+# What an empirical formula is put together from: patterns in (r, ψ, t, s, speed, row).
+VOCABULARY: tuple[tuple[EffectModel, Shape], ...] = _vocabulary()

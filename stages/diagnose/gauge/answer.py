@@ -27,7 +27,9 @@ from stages.diagnose.result import (
 )
 
 Float = NDArray[np.float64]
-CONFIDENT = 0.95
+CONFIDENT = 0.97
+# What a fit leaves must be no rarer than this when only noise is left.
+ADEQUATE = 1e-5
 _IN_CLASS = 0.01
 _DRAWS = 400
 
@@ -91,7 +93,7 @@ def members(examined: Examined) -> tuple[str, ...]:
     if examined.verdicts is None:
         return ()
     pairs = zip(examined.verdicts.probability, examined.verdicts.judged, strict=True)
-    names = [n for p, j in pairs if p > _IN_CLASS for n in j.names]
+    names = [n for p, j in pairs if p > _IN_CLASS and j.named for n in j.names]
     return tuple(dict.fromkeys(names))
 
 
@@ -145,17 +147,15 @@ def ring_picture(examined: Examined, azimuths: int = 180) -> Picture:
 def verdict_of(examined: Examined) -> Verdict:
     """Return what rings and fiducials alone come to."""
     best, verdicts = examined.best, examined.verdicts
-    if best is None or verdicts is None or not best.fit.terms:
+    if best is None or verdicts is None:
         return Verdict.CONSISTENT
-    if any(name.startswith("decoy") for name in best.names):
+    if not best.named or verdicts.adequacy < ADEQUATE:
+        return Verdict.UNEXPLAINED
+    if any(not c.agrees for each in examined.confirmed for c in each):
         return Verdict.UNEXPLAINED
     sure = all(verdicts.chance_of(n) > CONFIDENT for n in best.names)
-    confirmed = all(
-        any(c.agrees for c in each) and all(c.agrees for c in each) for each in examined.confirmed
-    )
-    if sure and confirmed:
-        return Verdict.NAMED
-    return Verdict.CLASS if confirmed or not sure else Verdict.UNEXPLAINED
+    confirmed = all(each for each in examined.confirmed)
+    return Verdict.NAMED if sure and confirmed else Verdict.CLASS
 
 
 def same_class(names: tuple[str, ...]) -> bool:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from pipeline.physics.catalogue import effect
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
@@ -121,7 +120,7 @@ def _by_kind(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> tuple
     _, edges, both = evidence(
         run, judged.fit, (), [Part(everything, (EDGE,)), Part(everything, (EDGE, RING))]
     )
-    if effect(term.model.name).family != "camera" and not _seen(edges, term):
+    if not _seen(edges, term):
         return ()
     from_edges = partial_of("fiducials alone", edges, judged, term, stated)
     rings = Evidence(

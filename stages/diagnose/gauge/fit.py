@@ -70,7 +70,10 @@ def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int =
     for _ in range(iterations):
         prior, pull, _ = _prior(found.state, found.terms, run)
         information = found.reduced.information + prior
-        step = np.asarray(np.linalg.solve(information, found.reduced.right - pull), np.float64)
+        downhill = found.reduced.right - pull
+        step = np.asarray(np.linalg.solve(information, downhill), np.float64)
+        if float(step @ downhill) < _CONVERGED:
+            break
         better = _shortened(run, found, step)
         if better is None:
             return found

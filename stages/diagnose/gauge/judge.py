@@ -1,4 +1,4 @@
-"""Rivals compared on held-out regimes: another bore, another part of the motion."""
+"""Rivals compared: the marginal likelihood of all measurements ranks them, held-out regimes guard it."""
 
 from __future__ import annotations
 
@@ -10,18 +10,24 @@ from numpy.typing import NDArray
 
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.decoys import DECOYS
+from stages.diagnose.effects.generic import VOCABULARY
+from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.evidence import INSTRUMENT, Evidence, total
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
+from stages.diagnose.gauge.formula import adequacy, empirical
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.scan import scan
-from stages.diagnose.gauge.search import Search, alike, refits
+from stages.diagnose.gauge.scan import scan, span
+from stages.diagnose.gauge.search import Search, refits
 from stages.diagnose.inference import PRIOR_PLAUSIBLE, Stated, estimate
 
 Float = NDArray[np.float64]
-_RIVALS = 4
 _STRETCHES = 2
 _LEAST_FRAMES = 8
+# Beforehand: each effect of the library is as likely as any other, a nameless cause a third as likely as all
+# of them together, a decoy a third as likely as one effect.
+_NAMELESS = 1 / 3
+_PEAK = 2
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,8 @@ class Judged:
     surprise, heldout : float
         −2 ln of the likelihood of all, and of each regime given the others, over by how much neighbours err
         alike.
+    beforehand : float
+        −2 ln of its chance before anything was measured.
     """
 
     fit: Fit
@@ -54,20 +62,41 @@ class Judged:
     by_regime: tuple[Evidence, ...]
     surprise: float
     heldout: float
+    beforehand: float
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects, in order."""
         return tuple(sorted(t.model.name for t in self.fit.terms))
 
+    @property
+    def named(self) -> bool:
+        """Whether all its effects are of the library, and there are some."""
+        return bool(self.fit.terms) and not any(isinstance(t.model, Nameless) for t in self.fit.terms)
+
 
 @dataclass(frozen=True)
 class Verdicts:
-    """All hypotheses, the likeliest first, with the chance of each."""
+    """All hypotheses, the likeliest first, with the chance of each.
+
+    Attributes
+    ----------
+    regimes, judged
+    probability : (H,)
+    adequacy : float
+        Chance that what the likeliest leaves is noise.
+    formula : Judged
+        The empirical formula, whether it is the likeliest or not.
+    alike : float
+        How many measurements that err alike count as one.
+    """
 
     regimes: tuple[Regime, ...]
     judged: tuple[Judged, ...]
     probability: Float
+    adequacy: float
+    formula: Judged
+    alike: float
 
     def chance_of(self, name: str) -> float:
         """Return the chance that an effect is among the causes."""
@@ -94,35 +123,55 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
 
 
 def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) -> Verdicts:
-    """Fit the found hypothesis' rivals to all, and rank them by what they say of regimes held out."""
-    run, regimes = searched.run, regimes_of(searched.run)
-    fits = [searched.nothing, searched.found, *_rivals(searched, library, stated)]
-    scores = searched.steps[0].scores
-    deflation = alike(scores)
-    judged = [judged_of(run, f, regimes, stated, deflation) for f in _distinct(fits)]
-    judged.sort(key=lambda j: j.heldout)
-    heldout = np.array([j.heldout for j in judged])
-    weight = np.exp(-0.5 * (heldout - heldout.min()))
-    return Verdicts(regimes, tuple(judged), weight / weight.sum())
+    """Rank the found hypothesis, its rivals, decoys and an empirical formula."""
+    run, regimes, alike = searched.run, regimes_of(searched.run), searched.alike
+    formula = empirical(run, searched.nothing, stated)
+    fits = _distinct(
+        [searched.nothing, searched.found, *searched.rivals, *_decoyed(searched, stated), formula]
+    )
+    judged = [judged_of(run, f, regimes, stated, alike, beforehand(run, f, len(library))) for f in fits]
+    of_formula = next(j for j in judged if j.fit is formula) if formula.terms else judged[0]
+    nothing = next(j for j in judged if not j.fit.terms)
+    # What predicts other regimes worse than the stated instrument does explains nothing.
+    allowed = np.array([j.heldout <= nothing.heldout for j in judged])
+    total_surprise = np.array([j.surprise + j.beforehand for j in judged])
+    weight = np.where(allowed, np.exp(-0.5 * (total_surprise - total_surprise[allowed].min())), 0.0)
+    order = np.lexsort((total_surprise, -weight))
+    ranked = tuple(judged[k] for k in order)
+    left = adequacy(run, ranked[0].fit, stated)
+    return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike)
+
+
+def beforehand(run: GaugeRun, found: Fit, effects: int) -> float:
+    """Return −2 ln of a hypothesis' chance beforehand: how many others there are like it, shapes included."""
+    chance = 1.0
+    nameless = sum(isinstance(t.model, Nameless) for t in found.terms)
+    if nameless:
+        chance *= _NAMELESS
+    for t in found.terms:
+        formula = (t.model, t.shape) in VOCABULARY
+        rivals = len(VOCABULARY) if formula else effects
+        chance /= rivals * max(len(t.model.shapes(*span(run))) / _PEAK, 1.0) if not formula else rivals
+    return float(-2 * np.log(chance))
 
 
 def judged_of(
-    run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, deflation: float
+    run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, alike: float, before: float = 0.0
 ) -> Judged:
     """Return the hypothesis' evidence and its surprise, held out and not."""
     whole, *parts = evidence(run, found, (), [r.part for r in regimes])
     sigma = prior_sigma(whole, found.terms)
 
     def surprise(of: Evidence) -> float:
-        return estimate(of, stated, sigma).surprise / deflation
+        return estimate(of.deflated(alike), stated, sigma).surprise
 
     if len(parts) < 2:
-        return Judged(found, whole, tuple(parts), surprise(whole), surprise(whole))
+        return Judged(found, whole, tuple(parts), surprise(whole), surprise(whole), before)
     together = surprise(total(parts).over(whole.columns))
     heldout = [
         together - surprise(total([p for p in parts if p is not left]).over(whole.columns)) for left in parts
     ]
-    return Judged(found, whole, tuple(parts), surprise(whole), float(np.sum(heldout)))
+    return Judged(found, whole, tuple(parts), surprise(whole), float(np.sum(heldout)), before)
 
 
 def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
@@ -136,26 +185,23 @@ def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
     )
 
 
-def _rivals(searched: Search, library: Mapping[str, EffectModel], stated: Stated) -> list[Fit]:
-    """Return fits with another effect, or a decoy, in each found one's place."""
+def _decoyed(searched: Search, stated: Stated) -> list[Fit]:
+    """Return fits with the best decoy in each found effect's place."""
     run, found, out = searched.run, searched.found, []
     decoys = {d.name: d for d in DECOYS}
-    for k, term in enumerate(found.terms):
+    for k in range(len(found.terms)):
         others = found.terms[:k] + found.terms[k + 1 :]
         reduced = fit(run, found.state, others) if others else searched.nothing
-        rest = {name: m for name, m in library.items() if name != term.model.name}
-        scores = scan(run, reduced, rest, stated)
-        out += refits(run, reduced, scores, _RIVALS)
-        out += refits(run, reduced, scan(run, reduced, decoys, stated), 1)
-        out.append(reduced)
+        out += [reduced, *refits(run, reduced, scan(run, reduced, decoys, stated), 1)]
     return out
 
 
 def _distinct(fits: Sequence[Fit]) -> list[Fit]:
     """Return the best fit of each set of effects."""
-    best: dict[tuple[str, ...], Fit] = {}
+    best: dict[tuple[tuple[str, tuple[float, ...]], ...], Fit] = {}
     for f in fits:
-        names = tuple(sorted(t.model.name for t in f.terms))
-        if names not in best or f.cost < best[names].cost:
-            best[names] = f
+        shaped = ((t.model.name, t.shape if isinstance(t.model, Nameless) else ()) for t in f.terms)
+        key = tuple(sorted(shaped))
+        if key not in best or f.cost < best[key].cost:
+            best[key] = f
     return list(best.values())

@@ -30,7 +30,7 @@ def ring_points(state: Unknowns, rings: BoreRings, time_s: Float, width_px: Floa
     return ImagePoints(
         state.probe, rings.frame, time_s[rings.frame], rings.uv, xyz_c, normal_c, along_c,
         rate[:, None] * rings.outward, speed_along(state, time_s)[rings.frame], True, width_px,
-        np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2],
+        np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2], per_px_c=along_ray,
     )  # fmt: skip
 
 

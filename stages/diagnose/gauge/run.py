@@ -124,8 +124,8 @@ def _baseline(edges: Edges, edge_at: ImagePoints, ring_at: ImagePoints, parts: S
 
 def ring_mm_per_px(points: ImagePoints) -> Float:
     """Return (M,) by how much the radius grows with the ring's outward shift in the image."""
-    by_pixel = points.probe.triangulate_jacobian(points.uv)[0]
-    return np.asarray(np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward))
+    assert points.per_px_c is not None
+    return np.asarray(np.sum(points.normal_c * points.per_px_c, axis=1))
 
 
 def _without_ring_shift(

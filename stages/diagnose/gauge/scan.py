@@ -37,7 +37,7 @@ class Scored:
 def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated) -> list[Scored]:
     """Return the scores of the effects not yet in the fit, the most telling first."""
     models = [m for name, m in library.items() if name not in {t.model.name for t in found.terms}]
-    shapes = {m.name: m.shapes(*_span(run)) for m in models}
+    shapes = {m.name: m.shapes(*span(run)) for m in models}
     few = [(m, s) for m in models if len(shapes[m.name]) <= _MANY for s in shapes[m.name]]
     best = _best(run, found, few, stated)
     thin = thinned(run)
@@ -103,6 +103,7 @@ def _near(shape: Shape, shapes: Sequence[Shape]) -> list[Shape]:
     return [(float(x), *shape[1:]) for x in between]
 
 
-def _span(run: GaugeRun) -> tuple[float, float]:
+def span(run: GaugeRun) -> tuple[float, float]:
+    """Return the run's duration in s and its frame rate."""
     duration = float(run.time_s[-1] - run.time_s[0])
     return duration, (len(run.time_s) - 1) / max(duration, 1e-9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,13 @@ from stages.diagnose.inference import Stated
 Float = NDArray[np.float64]
 # Below this chance, corrected for all that was tried, something is there.
 DETECTED = 1e-4
-_REFITTED = 5
+_REFITTED = 4
 _MOST_EFFECTS = 3
 _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
+_RIVAL_ITERATIONS = 5
+# Rivals further off than this gain of χ² are out of the question.
+_FAR, _REWEIGHED = 100.0, 4
 # A further effect smaller than this share of the first may be the first's imprecise prediction.
 _LEAST_SHARE = 0.01
 
@@ -39,26 +42,47 @@ class Step:
 
 @dataclass(frozen=True)
 class Search:
-    """The selection's outcome: measurements with final weights, the final fit, and the steps to it."""
+    """The selection's outcome.
+
+    Attributes
+    ----------
+    run : GaugeRun
+        Measurements with final weights.
+    nothing, found : Fit
+        With no effect, and with those selected.
+    rivals : tuple of Fit
+        Fits with another effect in one found one's place, or without one.
+    steps : tuple of Step
+    alike : float
+        How many measurements that err alike count as one, after the effects found.
+    """
 
     run: GaugeRun
     nothing: Fit
     found: Fit
+    rivals: tuple[Fit, ...]
     steps: tuple[Step, ...]
+    alike: float
 
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
     """Add effects while the data ask for them; then see whether a rival does better in each one's place."""
-    found, steps = start, []
+    nothing, found, steps = start, start, []
+    rivals: tuple[Fit, ...] = ()
     while True:
         step, better = _extended(run, found, library, stated)
         steps.append(step)
         if better is None or len(better.terms) > _MOST_EFFECTS:
             break
+        if found.terms:
+            found, rivals = _exchanged(run, better, step.tried, library, stated)
+            continue
         run = weighed(run, better.state, better.terms)
-        found = fit(run, better.state, better.terms)
-        found = _exchanged(run, found, library, stated) if len(found.terms) > 1 else found
-    return Search(run, fit(run, start.state, ()), found, tuple(steps))
+        nothing = fit(run, start.state, ())
+        near = [f for f in step.tried if f.cost < better.cost + _FAR * alike(step.scores)][:_REWEIGHED]
+        found, *rest = (fit(run, f.state, f.terms, _RIVAL_ITERATIONS) for f in near)
+        found, rivals = _sorted(found, rest)
+    return Search(run, nothing, found, tuple(rivals), tuple(steps), alike(steps[-1].scores))
 
 
 def global_p(scores: Sequence[Scored]) -> float:
@@ -67,19 +91,29 @@ def global_p(scores: Sequence[Scored]) -> float:
 
 
 def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored], most: int = _REFITTED) -> list[Fit]:
-    """Return the fits with each of the most promising effects added, best first."""
+    """Return the fits with each of the most promising effects added, best first; no impossible sizes."""
     promising = sorted(scores, key=lambda s: -s.score.gain)[:most]
     worth = [s for s in promising if s.score.gain > _WORTH_REFITTING * promising[0].score.gain]
-    fits = []
-    for s in worth:
-        term = Term(s.model, s.shape, s.score.amplitude)
-        # A large effect promises more than its linear prediction keeps: start small, too.
-        fits += [_best_start(run, found, term)]
-    return sorted(fits, key=lambda f: f.cost)
+    # A large effect promises more than its linear prediction keeps: start from none of it.
+    terms = [Term(s.model, s.shape, 0 * s.score.amplitude) for s in worth]
+    fits = [fit(run, found.state, (*found.terms, term), _RIVAL_ITERATIONS) for term in terms]
+    possible = [f for f in fits if f.terms[-1].model.possible(f.terms[-1].shape, f.terms[-1].amplitude)]
+    return sorted(possible or fits, key=lambda f: f.cost)
 
 
-def _best_start(run: GaugeRun, found: Fit, term: Term) -> Fit:
-    return fit(run, found.state, (*found.terms, replace(term, amplitude=0 * term.amplitude)))
+def alike(scores: Sequence[Scored]) -> float:
+    """Return by how much a gain of χ² is overrated because neighbours err alike."""
+    ratio = [s.score.gain / s.score.statistic for s in scores if s.score.statistic > 1]
+    return float(max(np.median(ratio), 1.0)) if ratio else 1.0
+
+
+def shift_px(found: Fit, term: Term) -> float:
+    """Return the r.m.s. shift in px of rings and fiducials by a term."""
+    ring = ring_shift_px(term.model, found.linearised.rings, term.shape, term.amplitude)
+    edge = np.linalg.norm(
+        texture_shift_px(term.model, found.linearised.edges, term.shape, term.amplitude), axis=1
+    )
+    return float(max(np.sqrt(np.nanmean(ring**2)), np.sqrt(np.nanmean(edge**2))))
 
 
 def _extended(
@@ -92,38 +126,32 @@ def _extended(
     tried = refits(run, found, scores)
     step = Step(found, tuple(scores), tuple(tried), p_value)
     best = tried[0]
-    needed = found.cost - best.cost > _LEAST_GAIN * alike(scores) and _counts(run, best)
+    needed = found.cost - best.cost > _LEAST_GAIN * alike(scores) and _counts(best)
     return step, best if needed else None
 
 
-def alike(scores: Sequence[Scored]) -> float:
-    """Return by how much a gain of χ² is overrated because neighbours err alike."""
-    ratio = [s.score.gain / s.score.statistic for s in scores if s.score.statistic > 1]
-    return float(max(np.median(ratio), 1.0)) if ratio else 1.0
-
-
-def _counts(run: GaugeRun, found: Fit) -> bool:
+def _counts(found: Fit) -> bool:
     """Return whether the last effect is no mere trifle beside the others."""
     sizes = [shift_px(found, t) for t in found.terms]
     return len(sizes) < 2 or sizes[-1] > _LEAST_SHARE * max(sizes[:-1])
 
 
-def shift_px(found: Fit, term: Term) -> float:
-    """Return the r.m.s. shift in px of rings and fiducials by a term."""
-    ring = ring_shift_px(term.model, found.linearised.rings, term.shape, term.amplitude)
-    edge = np.linalg.norm(
-        texture_shift_px(term.model, found.linearised.edges, term.shape, term.amplitude), axis=1
-    )
-    return float(max(np.sqrt(np.nanmean(ring**2)), np.sqrt(np.nanmean(edge**2))))
-
-
-def _exchanged(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Fit:
-    """Try to put another effect in each term's place."""
-    for k in range(len(found.terms)):
+def _exchanged(
+    run: GaugeRun, found: Fit, tried: Sequence[Fit], library: Mapping[str, EffectModel], stated: Stated
+) -> tuple[Fit, tuple[Fit, ...]]:
+    """Try another effect in each earlier term's place; the last one's rivals were tried when it came."""
+    every = [found, *tried]
+    for k in range(len(found.terms) - 1):
         others = found.terms[:k] + found.terms[k + 1 :]
-        reduced = fit(run, found.state, others)
-        scores = scan(run, reduced, library, stated)
-        best = refits(run, reduced, scores, 3)[0]
-        if best.cost < found.cost - _LEAST_GAIN:
-            found = best
-    return found
+        reduced = fit(run, found.state, others, _RIVAL_ITERATIONS)
+        taken = {found.terms[k].model.name}
+        scores = [s for s in scan(run, reduced, library, stated) if s.model.name not in taken]
+        every += [reduced, *refits(run, reduced, scores, 3)]
+    return _sorted(every[0], every[1:])
+
+
+def _sorted(found: Fit, others: Sequence[Fit]) -> tuple[Fit, tuple[Fit, ...]]:
+    """Return the fit of the least cost among those with as many terms, and all others."""
+    full = [f for f in (found, *others) if len(f.terms) == len(found.terms)]
+    best = min(full, key=lambda f: f.cost)
+    return best, tuple(f for f in (found, *others) if f is not best)

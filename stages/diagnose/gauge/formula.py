@@ -1,0 +1,101 @@
+"""An empirical formula by sparse regression, and what is left when nothing of the library is added.
+
+Orthogonal matching pursuit (Y. Pati et al., 1993) over patterns in (r, ψ, t, s, speed, row), on the evidence
+from which poses and the stated instrument have been taken out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.generic import VOCABULARY
+from stages.diagnose.evidence import Evidence
+from stages.diagnose.gauge.fit import Fit, evidence, fit
+from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.inference import (
+    DEGREES,
+    Score,
+    Stated,
+    eliminated,
+    instrument_places,
+    places_of,
+    score,
+)
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_MOST_TERMS = 4
+# A further term must be rarer than this by chance, corrected for all that were tried.
+_NEEDED = 1e-4
+# Directions seen less sharply than this part of the sharpest tell nothing of adequacy.
+_WEAK = 1e-3
+
+
+def empirical(run: GaugeRun, nothing: Fit, stated: Stated) -> Fit:
+    """Return the fit with the few patterns that explain the most."""
+    about = evidence(run, nothing, VOCABULARY)[0]
+    chosen: list[tuple[EffectModel, Shape, Score]] = []
+    for _ in range(_MOST_TERMS):
+        given = _places(about, [(m, s) for m, s, _ in chosen])
+        best = _next(about, stated, given, [(m, s) for m, s, _ in chosen])
+        if best is None:
+            break
+        chosen.append(best)
+    terms = [Term(model, shape, np.zeros(len(model.amplitudes))) for model, shape, _ in chosen]
+    return fit(run, nothing.state, terms)
+
+
+def adequacy(run: GaugeRun, found: Fit, stated: Stated) -> float:
+    """Return the chance that what a fit leaves is noise: of the worst single pattern and of all together."""
+    about = evidence(run, found, VOCABULARY)[0]
+    given = _places(about, [(t.model, t.shape) for t in found.terms])
+    each = [_score(about, stated, m, s, given) for m, s in VOCABULARY]
+    single = min((s.p_value for s in each if s is not None), default=1.0) * len(VOCABULARY)
+    return float(min(2 * min(single, joint_p(about, stated, given)), 1.0))
+
+
+def joint_p(about: Evidence, stated: Stated, given: Int) -> float:
+    """Return the chance of the scores of all patterns together when only noise is left.
+
+    Scores are taken along the principal directions of their information, each over its true spread.
+    """
+    block = _places(about, VOCABULARY)
+    free = np.union1d(instrument_places(about), given).astype(np.int64)
+    own, right, _ = eliminated(about, stated, block, free)
+    a = about.information
+    size = np.sqrt(np.maximum(np.diag(a)[block], 1e-300))
+    value, vector = np.linalg.eigh(own / np.outer(size, size))
+    seen = value > _WEAK * value[-1]
+    inflation = np.diag(about.score_covariance)[block] / np.maximum(np.diag(a)[block], 1e-300)
+    along = vector[:, seen].T @ (right / size)
+    spread = value[seen] * (vector[:, seen].T ** 2 @ inflation)
+    statistic = float(np.sum(along**2 / spread))
+    return float(stats.f.sf(statistic / seen.sum(), seen.sum(), DEGREES))
+
+
+def _next(
+    about: Evidence, stated: Stated, given: Int, chosen: Sequence[tuple[EffectModel, Shape]]
+) -> tuple[EffectModel, Shape, Score] | None:
+    scored = [
+        (model, shape, result)
+        for model, shape in VOCABULARY
+        if (model, shape) not in chosen and (result := _score(about, stated, model, shape, given)) is not None
+    ]
+    best = max(scored, key=lambda s: s[2].statistic / len(s[2].amplitude), default=None)
+    needed = best is not None and best[2].p_value * len(VOCABULARY) < _NEEDED
+    return best if needed else None
+
+
+def _score(about: Evidence, stated: Stated, model: EffectModel, shape: Shape, given: Int) -> Score | None:
+    block = places_of(about, model, shape)
+    return score(about, stated, block, given) if not np.isin(block, given).any() else None
+
+
+def _places(about: Evidence, asked: Sequence[tuple[EffectModel, Shape]]) -> Int:
+    each = [places_of(about, model, shape) for model, shape in asked]
+    return np.concatenate([np.zeros(0, np.int64), *each]).astype(np.int64)
