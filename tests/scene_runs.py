@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -37,11 +38,11 @@ class SceneScore:
     distance_sigma_percent: float
 
 
-def run_scene(scene: Scene, folder: Path) -> SceneScore:
+def run_scene(scene: Scene, folder: Path, assignments: Sequence[str] = ()) -> SceneScore:
     """Render, run and score a scene below ``folder``."""
     recording, truth = rendered(scene, folder)
     run = folder / f"{scene.name}-run"
-    job = open_job(recording, run, None, PIPELINE, EXPORTERS, resolve(PIPELINE, None, ()))
+    job = open_job(recording, run, None, PIPELINE, EXPORTERS, resolve(PIPELINE, None, assignments))
     run_job(job, Selection(), SilentDisplay())
     return score(run, truth)
 

@@ -18,7 +18,7 @@ from pipeline.commands.gallery_figures import (
 )
 from pipeline.pages import page_template
 from pipeline.simulator.gallery.exhibit import Exhibit
-from pipeline.simulator.gallery.likeness import Likeness, likenesses
+from pipeline.simulator.gallery.likeness import STATES, Likeness, likenesses
 from pipeline.simulator.gallery.line import WINDOW_PX
 from pipeline.simulator.gallery.stage_set import surroundings
 from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM
@@ -87,6 +87,7 @@ def _shown(exhibit: Exhibit, alike: Sequence[Likeness], checks: Sequence[Check])
         "harmonic": exhibit.harmonic,
         "exponent": exhibit.exponent,
         "alike": alike,
+        "most_alike": next((a.name for a in alike if a.name not in STATES), ""),
         "checks": [(c, verdict(c).replace("*", "")) for c in checks if c.name == exhibit.name],
     }
 

@@ -12,6 +12,7 @@ import time
 import traceback
 from pathlib import Path
 
+from pipeline.errors import Cancelled
 from pipeline.simulator.scene import Scene
 from tests.scene_runs import SceneScore, run_scene
 from tests.simulated import SCENES, shipped, smaller
@@ -41,6 +42,8 @@ def _one(scene: Scene, folder: Path) -> None:
     began = time.process_time()
     try:
         found = run_scene(scene, folder)
+    except Cancelled:
+        raise
     except Exception:  # noqa: BLE001 - one scene that fails must not hide the others
         print(f"{scene.name:<20} FAILED\n{traceback.format_exc()}", flush=True)
         return

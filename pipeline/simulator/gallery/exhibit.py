@@ -13,7 +13,7 @@ from pipeline.simulator.gallery.course import Course, course_of
 from pipeline.simulator.gallery.line import SeenLine, read_radii, seen_line
 from pipeline.simulator.gallery.stage_set import scene_pair
 from pipeline.simulator.laws.bench import RADII_MM
-from pipeline.simulator.laws.harmonics import exponent, strongest
+from pipeline.simulator.laws.harmonics import exponent, harmonic, strongest
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.truth import SceneTruth
 
@@ -97,10 +97,14 @@ class Exhibit:
 
     @property
     def harmonic(self) -> int | None:
-        """Strongest harmonic, 0 to 6, of the radius error in 4 inch; None without one."""
+        """The harmonic, 0 to 6, that is most of the radius error in 4 inch; None where none is."""
         if not self.shows_on_ring:
             return None
-        return strongest(self.azimuth_rad, self.residual[max(self.residual)].error_mm)
+        residual = self.residual[max(self.residual)]
+        order = strongest(self.azimuth_rad, residual.error_mm)
+        size = abs(harmonic(self.azimuth_rad, residual.error_mm, order))
+        mean_square = size**2 / (2 if order else 1)
+        return order if mean_square >= residual.rms_mm**2 / 2 else None
 
     @property
     def exponent(self) -> float | None:

@@ -27,7 +27,7 @@ class Likeness:
 
 
 def likenesses(exhibits: Sequence[Exhibit], most: int = 5, least: float = 0.9) -> dict[str, list[Likeness]]:
-    """Return for each effect what looks like it in one bore, the most alike first.
+    """Return for each effect what looks like it in one bore, first what does so in all three.
 
     Compared are radius errors over azimuth; of effects that leave the radius alone the motion less the
     encoder's reading, or else light, width and skewness of the line. An effect with a direction of its own
@@ -40,7 +40,7 @@ def _alike(one: Exhibit, exhibits: Sequence[Exhibit], least: float) -> list[Like
     found = [_effect_likeness(one, e) for e in exhibits if e is not one and _kind(e) == _kind(one)]
     if one.shows_on_ring:
         found += [_state_likeness(one, name, order) for name, order in STATES.items()]
-    return sorted((f for f in found if f.one_bore >= least), key=lambda f: -f.one_bore)
+    return sorted((f for f in found if f.one_bore >= least), key=lambda f: -f.all_bores)
 
 
 def _kind(exhibit: Exhibit) -> str:
