@@ -1,11 +1,10 @@
 /** The unrolled wall: distance to the right, clock downward from 6 over 12 to 6, tiles loaded as they are seen. */
 import type { Session } from "./session";
-import type { Finding, Layer, Point } from "./types";
+import { TileLayer, type Ground } from "./tiles";
+import type { Finding, Point } from "./types";
 import { TURN, clock, element } from "./words";
 
-const TILE = 512;
 const TOP = -1.5 * Math.PI; // 6 o'clock
-const MOST_TILES = 160;
 // Outlines lie on pictures of any colour, in light and dark alike: bright on a black casing.
 const [CASING, OUTLINE, CHOSEN] = ["#000000", "#ffffff", "#ffc400"];
 const MARKS: Record<string, string> = { open: "?", accepted: "✓", rejected: "✕" };
@@ -18,17 +17,16 @@ export class FlatView {
     tabindex: "0", role: "img",
     "aria-label": "Unrolled wall. Arrow keys move the spot, plus and minus zoom; with a tool, Enter sets a point, Backspace takes it back.",
   });
-  private readonly tiles = new Map<string, HTMLImageElement>();
-  private layer: Layer | null = null;
-  private shown = ""; // the layer whose levels are known
+  private readonly picture: TileLayer;
   private view: View;
   private drag: { x: number; y: number; view: View; moved: boolean } | null = null;
 
   constructor(private readonly session: Session) {
     this.root = element("div", { class: "flat" }, this.canvas);
     const { run } = session;
+    this.picture = new TileLayer(session.source, () => this.paint());
     this.view = { distance: session.cursor[0], azimuth: TOP + Math.PI, mmPerPx: (TURN * run.radius_mm) / 320 };
-    session.on(["layer"], () => void this.load());
+    session.on(["layer"], () => this.load());
     session.on(["state", "selection", "cursor", "shape", "tool"], () => this.paint());
     session.on(["selection"], () => this.reveal());
     new ResizeObserver(() => this.resize()).observe(this.root);
@@ -37,7 +35,7 @@ export class FlatView {
     this.canvas.addEventListener("pointerup", (e) => this.release(e));
     this.canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     this.canvas.addEventListener("keydown", (e) => this.key(e));
-    void this.load();
+    this.load();
   }
 
   private get perRad(): number { return this.session.run.radius_mm / this.view.mmPerPx; }
@@ -55,17 +53,13 @@ export class FlatView {
     ];
   }
 
-  private async load(): Promise<void> {
-    const name = this.session.layer;
-    try {
-      const layer = await this.session.source.layer(name);
-      if (name !== this.session.layer) return;
-      this.layer = layer;
-      this.shown = name;
-      this.paint();
-    } catch (error) {
-      this.session.say(error instanceof Error ? error.message : String(error));
-    }
+  private load(): void {
+    this.picture.load(this.session.layer).catch((error: Error) => this.session.say(error.message));
+  }
+
+  private get ground(): Ground {
+    const span: Point = [this.point(0, 0)[0], this.point(this.size[0], 0)[0]];
+    return { x: (s) => this.x(s), y: (a) => this.y(a), size: this.size, span, mmPerPx: this.view.mmPerPx };
   }
 
   private resize(): void {
@@ -100,60 +94,18 @@ export class FlatView {
 
   private paint(): void {
     const context = this.canvas.getContext("2d");
-    if (!context || !this.layer) return;
+    if (!context || !this.picture.layer) return;
     const ratio = window.devicePixelRatio || 1;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const [width, height] = this.size;
     const style = getComputedStyle(this.root);
     context.fillStyle = style.getPropertyValue("--ground");
     context.fillRect(0, 0, width, height);
-    for (const turn of [-TURN, 0, TURN]) this.paintTiles(context, turn);
+    this.picture.paint(context, this.ground);
     this.paintGrid(context, style);
     for (const turn of [-TURN, 0, TURN]) this.paintFindings(context, turn);
     this.paintCursor(context);
     this.paintShape(context);
-  }
-
-  private paintTiles(context: CanvasRenderingContext2D, turn: number): void {
-    const layer = this.layer!;
-    const mmPerPixel = (layer.distance_mm[1] - layer.distance_mm[0]) / layer.width;
-    const level = Math.max(0, Math.min(layer.levels - 1, Math.floor(Math.log2(this.view.mmPerPx / mmPerPixel))));
-    const span = TILE << level;
-    const left = this.point(0, 0)[0], right = this.point(this.size[0], 0)[0];
-    const first = Math.max(0, Math.floor((left - layer.distance_mm[0]) / mmPerPixel / span));
-    const last = Math.min(Math.ceil(layer.width / span) - 1, Math.floor((right - layer.distance_mm[0]) / mmPerPixel / span));
-    context.imageSmoothingEnabled = this.view.mmPerPx > mmPerPixel / 3;
-    for (let row = 0; row * span < layer.height; row++) {
-      const from = layer.azimuth_rad + turn + (row * span * TURN) / layer.height;
-      const to = layer.azimuth_rad + turn + (Math.min((row + 1) * span, layer.height) * TURN) / layer.height;
-      if (this.y(to) < 0 || this.y(from) > this.size[1]) continue;
-      for (let column = first; column <= last; column++) {
-        const image = this.tile(level, column, row);
-        if (!image) continue;
-        const x0 = this.x(layer.distance_mm[0] + column * span * mmPerPixel);
-        const x1 = this.x(layer.distance_mm[0] + Math.min((column + 1) * span, layer.width) * mmPerPixel);
-        context.drawImage(image, x0, this.y(from), x1 - x0 + 0.5, this.y(to) - this.y(from) + 0.5);
-      }
-    }
-  }
-
-  private tile(level: number, column: number, row: number): HTMLImageElement | null {
-    const address = this.session.source.tile(this.shown, level, column, row);
-    const known = this.tiles.get(address);
-    if (known) {
-      this.tiles.delete(address);
-      this.tiles.set(address, known); // the least recently seen are dropped first
-      return known.complete && known.naturalWidth ? known : null;
-    }
-    const image = new Image();
-    image.onload = () => this.paint();
-    image.src = address;
-    this.tiles.set(address, image);
-    for (const old of this.tiles.keys()) {
-      if (this.tiles.size <= MOST_TILES) break;
-      this.tiles.delete(old);
-    }
-    return null;
   }
 
   private paintGrid(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
