@@ -84,6 +84,12 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume/--no-resume", help="Continue from what is there, or start afresh.")
     ] = True,
+    follow: Annotated[
+        bool, typer.Option(help="The recording is still being written: show it live, run it when it rests.")
+    ] = False,
+    quiet_s: Annotated[
+        float, typer.Option(min=1, help="With --follow: at rest after so many seconds without growth.")
+    ] = 10.0,
 ) -> None:
     """Turn a recording into a run folder: model, measurements, defects and report."""
     from rich.console import Console
@@ -96,6 +102,10 @@ def run(
 
     console = Console(stderr=True)
     configuration = _configuration(config, assignments)
+    if follow:
+        from pipeline.commands.follow import follow as follow_recording
+
+        follow_recording(recording, output, probe, quiet_s, console)
     job = open_job(recording, output, probe, PIPELINE, EXPORTERS, configuration)
     _print_inputs(console, job.recording.name, job.recording.warnings)
     with ProgressDisplay(console) as display:

@@ -1,0 +1,94 @@
+"""A recording is followed while it is written, and ends equal to a run made afterwards."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.errors import Cancelled
+from pipeline.follow.watch import glimpses
+from pipeline.instrument.probe_file import read_probe
+from pipeline.recording import open_recording
+from pipeline.stage import quiet_context
+from stages.preview import preliminary_sections
+from stages.rings import RingParameters
+from tests.bad_recordings import cut_sample
+from tests.shared_data import PROJECT_ROOT
+
+QUICK = ("--set", "rings.azimuths=360")
+FEW = RingParameters.model_validate({"azimuths": 360})
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return cut_sample(tmp_path_factory.mktemp("followed") / "cut", frames=24)
+
+
+def written_slowly(whole: Path, growing: Path, pieces: int, pause_s: float) -> None:
+    """Write a recording as a recorder does: description first, then tables and video piece by piece."""
+    growing.mkdir()
+    for name in ("recording.yaml", "probe.yaml"):
+        shutil.copy(whole / name, growing / name)
+    rest = {n: (whole / n).read_bytes() for n in ("encoder.csv", "frames.csv", "frames.mkv")}
+    for k in range(pieces):
+        for name, content in rest.items():
+            with (growing / name).open("ab") as file:
+                file.write(content[len(content) * k // pieces : len(content) * (k + 1) // pieces])
+        time.sleep(pause_s)
+
+
+def run(recording: Path, output: Path, *more: str) -> None:
+    command = [sys.executable, "-m", "pipeline.cli", "run", str(recording), "-o", str(output), *QUICK, *more]
+    told = subprocess.run(command, cwd=PROJECT_ROOT, capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+
+
+def test_followed_and_afterwards_are_the_same(whole: Path, tmp_path: Path) -> None:
+    growing = tmp_path / "cut"
+    writer = threading.Thread(target=written_slowly, args=(whole, growing, 6, 0.3))
+    writer.start()
+    run(growing, tmp_path / "followed", "--follow", "--quiet-s", "4")
+    writer.join()
+    run(whole, tmp_path / "afterwards")
+    for name in ("radius_map.npz", "trajectory.csv", "defects.json", "model.glb"):
+        followed, afterwards = (tmp_path / kind / name for kind in ("followed", "afterwards"))
+        assert followed.read_bytes() == afterwards.read_bytes(), name
+    page = (tmp_path / "followed" / "live.html").read_text("utf-8")
+    with (whole / "frames.csv").open() as file:
+        rings = sum(row["illumination"] == "laser" for row in csv.DictReader(file))
+    assert f"<dd>{rings}</dd>" in page, "every ring is on the page once the recording is at rest"
+    assert 'http-equiv="refresh"' not in page
+    (diameter,) = re.findall(r"([\d.]+) ± ", page)
+    assert abs(float(diameter) - 101.6) < 1.0
+
+
+def test_the_preliminary_diameter_is_near_and_nothing_is_told_twice(whole: Path) -> None:
+    recording = open_recording(whole)
+    probe = read_probe(recording.probe_file)
+    early = preliminary_sections(recording, probe, -1, FEW, quiet_context())
+    late = preliminary_sections(recording, probe, early[3].frame, FEW, quiet_context())
+    assert [s.frame for s in late] == [s.frame for s in early[4:]]
+    assert np.median([s.diameter_mm for s in early]) == pytest.approx(101.6, abs=0.5)
+    assert all(0 < s.diameter_sigma_mm < 0.1 and s.seen > 0.5 for s in early)
+
+
+def test_what_is_not_there_yet_is_waited_for_and_told_at_rest(tmp_path: Path) -> None:
+    seen = list(glimpses(tmp_path / "none", 0.2, 0.05, threading.Event()))
+    assert [g.resting for g in seen] == [False, True]
+    assert all(g.recording is None and g.problem for g in seen)
+
+
+def test_a_wish_to_stop_is_heard(tmp_path: Path) -> None:
+    wish = threading.Event()
+    wish.set()
+    with pytest.raises(Cancelled):
+        next(glimpses(tmp_path, 1.0, 0.05, wish))
