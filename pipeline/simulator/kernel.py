@@ -10,14 +10,14 @@ from numba import njit
 Function = Callable[..., Any]
 
 
-def owner(function: Function) -> Function:
-    """Compile a kernel that makes arrays of its own."""
-    return njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
-
-
 def kernel(function: Function) -> Function:
-    """Compile a kernel that makes no arrays.
+    """Compile a kernel that makes no arrays, into whatever calls it.
 
-    Counting references to the arrays handed through is left out: it takes two thirds of the time.
+    Called as functions, kernels would spend most of their time on handing over their many arrays. Counting
+    references to these is left out too: with it a frame takes three times as long. Numba has no public name
+    for that, so the lock pins the version this was tried with.
     """
-    return njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function)  # type: ignore[no-any-return]
+    compiled: Function = njit(
+        cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False
+    )(function)  # fmt: skip
+    return compiled

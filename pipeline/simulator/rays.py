@@ -46,8 +46,9 @@ def ray_table(camera: TrueCamera) -> RayTable:
     """Return the table of a camera; cubic interpolation errs by less than 10⁻⁷ rad at 300 px/rad."""
     width, height = camera.model.image_size
     first = -_MARGIN * _STEP_PX
-    u = np.arange(first, width + (_MARGIN + 1) * _STEP_PX, _STEP_PX, float)  # type: ignore[call-overload]
-    v = np.arange(first, height + (_MARGIN + 1) * _STEP_PX, _STEP_PX, float)  # type: ignore[call-overload]
+    u, v = (
+        first + _STEP_PX * np.arange(-(-side // _STEP_PX) + 2 * _MARGIN + 1.0) for side in (width, height)
+    )
     origin, ray = viewing_rays(camera, np.stack(np.meshgrid(u, v), -1))
     centre = camera.model.centre_px
     node = np.ascontiguousarray(np.concatenate([origin, ray], -1))
@@ -79,7 +80,7 @@ def _without_distortion(camera: TrueCamera, uv: Float) -> Float:
         for _ in range(_DECENTRING_STEPS):
             m = seen - (np.sum(m * m, -1, keepdims=True) * p + 2 * m * np.sum(m * p, -1, keepdims=True))
         offset = focal * m
-    return offset + camera.model.centre_px  # type: ignore[no-any-return]
+    return np.asarray(offset + camera.model.centre_px)
 
 
 def focal_px(camera: TrueCamera) -> float:
@@ -90,7 +91,7 @@ def focal_px(camera: TrueCamera) -> float:
 
 
 @kernel
-def ray_at(table, u, v, out):  # type: ignore[no-untyped-def]
+def ray_at(table: RayTable, u: float, v: float, out: Float) -> None:
     """Write origin and unit direction of pixel (u, v) to ``out`` (6,), by Lagrange's cubic both ways."""
     if table.locking != 0.0:
         du, dv = u - table.centre_u, v - table.centre_v

@@ -11,6 +11,8 @@ import av
 import cv2
 import numpy as np
 import yaml
+from av.container import OutputContainer
+from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
 from pipeline.disk import disk_errors_named
@@ -57,17 +59,23 @@ def write_video(
             progress(number + 1, total)
         return
     with av.open(str(folder / _VIDEO[codec]), "w") as container:
-        stream = container.add_stream(
-            {"h264": "libx264", "ffv1": "ffv1"}[codec],
-            rate=Fraction(truth.frame_rate).limit_denominator(1001),
-            options={"crf": str(quality), "preset": "fast"} if codec == "h264" else {"slicecrc": "1"},
-        )
-        stream.width, stream.height = truth.instrument.camera.model.image_size  # type: ignore[union-attr]
-        stream.pix_fmt = {"h264": "yuv444p", "ffv1": "bgr0"}[codec]  # type: ignore[union-attr]
+        stream = _video_stream(container, truth, codec, quality)
         for number, image in enumerate(images):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))  # type: ignore[arg-type, union-attr]
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
             progress(number + 1, total)
-        container.mux(stream.encode())  # type: ignore[union-attr]
+        container.mux(stream.encode())
+
+
+def _video_stream(container: OutputContainer, truth: SceneTruth, codec: Codec, quality: int) -> VideoStream:
+    rate = Fraction(truth.frame_rate).limit_denominator(1001)
+    if codec == "h264":
+        stream = container.add_stream("libx264", rate, {"crf": str(quality), "preset": "fast"})
+        stream.pix_fmt = "yuv444p"
+    else:
+        stream = container.add_stream("ffv1", rate, {"slicecrc": "1"})
+        stream.pix_fmt = "bgr0"
+    stream.width, stream.height = truth.instrument.camera.model.image_size
+    return stream
 
 
 def _write_tables(truth: SceneTruth, folder: Path, video: str) -> None:

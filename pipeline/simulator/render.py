@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.recording.base import Illumination
-from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueSensor
-from pipeline.simulator.light import add_line, add_wall_light
+from pipeline.simulator.instrument import TrueCamera, TrueInstrument, TrueSensor
+from pipeline.simulator.lamps import Lamps, add_wall_light, lamps_of, stray_light
+from pipeline.simulator.light import add_line
 from pipeline.simulator.rays import RayTable, focal_px, ray_table
 from pipeline.simulator.sensor import exposed, shade_of, through_lens
 from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
@@ -69,7 +70,8 @@ class Renderer:
         if kind != Illumination.LED.value:
             self._add_laser(number, view, instrument, light)
         if kind != Illumination.LASER.value:
-            _add_leds(view, instrument.light, self.truth.rendering.wall_samples, light)
+            ring, samples = instrument.light, self.truth.rendering.wall_samples
+            _add_wall(view, lamps_of(ring), np.array(ring.colour_bgr), samples, light)
         return light
 
     def view(self, number: int, instrument: TrueInstrument) -> View:
@@ -105,15 +107,11 @@ class Renderer:
         for line in lines:
 
             def band(first: int, last: int, line: Line = line) -> None:
-                add_line(
-                    view, line, colour, 1.0, speckle, tiles, rendering.line_samples, first, last, light
-                )  # fmt: skip
+                add_line(view, line, colour, speckle, tiles, rendering.line_samples, first, last, light)
 
             in_bands(band, len(light))
         if instrument.sensor.ambient > 0:
-            _add_wall(
-                view, np.zeros((0, 3)), (1.0, 0.0), np.ones(3), 0.0, instrument.sensor.ambient, 1, light
-            )
+            _add_wall(view, stray_light(instrument.sensor.ambient), np.ones(3), 1, light)
 
     def lines(self, number: int, view: View, instrument: TrueInstrument) -> tuple[Line, ...]:
         """Return the laser's sheet and, where the wall mirrors, its bounce across the bore."""
@@ -144,26 +142,13 @@ def _shade(camera: TrueCamera, sensor: TrueSensor) -> Float32 | None:
     width, height = camera.model.image_size
     u = ((np.arange(width) - table.first) / table.step).astype(np.float32)
     v = ((np.arange(height) - table.first) / table.step).astype(np.float32)
-    cosine = cv2.remap(  # type: ignore[call-overload]
-        table.node[..., 5].astype(np.float32), *map(np.ascontiguousarray, np.meshgrid(u, v)), cv2.INTER_LINEAR
-    )
+    at_u, at_v = (np.ascontiguousarray(at) for at in np.meshgrid(u, v))
+    cosine = cv2.remap(table.node[..., 5].astype(np.float32), at_u, at_v, cv2.INTER_LINEAR)
     return shade_of(sensor, np.asarray(np.nan_to_num(cosine, nan=-1.0), np.float32))
 
 
-def _add_leds(view: View, light: LedRing, samples: int, image: Float32) -> None:
-    around = 2 * np.pi * (np.arange(light.leds) + 0.5) / light.leds
-    place = np.stack([light.radius_mm * np.cos(around), light.radius_mm * np.sin(around)], 1)
-    leds = np.concatenate([place, np.full((light.leds, 1), light.z_mm)], 1)
-    _add_wall(
-        view, leds, (light.lobe, light.even), np.array(light.colour_bgr), light.level, 0.0, samples, image
-    )
-
-
-def _add_wall(
-    view: View, leds: Float, emission: tuple[float, float], colour: Float, level: float, ambient: float,
-    samples: int, image: Float32,
-) -> None:  # fmt: skip
+def _add_wall(view: View, lamps: Lamps, colour: Float, samples: int, image: Float32) -> None:
     def band(first: int, last: int) -> None:
-        add_wall_light(view, leds, emission, colour, level, ambient, samples, first, last, image)
+        add_wall_light(view, lamps, colour, samples, first, last, image)
 
     in_bands(band, len(image))

@@ -22,13 +22,14 @@ _QUANTILES = 1 << 16
 
 def through_lens(light: Float32, sensor: TrueSensor, shade: Float32 | None) -> Float32:
     """Return light (H, W, 3) after vignetting and dust, glare and blur; ``shade`` (H, W) or None."""
-    seen = light if shade is None else light * shade[..., None]
+    seen: Float32 = light if shade is None else light * shade[..., None]
     if sensor.veil_relative > 0:
         seen = (1 - sensor.veil_relative) * seen + sensor.veil_relative * _widely(seen, sensor.veil_sigma_px)
     if sensor.psf_sigma_px > 0:
         # at 6 σ the cut-off tail is below rounding
         side = 2 * int(np.ceil(6 * sensor.psf_sigma_px)) + 1
-        seen = cv2.GaussianBlur(seen, (side, side), sensor.psf_sigma_px, borderType=cv2.BORDER_REPLICATE)  # type: ignore[assignment]
+        blurred = cv2.GaussianBlur(seen, (side, side), sensor.psf_sigma_px, borderType=cv2.BORDER_REPLICATE)
+        seen = np.asarray(blurred, np.float32)
     return np.asarray(seen, np.float32)
 
 
@@ -78,7 +79,10 @@ def _normal_quantiles() -> Float32:
 
 
 @kernel
-def _expose(light, numbers, draw, seed, quantile, dark, v_from, v_to, out):  # type: ignore[no-untyped-def]
+def _expose(
+    light: Float32, numbers: tuple[float, float, float, float, float], draw: np.uint64, seed: np.uint64,
+    quantile: Float32, dark: Image, v_from: int, v_to: int, out: Image,
+) -> None:  # fmt: skip
     well, read, black, gamma, pattern = numbers
     columns, mask = light.shape[1], np.uint64(0xFFFF)
     for v in range(v_from, v_to):

@@ -8,14 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.simulator.instrument import TrueLaser
-from pipeline.simulator.kernel import kernel, owner
+from pipeline.simulator.kernel import kernel
+from pipeline.simulator.meet import meet, normal_at
 from pipeline.simulator.profile import LineProfile
-from pipeline.simulator.surface import Surface, meet, normal_at
+from pipeline.simulator.surface import Surface
 from pipeline.simulator.window import through
 
 Float = NDArray[np.float64]
 _NODES = 1440
 _PROFILE_NODES = 4001
+_CLOSE_MM = 2e-5
 
 
 class SheetTable(NamedTuple):
@@ -77,7 +79,9 @@ def ghost_table(surface: Surface, laser: TrueLaser, T_wc: Float, distance_mm: fl
     azimuth = -np.pi + 2 * np.pi * np.arange(_NODES) / _NODES
     origin, ray = sheet_rays(laser, azimuth)
     R, t = T_wc[:, :3], T_wc[:, 3]
-    hits = _mirrored(surface, np.concatenate([origin @ R.T + t, ray @ R.T], 1), distance_mm)
+    hits = np.full((_NODES, 9), np.nan)
+    rays = np.concatenate([origin @ R.T + t, ray @ R.T], 1)
+    _write_mirrored(surface, rays, distance_mm, np.empty((5, 3)), np.empty(4), np.empty(6), hits)
     second, onward = (hits[:, 3:6] - t) @ R, (hits[:, 6:9]) @ R
     final = np.unwrap(np.arctan2(second[:, 1], second[:, 0]))
     crowding = np.clip(np.abs(2 * np.pi / _NODES / np.gradient(final)), 0.0, 4.0)
@@ -116,14 +120,15 @@ def _resampled(final: Float, height: Float, slope: Float, weight: Float, azimuth
     return SheetTable(*parts)
 
 
-@owner
-def _mirrored(surface, rays, s):  # type: ignore[no-untyped-def]
-    """Return first hit, second hit and direction between them (N, 9) of rays (N, 6) mirrored at the wall."""
-    out = np.full((rays.shape[0], 9), np.nan)
-    o, R, hit, normal, ray = np.empty(3), np.empty((3, 3)), np.empty(4), np.empty(3), np.empty(6)
+@kernel
+def _write_mirrored(
+    surface: Surface, rays: Float, s: float, room: Float, hit: Float, ray: Float, out: Float
+) -> None:
+    """Write first hit, second hit and direction between them (N, 9) of rays (N, 6) mirrored at the wall."""
+    o, R, normal = room[0], room[1:4], room[4]
     for n in range(rays.shape[0]):
         ray[:] = rays[n]
-        if not np.isfinite(ray.sum()) or not meet(surface, ray, s, o, R, hit):
+        if not np.isfinite(ray.sum()) or not meet(surface, ray, s, _CLOSE_MM, o, R, hit):
             continue
         normal_at(surface, hit, R, normal)
         sink = 2.0 * (ray[3] * normal[0] + ray[4] * normal[1] + ray[5] * normal[2])
@@ -131,16 +136,15 @@ def _mirrored(surface, rays, s):  # type: ignore[no-untyped-def]
             out[n, k] = ray[k] + hit[0] * ray[3 + k]
             ray[3 + k] -= sink * normal[k]
             ray[k] = out[n, k] + 0.02 * normal[k]
-        if not meet(surface, ray, hit[1], o, R, hit):
+        if not meet(surface, ray, hit[1], _CLOSE_MM, o, R, hit):
             continue
         for k in range(3):
             out[n, 3 + k] = ray[k] + hit[0] * ray[3 + k]
             out[n, 6 + k] = ray[3 + k]
-    return out
 
 
 @kernel
-def sheet_at(table, moment, azimuth):  # type: ignore[no-untyped-def]
+def sheet_at(table: SheetTable, moment: float, azimuth: float) -> tuple[float, float, float]:
     """Return height, slope and weight at a moment (0 to 1 of the table's span) and an azimuth."""
     times, nodes = table.height.shape
     x = (azimuth + np.pi) * nodes / (2.0 * np.pi)
@@ -157,18 +161,18 @@ def sheet_at(table, moment, azimuth):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _mix(values, i0, i1, j0, j1, wx, wy):  # type: ignore[no-untyped-def]
+def _mix(values: Float, i0: int, i1: int, j0: int, j1: int, wx: float, wy: float) -> float:
     upper = (1.0 - wx) * values[i0, j0] + wx * values[i0, j1]
     if wy == 0.0:
-        return upper
-    return (1.0 - wy) * upper + wy * ((1.0 - wx) * values[i1, j0] + wx * values[i1, j1])
+        return float(upper)
+    return float((1.0 - wy) * upper + wy * ((1.0 - wx) * values[i1, j0] + wx * values[i1, j1]))
 
 
 @kernel
-def density_at(table, height):  # type: ignore[no-untyped-def]
+def density_at(table: ProfileTable, height: float) -> float:
     """Return the density of light at a height above the sheet; 0 outside the table."""
     x = (height - table.low) / table.step
     if not (x >= 0.0 and x < table.density.shape[0] - 1):
         return 0.0
     j = int(x)
-    return (1.0 - (x - j)) * table.density[j] + (x - j) * table.density[j + 1]
+    return float((1.0 - (x - j)) * table.density[j] + (x - j) * table.density[j + 1])

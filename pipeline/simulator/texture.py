@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.wall.base import Wall
 
+Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 _LEVELS = 6
+_SHEEN_NODES = 4097
 
 
 class Texture(NamedTuple):
@@ -26,15 +28,16 @@ class Texture(NamedTuple):
         Row at which each level begins.
     from_mm, step_mm : float
         Of the finest level's rows.
-    gloss, lobe : float
+    sheen : (N,)
+        What the wall sends to the camera over what a dull one would, by the cosine, 0 to 1, between its
+        normal and the direction halfway between light and camera (Blinn-Phong, normalised).
     """
 
     albedo: Float32
     first: Int
     from_mm: float
     step_mm: float
-    gloss: float
-    lobe: float
+    sheen: Float
 
 
 def texture_of(wall: Wall) -> Texture:
@@ -46,13 +49,14 @@ def texture_of(wall: Wall) -> Texture:
         levels.append(0.5 * (even[0::2] + even[1::2]))
     first = np.cumsum([0, *(len(level) for level in levels)])
     grid = wall.texture
-    return Texture(
-        np.concatenate(levels), first, grid.distance_from_mm, grid.step_mm, wall.gloss, wall.gloss_lobe
-    )
+    cosine = np.linspace(0.0, 1.0, _SHEEN_NODES)
+    lobe = (wall.gloss_lobe + 8) / 8 * cosine**wall.gloss_lobe
+    sheen = 1 - wall.gloss + wall.gloss * lobe
+    return Texture(np.concatenate(levels), first, grid.distance_from_mm, grid.step_mm, sheen)
 
 
 @kernel
-def albedo_at(texture, s, psi, footprint_mm, out):  # type: ignore[no-untyped-def]
+def albedo_at(texture: Texture, s: float, psi: float, footprint_mm: float, out: Float) -> None:
     """Write the reflectance (3,) at a place, averaged over a footprint along the pipe."""
     level = 0.0
     if footprint_mm > texture.step_mm:
@@ -66,7 +70,7 @@ def albedo_at(texture, s, psi, footprint_mm, out):  # type: ignore[no-untyped-de
 
 
 @kernel
-def _level_at(texture, k, s, psi, weight, fresh, out):  # type: ignore[no-untyped-def]
+def _level_at(texture: Texture, k: int, s: float, psi: float, weight: float, fresh: bool, out: Float) -> None:
     """Add one level's reflectance, linear between its samples."""
     top, rows = texture.first[k], texture.first[k + 1] - texture.first[k]
     scale = 1 << k
@@ -85,3 +89,11 @@ def _level_at(texture, k, s, psi, weight, fresh, out):  # type: ignore[no-untype
         lower = (1.0 - wx) * a[i + 1, j, c] + wx * a[i + 1, j + 1, c]
         value = weight * ((1.0 - wy) * upper + wy * lower)
         out[c] = value if fresh else out[c] + value
+
+
+@kernel
+def sheen_at(texture: Texture, cosine: float) -> float:
+    """Return the table's sheen at a cosine, linear between its nodes."""
+    x = min(max(cosine, 0.0), 1.0) * (texture.sheen.shape[0] - 1)
+    j = min(int(x), texture.sheen.shape[0] - 2)
+    return float(texture.sheen[j] + (x - j) * (texture.sheen[j + 1] - texture.sheen[j]))

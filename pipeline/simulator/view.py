@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from pipeline.simulator.kernel import kernel, owner
+from pipeline.simulator.kernel import kernel
+from pipeline.simulator.meet import meet
 from pipeline.simulator.rays import RayTable, ray_at
 from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
-from pipeline.simulator.surface import Surface, meet
+from pipeline.simulator.surface import Surface
 from pipeline.simulator.texture import Texture
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 TILE_PX = 8
+_CLOSE_MM = 1e-3
 
 
 class View(NamedTuple):
@@ -47,6 +49,26 @@ class View(NamedTuple):
     px_per_rad: float
 
 
+class Work(NamedTuple):
+    """Room for what is computed of one ray: (6,) in C and in W, its hit, section, normal and vectors."""
+
+    c_ray: Float
+    w_ray: Float
+    hit: Float
+    o: Float
+    R: Float
+    normal: Float
+    albedo: Float
+    way: Float
+    at: Float
+
+
+def new_work() -> Work:
+    """Return room for one ray."""
+    ray, vector = (np.empty(6), np.empty(6)), (np.empty(3), np.empty(3), np.empty(3), np.empty(3))
+    return Work(*ray, np.empty(4), np.empty(3), np.empty((3, 3)), *vector)
+
+
 class Line(NamedTuple):
     """A sheet of light, the profile across it, and how far the sheet moves during a frame, mm."""
 
@@ -69,7 +91,8 @@ def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Ma
         low = line.profile.low - line.wobble_mm
         high = line.profile.low + line.profile.step * (len(line.profile.density) - 1) + line.wobble_mm
         for k in range(view.pose.shape[1]):
-            height = _heights(view, line.sheet, k, rows + 1, columns + 1)
+            height = np.full((rows + 1, columns + 1), np.nan)
+            _write_heights(view, line.sheet, k, new_work(), height)
             touched |= _crossed(height, low, high)
     return np.asarray(binary_dilation(touched, np.ones((3, 3), bool)))
 
@@ -84,30 +107,27 @@ def _crossed(height: Float, low: float, high: float) -> Mask:
     return np.asarray(finite.any(0) & (least - room < high) & (most + room > low))
 
 
-@owner
-def _heights(view, sheet, k, rows, columns):  # type: ignore[no-untyped-def]
-    """Return the wall's height above the sheet (rows, columns) at the tiles' corners; NaN without a wall."""
-    out = np.full((rows, columns), np.nan)
-    c_ray, w_ray, hit = np.empty(6), np.empty(6), np.empty(4)
-    o, R = np.empty(3), np.empty((3, 3))
-    for i in range(rows):
-        for j in range(columns):
+@kernel
+def _write_heights(view: View, sheet: SheetTable, k: int, work: Work, out: Float) -> None:
+    """Write the wall's height above the sheet (rows, columns) at the tiles' corners where there is a wall."""
+    c_ray, w_ray, hit = work.c_ray, work.w_ray, work.hit
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
             ray_at(view.rays, j * TILE_PX - 0.5, i * TILE_PX - 0.5, c_ray)
             # light goes a little backward at most: rays far behind cannot see the line
             if not (c_ray[5] > -0.5):
                 continue
             to_wall(view, i * TILE_PX, k, c_ray, w_ray)
-            if not meet(view.surface, w_ray, view.distance_mm, o, R, hit):
+            if not meet(view.surface, w_ray, view.distance_mm, _CLOSE_MM, work.o, work.R, hit):
                 continue
             x, y = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4]
             z = c_ray[2] + hit[0] * c_ray[5]
             height, slope, _ = sheet_at(sheet, 0.5, np.arctan2(y, x))
             out[i, j] = z - height - np.sqrt(x * x + y * y) * slope
-    return out
 
 
 @kernel
-def to_wall(view, row, k, c_ray, w_ray):  # type: ignore[no-untyped-def]
+def to_wall(view: View, row: int, k: int, c_ray: Float, w_ray: Float) -> None:
     """Write a ray of C, seen in a row at moment k of its exposure, in W."""
     T = view.pose[min(row, view.pose.shape[0] - 1), k]
     for a in range(3):

@@ -25,7 +25,7 @@ class WallGrid:
     @property
     def distance_mm(self) -> Float:
         """(rows,) distances of the rows."""
-        return self.distance_from_mm + self.step_mm * np.arange(self.rows)  # type: ignore[return-value]
+        return np.asarray(self.distance_from_mm + self.step_mm * np.arange(self.rows))
 
     @property
     def azimuth_rad(self) -> Float:

@@ -1,0 +1,209 @@
+"""Light of the LEDs, and even stray light, that the wall sends to each pixel."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.simulator.instrument import LedRing
+from pipeline.simulator.kernel import kernel
+from pipeline.simulator.light import REFERENCE_MM
+from pipeline.simulator.meet import meet, normal_at, radius_at
+from pipeline.simulator.rays import ray_at
+from pipeline.simulator.surface import Surface
+from pipeline.simulator.texture import albedo_at, sheen_at
+from pipeline.simulator.view import View, Work, new_work, to_wall
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+# How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
+_CLOSE_MM = 5e-4
+_PATCH_PX = 16
+
+
+class Lamps(NamedTuple):
+    """What lights the wall.
+
+    Attributes
+    ----------
+    place : (3, L)
+        LEDs in C.
+    share : float
+        Light of each, full scales, on a white wall that faces it squarely from the reference distance.
+    lobe, even : float
+        See `LedRing`.
+    ambient : float
+        Light, full scales, of a white wall under stray light.
+    """
+
+    place: Float
+    share: float
+    lobe: float
+    even: float
+    ambient: float
+
+
+def lamps_of(ring: LedRing) -> Lamps:
+    """Return the lamps of a ring of LEDs."""
+    around = 2 * np.pi * (np.arange(ring.leds) + 0.5) / ring.leds
+    across = ring.radius_mm * np.stack([np.cos(around), np.sin(around)])
+    place = np.concatenate([across, np.full((1, ring.leds), ring.z_mm)])
+    return Lamps(place, ring.level / ring.leds, ring.lobe, ring.even, 0.0)
+
+
+def stray_light(level: float) -> Lamps:
+    """Return no lamps but even stray light."""
+    return Lamps(np.zeros((3, 0)), 0.0, 1.0, 0.0, level)
+
+
+def add_wall_light(
+    view: View, lamps: Lamps, colour: Float, samples: int, v_from: int, v_to: int, image: Float32
+) -> None:
+    """Add what lamps make of the wall to rows v_from … v_to of an image (H, W, 3)."""
+    lit = np.empty((3, lamps.place.shape[1]))
+    _add_rows(view, lamps, colour, samples, v_from, v_to, new_work(), lit, np.empty(3), image)
+
+
+@kernel
+def _add_rows(
+    view: View, lamps: Lamps, colour: Float, samples: int, v_from: int, v_to: int, work: Work, lit: Float,
+    total: Float, image: Float32,
+) -> None:  # fmt: skip
+    across = -(-image.shape[1] // _PATCH_PX)
+    # in patches, so that neighbours find the wall's samples still at hand
+    for patch in range(across * -(-(v_to - v_from) // _PATCH_PX)):
+        v_first, u_first = v_from + patch // across * _PATCH_PX, patch % across * _PATCH_PX
+        for v in range(v_first, min(v_first + _PATCH_PX, v_to)):
+            for u in range(u_first, min(u_first + _PATCH_PX, image.shape[1])):
+                _pixel_light(view, lamps, samples, u, v, work, lit, total)
+                for c in range(3):
+                    image[v, u, c] += colour[c] * total[c]
+
+
+@kernel
+def _pixel_light(
+    view: View, lamps: Lamps, samples: int, u: int, v: int, work: Work, lit: Float, total: Float
+) -> None:
+    times = view.pose.shape[1]
+    total[:] = 0.0
+    for n in range(samples * samples):
+        y = v + (n // samples + 0.5) / samples - 0.5
+        x = u + (n % samples + 0.5) / samples - 0.5
+        ray_at(view.rays, x, y, work.c_ray)
+        for k in range(times):
+            _ray_light(view, lamps, v, k, samples, work, lit, total)
+    for c in range(3):
+        total[c] /= samples * samples * times
+
+
+@kernel
+def _ray_light(
+    view: View, lamps: Lamps, row: int, k: int, samples: int, work: Work, lit: Float, total: Float
+) -> None:
+    c_ray, w_ray, hit, normal, albedo = work.c_ray, work.w_ray, work.hit, work.normal, work.albedo
+    # LEDs face forward and sit about at the viewpoint
+    if not (c_ray[5] > (-0.05 if lamps.ambient == 0.0 else -1.0)):
+        return
+    to_wall(view, row, k, c_ray, w_ray)
+    if not meet(view.surface, w_ray, view.distance_mm, _CLOSE_MM, work.o, work.R, hit):
+        return
+    normal_at(view.surface, hit, work.R, normal)
+    facing = -(w_ray[3] * normal[0] + w_ray[4] * normal[1] + w_ray[5] * normal[2])
+    if facing <= 0.0:
+        return
+    light = lamps.ambient
+    if lamps.place.shape[1] > 0:
+        T = view.pose[min(row, view.pose.shape[0] - 1), k]
+        light += _lamp_light(view, lamps, T, facing, work, lit)
+    foot = hit[0] / (view.px_per_rad * samples * max(facing, 0.05))
+    albedo_at(view.texture, hit[1], hit[2], foot, albedo)
+    for c in range(3):
+        total[c] += light * albedo[c]
+
+
+@kernel
+def _lamp_light(view: View, lamps: Lamps, T: Float, facing: float, work: Work, lit: Float) -> float:
+    """Return the light of all lamps at the work's hit; ``lit`` (3, L) is room for what each contributes."""
+    at, way, normal, place = work.at, work.way, work.normal, lamps.place
+    for a in range(3):
+        at[a] = work.c_ray[a] + work.hit[0] * work.c_ray[3 + a]
+    _face_lamps(place, at, work.c_ray, normal, T, facing, lit)
+    hidden = _may_hide(view.surface, work.hit, T, work.o, work.R)
+    light = 0.0
+    for n in range(place.shape[1]):
+        if lit[0, n] <= 0.0 or lit[1, n] <= 0.0:
+            continue
+        if hidden:
+            for a in range(3):
+                way[a] = at[a] - place[a, n]
+            distance = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+            if _shaded(view.surface, work.hit, T, way, distance, work.R):
+                continue
+        lobe = lit[1, n] if lamps.lobe == 1.0 else lit[1, n] ** lamps.lobe
+        light += (lamps.even + (1.0 - lamps.even) * lobe) * lit[0, n] * sheen_at(view.texture, lit[2, n])
+    return lamps.share * light
+
+
+@kernel
+def _face_lamps(
+    place: Float, at: Float, ray: Float, normal: Float, T: Float, facing: float, lit: Float
+) -> None:
+    """Write for each lamp: light over its lobe, cosine at the lamp, cosine of the direction halfway.
+
+    Without branches and sums, so that several lamps are computed at once.
+    """
+    px, py, pz, rx, ry, rz = at[0], at[1], at[2], ray[3], ray[4], ray[5]
+    nx = T[0, 0] * normal[0] + T[1, 0] * normal[1] + T[2, 0] * normal[2]
+    ny = T[0, 1] * normal[0] + T[1, 1] * normal[1] + T[2, 1] * normal[2]
+    nz = T[0, 2] * normal[0] + T[1, 2] * normal[1] + T[2, 2] * normal[2]
+    for n in range(place.shape[1]):
+        x, y, z = px - place[0, n], py - place[1, n], pz - place[2, n]
+        near = 1.0 / np.sqrt(x * x + y * y + z * z)
+        square = -(x * nx + y * ny + z * nz) * near
+        along = (x * rx + y * ry + z * rz) * near
+        lit[0, n] = square * (REFERENCE_MM * near) ** 2
+        lit[1, n] = z * near
+        lit[2, n] = (square + facing) / np.sqrt(2.0 + 2.0 * along)
+
+
+@kernel
+def _may_hide(surface: Surface, hit: Float, T: Float, o: Float, R: Float) -> bool:
+    """Tell whether the wall between a hit and the camera stands in far enough to hide the LEDs."""
+    along = R[0, 2] * (o[0] - T[0, 3]) + R[1, 2] * (o[1] - T[1, 3]) + R[2, 2] * (o[2] - T[2, 3])
+    if along <= 1.0:
+        return False
+    back = 0.5
+    while back < min(along, 64.0):
+        k = min(max(int(hit[1] - back - surface.from_mm), 0), surface.floor_mm.shape[1] - 1)
+        if surface.floor_mm[0, k] < hit[3] * (1.0 - back / along) + 11.0 * back / along:
+            return True
+        back *= 2.0
+    return False
+
+
+@kernel
+def _shaded(surface: Surface, hit: Float, T: Float, way: Float, distance: float, R: Float) -> bool:
+    """Tell whether the wall stands between a hit and an LED; the section's frame is taken as straight.
+
+    ``way`` (3,) leads from the LED to the hit in C and is ``distance`` long, ``T`` takes C to W.
+    """
+    c, s, dx, dy, dz = np.cos(hit[2]), np.sin(hit[2]), 0.0, 0.0, 0.0
+    for a in range(3):
+        turned = -(T[a, 0] * way[0] + T[a, 1] * way[1] + T[a, 2] * way[2]) / distance
+        dx += R[a, 0] * turned
+        dy += R[a, 1] * turned
+        dz += R[a, 2] * turned
+    step = 0.3
+    back = step
+    while back < min(distance, 40.0):
+        x, y = hit[3] * c + back * dx, hit[3] * s + back * dy
+        rho = np.sqrt(x * x + y * y)
+        if rho < surface.least_mm:
+            return False
+        if radius_at(surface, hit[1] + back * dz, np.arctan2(y, x)) < rho - 0.01:
+            return True
+        step *= 1.25
+        back += step
+    return False

@@ -1,0 +1,240 @@
+"""Where rays meet the wall, and how the wall faces there: kernels on a wall's grid."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.simulator.kernel import kernel
+from pipeline.simulator.surface import NEAR_BLOCKS, WIDE_BLOCKS, Surface
+
+Float = NDArray[np.float64]
+# A step of a ray stays within the blocks that a floor looks ahead by so much, mm.
+_SPARE = 0.1
+_FINE_MM = 0.3
+_LEAST_STEP_MM = 2e-5
+_FAR_MM = 2000.0
+
+
+@kernel
+def _frame(surface: Surface, s: float, o: Float, R: Float) -> None:
+    """Write a bent axis' point and the section's frame at distance s; straight beyond the ends."""
+    axis_s, axis_o, turn = surface.axis_s, surface.axis_o, surface.axis_turn
+    count = axis_s.shape[0]
+    span = (axis_s[count - 1] - axis_s[0]) / (count - 1)
+    w = (s - axis_s[0]) / span
+    k = min(max(int(np.floor(w)), 0), count - 2)
+    w -= k
+    inside = min(max(w, 0.0), 1.0)
+    for a in range(3):
+        for b in range(3):
+            R[a, b] = (1.0 - inside) * turn[k, a, b] + inside * turn[k + 1, a, b]
+    _orthonormalise(R)
+    beyond = (w - inside) * span
+    for a in range(3):
+        o[a] = (1.0 - inside) * axis_o[k, a] + inside * axis_o[k + 1, a] + beyond * R[a, 2]
+
+
+@kernel
+def _orthonormalise(R: Float) -> None:
+    size = np.sqrt(R[0, 2] ** 2 + R[1, 2] ** 2 + R[2, 2] ** 2)
+    for a in range(3):
+        R[a, 2] /= size
+    along = R[0, 0] * R[0, 2] + R[1, 0] * R[1, 2] + R[2, 0] * R[2, 2]
+    for a in range(3):
+        R[a, 0] -= along * R[a, 2]
+    size = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2 + R[2, 0] ** 2)
+    for a in range(3):
+        R[a, 0] /= size
+    R[0, 1] = R[1, 2] * R[2, 0] - R[2, 2] * R[1, 0]
+    R[1, 1] = R[2, 2] * R[0, 0] - R[0, 2] * R[2, 0]
+    R[2, 1] = R[0, 2] * R[1, 0] - R[1, 2] * R[0, 0]
+
+
+@kernel
+def _locate(
+    surface: Surface, ray: Float, way: float, s: float, o: Float, R: Float
+) -> tuple[float, float, float]:
+    """Return distance, and x and y off the axis in its section, of a ray's point; s is a first guess.
+
+    Leaves the section's axis point and frame in ``o`` and ``R``, unless the axis is straight.
+    """
+    x, y, z = ray[0] + way * ray[3], ray[1] + way * ray[4], ray[2] + way * ray[5]
+    if surface.axis_s.shape[0] == 2:
+        return z, x, y
+    a, b = 0.0, 0.0
+    for _ in range(30):
+        _frame(surface, s, o, R)
+        dx, dy, dz = x - o[0], y - o[1], z - o[2]
+        a = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz
+        b = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz
+        c = R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz
+        s += c
+        if abs(c) < 1e-9:
+            break
+    return s, a, b
+
+
+@kernel
+def radius_at(surface: Surface, s: float, psi: float) -> float:
+    """Return the wall's radius at a distance and an azimuth, linear between samples."""
+    radius = surface.radius
+    rows, columns = radius.shape[0], radius.shape[1] - 2
+    y = min(max((s - surface.from_mm) / surface.step_mm, 0.0), rows - 1.0)
+    i = min(int(y), rows - 2)
+    x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
+    x -= np.floor((x - 0.5) / columns) * columns
+    j = min(max(int(x), 0), columns)
+    wy, wx = y - i, x - j
+    upper = (1.0 - wx) * radius[i, j] + wx * radius[i, j + 1]
+    lower = (1.0 - wx) * radius[i + 1, j] + wx * radius[i + 1, j + 1]
+    return float((1.0 - wy) * upper + wy * lower)
+
+
+@kernel
+def meet(surface: Surface, ray: Float, s: float, close: float, o: Float, R: Float, hit: Float) -> bool:
+    """Find where a ray from inside the pipe first meets the wall.
+
+    Parameters
+    ----------
+    ray : (6,)
+        Origin and unit direction in W.
+    s : float
+        A guess of the origin's distance.
+    close : float
+        How near to the wall's radius a hit must lie, mm.
+    o, R : (3,), (3, 3)
+        Work space; on return the axis point and the section's frame at the hit.
+    hit : (4,)
+        On return the way along the ray, mm, the wall's distance, azimuth and radius there.
+
+    Returns
+    -------
+    bool
+        False where the ray leaves without meeting the wall within two metres.
+    """
+    straight, last = surface.axis_s.shape[0] == 2, surface.floor_mm.shape[1] - 1
+    way, low, gap, gap_low = 0.0, 0.0, 0.0, -1.0
+    da, db = ray[3], ray[4]
+    if straight:
+        way = _reach(ray[0], ray[1], da, db, surface.least_mm * 0.999)
+    while way < _FAR_MM:
+        s, a, b = _locate(surface, ray, way, s, o, R)
+        if not straight:
+            da = R[0, 0] * ray[3] + R[1, 0] * ray[4] + R[2, 0] * ray[5]
+            db = R[0, 1] * ray[3] + R[1, 1] * ray[4] + R[2, 1] * ray[5]
+        rho = np.sqrt(a * a + b * b)
+        k = min(max(int(s - surface.from_mm), 0), last)
+        if rho < surface.floor_mm[0, k]:
+            low, gap_low = way, -1.0
+            far = min(_reach(a, b, da, db, surface.floor_mm[1, k]), WIDE_BLOCKS - _SPARE)
+            near = min(_reach(a, b, da, db, surface.floor_mm[0, k] + _LEAST_STEP_MM), NEAR_BLOCKS - _SPARE)
+            way += max(far, near, _LEAST_STEP_MM)
+            continue
+        psi = np.arctan2(b, a)
+        wall = radius_at(surface, s, psi)
+        gap = wall - rho
+        hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
+        if gap <= close:
+            break
+        low, gap_low = way, gap
+        way += min(max(_reach(a, b, da, db, wall), _LEAST_STEP_MM), _FINE_MM)
+    if way >= _FAR_MM or np.isnan(way):
+        return False
+    if gap < -close:
+        _refine(surface, ray, close, low, gap_low, way, gap, s, o, R, hit)
+    if straight:
+        _straight_frame(hit[1], o, R)
+    return True
+
+
+@kernel
+def _straight_frame(s: float, o: Float, R: Float) -> None:
+    o[0], o[1], o[2] = 0.0, 0.0, s
+    for a in range(3):
+        for b in range(3):
+            R[a, b] = 1.0 if a == b else 0.0
+
+
+@kernel
+def _reach(a: float, b: float, da: float, db: float, radius: float) -> float:
+    """Return the way from (a, b) in a section to a radius about its axis; 0 from beyond it."""
+    square, along, left = da * da + db * db, a * da + b * db, a * a + b * b - radius * radius
+    if left >= 0.0:
+        return 0.0
+    if square * _FAR_MM * _FAR_MM < -left:
+        return _FAR_MM
+    return float((-along + np.sqrt(along * along - square * left)) / square)
+
+
+@kernel
+def _gap(surface: Surface, ray: Float, way: float, s: float, o: Float, R: Float, hit: Float) -> float:
+    s, a, b = _locate(surface, ray, way, s, o, R)
+    psi = np.arctan2(b, a)
+    wall = radius_at(surface, s, psi)
+    hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
+    return float(wall - np.sqrt(a * a + b * b))
+
+
+@kernel
+def _refine(
+    surface: Surface,
+    ray: Float,
+    close: float,
+    low: float,
+    f_low: float,
+    high: float,
+    f_high: float,
+    s: float,
+    o: Float,
+    R: Float,
+    hit: Float,
+) -> None:
+    """Close in on the crossing between two ways: regula falsi with the Illinois rule."""
+    if f_low <= 0.0:
+        f_low = _gap(surface, ray, low, s, o, R, hit)
+    if f_low <= 0.0:
+        return
+    side = 0
+    for _ in range(60):
+        way = (low * f_high - high * f_low) / (f_high - f_low)
+        f = _gap(surface, ray, way, s, o, R, hit)
+        if abs(f) < close or high - low < 1e-9:
+            return
+        if f > 0.0:
+            low, f_low = way, f
+            if side == 1:
+                f_high *= 0.5
+            side = 1
+        else:
+            high, f_high = way, f
+            if side == -1:
+                f_low *= 0.5
+            side = -1
+
+
+@kernel
+def normal_at(surface: Surface, hit: Float, R: Float, normal: Float) -> None:
+    """Write the wall's inward unit normal in W at a hit, from slopes linear between samples.
+
+    The foreshortening of distance in a bend, 1 − κ r cos, is left out of the slope along the pipe.
+    """
+    slope, psi = surface.slope, hit[2]
+    rows, columns = slope.shape[0], slope.shape[1] - 2
+    y = min(max((hit[1] - surface.from_mm) / surface.step_mm, 0.0), rows - 1.0)
+    i = min(int(y), rows - 2)
+    x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
+    x -= np.floor((x - 0.5) / columns) * columns
+    j = min(max(int(x), 0), columns)
+    wy, wx = y - i, x - j
+    w00, w01, w10, w11 = (1.0 - wy) * (1.0 - wx), (1.0 - wy) * wx, wy * (1.0 - wx), wy * wx
+    along = w00 * slope[i, j, 0] + w01 * slope[i, j + 1, 0]
+    along += w10 * slope[i + 1, j, 0] + w11 * slope[i + 1, j + 1, 0]
+    around = w00 * slope[i, j, 1] + w01 * slope[i, j + 1, 1]
+    around += w10 * slope[i + 1, j, 1] + w11 * slope[i + 1, j + 1, 1]
+    around /= hit[3]
+    c, sn = np.cos(psi), np.sin(psi)
+    size = 1.0 / np.sqrt(1.0 + along * along + around * around)
+    x, y, z = -(c + around * sn) * size, -(sn - around * c) * size, along * size
+    for k in range(3):
+        normal[k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z
