@@ -25,11 +25,14 @@ from tests.truth_comparison import compare_wall
 class SceneScore:
     """How well a run measured a scene; ``stated_mm`` is the median stated 1 σ of a cell's radius.
 
-    ``distance_percent`` is the camera's way along z from first to last frame against the true one, of the
-    path driven; ``distance_sigma_percent`` what the run states for it.
+    ``radius_mm`` is the median radius of the map. ``distance_percent`` is the camera's way along z from first
+    to last frame against the true one, of the path driven; ``distance_sigma_percent`` what the run states for
+    it, its end and its scale together.
     """
 
+    radius_mm: float
     bias_mm: float
+    median_mm: float
     rms_mm: float
     stated_mm: float
     inside_95: float
@@ -52,9 +55,11 @@ def score(run: Path, truth: Path) -> SceneScore:
     with np.load(run / "radius_map.npz") as file:
         found = RadiusMap(**{f.name: file[f.name] for f in fields(RadiusMap)})
     wall = compare_wall(found, truth)
+    error, rms = wall.error_mm, float(np.sqrt(np.mean(wall.error_mm**2)))
     return SceneScore(
-        float(wall.error_mm.mean()), float(np.sqrt(np.mean(wall.error_mm**2))),
-        float(np.median(wall.sigma_mm)), wall.inside_95, wall.coverage, *_distance(run, truth),
+        float(np.nanmedian(found.radius_mm)),
+        float(error.mean()), float(np.median(error)), rms, float(np.median(wall.sigma_mm)),
+        wall.inside_95, wall.coverage, *_distance(run, truth),
     )  # fmt: skip
 
 
@@ -64,5 +69,8 @@ def _distance(run: Path, truth: Path) -> tuple[float, float]:
     true = poses[rows["frame"].astype(int), 2, 3]
     path = float(np.sum(np.abs(np.diff(true))))
     off = (rows["z_mm"][-1] - rows["z_mm"][0]) - (true[-1] - true[0])
-    told = {m["name"]: m["value"] for m in json.loads((run / "run.json").read_text())["metrics"]}
-    return 100 * float(off) / path, 100 * told["relative 1 sigma of the distance scale"]
+    record = json.loads((run / "run.json").read_text())
+    numbers = [*record["metrics"], *(n for stage in record["stages"] for n in stage["numbers"])]
+    told = {n["name"]: n["value"] for n in numbers}
+    end = told["1 σ of distance at the end"] / path
+    return 100 * float(off) / path, 100 * float(np.hypot(end, told["relative 1 sigma of the distance scale"]))

@@ -17,7 +17,9 @@ from pipeline.simulator.scene import Scene
 from tests.scene_runs import SceneScore, run_scene
 from tests.simulated import SCENES, shipped, smaller
 
-_HEAD = "scene               frames   bias mm    rms mm  stated σ  inside 95 %  seen %  distance %   1 σ  CPU"
+_HEAD = (
+    "scene              frames   bias mm  median mm    rms mm  stated σ  inside   seen distance   1 σ  CPU"
+)
 
 
 def main() -> None:
@@ -45,16 +47,16 @@ def _one(scene: Scene, folder: Path) -> None:
     except Cancelled:
         raise
     except Exception:  # noqa: BLE001 - one scene that fails must not hide the others
-        print(f"{scene.name:<20} FAILED\n{traceback.format_exc()}", flush=True)
+        print(f"{scene.name:<19} FAILED\n{traceback.format_exc()}", flush=True)
         return
     print(_row(scene, found, time.process_time() - began), flush=True)
 
 
 def _row(scene: Scene, s: SceneScore, cpu_s: float) -> str:
     return (
-        f"{scene.name:<20}{scene.frames:>6}{s.bias_mm:>+10.4f}{s.rms_mm:>10.4f}{s.stated_mm:>10.4f}"
-        f"{s.inside_95:>13.3f}{100 * s.coverage:>8.1f}{s.distance_percent:>+12.3f}"
-        f"{s.distance_sigma_percent:>6.3f}{cpu_s:>7.0f}"
+        f"{scene.name:<19}{scene.frames:>6}{s.bias_mm:>+10.4f}{s.median_mm:>+10.4f}{s.rms_mm:>10.4f}{s.stated_mm:>10.4f}"
+        f"{s.inside_95:>8.3f}{s.coverage:>7.3f}{s.distance_percent:>+8.3f}%"
+        f"{s.distance_sigma_percent:>6.3f}{cpu_s:>5.0f}"
     )
 
 
