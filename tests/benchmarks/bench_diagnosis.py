@@ -43,6 +43,7 @@ from tests.benchmarks.ring_level import Noise, ring_level_run
 PRIOR = Path(__file__).with_name("ring_level.yaml")
 # Fewer frames at a lower rate: the same way and time, for less computing.
 _FRAMES = 2 / 3
+_TEXEL_MM = 1.0
 _KEPT = ("verdict", "global_p", "location", "effects", "class", "fit", "feasibility", "identifiable")
 app = typer.Typer()
 
@@ -79,9 +80,10 @@ def drawn(mode: Mode, seed: int) -> Drawn:
     louder = random.uniform(0.7, 1.5, 3)
     noise = Noise(0.05 * louder[0], 0.02 * louder[1], 0.07 * louder[2], 0.05 * louder[1])
     frames = round(_FRAMES * pair.gauge.frames)
-    scene = pair.gauge.model_copy(
-        update={"frames": frames, "frame_rate": _FRAMES * pair.gauge.frame_rate, "effects": {}}
-    )
+    rate = _FRAMES * pair.gauge.frame_rate
+    # Nobody looks at the wall's paint.
+    pipe = pair.gauge.pipe.model_copy(update={"texel_mm": _TEXEL_MM})
+    scene = pair.gauge.model_copy(update={"frames": frames, "frame_rate": rate, "pipe": pipe, "effects": {}})
     return Drawn(scene, pair.folder / "scene.yaml", switches_from_mapping(pair.gauge.effects, PRIOR), noise)
 
 
