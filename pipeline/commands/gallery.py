@@ -30,8 +30,8 @@ def gallery(
 ) -> None:
     """Show what each known effect does: its picture, its residual on the ring, its law, its size, its likes.
 
-    Everything on the page is rendered or computed when the page is made; all effects take a few
-    minutes. An effect takes its catalogue's quantities, as in laser_tilt=0.6@40, or its typical size.
+    All of the page is computed when it is made, which takes a few minutes for all effects. An effect takes
+    its catalogue's quantities, as in laser_tilt=0.6@40, or its typical size.
     """
     console = Console(stderr=True)
     switches = parse_switches(effects or ()) or tuple(typical_switch(name) for name in EFFECTS)
