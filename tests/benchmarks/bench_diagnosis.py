@@ -22,6 +22,7 @@ import typer
 from scipy.stats import kstest
 
 from pipeline.errors import UnusableError
+from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from pipeline.simulator.effects.switch import Switch, switches_from_mapping
 from pipeline.simulator.prior import draw_pair, read_prior
@@ -34,6 +35,8 @@ from stages.diagnose.drill.score import Trial
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import LIBRARY, without
 from stages.diagnose.gauge.examine import Examined, examine
+from stages.diagnose.gauge.scan import scan
+from stages.diagnose.inference import stated_belief
 from stages.diagnose.result import to_json
 from stages.diagnose.seen import Seen
 from stages.diagnose.travel.evidence import TravelEvidence
@@ -111,10 +114,12 @@ def diagnosed(case: Drawn, library: Mapping[str, EffectModel]) -> dict[str, Any]
     answer = {k: found[k] for k in _KEPT if k in found}
     answer["candidates"] = [c for c in found["candidates"] if c["probability"] > 1e-3]  # type: ignore[attr-defined]
     answer["shortcomings"] = list(missing)
-    return {"answer": answer, "snr": [oracle_snr(s, geometry, travel) for s in case.switches]}
+    return {"answer": answer, "snr": [oracle_snr(s, geometry, travel, stated) for s in case.switches]}
 
 
-def oracle_snr(switch: Switch, geometry: Examined | None, travel: TravelEvidence | None) -> float | None:
+def oracle_snr(
+    switch: Switch, geometry: Examined | None, travel: TravelEvidence | None, stated: Probe
+) -> float | None:
     """Return the true size over the 1 σ of one who knows the effect's name; None where it was not scored.
 
     The 1 σ is that of the score about the stated instrument, poses and stated uncertainty free.
@@ -123,11 +128,24 @@ def oracle_snr(switch: Switch, geometry: Examined | None, travel: TravelEvidence
     estimate = travel.estimate(name) if travel is not None else None
     if estimate is not None:
         return float(size / np.hypot(estimate.sigma, estimate.stated_sigma))
-    for s in geometry.searched.steps[0].scores if geometry is not None else ():
-        if s.model.name == name:
-            found = abs(s.model.quantities(s.shape, s.score.amplitude)[switch.effect.quantities[0].name])
-            return float(np.sqrt(s.score.statistic) * size / max(found, 1e-12))
+    found_at = {"probe_vibration": _line_sigmas(travel), "encoder_slip": _slip_sigmas(travel)}.get(name, ())
+    if found_at:
+        return float(size / min(found_at))
+    if geometry is None or name not in of_positions(LIBRARY):
+        return None
+    searched = geometry.searched
+    for s in scan(searched.run, searched.nothing, {name: LIBRARY[name]}, stated_belief(stated)):
+        found = abs(s.model.quantities(s.shape, s.score.amplitude)[switch.effect.quantities[0].name])
+        return float(np.sqrt(s.score.statistic) * size / max(found, 1e-12))
     return None
+
+
+def _line_sigmas(travel: TravelEvidence | None) -> tuple[float, ...]:
+    return tuple(line.sigma_mm for line in travel.lines) if travel is not None else ()
+
+
+def _slip_sigmas(travel: TravelEvidence | None) -> tuple[float, ...]:
+    return tuple(slip.sigma_mm for slip in travel.slips) if travel is not None else ()
 
 
 def _line(mode: Mode, seed: int, version: str) -> dict[str, Any]:

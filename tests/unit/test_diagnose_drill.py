@@ -84,6 +84,11 @@ def test_an_unknown_effect_is_owned_as_unknown_or_as_one_of_its_likes():
     assert result.named_exactly.of == 0
 
 
+def test_an_unknown_effect_that_no_oracle_sees_is_not_asked_about():
+    trials = [Trial("a", (TILT,), CONSISTENT, ("laser_tilt",), oracle_snr=snr) for snr in (3.0, 9.0, None)]
+    assert score(trials).unknown_owned.of == 2
+
+
 def test_sizes_are_judged_in_their_own_sigma():
     close, far = named("laser_tilt", value=0.61), named("laser_tilt", value=0.65)
     result = score([Trial("a", (TILT,), close), Trial("b", (TILT,), far)])

@@ -23,8 +23,8 @@ _RATES: tuple[tuple[str, str, str], ...] = (
     ("misnamed", "Confident wrong name", "≤ 0.5 %"),
     ("pairs_named", "Pairs: both named", "≥ 90 %"),
     ("pairs_identifiable", "Pairs: both named, where both are identifiable", ""),
-    ("unknown_owned", "Left out of the library: unexplained or a class of its likes", "≥ 90 %"),
-    ("unknown_misnamed", "Left out of the library: confidently misnamed", "≤ 5 %"),
+    ("unknown_owned", "Left out of the library (SNR ≥ 8): unexplained or a class of its likes", "≥ 90 %"),
+    ("unknown_misnamed", "Left out of the library (SNR ≥ 8): confidently misnamed", "≤ 5 %"),
     ("size_in_95", "Sizes within their 95 % interval", "93–97 %"),
 )
 

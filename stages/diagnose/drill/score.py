@@ -153,7 +153,8 @@ def score(trials: Iterable[Trial]) -> Scores:
     listed = list(trials)
     null = [t for t in listed if not t.concealed]
     known = [t for t in listed if t.concealed and not t.truth & set(t.left_out)]
-    unknown = [t for t in listed if t.truth & set(t.left_out)]
+    # What no oracle would see cannot be called unknown either.
+    unknown = [t for t in listed if t.truth & set(t.left_out) and (t.snr is None or t.snr >= SNR)]
     single = [t for t in known if len(t.concealed) == 1]
     found = [t for t in single if t.found]
     clear = [t for t in known if t.snr is not None and t.snr >= SNR]
