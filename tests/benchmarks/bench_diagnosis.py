@@ -21,7 +21,7 @@ import numpy as np
 import typer
 from scipy.stats import kstest
 
-from pipeline.errors import UnusableError
+from pipeline.errors import BoresightError, UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from pipeline.simulator.effects.switch import Switch, switches_from_mapping
@@ -153,7 +153,14 @@ def _line(mode: Mode, seed: int, version: str) -> dict[str, Any]:
     names = tuple(s.name for s in case.switches)
     left_out = names if mode is Mode.LEFTOUT else ()
     start = time.process_time()
-    told = diagnosed(case, without(left_out) if left_out else LIBRARY)
+    try:
+        told = diagnosed(case, without(left_out) if left_out else LIBRARY)
+    except BoresightError as error:
+        told = {
+            "answer": {"verdict": "not_identifiable", "effects": [], "class": []},
+            "snr": [],
+            "failed": str(error),
+        }
     return {
         "mode": mode.value, "seed": seed, "version": version, "scene": case.scene.summary,
         "concealed": [s.truth for s in case.switches], "left_out": list(left_out),
@@ -198,7 +205,7 @@ def _tell(line: dict[str, Any]) -> None:
     told = " ".join(f"{n} {v[0]:.4g}" for n, v in line["concealed"]) or "nothing"
     typer.echo(
         f"{line['mode']} {line['seed']}: {told} (snr {line['snr']}) -> {answer['verdict']} {said} "
-        f"p {answer['global_p']:.2g} {line['cpu_s']} s"
+        f"p {answer.get('global_p') or 0:.2g} {line['cpu_s']} s {line.get('failed', '')}"
     )
 
 
@@ -224,7 +231,10 @@ def summary(
     for file in proof or ():
         for rate in json.loads(file.read_text("utf-8"))["figures"]:
             typer.echo(f"rendered   | {rate['text']}")
-    p_values = [line["answer"]["global_p"] for line in lines if not line["concealed"]]
+    failed = sum("failed" in line for line in lines)
+    typer.echo(f"ended without an answer, counted as having identified nothing: {failed} of {len(lines)}")
+    nulls = [line for line in lines if not line["concealed"] and "failed" not in line]
+    p_values = [line["answer"]["global_p"] for line in nulls]
     if p_values:
         below = " ".join(f"{q:g}: {np.mean(np.array(p_values) < q):.3f}" for q in (0.5, 0.2, 0.1, 0.05, 0.01))
         # Corrected for all that is tried, p may be conservative, never the other way.
