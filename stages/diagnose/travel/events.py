@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
 from pipeline.recording.base import Encoder
@@ -26,6 +27,9 @@ _ENTERS = 1e-4
 _SIDE = 3
 # Rivals whose χ² differ by less are not told apart.
 _APART = 9.0
+# So many frames in a row may be lost without their times telling; of a frame's time, how exact it is.
+_UNNOTICED = 2
+_WITHIN, _TIMING = 3.0, 0.03
 
 
 @dataclass(frozen=True)
@@ -99,15 +103,22 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     event, sight = fit.events[place_in_list], fit.sight
     others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
     without = fitted(sight, encoder, others, fit.noise)
-    speed = np.gradient(sight.distance_mm, sight.time_s)
+    # The step itself is no speed.
+    speed = median_filter(np.gradient(sight.distance_mm, sight.time_s), 5)
     score, size = {}, {}
     for kind in EventKind:
         value, gain = without.whitened.gain(candidate_columns(sight, kind, speed))
         near = slice(max(event.place - 2, 0), event.place + 3)
         size[kind], score[kind] = float(value[near][np.argmax(gain[near])]), float(gain[near].max())
-    rivals = tuple(k for k in EventKind if k is not event.kind and score[k] > score[event.kind] - _APART)
     at = 4 + place_in_list
     sigma = float(fit.sigma[at])
+    rivals = tuple(
+        k
+        for k in EventKind
+        if k is not event.kind
+        and score[k] > score[event.kind] - _APART
+        and (k is not EventKind.LOST_TIME or _whole_frames(sight, size[k], sigma, speed[event.place]))
+    )
     z2 = (fit.values[at] / sigma) ** 2 if np.isfinite(sigma) else 0.0
     count = len(sight.time_s)
     k = moment(sight, encoder, event.place)
@@ -116,3 +127,10 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
         event.place, float(time_s), float(fit.values[at]), sigma,
         chance(z2, 2 * count, count), rivals, size[EventKind.LOST_TIME],
     )  # fmt: skip
+
+
+def _whole_frames(sight: Sight, missing_s: float, sigma_mm: float, speed_mm_s: float) -> bool:
+    """Return whether a time is that of one or two frames, which a camera may lose or write twice."""
+    frames = missing_s / sight.frame_time_s
+    sigma = _WITHIN * sigma_mm / max(abs(speed_mm_s), 1e-9) / sight.frame_time_s
+    return 0 < abs(round(frames)) <= _UNNOTICED and abs(frames - round(frames)) < sigma + _TIMING

@@ -26,6 +26,9 @@ SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
 _ROUNDS = 4
 _LONGEST_S = 1.0
 _AROUND = 10
+# The search for delay and play: points a side, finest step, tries of the play, rounds; speeds that differ by
+# less than this share tell nothing of a delay.
+_SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 2, 8, 0.02
 
 
 class EventKind(StrEnum):
@@ -85,7 +88,7 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     """
     steady = _without_steps(sight, encoder, events)
     speed = np.gradient(sight.distance_mm, sight.time_s)
-    delay_s, play_mm = 0.0, 0.0
+    delay_s, play_mm = _nearest_start(sight, steady, events, speed)
     for _ in range(_ROUNDS):
         reading = readings_at(steady, sight.time_s + delay_s)
         columns = np.concatenate(
@@ -104,6 +107,40 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     values[4:] += [_gain(encoder, sight, e) for e in events]
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
     return TravelFit(sight, events, values, covariance, noise, plain - np.median(plain), whitened)
+
+
+def _nearest_start(
+    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float
+) -> tuple[float, float]:
+    """Return delay and play from which the fit starts, by search: play can look like delay from afar.
+
+    Where the speed changes at once, a delay shows in a few pictures only, and its slope there tells little.
+    """
+    best, play_mm, width = 0.0, 0.0, _LONGEST_S
+    if np.ptp(speed) < _SPEEDS * float(np.max(np.abs(speed), initial=1e-9)):
+        return best, play_mm
+    while width > _FINEST_S:
+        cost = np.inf
+        for delay in best + width * np.linspace(-1, 1, 2 * _SEARCHED + 1):
+            here, play = _astray(sight, steady, events, speed, float(delay))
+            if here < cost:
+                cost, nearest, play_mm = here, float(delay), play
+        best, width = nearest, width / _SEARCHED
+    return best, play_mm
+
+
+def _astray(
+    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float, delay_s: float
+) -> tuple[float, float]:
+    """Return the sum of absolute increments left at a delay, and the play at which they are least."""
+    difference = readings_at(steady, sight.time_s + delay_s) - sight.distance_mm
+    of_events, left, play_mm = event_columns(sight, events, speed), np.inf, 0.0
+    for _ in range(_PLAYS):
+        columns = np.concatenate([np.delete(_smooth_columns(sight, speed, play_mm), DELAY, 1), of_events], 1)
+        found = robust_coefficients(difference, columns, _QUICKLY)
+        left = float(np.sum(np.abs(np.diff(difference - columns @ found))))
+        play_mm = float(found[PLAY - 1])
+    return left, play_mm
 
 
 def moment(sight: Sight, encoder: Encoder, place: int) -> int:

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 Float = NDArray[np.float64]
-_LEAST_WHITE_MM = 0.005
+_LEAST_WHITE_MM = 0.002
+# Readings of an even motion may by chance hit their quanta, but not throughout.
+_LEAST_SHARE = 0.5
 _LAGS = (2, 4, 8, 16, 32)
 # Of so many increments one step spoils no more than medians bear, nor do two.
 _PER_LAG = 12
@@ -39,12 +41,12 @@ def estimated_noise(difference_mm: Float, columns: Float, path_mm: Float, least_
     """
     left = difference_mm - columns @ robust_coefficients(difference_mm, columns)
     one = _increment_variance(left, 1)
-    white = max(one / 2, least_mm**2, _LEAST_WHITE_MM**2)
-    drift = 0.0
+    white = max(one / 2, (_LEAST_SHARE * least_mm) ** 2, _LEAST_WHITE_MM**2)
+    step, drift = float(np.median(np.diff(path_mm))), 0.0
     for lag in _LAGS:
         if lag == _LAGS[0] or _PER_LAG * lag <= len(left):
-            way = np.median(path_mm[lag:] - path_mm[:-lag])
-            drift = max(drift, (_increment_variance(left, lag) - 2 * white) / max(float(way), 1e-6))
+            way = float(np.median(path_mm[lag:] - path_mm[:-lag])) - step
+            drift = max(drift, (_increment_variance(left, lag) - one) / max(way, 1e-6))
     return DriftNoise(float(np.sqrt(white)), float(np.sqrt(drift)))
 
 
@@ -53,12 +55,12 @@ def _increment_variance(values: Float, lag: int) -> float:
     return float((_MAD * np.median(np.abs(step - np.median(step)))) ** 2) if len(step) else 0.0
 
 
-def robust_coefficients(values: Float, columns: Float) -> Float:
+def robust_coefficients(values: Float, columns: Float, rounds: int = _ROUNDS) -> Float:
     """Return coefficients (C,) of least absolute deviations of the increments (iterated reweighting)."""
     y, a = np.diff(values), np.diff(columns, axis=0)
     scale = np.maximum(np.linalg.norm(a, axis=0), 1e-12)
     found = np.zeros(columns.shape[1])
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         weight = 1 / np.sqrt(np.maximum(np.abs(y - a @ found), 1e-4))
         found = np.linalg.lstsq(weight[:, None] * a / scale, weight * y, rcond=1e-8)[0] / scale
     return found

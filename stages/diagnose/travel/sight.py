@@ -14,6 +14,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 _END_READINGS = 20
+_ROUNDING_MM, _WHOLE = 2e-4, 0.02
 
 
 @dataclass(frozen=True)
@@ -98,13 +99,13 @@ def readings_at(encoder: Encoder, time_s: Float) -> Float:
 
 def quantum_mm(encoder: Encoder) -> float:
     """Return the finest unit of the readings, mm; 0 where every step differs."""
-    steps = np.unique(np.round(np.abs(np.diff(encoder.distance_mm)), 4))
-    steps = steps[steps > 0]
-    if not len(steps):
+    sizes = np.unique(np.round(np.abs(np.diff(encoder.distance_mm)), 4))
+    units = np.concatenate([sizes, np.diff(sizes)])
+    units = units[units > _ROUNDING_MM]
+    if not len(units):
         return 0.0
-    unit = float(steps[0])
-    # Readings that are written with four digits are not quantised to any visible step.
-    return unit if np.all(np.abs(steps / unit - np.round(steps / unit)) < 0.02) else 0.0
+    unit = float(units.min())
+    return unit if np.all(np.abs(sizes / unit - np.round(sizes / unit)) < _WHOLE) else 0.0
 
 
 def _sight(recording: Recording, frame: Int, distance_mm: Float, use: Mask, scale_sigma: float) -> Sight:

@@ -1,0 +1,81 @@
+"""Steps of the reading are found; drift, stray pictures and lost time are no slips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.recording.base import Encoder
+from stages.diagnose.travel.events import StepFound, steps_found, with_events
+from stages.diagnose.travel.model import EventKind
+from stages.diagnose.travel.sight import Sight
+from tests.travel_cases import QUANTUM_MM, read, seen, way
+
+BELIEVED = 1e-5
+
+
+def slips(sight: Sight, encoder: Encoder) -> list[StepFound]:
+    fit = with_events(sight, encoder)
+    return [s for s in steps_found(fit, encoder) if s.p_value < BELIEVED and not s.rivals]
+
+
+@pytest.mark.parametrize("drift_mm", [0.0, 0.004, 0.02])
+@pytest.mark.parametrize("reverses", [True, False])
+def test_nothing_is_found_where_nothing_slips(drift_mm: float, reverses: bool) -> None:
+    random = np.random.default_rng(1)
+    found = [slips(seen(random, reverses, drift_mm), read(reverses)) for _ in range(12)]
+    assert sum(map(len, found)) == 0
+
+
+def test_smooth_drift_of_sight_is_no_slip() -> None:
+    random = np.random.default_rng(2)
+    sight = seen(random, False)
+    wavy = replace(sight, distance_mm=sight.distance_mm + 0.1 * np.tanh((sight.time_s - 4) / 0.4))
+    assert slips(wavy, read(False)) == []
+
+
+@pytest.mark.parametrize("reverses", [True, False])
+@pytest.mark.parametrize("gain_mm", [-20.0, -0.5, 0.4, 3.0])
+def test_a_slip_is_found_with_size_and_time(reverses: bool, gain_mm: float) -> None:
+    for seed in range(3):
+        sight = seen(np.random.default_rng(seed), reverses)
+        (found,) = slips(sight, read(reverses, slips=((2.303, gain_mm),)))
+        assert found.gain_mm == pytest.approx(gain_mm, abs=4 * found.sigma_mm + QUANTUM_MM / 2)
+        assert found.sigma_mm < 0.1
+        assert found.time_s == pytest.approx(2.303, abs=0.07 if abs(gain_mm) < 1 else 0.011)
+
+
+def test_two_slips_of_opposite_sign_are_two() -> None:
+    sight = seen(np.random.default_rng(3))
+    found = slips(sight, read(slips=((2.0, 8.0), (4.5, -5.0))))
+    assert sorted(round(s.gain_mm) for s in found) == [-5, 8]
+
+
+def test_a_stray_picture_is_no_slip() -> None:
+    sight = seen(np.random.default_rng(4))
+    stray = sight.distance_mm.copy()
+    stray[40] += 2.0
+    fit = with_events(replace(sight, distance_mm=stray), read())
+    assert [e.kind for e in fit.events] == [EventKind.OUTLIER]
+
+
+def test_missing_pictures_at_steady_speed_are_not_called_a_slip() -> None:
+    sight, encoder = seen(np.random.default_rng(5), False), read(False)
+    noise = sight.distance_mm - way(sight.time_s, False)
+    late = sight.time_s + np.where(sight.time_s > 4, 2 / 30, 0.0)
+    missing = replace(sight, distance_mm=18.0 * late + noise)
+    steady = replace(encoder, distance_mm=QUANTUM_MM * np.round(18.0 * encoder.time_s / QUANTUM_MM))
+    found = steps_found(with_events(missing, steady), steady)
+    assert [EventKind.LOST_TIME in s.rivals for s in found] == [True]
+    assert found[0].missing_s == pytest.approx(2 / 30, abs=0.01)
+
+
+def test_a_slip_leaves_delay_and_scale_alone() -> None:
+    sight = seen(np.random.default_rng(6))
+    plain, slipped = (with_events(sight, read(slips=s)) for s in ((), ((3.0, 5.0),)))
+    np.testing.assert_allclose(
+        plain.values[1:4], slipped.values[1:4], atol=3 * plain.sigma[1:4].max(), rtol=0
+    )
+    assert np.all(np.abs(plain.values[1:4] - slipped.values[1:4]) < 3 * slipped.sigma[1:4])

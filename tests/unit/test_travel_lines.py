@@ -1,0 +1,64 @@
+"""Lines in the probe's place across the pipe: found, measured, and told from a sheet that rocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stages.diagnose.travel.lines import find_lines
+
+Float = NDArray[np.float64]
+RATE = 30.0
+TIME_S = np.arange(240) / RATE
+LIT = np.arange(240) % 4 == 3
+
+
+def wander(seed: int) -> Float:
+    """Return places (N, 2) of a probe that wanders slowly by millimetres, measured to a few µm."""
+    random = np.random.default_rng(seed)
+    out = 0.003 * random.standard_normal((len(TIME_S), 2)) + 1e-3 * np.cumsum(
+        random.standard_normal((len(TIME_S), 2)), axis=0
+    )
+    for f in random.uniform(0.1, 0.9, 4):
+        out += np.sin(2 * np.pi * f * TIME_S[:, None] + random.uniform(0, 6, 2)) * random.uniform(0.3, 3, 2)
+    return out
+
+
+def swing(frequency: float, amplitude: float) -> Float:
+    return amplitude * np.sin(2 * np.pi * frequency * TIME_S + 0.4)[:, None] * np.array([0.8, 0.6])
+
+
+def test_a_probe_that_only_wanders_has_no_lines() -> None:
+    assert sum(len(find_lines(TIME_S, wander(seed), LIT)) for seed in range(150)) == 0
+
+
+@pytest.mark.parametrize(("frequency", "alias"), [(5.3, 5.3), (11.0, 11.0), (24.7, 5.3), (33.0, 3.0)])
+@pytest.mark.parametrize("amplitude", [0.03, 0.2])
+def test_a_vibration_is_found_with_its_alias_size_and_direction(
+    frequency: float, alias: float, amplitude: float
+) -> None:
+    (line,) = find_lines(TIME_S, wander(1) + swing(frequency, amplitude), LIT)
+    assert line.frequency_hz == pytest.approx(alias, abs=0.03)
+    assert line.amplitude_mm == pytest.approx(amplitude, abs=5 * line.sigma_mm + 0.002)
+    assert line.direction_deg == pytest.approx(np.degrees(np.arctan2(0.6, 0.8)), abs=6)
+    assert line.p_value < 1e-4
+    assert line.explained_by == ("probe_vibration",)
+
+
+def test_what_only_laser_pictures_show_is_the_sheet() -> None:
+    lines = find_lines(TIME_S, wander(2) + swing(5.3, 0.2) * ~LIT[:, None], LIT)
+    assert lines
+    assert lines[0].frequency_hz == pytest.approx(5.3, abs=0.03)
+    assert lines[0].explained_by == ("laser_rocking",)
+    assert lines[0].laser_mm == pytest.approx(0.2, abs=0.02)
+    assert lines[0].lit_mm < 0.01
+
+
+def test_with_the_laser_always_on_the_two_are_not_told_apart() -> None:
+    lines = find_lines(TIME_S, wander(3) + swing(5.3, 0.1), np.ones(len(TIME_S), bool))
+    assert [line.explained_by for line in lines] == [("probe_vibration", "laser_rocking")]
+
+
+def test_too_few_pictures_tell_nothing() -> None:
+    assert find_lines(TIME_S[:20], wander(4)[:20] + swing(5.3, 1.0)[:20], LIT[:20]) == ()

@@ -1,0 +1,85 @@
+"""Scale, delay and play of the encoder are found within their σ, where the motion lets tell them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stages.diagnose.travel.events import with_events
+from stages.diagnose.travel.evidence import TravelEstimate, _estimates
+from stages.diagnose.travel.model import DELAY, PLAY, SCALE
+from stages.diagnose.travel.sight import quantum_mm, readings_at
+from tests.travel_cases import read, seen
+
+STATED = 0.002
+
+
+def estimates(seed: int, reverses: bool = True, **faults: float) -> dict[str, TravelEstimate]:
+    fit = with_events(seen(np.random.default_rng(seed), reverses), read(reverses, **faults))  # type: ignore[arg-type]
+    return {e.effect: e for e in _estimates("gauge", fit, STATED)}
+
+
+@pytest.mark.parametrize(
+    ("name", "fault", "size"),
+    [
+        ("encoder_scale", "scale", 0.02),
+        ("encoder_scale", "scale", -0.015),
+        ("time_offset", "delay_s", 0.02),
+        ("time_offset", "delay_s", -0.06),
+        ("encoder_backlash", "play_mm", 0.5),
+        ("encoder_backlash", "play_mm", 2.0),
+    ],
+)
+def test_a_fault_is_found_and_nothing_else(name: str, fault: str, size: float) -> None:
+    found = estimates(1, **{fault: size})
+    assert found[name].value == pytest.approx(size, abs=4 * found[name].sigma)
+    assert found[name].p_value < 1e-5
+    assert all(e.p_value > 1e-3 for e in found.values() if e.effect != name)
+
+
+def test_errors_are_as_large_as_stated() -> None:
+    true = np.array([0.003, 0.01, 0.4])
+    random, scores = np.random.default_rng(2), []
+    # Frames are stamped to about a millisecond, readings to half their quantum.
+    allowed = np.array([0.0, 1e-3, 0.01])
+    encoder = read(scale=true[0], delay_s=true[1], play_mm=true[2])
+    for _ in range(16):
+        fit = with_events(seen(random), encoder)
+        scores.append(
+            (fit.values[[SCALE, DELAY, PLAY]] - true) / np.hypot(fit.sigma[[SCALE, DELAY, PLAY]], allowed)
+        )
+    assert np.all(np.sqrt(np.mean(np.square(scores), axis=0)) < 1.5)
+    assert np.all(np.abs(np.mean(scores, axis=0)) < 0.8)
+
+
+@pytest.mark.parametrize("reverses", [True, False])
+def test_a_sound_encoder_shows_no_fault(reverses: bool) -> None:
+    smallest = [min(e.p_value for e in estimates(seed, reverses).values()) for seed in range(16)]
+    assert min(smallest) > 1e-4
+
+
+def test_without_a_reversal_play_cannot_be_told() -> None:
+    found = estimates(3, reverses=False, play_mm=1.0)
+    assert not np.isfinite(found["encoder_backlash"].sigma)
+    assert not np.isfinite(found["encoder_backlash"].detectable)
+    assert all(e.p_value > 1e-3 for e in found.values())
+
+
+def test_at_one_speed_to_and_fro_delay_and_play_are_one() -> None:
+    sight = seen(np.random.default_rng(4), False)
+    back = np.where(sight.time_s < 4, 20 * sight.time_s, 160 - 20 * sight.time_s)
+    encoder = read(False)
+    steady = np.where(encoder.time_s < 4, 20 * encoder.time_s, 160 - 20 * encoder.time_s)
+    fit = with_events(replace(sight, distance_mm=back), replace(encoder, distance_mm=steady))
+    found = {e.effect: e for e in _estimates("gauge", fit, STATED)}
+    alike = {other for other, _ in found["time_offset"].alike}
+    assert "encoder_backlash" in alike or not np.isfinite(found["time_offset"].sigma)
+
+
+def test_the_readings_quantum_and_ends() -> None:
+    encoder = read(False)
+    assert quantum_mm(encoder) == pytest.approx(0.05)
+    beyond = readings_at(encoder, np.array([encoder.time_s[-1] + 0.1]))
+    assert beyond[0] - encoder.distance_mm[-1] == pytest.approx(1.7, abs=0.4)
