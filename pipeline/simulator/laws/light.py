@@ -41,6 +41,7 @@ def light_checks() -> Iterator[Check]:
     yield from _blurred()
     yield _speckle()
     yield from _pixels()
+    yield _locking()
 
 
 def _albedo() -> Iterator[Check]:
@@ -229,6 +230,19 @@ def _pixels() -> Iterator[Check]:
     row = plain.grey.shape[0] // 2
     left = float(spotted.grey[row].sum() / plain.grey[row].sum())
     yield Check("dust", "○", "attenuation", "light left in the spot's middle", 0.5, left, "", 0.01)
+
+
+def _locking() -> Check:
+    """Check how far a line moves that is rendered through pixels which draw everything to a sin 2πρ."""
+    truth, size = strip_truth(_R), 0.02
+    moved = profiles(truth, Switch("pixel_locking", (size,))).centroid() - profiles(truth).centroid()
+    predicted = size * math.sin(2 * math.pi * FOCAL_PX * theta_of(_R))
+    return Check(
+        "pixel_locking", "○", "δρ = a sin 2πρ", f"a = {size:g} px, line of 0.9 px (1 σ), 4 inch",
+        predicted, float(moved[len(moved) // 2]), "px", 0.05 * abs(predicted),
+        mended="no shift of a line as wide as a pixel: light is drawn aside part by part, not the line",
+        mended_value=0.0,
+    )  # fmt: skip
 
 
 def _scatter(truth: SceneTruth, unequal: float) -> float:
