@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from rich.console import Console
 
@@ -18,6 +20,7 @@ from pipeline.commands.diagnose_resimulate import resimulate
 from pipeline.config import resolve
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
+from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
@@ -27,6 +30,9 @@ from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import diagnose as diagnose_recordings
 from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.result import Diagnosis, to_json
+
+# Stated parameters farther apart than so many σ are not one probe's.
+_ANOTHER = 8.0
 
 
 def diagnose(
@@ -58,6 +64,9 @@ def diagnose(
     recordings = [open_recording(path) if path is not None else None for path in (field, gauge)]
     file = _probe_file(recordings, probe)
     stated = read_probe(file)
+    foreign = _of_another_probe(recordings[1], stated) if field is not None and probe is None else ""
+    if foreign:
+        recordings[1] = None
     for recording in (r for r in recordings if r is not None):
         check_probe_fits(recording, stated)
     console = Console(stderr=True)
@@ -65,16 +74,19 @@ def diagnose(
         library = library_without(without or ())
         examination = diagnose_recordings(recordings[0], recordings[1], stated, library, quiet_context())
         simulated = resimulate(examination)
+    found = examination.found
+    if foreign:
+        found = replace(found, shortcomings=(foreign, *found.shortcomings))
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
         write_files(examination, stated, output)
         change = None
-        if apply and recordings[0] is not None:
+        if apply and recordings[0] is not None and recordings[1] is not None:
             configuration = resolve(PIPELINE, None, ())
             change = apply_correction(examination, recordings[0], file, configuration, output, console)
-        write_page(examination.found, Shown(simulated, change, image_of(examination)), output)
-        _write(examination.found, output)
-    _show(examination.found, output, console)
+        write_page(found, Shown(simulated, change, image_of(examination)), output)
+        _write(found, output)
+    _show(found, output, console)
     if change is not None:
         console.print(consequence(change))
 
@@ -85,6 +97,29 @@ def _probe_file(recordings: Sequence[Recording | None], probe: Path | None) -> P
     if file is None:
         raise InputError(given[0].path, "names no probe", hint="give one with --probe FILE")
     return file
+
+
+def _of_another_probe(gauge: Recording | None, stated: Probe) -> str:
+    """Return why a gauge run is not one of the stated probe; empty when it may be."""
+    if gauge is None or gauge.probe_file is None:
+        return ""
+    own = read_probe(gauge.probe_file)
+    if own.parameter_names != stated.parameter_names or own.camera.image_size != stated.camera.image_size:
+        return f"The gauge run {gauge.name} is of another probe, with another camera: it was left out."
+    sigma = np.sqrt(np.diag(own.covariance) + np.diag(stated.covariance))
+    apart = np.abs(own.parameters - stated.parameters) > _ANOTHER * sigma + 1e-9
+    if not apart.any():
+        return ""
+    names = ", ".join(
+        f"{name} {a:.6g} against {b:.6g}"
+        for name, a, b, far in zip(
+            stated.parameter_names, own.parameters, stated.parameters, apart, strict=True
+        )
+        if far
+    )
+    return (
+        f"The gauge run {gauge.name} is of another probe ({names}): it was left out and names nothing here."
+    )
 
 
 def _write(found: Diagnosis, output: Path) -> None:
