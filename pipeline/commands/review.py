@@ -7,47 +7,75 @@ import socket
 import webbrowser
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 import uvicorn
 
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
-from pipeline.review.export import export_review
 from pipeline.review.review import FOLDER, Review, open_review
 from pipeline.review.run_files import RunFiles
 from pipeline.review.server.app import application
 from pipeline.review.server.guard import Guard
 
+if TYPE_CHECKING:
+    from pipeline.review.comparison.compared import Compared
+
 
 def review(
     run: Annotated[Path, typer.Argument(help="folder of a finished run")],
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="port on 127.0.0.1; 0 takes that of last time, or a free one")
+        int,
+        typer.Option(min=0, max=65535, help="port on 127.0.0.1; 0 takes that of last time, or a free one"),
     ] = 0,
     export: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="write the page as files, read-only, and end")
     ] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
+    compare: Annotated[
+        Path | None, typer.Option(metavar="EARLIER", help="folder of an earlier run of the same pipe")
+    ] = None,
+    years: Annotated[
+        float | None,
+        typer.Option(min=0.001, max=200, help="time from the earlier run to this one, for rates"),
+    ] = None,
 ) -> None:
     """Go through a run in the browser: decide on each finding, measure, sign, print.
 
     The page is served on this machine only; nothing is sent anywhere. Decisions are kept in RUN/review.
     """
     opened = open_review(RunFiles(run.resolve()))
+    compared = _compared(opened, compare, years)
     with as_file(files("pipeline.review").joinpath("page", "dist")) as page:
         if not (page / "index.html").is_file():
             raise InputError(page, "has no page", hint="install boresight whole")
         if export is not None:
+            from pipeline.review.export import (
+                export_review,  # it draws papers; the page need not wait for that
+            )
+
             with disk_errors_named(export):
-                export_review(opened, page, export)
+                export_review(opened, page, export, compared)
             typer.echo(f"Read-only review: {export.resolve() / 'index.html'}")
             return
-        serve(opened, page, port, browser)
+        serve(opened, page, port, browser, compared)
 
 
-def serve(opened: Review, page: Path, port: int, browser: bool) -> None:
+def _compared(opened: Review, earlier: Path | None, years: float | None) -> Compared | None:
+    """Return the review's run laid on an earlier one, told in a line; None without one."""
+    if earlier is None:
+        if years is not None:
+            raise InputError("--years", "is the time since an earlier run", hint="give it with --compare")
+        return None
+    from pipeline.review.comparison.compared import laid_on  # a review of one run need not wait for it
+
+    compared = laid_on(opened, RunFiles(earlier.resolve()), years)
+    typer.echo(compared.line)
+    return compared
+
+
+def serve(opened: Review, page: Path, port: int, browser: bool, compared: Compared | None = None) -> None:
     """Serve a review until interrupted.
 
     Raises
@@ -64,7 +92,7 @@ def serve(opened: Review, page: Path, port: int, browser: bool) -> None:
         typer.echo(f"Review of {opened.files.path.name}: {address}\nStop with Ctrl-C.")
         if browser:
             webbrowser.open(address)
-        guarded = Guard(application(opened, page), token, number)
+        guarded = Guard(application(opened, page, compared), token, number)
         server = uvicorn.Server(uvicorn.Config(guarded, log_level="warning", server_header=False))
         server.run(sockets=[listener])
 

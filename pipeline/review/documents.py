@@ -45,7 +45,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "wall_thickness_mm": pipe.wall_thickness_mm if pipe is not None else None,
         "distance_mm": [float(overlays.distance_mm[0]), float(overlays.distance_mm[-1])],
         "radius_mm": float(np.median(overlays.reference_radius_mm)),
-        "overlays": [_overlay(o) for o in overlays.pictures],
+        "overlays": [overlay_document(o) for o in overlays.pictures],
         "defects": json.loads(files.defects_text()),
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),
@@ -63,7 +63,7 @@ def state_document(state: State, files: RunFiles) -> dict[str, Any]:
     """Return the findings as they stand."""
     bore = 2 * files.artefact(Overlays).nominal_radius_mm
     standing = [f for f in state.findings if f.status != GONE]
-    return cleaned({
+    return {
         "revision": state.revision,
         "findings": [_finding(f, state, bore) | {"covers": _covers(f, standing)} for f in state.findings],
         "may_undo": state.may_undo,
@@ -71,7 +71,7 @@ def state_document(state: State, files: RunFiles) -> dict[str, Any]:
         "lost": [_entry(e) for e in state.lost],
         "assumed": state.assumed.model_dump(exclude={"do"}),
         "history": [_entry(e) for e in state.entries],
-    })  # fmt: skip
+    }
 
 
 def layer_document(picture: FlatPicture) -> dict[str, Any]:
@@ -151,11 +151,14 @@ def _finding(finding: Finding, state: State, bore_mm: float) -> dict[str, Any]:
         remaining = strength(
             size.depth_mm, size.depth_sigma_mm, size.length_mm, bore_mm, wall, state.assumed.yield_mpa
         )
-    return asdict(finding) | {
+    judged = {
+        "size": vars(size),
         "wall_loss_percent": loss,
         "wall_loss_sigma_percent": 100 * size.depth_sigma_mm / wall if loss is not None and wall else None,
-        "strength": asdict(remaining) if remaining else None,
+        "strength": vars(remaining) if remaining else None,
     }
+    # A long pipe has thousands of outlines: they are known to be finite and are not copied.
+    return vars(finding) | cleaned(judged) | {"remarks": [vars(r) for r in finding.remarks]}
 
 
 def _covers(finding: Finding, standing: list[Finding]) -> tuple[str, ...]:
@@ -166,7 +169,8 @@ def _entry(entry: Entry) -> dict[str, Any]:
     return {"id": entry.id, "who": entry.who, "at": entry.at, "action": entry.action.model_dump()}
 
 
-def _overlay(overlay: Overlay) -> dict[str, Any]:
+def overlay_document(overlay: Overlay) -> dict[str, Any]:
+    """Return what a legend needs of an overlay."""
     at = np.linspace(1, 255, _LEGEND_STEPS).round().astype(int)
     return {
         "name": overlay.name,

@@ -7,7 +7,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,11 +21,14 @@ from pipeline.review.papers.catalogue import PAPERS, paper_of
 from pipeline.review.quality import quality_document
 from pipeline.review.review import Review, State
 
+if TYPE_CHECKING:
+    from pipeline.review.comparison.compared import Compared
+
 _SECTIONS = 400
 _LARGEST_MODEL = 200 << 20
 
 
-def export_review(review: Review, page: Path, folder: Path) -> None:
+def export_review(review: Review, page: Path, folder: Path, compared: Compared | None = None) -> None:
     """Write the page, its data, pictures and papers into a new or empty ``folder``.
 
     Raises
@@ -39,7 +42,7 @@ def export_review(review: Review, page: Path, folder: Path) -> None:
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir(parents=True)
     try:
-        _write(review, page, temporary)
+        _write(review, page, temporary, compared)
         if folder.exists():
             folder.rmdir()
         temporary.rename(folder)
@@ -47,7 +50,7 @@ def export_review(review: Review, page: Path, folder: Path) -> None:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _write(review: Review, page: Path, folder: Path) -> None:
+def _write(review: Review, page: Path, folder: Path, compared: Compared | None) -> None:
     state = review.state()
     shutil.copytree(page / "assets", folder / "assets")
     index = (page / "index.html").read_text("utf-8")
@@ -55,6 +58,8 @@ def _write(review: Review, page: Path, folder: Path) -> None:
     index = index.replace('<script defer src="assets/page.js"></script>', own)
     (folder / "index.html").write_text(index, "utf-8")
     data = _data(review, state, folder)
+    if compared is not None:
+        _add_comparison(data, compared, folder)
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))
     (folder / "assets" / "data.js").write_text(f"window.BORESIGHT={text};\n", "utf-8")
     for name in PAPERS:
@@ -74,6 +79,14 @@ def _data(review: Review, state: State, folder: Path) -> dict[str, Any]:
         "model": _model(review),
         "spots": list(_spots(review, state, folder)),
     }
+
+
+def _add_comparison(data: dict[str, Any], compared: Compared, folder: Path) -> None:
+    """Add what the comparison says, and write its tables and the tiles of its layers."""
+    data["comparison"] = compared.document()
+    data["layers"] |= {name: _tiles(name, compared.picture(name), folder) for name in compared.layers()}
+    for name in compared.tables:
+        (folder / name).write_bytes(compared.table(name)[1])
 
 
 def _stations(overlays: Overlays) -> list[float]:

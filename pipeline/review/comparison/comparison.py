@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 
 from pipeline.artefacts import RingSamples, Trajectory, WallTexture
 from pipeline.findings import DefectKind
+from pipeline.model import Overlays
 from pipeline.review.comparison.changes import Change, changes
 from pipeline.review.comparison.growth import Resolution, Value
 from pipeline.review.comparison.paired import PairedWalls
+from pipeline.review.comparison.pictures import DifferenceLayers, difference_layers
 from pipeline.review.comparison.places import put_together
 from pipeline.review.comparison.registration import register
 from pipeline.review.comparison.surface import Surface
 from pipeline.review.decisions.replay import GONE, REJECTED, Finding
+from pipeline.review.flat_tiles import FlatPicture, layers_of, overlay_picture, picture_of
 from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.review import Review, State
 
 _ROWS_AT_ONCE = 512
+_CORRELATED_MM = 10.0
+DIFFERENCE = ("difference", "difference_sigma")
+EARLIER = "earlier-"
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A review's run and an earlier run, registered when first asked for.
+    """A review's run and an earlier run; everything is worked out when asked for, and again when a run was.
 
     Attributes
     ----------
@@ -37,7 +43,12 @@ class Comparison:
     earlier: Review
     years: float | None = None
 
-    @cached_property
+    @property
+    def versions(self) -> tuple[int, int]:
+        """Those of both runs' results."""
+        return self.now.files.version, self.earlier.files.version
+
+    @property
     def pair(self) -> PairedWalls:
         """Both walls and how they lie on each other.
 
@@ -46,29 +57,52 @@ class Comparison:
         UnusableError
             When the runs do not show the same wall.
         """
-        before, after = _surface(self.earlier), _surface(self.now)
-        welds = [_middle_mm(f) for f in self.earlier_findings if f.kind == DefectKind.WELD]
-        return PairedWalls(before.wall, after.wall, register(before, after, np.array(welds)))
+        return _pair(self, self.versions)
 
-    @cached_property
+    @property
     def earlier_findings(self) -> tuple[Finding, ...]:
         """The earlier run's findings as its own review left them."""
         return _standing(self.earlier.state())
 
-    @cached_property
+    @property
     def diameter(self) -> Value:
         """Growth of the mean diameter over all rings that both saw, mm."""
-        wall = self.pair.now
-        grown = np.concatenate([
-            self.pair.stretch(i, i + _ROWS_AT_ONCE).diameter_mm
-            for i in range(0, len(wall.distance_mm), _ROWS_AT_ONCE)
-        ])  # fmt: skip
-        known = grown[np.isfinite(grown)]
-        wander = float(known.std()) / np.sqrt(max(len(known) * wall.step_mm / _CORRELATED_MM, 1.0))
-        systematic = 2 * np.sqrt(2) * _calibration_mm(wall)
-        return Value(
-            float(np.median(known)), float(np.hypot(wander, 0.0 if self.is_one_calibration else systematic))
-        )
+        return _diameter(self, self.versions)
+
+    @property
+    def wall_thickness_mm(self) -> float | None:
+        """As assumed in the review, else as the recording says; None where unknown."""
+        assumed = self.now.state().assumed.wall_thickness_mm
+        recording = self.now.files.recording()
+        return assumed or (recording.pipe.wall_thickness_mm if recording is not None else None)
+
+    def changes(self) -> tuple[Change, ...]:
+        """Return what became of every finding of either run as it stands."""
+        return _changes(self, self.versions, (self.now.state().revision, self.earlier.state().revision))
+
+    def difference_layers(self) -> DifferenceLayers:
+        """Return the walls' difference as overlays."""
+        return _difference_layers(self, self.versions)
+
+    def layers(self) -> tuple[str, ...]:
+        """Return the names of the layers that it adds to those of the later run."""
+        return (*DIFFERENCE, *(EARLIER + name for name in layers_of(self.earlier.files)))
+
+    def picture(self, layer: str) -> FlatPicture:
+        """Return a layer: one of the difference, of the earlier run, or of the later one.
+
+        Raises
+        ------
+        InputError
+            When there is none of that name.
+        """
+        if layer in DIFFERENCE:
+            found = self.difference_layers()
+            overlays = self.now.files.artefact(Overlays)
+            return overlay_picture(overlays, found.difference if layer == DIFFERENCE[0] else found.sigma)
+        if layer.startswith(EARLIER):
+            return picture_of(self.earlier.files, layer.removeprefix(EARLIER))
+        return picture_of(self.now.files, layer)
 
     @property
     def is_one_calibration(self) -> bool:
@@ -80,14 +114,8 @@ class Comparison:
         probes = {r.files.record()["input_sha256"]["probe"] for r in both}
         return len(probes) == 1 and all(r.files.artefact(Trajectory).instrument is None for r in both)
 
-    def changes(self, state: State) -> tuple[Change, ...]:
-        """Return what became of every finding, given the later review's state."""
-        pair = self.pair
-        radius = float(np.nanmedian(pair.now.radius_mm[:: max(len(pair.now.distance_mm) // 200, 1)]))
-        places = put_together(self.earlier_findings, _standing(state), pair.registration, radius)
-        return changes(places, pair, self._resolution(radius))
-
-    def _resolution(self, radius_mm: float) -> Resolution:
+    def resolution(self, radius_mm: float) -> Resolution:
+        """Return what limits the reading of depths."""
         own = max(_smoothing_mm(r) for r in (self.now, self.earlier))
         spacing = max(_ring_spacing_mm(r) for r in (self.now, self.earlier))
         along = float(np.hypot(own, spacing / np.sqrt(6)))
@@ -95,7 +123,43 @@ class Comparison:
         return Resolution(along, own, relative, self.is_one_calibration)
 
 
-_CORRELATED_MM = 10.0
+# Results are kept with the versions of the runs they were made of, which callers give.
+@lru_cache(maxsize=2)
+def _pair(comparison: Comparison, _versions: tuple[int, int]) -> PairedWalls:
+    before, after = _surface(comparison.earlier), _surface(comparison.now)
+    welds = [_middle_mm(f) for f in comparison.earlier_findings if f.kind == DefectKind.WELD]
+    return PairedWalls(before.wall, after.wall, register(before, after, np.array(welds)))
+
+
+@lru_cache(maxsize=2)
+def _changes(
+    comparison: Comparison, _versions: tuple[int, int], _revisions: tuple[int, int]
+) -> tuple[Change, ...]:
+    pair = comparison.pair
+    radius = float(np.nanmedian(pair.now.radius_mm[:: max(len(pair.now.distance_mm) // 200, 1)]))
+    standing = _standing(comparison.now.state())
+    places = put_together(comparison.earlier_findings, standing, pair.registration, radius)
+    return changes(places, pair, comparison.resolution(radius))
+
+
+@lru_cache(maxsize=1)
+def _difference_layers(comparison: Comparison, _versions: tuple[int, int]) -> DifferenceLayers:
+    return difference_layers(comparison.pair, comparison.now.files.artefact(Overlays))
+
+
+@lru_cache(maxsize=2)
+def _diameter(comparison: Comparison, _versions: tuple[int, int]) -> Value:
+    wall = comparison.pair.now
+    grown = np.concatenate([
+        comparison.pair.stretch(i, i + _ROWS_AT_ONCE).diameter_mm
+        for i in range(0, len(wall.distance_mm), _ROWS_AT_ONCE)
+    ])  # fmt: skip
+    known = grown[np.isfinite(grown)]
+    wander = float(known.std()) / np.sqrt(max(len(known) * wall.step_mm / _CORRELATED_MM, 1.0))
+    systematic = 2 * np.sqrt(2) * _calibration_mm(wall)
+    return Value(
+        float(np.median(known)), float(np.hypot(wander, 0.0 if comparison.is_one_calibration else systematic))
+    )
 
 
 def _surface(review: Review) -> Surface:

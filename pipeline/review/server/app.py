@@ -6,7 +6,7 @@ import json
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -20,14 +20,16 @@ from pipeline.model import Overlays
 from pipeline.review import documents
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.decisions.ledger import StaleError
-from pipeline.review.flat_tiles import picture_of
+from pipeline.review.flat_tiles import FlatPicture, picture_of
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.measuring.tools import readings
 from pipeline.review.model_stretches import model_of
-from pipeline.review.papers.catalogue import paper_of
 from pipeline.review.quality import quality_document
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.review import Review
+
+if TYPE_CHECKING:  # a review of one run alone need not wait for it
+    from pipeline.review.comparison.compared import Compared
 
 _CONFLICT, _REFUSED, _MISSING = 409, 422, 404
 Handler = Callable[[Request], Awaitable[Response]]
@@ -39,6 +41,7 @@ class ReviewApp:
 
     review: Review
     page: Path
+    compared: Compared | None = None
 
     def routes(self) -> list[Route | Mount]:
         """Return all addresses."""
@@ -62,6 +65,8 @@ class ReviewApp:
                 "/api/tiles/{layer:str}/{level:int}/{column:int}/{row:int}.png", self._answering(self._tile)
             ),
             Route("/api/papers/{name:str}", self._answering(self._paper)),
+            Route("/api/comparison", self._answering(self._comparison)),
+            Route("/api/comparison/{name:str}", self._answering(self._growth)),
             Route("/api/model", self._answering(self._model)),
             Route("/api/model/{stretch:int}.glb", self._answering(self._stretch)),
         ]
@@ -139,15 +144,35 @@ class ReviewApp:
         return Response(jpeg, media_type="image/jpeg")
 
     def _layer(self, request: Request, _: bytes) -> Response:
-        picture = picture_of(self.review.files, request.path_params["layer"])
+        picture = self._picture(request.path_params["layer"])
         return JSONResponse(documents.layer_document(picture))
 
     def _tile(self, request: Request, _: bytes) -> Response:
         at: dict[str, Any] = request.path_params
-        picture = picture_of(self.review.files, at["layer"])
+        picture = self._picture(at["layer"])
         return Response(picture.tile(at["level"], at["column"], at["row"]), media_type="image/png")
 
+    def _picture(self, layer: str) -> FlatPicture:
+        return picture_of(self.review.files, layer) if self.compared is None else self.compared.picture(layer)
+
+    def _comparison(self, _: Request, __: bytes) -> Response:
+        """Answer null where the review is of one run alone."""
+        return JSONResponse(self.compared.document() if self.compared else None)
+
+    def _growth(self, request: Request, _: bytes) -> Response:
+        if self.compared is None:
+            raise InputError(
+                "compare", "no earlier run was given", hint="boresight review RUN --compare EARLIER"
+            )
+        name = request.path_params["name"]
+        media_type, content = self.compared.table(name)
+        headers = {"content-disposition": f'attachment; filename="{name}"'}
+        return Response(content, media_type=media_type, headers=headers)
+
     def _paper(self, request: Request, _: bytes) -> Response:
+        # It draws with matplotlib, for which the first view need not wait.
+        from pipeline.review.papers.catalogue import paper_of
+
         paper = paper_of(request.path_params["name"], self.review, self.review.state())
         disposition = f'{"inline" if paper.shown else "attachment"}; filename="{paper.name}"'
         return Response(
@@ -155,9 +180,9 @@ class ReviewApp:
         )
 
 
-def application(review: Review, page: Path) -> Starlette:
+def application(review: Review, page: Path, compared: Compared | None = None) -> Starlette:
     """Return the server's application, unguarded: see `pipeline.review.server.guard`."""
-    return Starlette(routes=ReviewApp(review, page).routes())
+    return Starlette(routes=ReviewApp(review, page, compared).routes())
 
 
 def _number(request: Request, name: str) -> float:
