@@ -1,4 +1,5 @@
 /** The page of the review. */
+import { comparePage } from "./compare";
 import { FindingsPanel } from "./findings";
 import { FlatView } from "./flat";
 import { FrameView } from "./frame";
@@ -30,7 +31,7 @@ async function start(): Promise<void> {
     pane("Recorded frame", "view-frame", frame.bar(), frame.root), pane("Cross-section", "view-section", section.bar(), section.root),
     pane("Findings", "view-findings", null, findings.root));
   const pages: Record<string, HTMLElement> = {
-    Inspect: inspect, Quality: qualityPage(session), "Sign-off": signPage(session),
+    Inspect: inspect, Quality: qualityPage(session), "Sign-off": signPage(session), Compare: comparePage(session),
   };
   const help = keysDialog();
   document.body.replaceChildren(header(session, pages, help), notice(session), ...Object.values(pages), help);

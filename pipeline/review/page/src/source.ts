@@ -1,5 +1,5 @@
 /** Where the page gets its data: the local server, or the files of a read-only export. */
-import type { Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Stretch, Tool } from "./types";
+import type { Comparison, Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Stretch, Tool } from "./types";
 
 export class RefusedError extends Error {
   constructor(message: string, readonly stale: boolean) { super(message); }
@@ -23,6 +23,7 @@ export interface Source {
   stretches(): Promise<Stretch[]>;
   stretch(number: number): Promise<ArrayBuffer>;
   quality(): Promise<Quality>;
+  comparison(): Promise<Comparison | null>;
 }
 
 async function answer<T>(response: Response): Promise<T> {
@@ -73,11 +74,12 @@ export class Server implements Source {
     return response.arrayBuffer();
   };
   quality = () => get<Quality>("/api/quality");
+  comparison = () => get<Comparison | null>("/api/comparison");
 }
 
 /** Data that an export puts beside the page, as a script, because a page from a file may not fetch. */
 export interface Exported {
-  run: Run; state: ReviewState; seal: Seal; quality: Quality; sections: Section[]; layers: Record<string, Layer>; model: { stretches: Stretch[]; parts: string[] };
+  run: Run; state: ReviewState; seal: Seal; quality: Quality; comparison?: Comparison; sections: Section[]; layers: Record<string, Layer>; model: { stretches: Stretch[]; parts: string[] };
   spots: { distance_mm: number; azimuth_rad: number; sights: Sight[]; profile: Profile }[];
 }
 
@@ -107,6 +109,7 @@ export class Export implements Source {
   frame = (frame: number) => `frames/${frame}.jpg`;
   spot = async (): Promise<Point> => { throw new RefusedError("Moving by the frame needs boresight review.", false); };
   quality = async () => this.data.quality;
+  comparison = async () => this.data.comparison ?? null;
   stretches = async () => this.data.model.stretches;
   stretch = async (number: number) => Uint8Array.from(atob(this.data.model.parts[number]!), (c) => c.charCodeAt(0)).buffer;
 }

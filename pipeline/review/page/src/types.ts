@@ -58,6 +58,28 @@ export interface Section {
   fitted_mm: number[]; nominal_mm: number;
 }
 
+/** How the earlier run lies on this one, linear between stations of the earlier run's distance. */
+export interface Registration {
+  at_mm: number[]; shift_mm: number[]; shift_sigma_mm: number[]; roll_rad: number[]; roll_sigma_rad: number[]; scale: number; scale_sigma: number;
+  blocks: number; agreeing: number; correlation: number; chance: number; welds: { earlier_mm: number; now_mm: number }[]; overlap_mm: [number, number];
+  shift_range_mm: [number, number]; roll_range_rad: [number, number];
+}
+
+/** A finding of either run; outlines where they lie in this run, this run's own first. */
+export interface Change {
+  id: string | null; earlier_id: string | null; kind: string; fate: string; changed: boolean; distance_mm: number; azimuth_rad: number; half_mm: number;
+  outlines: Point[][]; depth_mm: number | null; earlier_depth_mm: number | null; depth_growth_mm: number | null; depth_growth_sigma_mm: number | null;
+  length_growth_mm: number | null; length_growth_sigma_mm: number | null; width_growth_mm: number | null; width_growth_sigma_mm: number | null;
+  area_growth_mm2: number | null; area_growth_sigma_mm2: number | null; p_adjusted: number | null;
+  depth_rate_mm_per_year: number | null; depth_rate_sigma_mm_per_year: number | null;
+  wall_loss_rate_percent_per_year: number | null; wall_loss_rate_sigma_percent_per_year: number | null;
+}
+
+export interface Comparison {
+  earlier: string; years: number | null; statement: string; registration: Registration; diameter: { value: number; sigma: number };
+  one_calibration: boolean; overlays: Overlay[]; changes: Change[];
+}
+
 export interface Curve { mm: number[]; depth_mm: (number | null)[]; sigma_mm: (number | null)[] }
 export interface Profile { along: Curve; around: Curve }
 
