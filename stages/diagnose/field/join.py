@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from pipeline.instrument.probe import Probe
+from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.classes import classes_of, record_next
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.answer import FieldAnswer, field_answer, location_in_field
@@ -28,7 +29,7 @@ def with_field(
     alone = field_answer(field.field, library, stated)
     examined = gauge.geometry if gauge is not None else None
     found = replace(found, global_p=_both(found.global_p, alone.global_p))
-    if examined is not None and examined.best is not None:
+    if examined is not None and examined.best is not None and examined.best.fit.terms:
         met = met_in_field(examined, field.field, stated)
         names = [t.model.name for t in examined.best.fit.terms]
         return _met(found, dict(zip(names, met, strict=True)))
@@ -42,7 +43,7 @@ def with_field(
 def _met(found: Diagnosis, met: Mapping[str, InField | None]) -> Diagnosis:
     """Return the answer with the field's confirmations, or less sure where the field contradicts it."""
     effects = tuple(_confirmed(e, met.get(e.name)) for e in found.effects)
-    silent = [name for name, each in met.items() if each is None and not name.startswith("decoy")]
+    silent = [name for name, each in met.items() if each is None and name in EFFECTS]
     missing = tuple(f"The field by itself tells too little of {name} to bear it out." for name in silent)
     known = [each for each in met.values() if each is not None]
     found = replace(found, effects=effects, shortcomings=(*found.shortcomings, *missing))
