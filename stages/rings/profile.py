@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import Float
-from stages.rings.kernels import FAST, factor, first_at_least, inverse_diagonal, solve
+from stages.rings.kernels import FAST, bell, factor, first_at_least, inverse_diagonal, solve
 from stages.rings.sectors import Sectors
 
 WINDOW_WIDTHS = 5.0
@@ -97,7 +97,7 @@ def fit_line(
     return ProfileFit(*out)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  # type: ignore[no-untyped-def]
     """Copy grey levels and distances to the seed of sector ``a``'s pixels near it; return their number.
 
@@ -118,7 +118,7 @@ def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  #
     return count
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _guess(y, t, count, width, p):  # type: ignore[no-untyped-def]
     """Start ``p`` = (r − seed, ln w, A, b0, b1) from flanks and peak; False when a flank is not seen."""
     edge = _FLANK * WINDOW_WIDTHS * width
@@ -141,7 +141,7 @@ def _guess(y, t, count, width, p):  # type: ignore[no-untyped-def]
     return True
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _normal_equations(y, t, count, p, response, trusted, n, v):  # type: ignore[no-untyped-def]
     """Fill ``n`` (5, 5) and ``v`` (5,) at parameters p = (r − seed, ln w, A, b0, b1); return χ²."""
     r, height, b0, b1 = p[0], p[2], p[3], p[4]
@@ -151,11 +151,10 @@ def _normal_equations(y, t, count, p, response, trusted, n, v):  # type: ignore[
     v0 = v1 = v2 = v3 = v4 = chi2 = 0.0
     for k in range(count):
         x = (t[k] - r) * iw
-        e = np.exp(-0.5 * x * x)
+        e = bell(x)
         m = height * e + b0 + b1 * t[k]
-        if m > trusted:
-            continue
-        weight = 1.0 / (variance + per_level * max(m - black, 0.0))
+        light = m - black if m > black else 0.0
+        weight = (0.0 if m > trusted else 1.0) / (variance + per_level * light)
         residual = y[k] - m
         d0 = height * e * x * iw
         d1 = height * e * x * x
@@ -188,7 +187,7 @@ def _normal_equations(y, t, count, p, response, trusted, n, v):  # type: ignore[
     return chi2
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
     """Clipped pixels, and unclipped ones on the inner and the outer flank (0.5 to 3 widths)."""
     clipped, inner, outer = 0, 0, 0
@@ -205,7 +204,7 @@ def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
     return clipped, inner, outer
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-untyped-def]
     """Take Gauss–Newton steps from ``p`` until the next would not matter; return χ², or NaN.
 
@@ -232,7 +231,7 @@ def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-
     return np.nan
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, response, trusted, out):  # type: ignore[no-untyped-def]
     n, v, p = np.empty((5, 5)), np.empty(5), np.empty(5)
     half = WINDOW_WIDTHS * width

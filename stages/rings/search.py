@@ -21,6 +21,7 @@ _SMALLEST_RADIUS_PX = 12
 _CREDIT = 6.0
 _JUMP = 18.0
 _TRIAL_WIDTHS_PX = (1.0, 2.0, 4.0)
+_RAYS = 360
 
 
 class Peaks(NamedTuple):
@@ -65,7 +66,7 @@ def search_band(
     return Peaks(*out)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _radial_profile(image, pixel, radius, low, high, first, bins, total, count):  # type: ignore[no-untyped-def]
     """Mean grey level in bins of one pixel from radius ``first``; return how many bins are seen.
 
@@ -94,7 +95,7 @@ def _radial_profile(image, pixel, radius, low, high, first, bins, total, count):
     return seen
 
 
-@numba.njit(cache=True, nogil=True, fastmath=FAST)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _correlate(profile, seen, template, response):  # type: ignore[no-untyped-def]
     """Write ``profile`` · ``template`` to ``response`` where it fits; return the place of the largest."""
     reach = template.size // 2
@@ -109,7 +110,7 @@ def _correlate(profile, seen, template, response):  # type: ignore[no-untyped-de
     return at
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _search_sectors(image, start, pixel, radius, low_px, high_px, template, apart, out):  # type: ignore[no-untyped-def]
     reach = template.size // 2
     size = int(np.nanmax(high_px - low_px)) + 2 * reach + 4
@@ -137,10 +138,14 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
     """Find the ring anywhere in the image: radius (A,), NaN where no line stands out, and trial line width.
 
     The closed path of the largest summed matched-filter score is found by dynamic programming in the polar
-    image, for several line widths; scores are capped, so that a glint cannot outvote the ring.
+    image, for several line widths; scores are capped, so that a glint cannot outvote the ring. Rays are a few
+    sectors apart, which is enough to find the ring by.
     """
-    polar = _polar_image(image, sectors)
-    best_total, best = -np.inf, (np.full(len(sectors.azimuth_rad), np.nan), _TRIAL_WIDTHS_PX[0])
+    sector = np.arange(len(sectors.azimuth_rad))
+    ray = sector[:: max(1, len(sector) // _RAYS)]
+    nearest = np.searchsorted((ray[1:] + ray[:-1]) / 2, sector)
+    polar = _polar_image(image, sectors, ray)
+    best_total, best = -np.inf, (np.full(len(sector), np.nan), _TRIAL_WIDTHS_PX[0])
     for width in _TRIAL_WIDTHS_PX:
         kernel = matched_template(width)[None].astype(np.float32)
         response = np.asarray(cv2.filter2D(polar, cv2.CV_32F, kernel), np.float32)
@@ -152,7 +157,8 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
         total = float(np.minimum(at_path, 10 * _CREDIT).sum())
         if total > best_total:
             found = at_path > detection_limit(polar.size)
-            radius = np.where(found, path + float(_SMALLEST_RADIUS_PX), np.nan)
+            radius = np.interp(sector, ray, path + float(_SMALLEST_RADIUS_PX), period=len(sector))
+            radius[~found[nearest]] = np.nan
             best_total, best = total, (radius, width)
     return best
 
@@ -169,13 +175,13 @@ def _texture_noise(response: NDArray[np.float32], width_px: float) -> NDArray[np
     return np.asarray(1.4826 * every, np.float32)
 
 
-def _polar_image(image: Image, sectors: Sectors) -> NDArray[np.float32]:
+def _polar_image(image: Image, sectors: Sectors, ray: NDArray[np.int64]) -> NDArray[np.float32]:
     width, height = sectors.image_size
     u, v = sectors.centre_px
     corners = np.hypot(np.array([u, u, width - u, width - u]), np.array([v, height - v, v, height - v]))
     radius = np.arange(_SMALLEST_RADIUS_PX, int(corners.max()))
-    map_u = u + radius * np.cos(sectors.azimuth_rad)[:, None]
-    map_v = v + radius * np.sin(sectors.azimuth_rad)[:, None]
+    map_u = u + radius * np.cos(sectors.azimuth_rad[ray])[:, None]
+    map_v = v + radius * np.sin(sectors.azimuth_rad[ray])[:, None]
     out = cv2.remap(
         image.astype(np.float32), map_u.astype(np.float32), map_v.astype(np.float32),
         cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"),
@@ -183,7 +189,7 @@ def _polar_image(image: Image, sectors: Sectors) -> NDArray[np.float32]:
     return np.asarray(out, np.float32)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _moved(value, jump, moved, origin):  # type: ignore[no-untyped-def]
     """Best ``value`` (R,) less its way to each radius, 1 a px, at most ``jump``; and where it came from."""
     top = np.argmax(value)
@@ -199,7 +205,7 @@ def _moved(value, jump, moved, origin):  # type: ignore[no-untyped-def]
             moved[r], origin[r] = value[top] - jump, top
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _closed_path(credit, jump):  # type: ignore[no-untyped-def]
     """Path (A,) of largest credit (A, R) less its moves around the circle.
 

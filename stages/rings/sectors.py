@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import Float
+from stages.rings.kernels import first_at_least
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,9 @@ class Sectors:
 
     def pixels_near(self, radius_px: Float, least_px: float, most_px: float) -> NDArray[np.int32]:
         """Return flat indices of the pixels whose distance to the ring (A,) is in [least, most), px."""
-        away = np.abs(self.radius_px - np.repeat(radius_px, np.diff(self.start)).astype(np.float32))
-        return self.pixel[(away >= least_px) & (away < most_px)]
+        ring = radius_px.astype(np.float32)
+        out = np.empty(_count_near(self.start, self.radius_px, ring, most_px), np.int32)
+        return out[: _pick_near(self.start, self.pixel, self.radius_px, ring, least_px, most_px, out)]
 
 
 def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) -> Sectors:
@@ -60,6 +62,29 @@ def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) ->
     start, order = _grouped(sector, radius, azimuths)
     azimuth: Float = -np.pi + 2 * np.pi / azimuths * np.arange(azimuths, dtype=np.float64)
     return Sectors(azimuth, centre, image_size, start, order, radius[order], offset[order])
+
+
+@numba.njit(cache=True, nogil=True)
+def _count_near(start, radius, ring, most):  # type: ignore[no-untyped-def]
+    """Return how many pixels may be nearer to the ring (A,) than ``most``."""
+    total = 0
+    for a in range(ring.size):
+        low = first_at_least(radius, start[a], start[a + 1], ring[a] - most)
+        total += first_at_least(radius, low, start[a + 1], ring[a] + most) - low
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _pick_near(start, pixel, radius, ring, least, most, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with the pixels at distances in [least, most) to the ring (A,); return their number."""
+    count = 0
+    for a in range(ring.size):
+        low = first_at_least(radius, start[a], start[a + 1], ring[a] - most)
+        for k in range(low, first_at_least(radius, low, start[a + 1], ring[a] + most)):
+            if least <= abs(radius[k] - ring[a]) < most:
+                out[count] = pixel[k]
+                count += 1
+    return count
 
 
 @numba.njit(cache=True, nogil=True)
