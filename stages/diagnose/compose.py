@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from stages.diagnose.classes import classes_of, record_next
 from stages.diagnose.gauge import answer as of_gauge
-from stages.diagnose.gauge.answer import location_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.finding import Finding
@@ -43,12 +44,14 @@ def composed(field: Seen | None, gauge: Seen | None, probe: Probe) -> Diagnosis:
     claims = _beyond(claims, effects)
     members: tuple[str, ...] = ()
     if verdict is Verdict.CLASS and examined is not None:
-        members = classes_of([n for n in of_gauge.members(examined) if not n.startswith("decoy")])
+        members = classes_of(of_gauge.members(examined))
     doubted = tuple(n for c in claims for n in c.alike)
     if claims and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE, Verdict.NAMED):
         verdict = Verdict.CLASS if doubted else Verdict.NAMED
         members = classes_of([*doubted, *(c.found.name for c in claims)]) if doubted else ()
     p_value = _global_p(field, gauge)
+    if verdict is Verdict.UNEXPLAINED:
+        effects = ()
     named = (*effects, *(c.found for c in claims))
     asked = members if verdict is Verdict.CLASS else [e.name for e in named]
     return Diagnosis(
@@ -57,15 +60,24 @@ def composed(field: Seen | None, gauge: Seen | None, probe: Probe) -> Diagnosis:
         verdict=verdict,
         global_p=p_value,
         location=_location(examined, claims),
-        effects=named if verdict in (Verdict.NAMED, Verdict.CLASS) else (),
+        effects=named,
         members=members,
-        identifiable="; ".join(e.statement for e in named) if verdict is Verdict.CLASS else "",
-        fit=of_gauge.fit_quality(examined) if examined is not None else None,
+        identifiable=_identifiable(verdict, named, examined),
+        fit=examined.quality if examined is not None else None,
         record_next=record_next(asked) if verdict is Verdict.CLASS and asked else "",
+        feasibility=examined.feasibility if examined is not None else (),
+        inseparable=examined.inseparable if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
         ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
     )
+
+
+def _identifiable(verdict: Verdict, named: Sequence[EffectFound], examined: Examined | None) -> str:
+    """Return what is determined all the same: the size each cause would have, or an empirical formula."""
+    if verdict is Verdict.CLASS:
+        return "; or ".join(e.statement for e in named)
+    return of_gauge.formula(examined) if verdict is Verdict.UNEXPLAINED and examined is not None else ""
 
 
 def _claims(field: Seen | None, gauge: Seen | None) -> list[Claim]:
@@ -115,15 +127,18 @@ def _of_travel(travel: TravelEvidence | None) -> list[Claim]:
             found = EffectFound("encoder_slip", 0.98, size, words, effect("encoder_slip").law)
             out.append(Claim(found, "motion", s.p_value, (), travel.source))
     for line in travel.lines:
-        if line.p_value < _TRAVEL_FOUND:
+        if line.p_value < _TRAVEL_FOUND and "probe_vibration" in line.explained_by:
+            turn = float(np.degrees(line.sigma_mm / line.amplitude_mm))
             size = {
                 "amplitude_mm": Value(line.amplitude_mm, line.sigma_mm),
                 "frequency_hz": Value(line.frequency_hz, 0.05),
+                "direction_deg": Value(line.direction_deg, turn),
             }
+            others = tuple(n for n in line.explained_by if n != "probe_vibration")
             size_words = f"{line.amplitude_mm:.3f} mm at {line.frequency_hz:.2f} Hz"
             words = f"The camera swings across the pipe by {size_words}."
             found = EffectFound("probe_vibration", 0.98, size, words, effect("probe_vibration").law)
-            out.append(Claim(found, "motion", line.p_value, (), travel.source))
+            out.append(Claim(found, "motion", line.p_value, others, travel.source))
     return out
 
 
@@ -154,8 +169,8 @@ def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Cla
 
 
 def _location(examined: Examined | None, claims: Sequence[Claim]) -> Location | None:
-    if examined is not None and examined.best is not None and examined.best.fit.terms:
-        return location_of(examined.best)
+    if examined is not None and examined.location is not None:
+        return examined.location
     if not claims:
         return None
     known = effect(claims[0].found.name)

@@ -18,7 +18,7 @@ Int = NDArray[np.int64]
 # Scores are sums over so many independent cells that χ² has heavier tails: those of F.
 DEGREES = 60.0
 _TIED = 1e-6
-_SEEN = 1e-8
+_SEEN, _SEEN_BESIDE = 1e-8, 1e-6
 # An amplitude's 1 σ beforehand, in plausible sizes.
 PRIOR_PLAUSIBLE = 5.0
 
@@ -85,14 +85,15 @@ class Score:
 def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = None) -> Score | None:
     """Return the score of columns ``block``, the instrument and columns ``given`` being free.
 
-    None when the columns cannot be seen.
+    None when the columns cannot be seen. What is seen of an effect only beside another, nearly the same one
+    that is free, rests on laws being exact, and does not count.
     """
     a = evidence.information
     free = instrument_places(evidence) if given is None else np.union1d(instrument_places(evidence), given)
     own, right, from_stated = eliminated(evidence, stated, block, free)
     size = np.sqrt(np.maximum(np.diag(a)[block], 1e-300))
     value = np.linalg.eigvalsh(own / np.outer(size, size))
-    if not np.all(value > _SEEN):
+    if not np.all(value > (_SEEN if given is None or not len(given) else _SEEN_BESIDE)):
         return None
     # Neighbours that err alike widen what the data say, not what was stated beforehand.
     inflation = np.sqrt(np.diag(evidence.score_covariance)[block] / np.diag(a)[block])

@@ -5,22 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.physics.catalogue import effect
 from stages.diagnose.classes import alike as of_one_class
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.elimination import RING
-from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.gauge.fit import Fit
+from stages.diagnose.gauge.examine import ADEQUATE, Examined
 from stages.diagnose.gauge.judge import Judged
-from stages.diagnose.gauge.points import ring_points
-from stages.diagnose.gauge.run import GaugeRun, Term, ring_mm_per_px
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.inference import Stated
 from stages.diagnose.result import (
     Candidate,
     Confirmation,
     EffectFound,
-    FitQuality,
-    Location,
     Picture,
     Value,
     Verdict,
@@ -28,8 +23,6 @@ from stages.diagnose.result import (
 
 Float = NDArray[np.float64]
 CONFIDENT = 0.97
-# What a fit leaves must be no rarer than this when only noise is left.
-ADEQUATE = 1e-5
 _IN_CLASS = 0.01
 _DRAWS = 400
 
@@ -37,7 +30,7 @@ _DRAWS = 400
 def effects_found(examined: Examined, stated: Stated) -> tuple[EffectFound, ...]:
     """Return the effects of the likeliest hypothesis with sizes and chances."""
     best, verdicts = examined.best, examined.verdicts
-    if best is None or verdicts is None:
+    if best is None or verdicts is None or not best.named:
         return ()
     out = []
     for term, confirmed in zip(best.fit.terms, examined.confirmed, strict=True):
@@ -89,39 +82,20 @@ def candidates(examined: Examined) -> tuple[Candidate, ...]:
 
 
 def members(examined: Examined) -> tuple[str, ...]:
-    """Return the names that cannot be ruled out."""
+    """Return the names that cannot be ruled out, by these measurements or by what they could tell."""
     if examined.verdicts is None:
         return ()
     pairs = zip(examined.verdicts.probability, examined.verdicts.judged, strict=True)
     names = [n for p, j in pairs if p > _IN_CLASS and j.named for n in j.names]
-    return tuple(dict.fromkeys(names))
+    return tuple(dict.fromkeys([*names, *examined.unsplit]))
 
 
-def location_of(best: Judged) -> Location:
-    """Return where the largest effect shows, as its law says."""
-    first = effect(best.fit.terms[0].model.name)
-    return Location(str(first.channel), str(first.fixed_to), first.time, first.harmonic)
-
-
-def fit_quality(examined: Examined) -> FitQuality | None:
-    """Return the rings' r.m.s. residual in px before and after."""
-    searched, best = examined.searched, examined.best
-    after = best.fit if best is not None else searched.found
-    before_px, after_px = (
-        ring_residual_px(searched.run, searched.nothing),
-        ring_residual_px(searched.run, after),
-    )
-    floor = float(np.sqrt(np.mean(1 / searched.run.ring_weight * 0 + after_px**2)))
-    rms = [float(np.sqrt(np.mean(r**2))) for r in (before_px, after_px)]
-    return FitQuality("px", rms[0], rms[1], rms[0], rms[1], floor)
-
-
-def ring_residual_px(run: GaugeRun, found: Fit) -> Float:
-    """Return (R,) the rings' residuals as outward px."""
-    equations = found.linearised.equations
-    residual = equations.residual[equations.kind == RING]
-    points = ring_points(found.state, run.rings, run.time_s, run.width_px)
-    return np.asarray(residual / ring_mm_per_px(points))
+def formula(examined: Examined) -> str:
+    """Return the empirical formula for what nothing of the library explains."""
+    if examined.verdicts is None:
+        return ""
+    terms = examined.verdicts.formula.fit.terms
+    return "; ".join(t.model.equation(t.shape, t.amplitude) for t in terms)
 
 
 def ring_picture(examined: Examined, azimuths: int = 180) -> Picture:
@@ -155,7 +129,7 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.UNEXPLAINED
     sure = all(verdicts.chance_of(n) > CONFIDENT for n in best.names)
     confirmed = all(each for each in examined.confirmed)
-    return Verdict.NAMED if sure and confirmed else Verdict.CLASS
+    return Verdict.NAMED if sure and confirmed and not examined.unsplit else Verdict.CLASS
 
 
 def same_class(names: tuple[str, ...]) -> bool:

@@ -41,7 +41,7 @@ def confirmations(
     run: GaugeRun, judged: Judged, regimes: Sequence[Regime], term: Term, stated: Stated
 ) -> tuple[Confirmation, ...]:
     """Return what disjoint parts of the run say of a term, each against all the others."""
-    parts = [*_by_bore(regimes), *_by_direction(run, judged), *_by_half(run)]
+    parts = [*by_bore(regimes), *_by_direction(run, judged), *_by_half(run)]
     _, *each = evidence(run, judged.fit, (), [part for _, part in parts])
     found = [
         partial
@@ -67,7 +67,8 @@ def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: S
     return Partial(where, result.value[at], covariance)
 
 
-def _by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
+def by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
+    """Return the parts of the run within one bore each."""
     out = []
     for section in sorted({r.section for r in regimes}):
         mask = np.any([r.part.frames for r in regimes if r.section == section], axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,12 +13,18 @@ from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.gauge.confirm import confirmations
+from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
 from stages.diagnose.gauge.fit import fit
+from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.judge import Judged, Verdicts, judge
+from stages.diagnose.gauge.locate import location_of
 from stages.diagnose.gauge.prepare import prepare
 from stages.diagnose.gauge.search import DETECTED, Search, search
-from stages.diagnose.inference import stated_belief
-from stages.diagnose.result import Confirmation
+from stages.diagnose.inference import Stated, stated_belief
+from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
+
+# What a fit leaves must be no rarer than this when only noise is left.
+ADEQUATE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -32,11 +38,24 @@ class Examined:
         None when nothing beyond the stated instrument was found.
     confirmed : tuple of tuple of Confirmation
         For each term of the likeliest hypothesis.
+    feasibility : tuple of Feasible
+        What could be seen of each effect, before any residual was looked at.
+    inseparable : tuple of tuple of str
+        Groups of effects that are not told apart here at their typical sizes.
+    unsplit : tuple of str
+        Effects that this run is not expected to tell from those found at the sizes found.
+    location : Location or None
+    quality : FitQuality or None
     """
 
     searched: Search
     verdicts: Verdicts | None
     confirmed: tuple[tuple[Confirmation, ...], ...]
+    feasibility: tuple[Feasible, ...]
+    inseparable: tuple[tuple[str, ...], ...]
+    unsplit: tuple[str, ...] = ()
+    location: Location | None = None
+    quality: FitQuality | None = None
 
     @property
     def global_p(self) -> float:
@@ -62,14 +81,35 @@ def examine(run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe) 
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
             measurements, start = prepare(run)
-            searched = search(measurements, fit(measurements, start, ()), library, stated)
+            nothing = fit(measurements, start, ())
+            about, shapes = ability(measurements, nothing, library)
+            table = feasibility(about, shapes, library, stated)
+            groups = inseparable(table, about, shapes, library, stated)
+            searched = search(measurements, nothing, library, stated)
             if searched.steps[0].global_p > DETECTED:
-                return Examined(searched, None, ())
-            verdicts = judge(searched, library, stated)
-            best = verdicts.judged[0]
-            confirmed = tuple(
-                confirmations(searched.run, best, verdicts.regimes, term, stated) for term in best.fit.terms
+                return Examined(searched, None, (), table, groups)
+            return _judged(
+                Examined(searched, judge(searched, library, stated), (), table, groups), library, stated
             )
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
-    return Examined(searched, verdicts, confirmed)
+
+
+def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) -> Examined:
+    """Return what was found with its confirmations, location and quality of fit."""
+    searched, verdicts, best = seen.searched, seen.verdicts, seen.best
+    assert verdicts is not None
+    assert best is not None
+    run, regimes = searched.run, verdicts.regimes
+    nothing = next(j for j in verdicts.judged if not j.fit.terms)
+    terms = best.fit.terms if best.named else ()
+    alike = searched.alike
+    unsplit = not_told_apart(run, searched.nothing, terms, library, stated, alike) if terms else ()
+    shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula
+    return replace(
+        seen,
+        confirmed=tuple(confirmations(run, best, regimes, term, stated) for term in terms),
+        unsplit=unsplit,
+        location=location_of(run, shown, regimes, stated),
+        quality=fit_quality(run, nothing, shown, regimes, stated),
+    )

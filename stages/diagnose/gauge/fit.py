@@ -121,10 +121,10 @@ def _reduced(
 ) -> Evidence:
     """Return the evidence of equations, all but the shared columns eliminated."""
     reduced = eliminate_poses(equations, motion, len(found.state.T_pc))
-    own = _own_unknowns(run, found, equations.by_global.shape[1])
+    own = own_unknowns(run, found, equations.by_global.shape[1])
     left = eliminate_globals(reduced, own)
     inflation = score_inflation(equations, reduced, left)
-    names, value = _named(found, asked)
+    names, value = kept_columns(found, asked)
     information, right = left.information, left.right
     # From the linearisation's place back to nothing beyond the stated.
     misfit = left.misfit + float(2 * right @ value + value @ information @ value)
@@ -139,7 +139,7 @@ def _reduced(
     )  # fmt: skip
 
 
-def _own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
+def own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
     """Return which globals are the run's own: offset, delay, bores, fiducials, the baseline at the end."""
     at = found.state.layout
     prior, pull, value = _prior(found.state, found.terms, run)
@@ -151,7 +151,7 @@ def _own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
     return OwnUnknowns(out, np.setdiff1d(np.arange(size), out), *(x[out] for x in wide))
 
 
-def _named(found: Fit, asked: Sequence[tuple[EffectModel, Shape]]) -> tuple[list[Column | None], Float]:
+def kept_columns(found: Fit, asked: Sequence[tuple[EffectModel, Shape]]) -> tuple[list[Column | None], Float]:
     """Return the kept globals' columns, and their present values, true minus stated."""
     state = found.state
     names: list[Column | None] = [Column(INSTRUMENT, "encoder_scale")]

@@ -24,9 +24,9 @@ from stages.diagnose.inference import PRIOR_PLAUSIBLE, Stated, estimate
 Float = NDArray[np.float64]
 _STRETCHES = 2
 _LEAST_FRAMES = 8
-# Beforehand: each effect of the library is as likely as any other, a nameless cause a third as likely as all
-# of them together, a decoy a third as likely as one effect.
-_NAMELESS = 1 / 3
+# Beforehand: each effect of the library is as likely as any other. A pattern without a cause that fits as
+# well as a law may be that very law, so that it counts little; whether a law is enough is tested apart.
+_NAMELESS = 1 / 50
 _PEAK = 2
 
 

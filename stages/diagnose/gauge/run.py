@@ -33,6 +33,7 @@ from stages.motion.bordered import Rows
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 _ROUNDS = 2
+_FAR_PX = 1.0
 _ENCODER_SIGMA_MM = 1.0
 # Encoder readings this many frames apart err apart.
 _ENCODER_CELL = 8
@@ -93,8 +94,11 @@ def linearise(
     """Return the equations with columns for globals, terms, the effects asked about, and the baseline."""
     edges, edge_at = _without_edge_shift(run, state, terms)
     rings, ring_at = _without_ring_shift(run, state, terms)
+    residual = _off_bore(state, rings)
+    rings = _on_bore(rings, ring_at, residual)
+    ring_at = ring_points(state, rings, run.time_s, run.width_px)
     parts = [_edge_part(run, state, edges, edge_at, terms, asked)]
-    parts.append(_ring_part(run, state, rings, ring_at, terms, asked))
+    parts.append(_ring_part(run, state, rings, ring_at, residual, terms, asked))
     if run.encoder is not None:
         parts.append(_encoder_part(run, run.encoder, state, terms, asked))
     joined = {k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])}
@@ -141,24 +145,40 @@ def _without_ring_shift(
     return rings, ring_points(state, rings, run.time_s, run.width_px)
 
 
+def _off_bore(state: Unknowns, rings: BoreRings) -> Float:
+    """Return (R,) by how many mm rings lie outside the bore."""
+    return ring_equations(state, rings).rows.residual
+
+
+def _on_bore(rings: BoreRings, points: ImagePoints, residual: Float) -> BoreRings:
+    """Return the ring bins where they are predicted.
+
+    Derivatives taken where a ring was measured would share its noise, and scores would be off for it.
+    """
+    step = np.clip(residual / ring_mm_per_px(points), -_FAR_PX, _FAR_PX)
+    return replace(rings, uv=rings.uv - step[:, None] * rings.outward)
+
+
 def _without_edge_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> tuple[Edges, ImagePoints]:
     points = edge_points(state, run.edges, run.time_s)
+    # Where they are predicted, for the same reason as rings.
+    points = replace(points, uv=points.projected_uv)
     uv = run.edges.uv
     for t in terms:
         uv = uv - texture_shift_px(t.model, points, t.shape, t.amplitude)
-    edges = replace(run.edges, uv=uv)
-    return edges, replace(points, uv=uv)
+    return replace(run.edges, uv=uv), points
 
 
 def _ring_part(
-    run: GaugeRun, state: Unknowns, rings: BoreRings, points: ImagePoints,
+    run: GaugeRun, state: Unknowns, rings: BoreRings, points: ImagePoints, residual: Float,
     terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
 ) -> Equations:  # fmt: skip
-    made = ring_equations(state, rings)
     mm_per_px = ring_mm_per_px(points)
     shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
     shift += [columns(model, points, shape) for model, shape in asked]
-    return _with_effects(made.rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster, RING)
+    made = ring_equations(state, rings)
+    rows = replace(made.rows, residual=residual)
+    return _with_effects(rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster, RING)
 
 
 def _edge_part(

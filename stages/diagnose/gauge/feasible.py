@@ -1,0 +1,139 @@
+"""What a gauge run could show and what it could not tell apart, from its motion and bores alone.
+
+Only the information matrix is used, poses and the stated uncertainties taken out; the scores, which hold the
+residuals, are not looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.physics.catalogue import effect
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.evidence import Evidence
+from stages.diagnose.gauge.fit import Fit, evidence
+from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.scan import span
+from stages.diagnose.inference import Stated, eliminated, instrument_places, places_of
+from stages.diagnose.result import Feasible
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+_SIGMAS = 5.0
+# Twice the log of the expected Bayes factor above which two effects are told apart.
+APART = 14.0
+_NEAR = 0.5
+
+
+def ability(
+    run: GaugeRun, nothing: Fit, library: Mapping[str, EffectModel]
+) -> tuple[Evidence, dict[str, Shape]]:
+    """Return the evidence over all effects, each at one shape, and these shapes."""
+    shapes = {name: _middle(model.shapes(*span(run))) for name, model in library.items()}
+    asked = [(library[name], shape) for name, shape in shapes.items() if shape is not None]
+    known = {name: shape for name, shape in shapes.items() if shape is not None}
+    return evidence(run, nothing, asked)[0], known
+
+
+def feasibility(
+    about: Evidence, shapes: Mapping[str, Shape], library: Mapping[str, EffectModel], stated: Stated
+) -> tuple[Feasible, ...]:
+    """Return for every effect the least size seen at 5 σ and the effect most like it here."""
+    places = {name: places_of(about, library[name], shape) for name, shape in shapes.items()}
+    seen = {
+        name: block for name, block in places.items() if _least(own_information(about, stated, block)) > 0
+    }
+    return tuple(_feasible(name, about, seen, library, stated) for name in seen)
+
+
+def inseparable(
+    table: Sequence[Feasible], about: Evidence, shapes: Mapping[str, Shape],
+    library: Mapping[str, EffectModel], stated: Stated,
+) -> tuple[tuple[str, ...], ...]:  # fmt: skip
+    """Return the groups of effects that are not told apart here at their typical sizes."""
+    typical = {f.name: f.typical for f in table if f.detectable < f.typical}
+    groups: list[set[str]] = []
+    for name, size in typical.items():
+        block = places_of(about, library[name], shapes[name])
+        amplitude = np.full(len(block), size / np.sqrt(len(block)))
+        near = {
+            other
+            for other in typical
+            if other != name
+            and expected_gain(
+                about, stated, block, amplitude, places_of(about, library[other], shapes[other])
+            )
+            < APART
+        }
+        joined = [g for g in groups if g & near or name in g]
+        groups = [g for g in groups if g not in joined] + [set().union(*joined, near, {name})]
+    return tuple(tuple(n for n in shapes if n in g) for g in groups if len(g) > 1)
+
+
+def not_told_apart(
+    run: GaugeRun, nothing: Fit, terms: Sequence[Term], library: Mapping[str, EffectModel], stated: Stated,
+    alike: float,
+) -> tuple[str, ...]:  # fmt: skip
+    """Return the effects that this run is not expected to tell from one of the terms at the size found."""
+    shapes = {name: _middle(model.shapes(*span(run))) for name, model in library.items()}
+    shapes |= {t.model.name: t.shape for t in terms}
+    asked = [(library[name], shape) for name, shape in shapes.items() if shape is not None]
+    about = evidence(run, nothing, asked)[0].deflated(alike)
+    rivals = {m.name: places_of(about, m, s) for m, s in asked if m.name not in {t.model.name for t in terms}}
+    blocks = [(places_of(about, t.model, t.shape), t.amplitude) for t in terms]
+    return tuple(
+        name
+        for name, rival in rivals.items()
+        if np.diag(about.information)[rival].min() > 0
+        and any(expected_gain(about, stated, block, size, rival) < APART for block, size in blocks)
+    )
+
+
+def expected_gain(about: Evidence, stated: Stated, block: Int, amplitude: Float, rival: Int) -> float:
+    """Return by how much χ² prefers an effect of this size over its rival at the rival's best."""
+    free = np.union1d(instrument_places(about), rival)
+    own, _, _ = eliminated(about, stated, block, free)
+    return float(amplitude @ own @ amplitude)
+
+
+def own_information(about: Evidence, stated: Stated, block: Int, rival: Int | None = None) -> Float:
+    """Return (Q, Q) information on an effect, the stated instrument and a rival being free."""
+    free = instrument_places(about)
+    return eliminated(about, stated, block, free if rival is None else np.union1d(free, rival))[0]
+
+
+def _feasible(
+    name: str, about: Evidence, seen: Mapping[str, Int], library: Mapping[str, EffectModel], stated: Stated
+) -> Feasible:
+    own = own_information(about, stated, seen[name])
+    left = {
+        other: _share(own, own_information(about, stated, seen[name], block))
+        for other, block in seen.items()
+        if other != name
+    }
+    rival = min(left, key=lambda other: left[other], default="")
+    quantity = effect(name).quantities[0]
+    share = left.get(rival, 1.0)
+    return Feasible(
+        name, quantity.name, quantity.unit, float(_SIGMAS / np.sqrt(_least(own))), abs(quantity.typical),
+        rival if share < _NEAR else "", share,
+    )  # fmt: skip
+
+
+def _share(own: Float, left: Float) -> float:
+    """Return the least share of information that is left in any direction."""
+    root = np.linalg.cholesky(own + 1e-12 * np.trace(own) * np.eye(len(own)))
+    inner = np.linalg.solve(root, np.linalg.solve(root, left).T)
+    return float(np.clip(np.linalg.eigvalsh(inner)[0], 0.0, 1.0))
+
+
+def _least(information: Float) -> float:
+    value = np.linalg.eigvalsh(information)
+    return float(value[0]) if value[0] > 1e-9 * max(value[-1], 1e-300) else 0.0
+
+
+def _middle(shapes: Sequence[Shape]) -> Shape | None:
+    return shapes[len(shapes) // 2] if shapes else None
