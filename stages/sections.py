@@ -21,6 +21,9 @@ from pipeline.stage import Context, Parameters, Stage
 Float = NDArray[np.float64]
 
 _DIRECTIONS: Float = np.linspace(0, np.pi, 360, endpoint=False)
+# Most of its period that a harmonic may span unseen: in mid-gap the series is then as sure as one sample.
+_LONGEST_GAP = 5 / 6
+_LEAST_HARMONICS = 2
 
 
 class SectionParameters(Parameters):
@@ -30,7 +33,10 @@ class SectionParameters(Parameters):
         5.0, ge=0.5, le=1000.0, description="distance between stations and length of each slab, mm"
     )
     harmonics: int = Field(
-        6, ge=2, le=24, description="highest harmonic of the section's smooth shape, even, dimensionless"
+        6,
+        ge=2,
+        le=24,
+        description="highest harmonic of the section's smooth shape, even; fewer where an arc was not seen",
     )
     min_coverage: float = Field(
         0.6, ge=0.1, le=1.0, description="least seen fraction of the azimuths for a section to be measured"
@@ -73,8 +79,10 @@ def measure_sections(
     rows = []
     for k, station in enumerate(stations):
         slab = _slab(radius_map, station, parameters.spacing_mm)
-        if np.isfinite(slab.radius_mm).mean() >= parameters.min_coverage:
-            shape = _fit_shape(radius_map.azimuth_rad, slab, parameters.harmonics)
+        seen = np.isfinite(slab.radius_mm)
+        harmonics = _told_harmonics(seen, parameters.harmonics)
+        if seen.mean() >= parameters.min_coverage and harmonics >= _LEAST_HARMONICS:
+            shape = _fit_shape(radius_map.azimuth_rad, slab, harmonics)
             rows.append(_measures(station, slab, shape, recording.pipe.nominal_diameter_mm))
         else:
             rows.append(_unmeasured(station, slab.coverage))
@@ -108,6 +116,15 @@ def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
     excess = np.maximum(total - random, 0)[seen]
     calibration = float(excess.mean()) if excess.size else np.nan
     return _Slab(mean, variance, calibration, float(seen.mean()))
+
+
+def _told_harmonics(seen: NDArray[np.bool_], most: int) -> int:
+    """Return how many harmonics samples (A,) around a turn can tell, by the longest unseen arc."""
+    edges = np.flatnonzero(np.concatenate([seen, seen]))
+    if not edges.size:
+        return 0
+    gap = int(np.diff(edges).max(initial=1)) - 1
+    return most if gap == 0 else min(most, int(_LONGEST_GAP * len(seen) / gap))
 
 
 def _basis(azimuth_rad: Float, harmonics: int) -> Float:
@@ -193,5 +210,5 @@ def _unmeasured(station: float, coverage: float) -> Float:
 
 
 SECTIONS = Stage(
-    "sections", "1", SectionParameters, measure_sections, "diameters, ovality and centre at every station"
+    "sections", "2", SectionParameters, measure_sections, "diameters, ovality and centre at every station"
 )

@@ -75,3 +75,20 @@ def test_unseen_stations_stay_empty_and_are_counted():
 def test_an_empty_wall_is_unusable():
     with pytest.raises(UnusableError, match="no measured radius"):
         measure(np.full((len(DISTANCE), 360), np.nan))
+
+
+@pytest.mark.parametrize("gap_deg", [0, 60, 120])
+def test_an_unseen_arc_makes_a_section_less_sure_and_never_wild(gap_deg):
+    rng = np.random.default_rng(7)
+    oval = 50 + 0.25 * np.cos(2 * (AZIMUTH - 0.4)) + 3 * np.cos(AZIMUTH)
+    off = []
+    for _ in range(8):
+        radius = oval + smooth_noise(rng, (len(DISTANCE), 360), 0.03, 2.0)
+        radius[:, :gap_deg] = np.nan
+        sections = measure(radius, 0.03, 0.03)
+        off.append((sections.max_diameter_mm - 100.5) / sections.max_diameter_sigma_mm)
+    off = np.array(off)
+    assert np.isfinite(off).all()
+    # an eccentricity of 3 mm is itself worth 0.09 mm of mean diameter to second order
+    assert np.sqrt(np.mean((off - off.mean()) ** 2)) < 2.5
+    assert np.abs(sections.mean_diameter_mm - 100).max() < 0.3
