@@ -80,14 +80,15 @@ def diagnose(
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
         write_files(examination, stated, output)
-        change = None
-        if apply and recordings[0] is not None and recordings[1] is not None:
-            configuration = resolve(PIPELINE, None, ())
-            change = apply_correction(examination, recordings[0], file, configuration, output, console)
-        write_page(found, Shown(simulated, change, image_of(examination)), output)
+        shown = Shown(simulated, None, image_of(examination))
+        write_page(found, shown, output)
         _write(found, output)
     _show(found, output, console)
-    if change is not None:
+    if apply and recordings[0] is not None and recordings[1] is not None:
+        configuration = resolve(PIPELINE, None, ())
+        change = apply_correction(examination, recordings[0], file, configuration, output, console)
+        with disk_errors_named(output):
+            write_page(found, replace(shown, change=change), output)
         console.print(consequence(change))
 
 

@@ -78,7 +78,7 @@ def resimulate(examination: Examination) -> Resimulated | None:
     if gauge is None or examined is None or examined.best is None or not examined.best.fit.terms:
         return None
     run, start, terms = examined.searched.run, examined.searched.nothing.state, examined.best.fit.terms
-    if any(t.model.name not in EFFECTS for t in terms):
+    if any(not _switchable(t) for t in terms):
         return None
     frames = held_out(run)
     quiet = np.where(np.isin(run.rings.frame, frames), _UNHEARD, 1.0)
@@ -115,6 +115,14 @@ def _compared(recording: Recording, run: GaugeRun, frames: Int, without: Fit, fo
         recording.frames.frame[frame[good]], azimuth[good], off[0][good], off[1][good],
         _floor(frame[good], azimuth[good], off[1][good]), tuple(s.text for s in switches),
     )  # fmt: skip
+
+
+def _switchable(term: Term) -> bool:
+    """Return whether the simulator has the effect, and all its quantities are known."""
+    if term.model.name not in EFFECTS:
+        return False
+    known = term.model.quantities(term.shape, term.amplitude)
+    return all(q.name in known for q in effect(term.model.name).quantities)
 
 
 def _switch(term: Term) -> Switch:

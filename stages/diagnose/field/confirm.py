@@ -97,7 +97,10 @@ def met_in_field(
         own = partial_of("all", best.evidence, best, term, stated)
         known = own is not None and np.isfinite(own.covariance).all()
         covariance = own.covariance if own is not None and known else np.zeros((len(term.amplitude),) * 2)
-        out.append(confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated))
+        try:
+            out.append(confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated))
+        except np.linalg.LinAlgError:
+            out.append(None)
     return tuple(out)
 
 
