@@ -12,39 +12,51 @@ from typing import Any
 import pytest
 from scipy.optimize import brentq
 
+from pipeline.simulator.scene import Scene
 from tests.scene_runs import run_scene
 from tests.simulated import SCENES, shipped, smaller
 
 NAMES = sorted(file.stem for file in SCENES.glob("*.yaml"))
 IN_WATER = "water-filled-3-inch"
-# A camera of a sixteenth of the pixels, and 24 mm of pipe; maps as coarse as its rings.
+# A camera of a sixteenth of the pixels, and a few centimetres of pipe; maps as coarse as its rings.
 SHRINK, FRAMES = 4, 40
 COARSE = ("accumulate.distance_step_mm=1.0", "accumulate.azimuth_samples=240", "mesh.texel_mm=0.5")
-# What would happen after the last frame happens within them.
-EARLIER: dict[str, dict[str, Any]] = {
-    "slipping-4-inch": {"effects": {"encoder_slip": {"slip_mm": -4.0, "time_s": 0.7}}}
+# One frame in four of a gauge run is lit: fewer than 15 leave its texture untracked.
+GAUGE_FRAMES = 60
+# What a scene is for happens within these frames, and is large enough for this camera.
+CHANGES: dict[str, dict[str, Any]] = {
+    "hot-4-inch": {"effects": {"baseline_drift": {"drift_mm": 0.03, "time_s": 0.5}}},
+    "mixed-light-2-inch": {"light": {"level": 0.5}},
+    "slipping-4-inch": {"effects": {"encoder_slip": {"slip_mm": -4.0, "time_s": 0.7}}},
 }
-# Steep walls, at joints and pits, are measured to about a ring's spacing along the pipe, not to their 1 σ.
-LEAST_INSIDE = 0.85
+# Steep walls, at the gauges' steps above all, are measured to about a ring's spacing, not to their 1 σ.
+LEAST_INSIDE, LEAST_INSIDE_STEPPED = 0.85, 0.7
+
+
+def small(name: str) -> Scene:
+    scene = shipped(name)
+    frames = GAUGE_FRAMES if scene.kind == "gauge" else FRAMES
+    return smaller(scene, SHRINK, frames, **CHANGES.get(name, {}))
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n != IN_WATER])
 def test_a_shipped_scene_is_measured_within_what_is_stated(name: str, tmp_path: Path) -> None:
-    found = run_scene(smaller(shipped(name), SHRINK, FRAMES, **EARLIER.get(name, {})), tmp_path, COARSE)
+    scene = small(name)
+    found = run_scene(scene, tmp_path, COARSE)
     assert abs(found.median_mm) <= 2 * found.stated_mm
-    assert found.inside_95 >= LEAST_INSIDE
+    assert found.inside_95 >= (LEAST_INSIDE_STEPPED if scene.kind == "gauge" else LEAST_INSIDE)
     assert abs(found.distance_percent) <= 3 * found.distance_sigma_percent
-    assert found.coverage > 0.7
+    assert found.coverage > 0.65
 
 
 def test_water_is_measured_as_snell_has_it_and_not_as_stated(tmp_path: Path) -> None:
-    scene = smaller(shipped(IN_WATER), SHRINK, FRAMES)
+    scene = small(IN_WATER)
     found = run_scene(scene, tmp_path, COARSE)
     true, baseline = scene.pipe.diameter_mm / 2, scene.probe["laser"]["baseline_mm"]
     apparent = _through_water(true, baseline, 1 + scene.effects["outside_index"]["index_excess"])
     # the motion pulls the instrument some way towards the wrong medium, which takes half a millimetre back
     assert found.radius_mm == pytest.approx(apparent, abs=0.1 * (true - apparent))
-    assert found.inside_95 < 0.05
+    assert found.inside_95 < 0.2
 
 
 def _through_water(radius_mm: float, baseline_mm: float, index: float) -> float:
