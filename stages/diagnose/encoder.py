@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.effects.base import Shape, Travel
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.result import EffectFound
 
+Float = NDArray[np.float64]
 _OF_ENCODER = {
     "encoder_scale": "relative", "encoder_slip": "slip_mm", "encoder_backlash": "backlash_mm",
     "time_offset": "delay_s",
@@ -31,16 +33,23 @@ def with_true_readings(recording: Recording, effects: Sequence[EffectFound]) -> 
     """
     if recording.encoder is None:
         return recording
-    encoder = recording.encoder
-    true = encoder.distance_mm
+    encoder, found = recording.encoder, encoder_effects(effects)
+    # Steps first: what is left of one would look like speed to the others.
+    reading = encoder.distance_mm - _shift(encoder, encoder.distance_mm, [e for e in found if _shape(e)])
+    smooth, true = [e for e in found if not _shape(e)], reading
     for _ in range(_ROUNDS):
-        travel = Travel(encoder.time_s, true, np.gradient(true, encoder.time_s), encoder.distance_mm)
-        shift = np.zeros(len(true))
-        for e in encoder_effects(effects):
-            size = np.array([e.parameters[_OF_ENCODER[e.name]].value])
-            shift += LIBRARY[e.name].reading_shift_mm(travel, _shape(e), size)
-        true = encoder.distance_mm - shift
-    return replace(recording, encoder=Encoder(encoder.time_s, np.asarray(true)))
+        true = reading - _shift(encoder, true, smooth)
+    return replace(recording, encoder=Encoder(encoder.time_s, true))
+
+
+def _shift(encoder: Encoder, true_mm: Float, effects: Sequence[EffectFound]) -> Float:
+    """Return by how much effects falsify readings (N,) of a way (N,)."""
+    travel = Travel(encoder.time_s, true_mm, np.gradient(true_mm, encoder.time_s), encoder.distance_mm)
+    shift = np.zeros(len(true_mm))
+    for e in effects:
+        size = np.array([e.parameters[_OF_ENCODER[e.name]].value])
+        shift += LIBRARY[e.name].reading_shift_mm(travel, _shape(e), size)
+    return shift
 
 
 def _shape(effect: EffectFound) -> Shape:

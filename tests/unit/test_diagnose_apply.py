@@ -1,0 +1,95 @@
+"""What a correction changes: radius by clock position, depths of defects, and the sentence about it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.commands.diagnose_apply import GeometryChange, clock_of, consequence, geometry_change
+from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
+from stages.diagnose.encoder import encoder_effects, with_true_readings
+from stages.diagnose.residual import AZIMUTHS, RingResidual, azimuths_rad, wall_distances_mm
+from stages.diagnose.result import EffectFound, Value
+
+AZIMUTH = np.radians(np.arange(-180.0, 180.0, 2.0))
+DISTANCE = np.arange(0.0, 50.0, 0.5)
+
+
+def run(folder, radius, depths):
+    folder.mkdir()
+    np.savez(folder / "radius_map.npz", distance_mm=DISTANCE, azimuth_rad=AZIMUTH, radius_mm=radius)
+    defects = [
+        {"kind": kind, "distance_from_mm": 20.0, "distance_to_mm": 24.0, "clock_from": hour - 0.3,
+         "clock_to": hour + 0.3, "depth_mm": depth, "depth_sigma_mm": 0.02}
+        for kind, hour, depth in depths
+    ]  # fmt: skip
+    (folder / "defects.json").write_text(json.dumps(defects))
+    return folder
+
+
+def test_clock_runs_clockwise_from_the_top():
+    # P has x right and y down: 12 o'clock is −y, 3 o'clock +x.
+    assert clock_of(np.array([-np.pi / 2, 0.0, np.pi / 2, np.pi])) == pytest.approx([0, 3, 6, 9])
+
+
+def test_the_radius_change_lies_at_its_clock_and_the_deepest_change_is_told(tmp_path):
+    plain = np.full((len(DISTANCE), len(AZIMUTH)), 50.0)
+    wider = plain + 0.2 * np.cos(AZIMUTH)
+    wider[10, :5] = np.nan
+    before = run(tmp_path / "a", plain, [("pit", 3.0, 0.80), ("corrosion", 9.0, 0.50)])
+    after = run(tmp_path / "b", wider, [("pit", 3.1, 1.01), ("corrosion", 9.0, 0.49), ("pit", 6.0, 0.3)])
+    change = geometry_change(before, after)
+    assert change.mean_mm[3] == pytest.approx(0.2, abs=0.01)
+    assert change.mean_mm[9] == pytest.approx(-0.2, abs=0.01)
+    assert change.mean_mm[0] == pytest.approx(0.0, abs=0.01)
+    assert [d.kind for d in change.defects] == ["pit", "corrosion"]
+    assert consequence(change).startswith("Wall loss at 3 o'clock, 22 mm, was understated by 0.21 mm")
+
+
+def test_without_defects_the_radius_is_told_and_nothing_is_told_of_nothing():
+    flat = GeometryChange(np.where(np.arange(12) == 4, -0.12, 0.0), np.zeros(12), 0.03, ())
+    assert "radius at 4 o'clock was overstated by 0.12 mm" in consequence(flat)
+    assert "of no consequence" in consequence(GeometryChange(np.zeros(12), np.zeros(12), 0.001, ()))
+    unseen = np.full(12, np.nan)
+    assert consequence(GeometryChange(unseen, unseen, float("nan"), ())) == ""
+
+
+def found(name, **sizes):
+    return EffectFound(name, 1.0, {k: Value(v, 0.0) for k, v in sizes.items()}, "", "")
+
+
+def recording(time_s, distance_mm):
+    frames = FrameTable(np.arange(2), np.arange(2.0), np.array(["laser", "led"]))
+    encoder = Encoder(time_s, distance_mm)
+    return Recording("r", "inspection", None, frames, encoder, PipeFacts(50.0), 30.0, None, None, "key")
+
+
+def test_readings_are_put_right():
+    time_s = np.arange(0.0, 8.0, 0.01)
+    true = 20 * time_s + 3 * np.sin(time_s)
+    late = np.interp(time_s - 0.05, time_s, true, left=0.0)
+    read = 1.02 * late + 4.0 * (time_s > 5.0)
+    effects = (
+        found("encoder_scale", relative=0.02), found("time_offset", delay_s=0.05),
+        found("encoder_slip", slip_mm=4.0, time_s=5.0), found("laser_tilt", tilt_deg=0.5),
+    )  # fmt: skip
+    assert [e.name for e in encoder_effects(effects)] == ["encoder_scale", "time_offset", "encoder_slip"]
+    mended = with_true_readings(recording(time_s, read), effects).encoder.distance_mm
+    away = np.abs(time_s - 5.0) > 0.1
+    inside = away & (time_s > 0.2) & (time_s < 7.8)
+    assert mended[inside] == pytest.approx(true[inside], abs=0.05)
+
+
+def test_residuals_fall_into_the_cells_where_they_lie():
+    azimuth = azimuths_rad()
+    none = np.zeros((AZIMUTHS, 2))
+    rings = RingResidual(
+        "field", np.full(AZIMUTHS, 7), azimuth, azimuth, np.full(AZIMUTHS, 3.1), none,
+        np.cos(azimuth), 2 * np.cos(azimuth), np.arange(AZIMUTHS) != 5,
+    )  # fmt: skip
+    over = rings.over_frames(np.array([6, 7]))
+    assert np.isnan(over[0]).all()
+    assert np.isnan(over[1, 5])
+    assert np.delete(over[1], 5) == pytest.approx(np.delete(np.cos(azimuth), 5))
+    assert np.isfinite(rings.over_wall(wall_distances_mm(rings))).sum() == AZIMUTHS - 1
+    assert rings.rms_px == pytest.approx(np.sqrt(2), rel=0.02)
