@@ -44,7 +44,7 @@ class ReviewServer:
 
     def start(self) -> None:
         command = [sys.executable, "-m", "pipeline.cli", "review", str(self.run), "--no-browser"]
-        self._process = subprocess.Popen(
+        self.process = subprocess.Popen(
             [*command, "--port", str(self.port)],
             cwd=PROJECT_ROOT,
             stdout=subprocess.PIPE,
@@ -52,16 +52,16 @@ class ReviewServer:
             text=True,
             env=os.environ | {"PYTHONUNBUFFERED": "1"},
         )
-        line = self._process.stdout.readline()
+        line = self.process.stdout.readline()
         found = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", line)
-        assert found, line + self._process.stderr.read()
+        assert found, line + self.process.stderr.read()
         self.address, self.port, self.token = found[0], int(found[1]), found[2]
 
     def kill(self, how: signal.Signals = signal.SIGKILL) -> None:
-        self._process.send_signal(how)
-        self._process.wait(timeout=20)
-        self._process.stdout.close()
-        self._process.stderr.close()
+        self.process.send_signal(how)
+        self.process.wait(timeout=20)
+        self.process.stdout.close()
+        self.process.stderr.close()
 
     @property
     def origin(self) -> str:

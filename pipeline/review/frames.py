@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, Trajectory
+from pipeline.artefacts import RingSamples, RingValidity, Trajectory
 from pipeline.errors import BoresightError
 from pipeline.geometry.axis import from_pipe, to_pipe
 from pipeline.geometry.rigid import inverse, transform
@@ -24,6 +24,7 @@ _QUALITY = 88
 _BEST_POLAR_RAD = 1.05
 # How far a pixel's ray is followed to the wall, in radii and steps of 0.5 %.
 _NEAREST_RADII, _FARTHEST_RADII, _REACHES = 0.3, 30.0, 900
+_NEAR_RADII = 8.0
 _KEPT = 2
 
 
@@ -72,13 +73,14 @@ class FrameFinder:
         """
         axis = self.trajectory.axis
         spot_p = from_pipe(axis, np.array([distance_mm]), np.array([azimuth_rad]), np.array([self.radius_mm]))
-        spot_c = transform(inverse(self.trajectory.T_pc), spot_p)
+        near = self._near(spot_p)
+        spot_c = transform(inverse(self.trajectory.T_pc[near]), spot_p)
         polar = np.arctan2(np.hypot(spot_c[:, 0], spot_c[:, 1]), spot_c[:, 2])
-        lit_by = self._illumination()
+        lit_by = self._illumination(near)
         ahead = np.where(np.isin(lit_by, ["laser", "both"]), np.abs(self._off_sheet(spot_c)), np.inf)
         lit = np.where(np.isin(lit_by, ["led", "both"]), np.abs(polar - _BEST_POLAR_RAD), np.inf)
         best = {int(np.argmin(way)): None for way in (ahead, lit) if np.isfinite(way).any()}
-        found = tuple(s for k in best if (s := self._sight(k, spot_c[k], lit_by[k])) is not None)
+        found = tuple(s for k in best if (s := self._sight(near[k], spot_c[k], lit_by[k])) is not None)
         if not found:
             raise UnseenError("no frame shows this spot")
         return found
@@ -129,9 +131,15 @@ class FrameFinder:
         laser = self.probe.laser
         return np.asarray(spot_c[:, 2] - laser.height(azimuth) - rho * laser.slope(azimuth))
 
-    def _illumination(self) -> NDArray[np.str_]:
+    def _near(self, spot_p: Float) -> NDArray[np.int64]:
+        """Return the frames taken from near a spot, or all: long runs have hundreds of thousands."""
+        away = np.linalg.norm(self.trajectory.T_pc[:, :3, 3] - spot_p, axis=1)
+        near = np.flatnonzero(away < _NEAR_RADII * self.radius_mm)
+        return near if len(near) else np.arange(len(away))
+
+    def _illumination(self, near: NDArray[np.int64]) -> NDArray[np.str_]:
         frames = self.recording.frames
-        return np.asarray(frames.illumination[np.searchsorted(frames.frame, self.trajectory.frame)])
+        return np.asarray(frames.illumination[np.searchsorted(frames.frame, self.trajectory.frame[near])])
 
     def _sight(self, index: int, spot_c: Float, illumination: str) -> Sight | None:
         uv, valid = self.probe.camera.project(spot_c[None])
@@ -146,7 +154,10 @@ class FrameFinder:
         row = np.flatnonzero(self.rings.frame == frame)
         if not len(row):
             return np.zeros((0, 2))
-        return np.asarray(self.rings.pixels()[row[0]][self.rings.valid[row[0]]])
+        rings, k = self.rings, row[0]
+        used = rings.validity[k] == RingValidity.VALID  # of this frame alone: all of a long run are gigabytes
+        outward = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
+        return np.asarray(rings.centre_px + rings.radius_px[k, used, None] * outward[used], float)
 
 
 def finder_of(files: RunFiles) -> FrameFinder:

@@ -9,6 +9,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.errors import InputError
 from pipeline.findings import DefectKind, Sections
@@ -142,6 +144,8 @@ def measured_findings(defects: str, file: Path) -> tuple[Finding, ...]:
 
 def _finding(entry: dict[str, Any]) -> Finding:
     outline = tuple((float(s), float(a)) for s, a in entry["outline"])
+    if len(outline) < 3 or not np.isfinite(outline).all():
+        raise ValueError(f"the outline of {entry['id']} is no polygon")
     size = Measured(**{name: _number(entry[name]) for name in Measured.__dataclass_fields__})
     number = int(entry["id"])
     return Finding(str(number), DefectKind(entry["kind"]).value, outline, size, original=number)

@@ -155,7 +155,7 @@ def test_every_overlay_dresses_wall_and_model(page: Tab) -> None:
     assert len(names) >= 4
     for name in [*names, "photo"]:
         page.page.select_option('select[aria-label="what the wall shows"]', name)
-        page.until(f"boresight.flat.shown === '{name}'")
+        page.until(f"boresight.flat.picture.shown === '{name}'")
         variant = {"deviation_nominal": "deviation"}.get(name, name)
         worn = page.js("boresight.model.parts.map((p) => p.mesh.material.name)")
         assert worn
@@ -562,9 +562,7 @@ def test_an_export_opens_from_the_disk_and_changes_nothing(browser, sample: Path
         assert page.page.locator("main button.accept").count() == 0
         page.choose("1")
         page.until("document.querySelector('.zoomed img')?.naturalWidth > 100")
-        page.until(
-            "boresight.flat.tiles.size > 0 && [...boresight.flat.tiles.values()].some((t) => t.naturalWidth)"
-        )
+        page.until("[...boresight.flat.picture.tiles.values()].some((t) => t.naturalWidth)")
         page.page_of("Quality")
         page.page.locator(".plots figure").first.wait_for()
     context.close()

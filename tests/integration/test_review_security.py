@@ -15,8 +15,9 @@ from tests.review_server import ReviewServer
 
 HOSTILE = "<img src=x onerror=alert(1)><script>alert(2)</script>"
 SECRET = "the inspector's own"
-READ = ("/", "/api/run", "/api/state", "/api/seal", "/api/quality", "/api/model", "/api/model/0.glb", "/assets/page.js",
-        "/api/tiles/photo", "/api/tiles/photo/0/0/0.png", "/api/frames/0.jpg", "/api/papers/findings.csv",
+READ = ("/", "/api/run", "/api/state", "/api/seal", "/api/quality", "/api/model", "/api/model/0.glb",
+        "/assets/page.js", "/api/tiles/photo", "/api/tiles/photo/0/0/0.png", "/api/frames/0.jpg",
+        "/api/papers/findings.csv",
         "/api/section?distance=40", "/api/profile?distance=40&azimuth=0&half=10",
         "/api/sights?distance=40&azimuth=0")  # fmt: skip
 WRITE = ("/api/actions", "/api/sign", "/api/measure")

@@ -10,6 +10,7 @@ const TILE = 512;
 const AROUND = 24;
 const LEAST_ROWS = 40; // pixels of a tile around the pipe
 const SEEN_RADII = 80;
+const WIDER = 1.004; // so that detail, where both are, lies in front
 
 interface Piece { mesh: THREE.Mesh<THREE.BufferGeometry, THREE.Material[]>; from: number; to: number; rings: number; address: string; isDressed: boolean }
 
@@ -19,7 +20,7 @@ export class CoarseWall {
   private hidden: [number, number] | null = null;
   private at = 0;
 
-  constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly changed: () => void) {}
+  constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly isPlain: boolean, private readonly changed: () => void) {}
 
   async dress(): Promise<void> {
     const name = this.session.layer;
@@ -49,8 +50,11 @@ export class CoarseWall {
     this.hidden = between;
     const [from, to] = between ?? [Infinity, Infinity];
     for (const { mesh, from: first, to: last, rings } of this.pieces) {
-      const ring = (mm: number) => Math.max(0, Math.min(rings, Math.round((rings * (mm - first)) / (last - first))));
-      const [a, b] = [ring(from), ring(to)].map((n) => n * AROUND * 6) as [number, number];
+      const ring = (mm: number) => (rings * (mm - first)) / (last - first);
+      const inside = (n: number) => Math.max(0, Math.min(rings, n)) * AROUND * 6;
+      // A ring more on either side: the seam must not gape.
+      const [a, b] = [inside(Math.ceil(ring(from)) + 1), inside(Math.floor(ring(to)) - 1)];
+      if (a >= b) { mesh.geometry.clearGroups(); mesh.geometry.addGroup(0, rings * AROUND * 6, 0); continue; }
       mesh.geometry.clearGroups();
       if (a > 0) mesh.geometry.addGroup(0, a, 0);
       if (b < rings * AROUND * 6) mesh.geometry.addGroup(b, rings * AROUND * 6 - b, 0);
@@ -72,7 +76,7 @@ export class CoarseWall {
     const place: number[] = [], uv: number[] = [], index: number[] = [];
     for (let i = 0; i <= rings; i++) {
       for (let j = 0; j <= AROUND; j++) {
-        const [x, y, z] = this.pipe.point(from + ((to - from) * i) / rings, azimuth + (TURN * j) / AROUND, this.session.run.radius_mm);
+        const [x, y, z] = this.pipe.point(from + ((to - from) * i) / rings, azimuth + (TURN * j) / AROUND, this.session.run.radius_mm * WIDER);
         place.push(x * MM, -y * MM, -z * MM);
         uv.push(i / rings, 1 - j / AROUND);
       }
@@ -98,7 +102,7 @@ export class CoarseWall {
     image.onload = () => {
       const material = piece.mesh.material[0] as THREE.MeshBasicMaterial;
       material.map = new THREE.Texture(image);
-      material.map.colorSpace = THREE.SRGBColorSpace;
+      material.map.colorSpace = this.isPlain ? THREE.NoColorSpace : THREE.SRGBColorSpace;
       material.map.needsUpdate = true;
       material.color.set(0xffffff);
       material.needsUpdate = true;

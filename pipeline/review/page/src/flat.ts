@@ -27,7 +27,8 @@ export class FlatView {
     this.picture = new TileLayer(session.source, () => this.paint());
     this.view = { distance: session.cursor[0], azimuth: TOP + Math.PI, mmPerPx: (TURN * run.radius_mm) / 320 };
     session.on(["layer"], () => this.load());
-    session.on(["state", "selection", "cursor", "shape", "tool"], () => this.paint());
+    session.on(["state", "selection", "shape", "tool"], () => this.paint());
+    session.on(["cursor"], () => this.follow());
     session.on(["selection"], () => this.reveal());
     new ResizeObserver(() => this.resize()).observe(this.root);
     this.canvas.addEventListener("pointerdown", (e) => this.press(e));
@@ -69,6 +70,15 @@ export class FlatView {
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
     this.view.mmPerPx = Math.min(this.view.mmPerPx, (TURN * this.session.run.radius_mm) / height);
+    this.paint();
+  }
+
+  /** Keep the spot in view, wherever it was moved from. */
+  private follow(): void {
+    const [distance, azimuth] = this.session.cursor;
+    const [x, turns] = [this.x(distance), [-TURN, 0, TURN].map((t) => this.y(azimuth + t))];
+    if (x < 0 || x > this.size[0]) this.view.distance = distance;
+    if (!turns.some((y) => y >= 0 && y <= this.size[1])) { this.view.azimuth = azimuth; this.keepInside(); }
     this.paint();
   }
 

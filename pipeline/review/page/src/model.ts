@@ -10,11 +10,14 @@ import { element } from "./words";
 const MM = 1e-3;
 const FLIGHT_MM = 6;
 const MOST_PIXELS = 1280 * 720;
+// 30 pictures a second while moving; a longer gap is a rest, after which the picture is drawn sharply.
+const [WANTED_STEP_MS, LONGEST_STEP_MS, REST_MS, LEAST_SHARPNESS] = [34, 250, 300, 0.4];
 
 // From outside, no more of a long pipe is shown than this many radii: it would be a thread.
 const OUTSIDE_RADII = 16;
 
 export class ModelView {
+  private readonly isPlain = isSoftware(); // first: it says how colours are to be understood
   readonly root = element("div", { class: "model" });
   readonly frameTimes: number[] = [];
   private readonly canvas = element("canvas", {
@@ -28,6 +31,9 @@ export class ModelView {
   private readonly without = element("button", { "aria-pressed": "false", click: () => this.enter(false) }, "Outside");
   private readonly hint = element("p", { class: "hint view-hint" });
   private isInside = true;
+  private sharpness = 1; // of pictures while they move
+  private drawnAt = 0;
+  private resting = 0;
   private readonly pipe: Pipe;
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(80, 1, 1e-3, 1000);
@@ -51,8 +57,8 @@ export class ModelView {
   constructor(private readonly session: Session) {
     this.pipe = new Pipe(session.run.axis);
     this.flown = session.run.distance_mm[0];
-    this.fine = new Stretches(session, this.pipe, () => this.grown());
-    this.coarse = new CoarseWall(session, this.pipe, () => this.draw());
+    this.fine = new Stretches(session, this.pipe, this.isPlain, () => this.grown());
+    this.coarse = new CoarseWall(session, this.pipe, this.isPlain, () => this.draw());
     this.root.append(element("div", { class: "stage" }, this.canvas, this.told), this.hint);
     this.marker.renderOrder = 1; // drawn after the wall, or the wall would cover it
     this.explain();
@@ -84,14 +90,15 @@ export class ModelView {
 
   private async start(): Promise<void> {
     try {
-      this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true });
+      this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: !this.isPlain });
+      if (this.isPlain) this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     } catch {
       this.told.textContent = "This browser shows no 3D (WebGL is off). Everything else works.";
       return;
     }
     this.renderer.localClippingEnabled = true;
     this.scene.background = new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue("--ground").trim());
-    this.scene.add(new THREE.AmbientLight(0xffffff, 1.1), this.lamp, this.marker, this.line, this.corners);
+    this.scene.add(new THREE.AmbientLight(0xffffff, this.isPlain ? 2 : 1.1), this.lamp, this.marker, this.line, this.corners);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.addEventListener("change", () => this.draw());
     this.canvas.addEventListener("pointerdown", (e) => { this.pressed = { x: e.clientX, y: e.clientY }; });
@@ -240,11 +247,33 @@ export class ModelView {
 
   private get isCut(): boolean { return this.cut.checked && !this.isInside; }
 
+  /** Draw less sharply while the view moves, where it would stutter otherwise; sharply again when it rests. */
+  private keepUp(now: number): void {
+    const took = now - this.drawnAt;
+    const isMoving = took < LONGEST_STEP_MS && this.drawnAt > 0;
+    this.drawnAt = now;
+    if (isMoving && took > WANTED_STEP_MS) this.sharpness = Math.max(LEAST_SHARPNESS, this.sharpness * 0.85);
+    if (isMoving && took < WANTED_STEP_MS / 2) this.sharpness = Math.min(1, this.sharpness * 1.05);
+    window.clearTimeout(this.resting);
+    if (isMoving) this.setSharpness(this.sharpness);
+    if (this.sharpness < 1) this.resting = window.setTimeout(() => { this.setSharpness(1); this.drawnAt = 0; this.draw(); }, REST_MS);
+  }
+
+  private setSharpness(share: number): void {
+    const ratio = this.pixelRatio * share;
+    if (Math.abs(this.renderer!.getPixelRatio() - ratio) > 0.02 * ratio) this.renderer!.setPixelRatio(ratio);
+  }
+
+  private get pixelRatio(): number {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement!;
+    return Math.min(window.devicePixelRatio, Math.sqrt(MOST_PIXELS / (width * height)));
+  }
+
   private resize(): void {
     const stage = this.canvas.parentElement!;
     const [width, height] = [stage.clientWidth, stage.clientHeight];
     if (!this.renderer || !width || !height) return;
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, Math.sqrt(MOST_PIXELS / (width * height))));
+    this.renderer.setPixelRatio(this.pixelRatio);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -261,6 +290,7 @@ export class ModelView {
     this.asked = true;
     requestAnimationFrame((now) => {
       this.asked = false;
+      this.keepUp(now);
       this.frameTimes.push(now);
       if (this.frameTimes.length > 120) this.frameTimes.shift();
       this.lamp.position.copy(this.camera.position);
@@ -277,3 +307,14 @@ export class ModelView {
 /** The model's axes are glTF's: x right, y up, z toward the viewer; the pipe's are x right, y down, z forward. */
 function toModel([x, y, z]: Vector): THREE.Vector3 { return new THREE.Vector3(x, -y, -z); }
 function fromModel(v: THREE.Vector3): Vector { return [v.x / MM, -v.y / MM, -v.z / MM]; }
+
+/** Whether pictures are drawn by the processor, where smooth edges cost more than they are worth. */
+function isSoftware(): boolean {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const named = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = named ? String(context!.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  const isSlow = /swiftshader|llvmpipe|software|basic render/i.test(name);
+  THREE.ColorManagement.enabled = !isSlow;
+  return isSlow;
+}

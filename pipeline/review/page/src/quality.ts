@@ -8,14 +8,14 @@ export function qualityPage(session: Session): HTMLElement {
   const { run } = session;
   const measured = element("div", {}, element("p", { class: "quiet" }, "Loading…"));
   const pictures = element("div", { class: "pictures" });
-  session.source.quality().then((quality) => {
+  const load = () => session.source.quality().then((quality) => {
     measured.replaceChildren(...sections(quality));
     pictures.replaceChildren(...quality.pictures.map((p) =>
       element("figure", {}, element("img", { src: p.source, alt: p.title }), element("figcaption", {}, p.title))));
   }).catch((error: Error) => measured.replaceChildren(element("p", { class: "unsigned" }, error.message)));
   const stages = run.numbers.filter((s) => s.numbers.length).map((s) =>
     element("section", {}, element("h3", {}, s.stage), element("table", {}, ...rows(s.numbers))));
-  return element("div", { class: "page" },
+  const root = element("div", { class: "page" },
     element("section", {}, element("h2", {}, "The run in figures"), element("table", { class: "wide" }, ...rows(run.metrics))),
     measured,
     element("section", {}, element("h2", {}, "Left-out physics"), element("p", {}, run.diagnosis
@@ -25,6 +25,10 @@ export function qualityPage(session: Session): HTMLElement {
     element("details", {}, element("summary", {}, "What every stage reports"), element("div", { class: "columns" }, ...stages)),
     element("section", {}, element("h2", {}, "Made from"), element("table", {},
       ...Object.entries(run.inputs).map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, `SHA-256 ${v}`))))));
+  // Asked for when it is first looked at: the first view has the server to itself.
+  const seen = new IntersectionObserver((all) => { if (all.some((e) => e.isIntersecting)) { seen.disconnect(); void load(); } });
+  seen.observe(root);
+  return root;
 }
 
 function rows(numbers: Quantity[]): HTMLElement[] {

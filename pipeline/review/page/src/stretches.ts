@@ -8,7 +8,7 @@ import type { Stretch } from "./types";
 const MM = 1e-3;
 const VARIANTS: Record<string, string> = { deviation_nominal: "deviation" };
 // What a browser without a graphics card can still turn, and what keeps the tab's memory small.
-const MOST_TRIANGLES = 700_000;
+const MOST_TRIANGLES = 215_000;
 const AT_ONCE = 2;
 
 interface Part { mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material> }
@@ -21,7 +21,7 @@ export class Stretches {
   private at = 0;
   private gain = 1;
 
-  constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly changed: () => void) {}
+  constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly isPlain: boolean, private readonly changed: () => void) {}
 
   async start(): Promise<void> { this.list = await this.session.source.stretches(); }
 
@@ -110,7 +110,14 @@ export class Stretches {
       gltf.parser.assignFinalMaterial(mesh);
       for (const k of mapping.variants) variants.set(names[k] ?? "", material);
     }
+    const photo = variants.get("photo") as THREE.MeshStandardMaterial;
+    // A matt wall needs no more than this; the loader's own material costs three times as much without a graphics card.
+    variants.set("photo", mesh.material = new THREE.MeshLambertMaterial({ map: photo.map, name: photo.name }));
+    photo.dispose();
     for (const material of variants.values()) {
+      const { map } = material as THREE.MeshBasicMaterial;
+      // Colours pass as they are and one level of the picture is enough: both are dear without a graphics card.
+      if (map && this.isPlain) [map.colorSpace, map.minFilter] = [THREE.NoColorSpace, THREE.LinearMipmapNearestFilter];
       material.side = THREE.DoubleSide;
       material.clippingPlanes = [];
     }
