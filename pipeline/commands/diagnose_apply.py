@@ -27,7 +27,7 @@ Float = NDArray[np.float64]
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
 # What shows the geometry; the model is made of the corrected run alone.
 _GEOMETRY = frozenset({"rings", "triangulate", "motion", "accumulate", "texture", "defects"})
-_FILES = frozenset({"radius_map.npz", "defects.json"})
+_FILES = frozenset({"trajectory.csv", "radius_map.npz", "defects.json"})
 
 
 @dataclass(frozen=True)
