@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from stages.motion import MotionParameters
 from stages.motion.matching import _match, cut, match
 from stages.motion.strip import Strip, StripGrid, _sample, _without_light, unroll
-from tests.unit.drawn_pipe import RADIUS, draw, reflectance, small_probe
+from stages.motion.tracking import TextureTracker
+from tests.unit.drawn_pipe import RADIUS, draw, led_light, reflectance, small_probe, wall_hits
 
 Float32 = NDArray[np.float32]
 HALF = 8
@@ -142,12 +146,11 @@ def pose(roll: float = 0.2, z: float = 7.0):
 
 
 def true_contrast(strip: Strip, wall: StripGrid) -> Float32:
-    """Return the wall's own reflectance on the strip over its mean around each spot."""
+    """Return the wall's own reflectance on the strip over the mean of each row."""
     row, column = np.meshgrid(*(np.arange(n) for n in strip.contrast.shape), indexing="ij")
     xyz = wall.wall(strip.first_row + row, column)
     own = reflectance(xyz[..., 2], np.arctan2(xyz[..., 1], xyz[..., 0]))[..., 1].astype(np.float32)
-    wide = np.concatenate([own[:, -60:], own, own[:, :60]], 1)
-    return (own / cv2.blur(wide, (41, 41))[:, 60:-60] - 1).astype(np.float32)
+    return (own / own.mean(1, keepdims=True) - 1).astype(np.float32)
 
 
 def test_unrolled_texture_lies_where_the_wall_has_it() -> None:
@@ -161,6 +164,32 @@ def test_unrolled_texture_lies_where_the_wall_has_it() -> None:
     assert np.sum(both[0] * both[1]) / np.sqrt(np.sum(both[0] ** 2) * np.sum(both[1] ** 2)) > 0.9
     (dx, dy), _ = cv2.phaseCorrelate(*(np.ascontiguousarray(b) for b in both))
     assert max(abs(dx), abs(dy)) < 0.5
+
+
+def test_a_plain_wall_seen_from_off_the_axis_is_even_but_for_wrong_lamps() -> None:
+    probe, wall = small_probe(), grid()
+    T = from_parts(np.eye(3), np.array([3.0, -2.0, 7.0]))
+    light = led_light(probe, T, wall_hits(probe, T))
+    image = np.clip(160 * light / np.percentile(light, 99), 0, 255).astype(np.uint8)
+    other = replace(probe, lighting=replace(probe.lighting, z_mm=-15.0))
+    even, uneven = (unroll(image, lit_by, T, wall, (0.0, 0.0)) for lit_by in (probe, other))
+    assert even.usable.mean() > 0.8
+    assert np.abs(even.contrast[even.usable]).max() < 0.04
+    assert np.abs(uneven.contrast[uneven.usable]).max() > 2 * np.abs(even.contrast[even.usable]).max()
+
+
+def test_patches_are_looked_for_only_where_they_may_err_and_still_be_seen_whole() -> None:
+    probe, wall = small_probe(), grid()
+    strip = unroll(draw(probe, pose())[..., 1], probe, pose(), wall, (20.0, 24.0))
+    tracker = TextureTracker(
+        probe, wall, MotionParameters.model_validate({"patch_half_px": HALF}), (20.0, 24.0)
+    )
+    row = np.arange(strip.contrast.shape[0])
+    looked_for = tracker._in_view(strip, np.stack([row, np.full(len(row), 100.3)], -1))
+    for i in np.flatnonzero(looked_for):
+        assert strip.usable[i - HALF - 3 : i + HALF + 4, 80:120].all()
+    assert looked_for.any()
+    assert not tracker._in_view(strip, np.array([[-4.0, 100.0], [len(row) + 2.0, 100.0]])).any()
 
 
 def test_the_strip_knows_the_pixels_it_looked_at() -> None:

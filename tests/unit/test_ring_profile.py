@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from stages.rings.kernels import bell
 from stages.rings.profile import WINDOW_WIDTHS, Response, fit_line
 from stages.rings.sectors import cut_sectors
 from tests.ring_images import exposed, off_centre, ring_light
 
 SIZE, CENTRE, AZIMUTHS = (640, 480), (318.7, 241.3), 720
 WIDTH, AMPLITUDE, BLACK = 1.2, 90.0, 16.0
+
+
+def test_the_bell_is_a_gaussian():
+    x = np.linspace(-30, 30, 4001)
+    np.testing.assert_allclose([bell(v) for v in x], np.exp(-0.5 * x * x), atol=1e-8, rtol=1e-7)
 
 
 @pytest.fixture(scope="module")

@@ -36,6 +36,12 @@ def test_every_pixel_belongs_to_the_sector_nearest_to_it(sectors):
     assert (np.diff(sectors.radius_px)[inside] >= 0).all()
 
 
+def test_pixels_near_a_ring_are_those_at_its_distance(sectors):
+    ring = off_centre(150.0, 20.0)(sectors.azimuth_rad)
+    away = np.abs(sectors.radius_px - np.repeat(ring, np.diff(sectors.start)).astype(np.float32))
+    assert np.array_equal(sectors.pixels_near(ring, 2.0, 5.0), sectors.pixel[(away >= 2.0) & (away < 5.0)])
+
+
 @pytest.mark.parametrize(("radius", "along"), [(150.0, 0.0), (120.0, 45.0), (200.0, 15.0)])
 @pytest.mark.parametrize("width", [0.9, 1.6, 3.0])
 def test_a_ring_is_found_wherever_it_is_and_however_thick(sectors, radius, along, width):
