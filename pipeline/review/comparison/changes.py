@@ -8,7 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import t as student
 
 from pipeline.findings import DefectKind
 from pipeline.review.comparison.growth import Growth, Resolution, measure_growth
@@ -102,7 +102,9 @@ def _measured(place: Place, number: int, cutter: Cutter, resolution: Resolution)
         return Change(place, unseen, seen_now, seen_earlier, None)
     growth = _growth(place, patch, cutter.pair, resolution)
     z = growth.depth_mm.value / growth.depth_mm.sigma
-    p = min(2 * float(norm.sf(abs(z))) * _places_alike(place, patch, cutter.pair), 1.0)
+    # half the pieces overlap with the other half; so many are what the σ rests on
+    freedom = len(patch.noise_mm) / 2
+    p = min(2 * float(student.sf(abs(z), freedom)) * _places_alike(place, patch, cutter.pair), 1.0)
     return Change(place, Fate.UNCHANGED, seen_now, seen_earlier, growth, z, p)
 
 

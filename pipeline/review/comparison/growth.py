@@ -17,6 +17,8 @@ _ALIKE = 0.5
 # The common level at which extents are read, as a share of the lesser depth.
 _LEVEL = 0.5
 _BASE_MM = 1.0
+# Of so many pieces of clean wall on its own rings their scatter counts where it is the larger one.
+_LEAST_OWN = 8
 
 
 @dataclass(frozen=True)
@@ -172,10 +174,13 @@ def _spread(now: Float, before: Float, patch: Patch, level: float, in_both: bool
     for piece in patch.noise_mm:
         other = base + piece
         peak = _argmax(other, patch.inside) if in_both else at
-        drawn.append(np.array([other[peak], *_size(other, patch, level, peak)]) - without)
+        # an extreme that may choose its cell scatters less than any one cell; the safe side is taken
+        drawn.append(np.array([other[at], *_size(other, patch, level, peak)]) - without)
     errors = np.array(drawn)
-    errors[:, 0] -= errors[:, 0].mean() if in_both else 0.0
-    return np.asarray(np.sqrt((errors**2).mean(0)))
+    spread = np.sqrt((errors**2).mean(0))
+    if patch.own_pieces < _LEAST_OWN:
+        return np.asarray(spread)
+    return np.maximum(spread, np.sqrt((errors[: patch.own_pieces] ** 2).mean(0)))
 
 
 def _misplaced(

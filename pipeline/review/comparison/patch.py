@@ -19,8 +19,8 @@ _MARGIN_MM = 6.0
 # Heights are read on surfaces smoothed this much, 1 σ.
 _SMOOTHING_MM = 0.3
 _LEAST_CLEAN = 0.9
-# Pieces of clean wall: those of the defect's own rings, and of others only when these are fewer.
-_ENOUGH = 12
+# Pieces of clean wall, of the defect's own rings and then of its neighbours.
+_ENOUGH = 40
 _LEAST_PIECES = 4
 _LEAST_SEEN = 0.5
 
@@ -39,6 +39,8 @@ class Patch:
     cell_mm : (float, float)
     noise_mm : (K, R, C)
         The walls' difference over clean wall elsewhere: what it is where nothing has happened.
+    own_pieces : int
+        How many of those, the first, are of the defect's own rings.
     """
 
     now_mm: Float
@@ -48,6 +50,7 @@ class Patch:
     inside: Bool
     cell_mm: tuple[float, float]
     noise_mm: Float
+    own_pieces: int
 
     @property
     def is_seen_in_both(self) -> bool:
@@ -97,8 +100,8 @@ class Cutter:
         cell = (wall.step_mm, wall.step_rad * radius)
         now, before = (smoothed(np.nan_to_num(h), cell) for h in heights)
         seen_now, seen_before = (np.isfinite(h) for h in heights)
-        noise = self._noise(stretch, rows, inside.shape, cell, random)
-        return Patch(now, before, seen_now, seen_before, inside, cell, noise)
+        noise, own_pieces = self._noise(stretch, rows, inside.shape, cell, random)
+        return Patch(now, before, seen_now, seen_before, inside, cell, noise, own_pieces)
 
     def _rows(self, corner: Float) -> Int:
         wall = self.pair.now
@@ -118,18 +121,20 @@ class Cutter:
     def _noise(
         self, own: Stretch, rows: Int, shape: tuple[int, int], cell: tuple[float, float],
         random: np.random.Generator,
-    ) -> Float:  # fmt: skip
-        """Return differences (K, R, C) of clean pieces, of its own rings first, then of neighbours."""
+    ) -> tuple[Float, int]:  # fmt: skip
+        """Return differences (K, R, C) of clean pieces, its own rings' first, and how many these are."""
         reach = len(rows)
         steps = (0, -1, 1, -2, 2, -3, 3, -4, 4, -6, 6, -8, 8)
         starts = [int(rows[0]) + k * reach for k in steps]
         found: list[Float] = []
+        own_pieces = 0
         for start in (s for s in starts if 0 <= s <= len(self.defective) - reach):
             if len(found) >= _ENOUGH:
                 break
             stretch = own if start == rows[0] else self.pair.stretch(start, start + reach)
             found += self._clean_pieces(stretch, start, shape[1], cell, random)
-        return np.array(found).reshape(-1, *shape)
+            own_pieces = len(found) if start == rows[0] else own_pieces
+        return np.array(found).reshape(-1, *shape), own_pieces
 
     def _clean_pieces(
         self, stretch: Stretch, start: int, width: int, cell: tuple[float, float], random: np.random.Generator

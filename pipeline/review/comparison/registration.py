@@ -230,8 +230,9 @@ def _registration(
     left = stations.shift_mm - stations.shift_mm.mean() - slope * away
     spread = max(float(np.sqrt(left @ left / max(len(left) - 2, 1))), float(stations.shift_sigma_mm.min()))
     ends = np.array([earlier.from_mm, earlier.from_mm + earlier.length_mm])
+    whole_turns = 2 * np.pi * np.round(stations.roll_rad.mean() / (2 * np.pi))
     made = Registration(
-        stations.at_mm, stations.shift_mm, stations.shift_sigma_mm, stations.roll_rad,
+        stations.at_mm, stations.shift_mm, stations.shift_sigma_mm, stations.roll_rad - whole_turns,
         stations.roll_sigma_rad, 1 + slope, float(spread / np.sqrt(away @ away)), len(matches.agree),
         int(matches.agree.sum()), float(np.median(matches.correlation[matches.agree])), chance, pairs,
         (0.0, 0.0),

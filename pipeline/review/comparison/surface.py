@@ -122,9 +122,13 @@ def _standing_out(values: Float32, reach: int) -> Float32:
         return np.zeros_like(values)
     filled = np.nan_to_num(values)
     size = (2 * reach + 1, 2 * reach + 1)
-    away = (filled - _around(filled, size) / np.maximum(_around(known, size), 1e-6)) * known
-    smooth = _periodic(np.asarray(away, np.float32), lambda a: cv2.GaussianBlur(a, (0, 0), _BLUR_CELLS), 8)
-    smooth -= (smooth * known).sum(1, keepdims=True) / np.maximum(known.sum(1, keepdims=True), 1.0)
+    away = np.asarray(
+        (filled - _around(filled, size) / np.maximum(_around(known, size), 1e-6)) * known, np.float32
+    )
+    # every ring for itself too: a probe that shakes moves whole rings
+    along_ring = (size[0], 1)
+    away -= _around(away, along_ring) / np.maximum(_around(known, along_ring), 1e-6) * known
+    smooth = _periodic(away, lambda a: cv2.GaussianBlur(a, (0, 0), _BLUR_CELLS), 8)
     spread = 1.4826 * float(np.median(np.abs(smooth[known > 0])))
     return np.asarray(np.clip(smooth / max(spread, 1e-9), -_CLIP, _CLIP) * known, np.float32)
 

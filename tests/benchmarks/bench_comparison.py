@@ -1,0 +1,90 @@
+"""How honest the comparison of two runs is: ``python -m tests.benchmarks.bench_comparison``.
+
+On made walls: how often growth lies within its 95 % interval, how z scatters, how often anything at all is
+declared in a family of twelve defects where nothing changed. With ``--runs EARLIER LATER`` and the folders of
+their truths: growth of simulated runs beside the true one, read off the true walls within the same outlines;
+the earlier run is to begin at distance 0 and roll 0, so that its places are those of its truth.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.review.comparison.comparison import Comparison
+from pipeline.review.review import open_review
+from pipeline.review.run_files import RunFiles
+from tests.two_walls import PLACES, RADIUS, family
+
+
+def made_walls(families: int) -> None:
+    """Print coverage and scatter where pits grow, and what is declared where none does."""
+    z, declared = [], 0
+    for seed in range(families):
+        truth = np.random.default_rng(seed).uniform(-0.1, 0.3, len(PLACES))
+        found = family(truth, 1000 + 2 * seed)
+        growth = [found[k].growth.depth_mm for k in range(len(PLACES))]
+        z += [(g.value - t) / g.sigma for g, t in zip(growth, truth, strict=True)]
+        nothing = family(np.zeros(len(PLACES)), 5000 + 2 * seed, found_now=9)
+        declared += any(c.is_significant for c in nothing.values())
+    inside = np.abs(z) < 1.96
+    print(f"{len(z)} pits that grow by -0.1 to 0.3 mm: {100 * inside.mean():.1f} % in the 95 % interval,")
+    print(
+        f"  (measured - true) / sigma: mean {np.mean(z):.2f}, 1 sigma {np.std(z):.2f}, "
+        f"farthest {np.max(np.abs(z)):.1f}"
+    )
+    print(f"families of twelve without change in which any was declared: {declared} of {families}")
+
+
+def simulated_runs(runs: list[Path], truths: list[Path]) -> None:
+    """Print every change of two simulated runs beside the true one."""
+    comparison = Comparison(*(open_review(RunFiles(run.resolve())) for run in reversed(runs)))
+    registration = comparison.pair.registration
+    walls = [_true_wall(folder) for folder in truths]
+    for change in comparison.changes():
+        if change.growth is None:
+            continue
+        s, psi = change.place.middle
+        earlier = registration.to_earlier(np.array([s]), np.array([psi]))
+        place = float(earlier[0][0]), float(earlier[1][0])
+        corner = np.concatenate(change.place.outlines)
+        half = np.ptp(corner, axis=0) / 2 + [0.5, 0.5 / RADIUS]
+        sign = 1 if change.place.kind.is_metal_loss else -1
+        before, after = (_extreme(wall, place, half, sign) for wall in walls)
+        growth, true = change.growth.depth_mm, sign * (after - before)
+        print(
+            f"{change.place.kind:10} {s:6.1f} mm  {change.fate:34} {growth.value:+.3f} ± {growth.sigma:.3f}  "
+            f"true {true:+.3f}  {abs(growth.value - true) / growth.sigma:.1f} sigma"
+        )
+
+
+def _true_wall(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    with np.load(folder / "truth_wall.npz") as stored:
+        radius = stored["radius_mm"].astype(float)
+        return stored["distance_mm"], stored["azimuth_rad"], radius - np.median(radius, axis=1, keepdims=True)
+
+
+def _extreme(wall, place, half, sign) -> float:
+    s, psi, height = wall
+    rows = np.abs(s - place[0]) <= half[0]
+    columns = np.abs(np.mod(psi - place[1] + np.pi, 2 * np.pi) - np.pi) <= half[1]
+    return float((sign * height[np.ix_(rows, columns)]).max())
+
+
+def main() -> None:
+    """Run what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--families", type=int, default=20)
+    parser.add_argument("--runs", type=Path, nargs=2, metavar=("EARLIER", "LATER"))
+    parser.add_argument("--truths", type=Path, nargs=2, metavar=("EARLIER", "LATER"))
+    wish = parser.parse_args()
+    if wish.runs and wish.truths:
+        simulated_runs(wish.runs, wish.truths)
+    else:
+        made_walls(wish.families)
+
+
+if __name__ == "__main__":
+    main()

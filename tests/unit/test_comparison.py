@@ -1,0 +1,121 @@
+"""Two walls laid on each other: the shift and roll put in come out, what grew is told from what did not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UnusableError
+from pipeline.review.comparison.changes import FAMILY_ERROR, Fate, changes, holm
+from pipeline.review.comparison.paired import PairedWalls
+from pipeline.review.comparison.places import put_together
+from pipeline.review.comparison.registration import register
+from tests.two_walls import (
+    FINE,
+    NO_WELDS,
+    PIPE,
+    PLACES,
+    RADIUS,
+    ROLL_RAD,
+    SCALE,
+    SHIFT_MM,
+    Pipe,
+    compared,
+    family,
+    finding,
+    later,
+    moved,
+)
+
+
+def test_shift_scale_and_roll_come_out_within_their_sigma():
+    found = register(PIPE.surface((), 1), later((), 2), NO_WELDS)
+    at = np.array([40.0, 70.0, 95.0])
+    now, azimuth = found.to_now(at, np.zeros(3))
+    sigma = np.array([found.sigma_at(s) for s in at])
+    assert np.all(np.abs(now - (SCALE * at + SHIFT_MM)) < np.maximum(3 * sigma[:, 0], 0.05))
+    assert np.all(sigma[:, 0] < 0.3)
+    assert np.all(np.abs(np.mod(azimuth - ROLL_RAD + 1, 2 * np.pi) - 1) < np.maximum(3 * sigma[:, 1], 1e-3))
+    back, turned = found.to_earlier(now, azimuth)
+    assert back == pytest.approx(at, abs=1e-6)
+    assert turned == pytest.approx(0, abs=1e-6)
+    assert abs(found.scale - SCALE) < 3 * found.scale_sigma + 5e-4
+
+
+def test_relief_alone_is_enough():
+    before, after = (replace(s, texture=None) for s in (PIPE.surface((), 1), later((), 2)))
+    assert register(before, after, NO_WELDS).chance < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(2, 8))
+def test_another_pipe_is_refused(seed):
+    with pytest.raises(UnusableError, match="do not show the same wall"):
+        register(PIPE.surface((), 1), later((), 2, Pipe(seed)), NO_WELDS)
+
+
+def test_another_bore_is_refused():
+    wide = later((), 2)
+    wide = replace(wide, wall=replace(wide.wall, radius_mm=wide.wall.radius_mm + 10))
+    with pytest.raises(UnusableError, match=r"bores are 100\.. mm and 120\.. mm"):
+        register(PIPE.surface((), 1), wide, NO_WELDS)
+
+
+def test_growth_new_and_vanished_are_found_and_told_from_what_stays():
+    grown, stays, new, gone = (45.0, 0.3), (65.0, -2.0), (85.0, 1.5), (75.0, -0.5)
+    before = [(*grown, 0.4, 2.0), (*stays, 0.6, 2.0), (*gone, 0.5, 2.0)]
+    after = [(*grown, 0.6, 2.0), (*stays, 0.6, 2.0), (*new, 0.5, 2.0)]
+    found = compared(
+        before, after, [finding(1, *grown), finding(2, *stays), finding(3, *gone)],
+        [finding(1, *grown), finding(2, *stays), finding(3, *new)],
+    )  # fmt: skip
+    fates = {(c.place.earlier and c.place.earlier.id, c.place.now and c.place.now.id): c for c in found}
+    assert {k: c.fate for k, c in fates.items()} == {
+        ("1", "1"): Fate.GREW, ("2", "2"): Fate.UNCHANGED, (None, "3"): Fate.NEW, ("3", None): Fate.VANISHED,
+    }  # fmt: skip
+    growth = fates["1", "1"].growth.depth_mm
+    assert abs(growth.value - 0.2) < 1.96 * growth.sigma
+    assert growth.sigma < 0.08
+
+
+def test_growth_lies_in_its_95_percent_interval_as_often_as_it_should():
+    inside = []
+    for seed in range(3):
+        truth = np.random.default_rng(seed).uniform(-0.1, 0.3, len(PLACES))
+        found = family(truth, 50 + 2 * seed)
+        growth = [found[k].growth.depth_mm for k in range(len(PLACES))]
+        inside += [abs(g.value - t) < 1.96 * g.sigma for g, t in zip(growth, truth, strict=True)]
+    # 36 of them; fewer than 31 would come by chance in one of 150 cases were the intervals honest
+    assert sum(inside) >= 31
+
+
+def test_nothing_is_declared_where_nothing_changed():
+    families = [family(np.zeros(len(PLACES)), 300 + 2 * seed, found_now=9) for seed in range(3)]
+    assert FAMILY_ERROR == 0.01
+    assert not any(c.is_significant for found in families for c in found.values())
+
+
+def test_wall_that_one_run_did_not_see_is_not_called_unchanged():
+    before, after = PIPE.surface([(60.0, 0.3, 0.5, 2.0)], 1), later((), 2)
+    hidden = np.array(before.wall.radius_mm)
+    hidden[108:132, 380:412] = np.nan
+    before = replace(before, wall=replace(before.wall, radius_mm=hidden))
+    registration = register(before, after, NO_WELDS)
+    places = put_together([], [moved(finding(1, 60.0, 0.3))], registration, RADIUS)
+    (found,) = changes(places, PairedWalls(before.wall, after.wall, registration), FINE)
+    assert found.fate is Fate.UNSEEN_EARLIER
+    assert found.seen_earlier < 0.5 < found.seen_now
+
+
+def test_a_deposit_is_not_taken_for_the_pit_beside_it():
+    registration = register(PIPE.surface((), 1), later((), 2), NO_WELDS)
+    places = put_together(
+        [finding(1, 60.0, 0.3)], [moved(finding(1, 60.0, 0.3, kind="deposit"))], registration, RADIUS
+    )
+    assert [(p.now is None, p.earlier is None) for p in places].count((False, False)) == 0
+    assert len(places) == 2
+
+
+def test_holm_steps_down_and_leaves_out_what_was_not_tested():
+    assert holm([0.01, float("nan"), 0.04, 0.03]) == pytest.approx(
+        [0.03, float("nan"), 0.06, 0.06], nan_ok=True
+    )
