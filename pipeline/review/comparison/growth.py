@@ -180,7 +180,7 @@ def _spread(now: Float, before: Float, patch: Patch, level: float, in_both: bool
     spread = np.sqrt((errors**2).mean(0))
     if patch.own_pieces < _LEAST_OWN:
         return np.asarray(spread)
-    return np.maximum(spread, np.sqrt((errors[: patch.own_pieces] ** 2).mean(0)))
+    return np.asarray(np.maximum(spread, np.sqrt((errors[: patch.own_pieces] ** 2).mean(0))))
 
 
 def _misplaced(
