@@ -22,8 +22,8 @@ Int = NDArray[np.int64]
 POSE = 6
 RING, EDGE, ENCODER = 0, 1, 2
 _REACH = 4
-# A pose that nothing holds keeps its place: 1 σ far beyond the size of any pipe.
-_HOLD = 1e-8
+# A pose that nothing holds keeps its place, by this part of the best known one's information.
+_HOLD = 1e-10
 
 
 @dataclass(frozen=True)
@@ -131,13 +131,15 @@ def _band(blocks: Float, motion: MotionPrior) -> tuple[Float, Float, float]:
     """Return the poses' information in lower banded form, the prior's pull (N, 6), and its sum of squares."""
     frames = len(blocks)
     full = np.zeros((frames, _REACH, POSE, POSE))
-    full[:, 0] = blocks + _HOLD * np.eye(POSE)
+    full[:, 0] = blocks
     pull = np.zeros((frames, POSE))
     for i in range(_REACH):
         np.add.at(pull, motion.frame[:, i], motion.by_pose[:, i] * (motion.weight * motion.residual)[:, None])
         for j in range(i + 1):
             part = np.einsum("s,si,sj->sij", motion.weight, motion.by_pose[:, i], motion.by_pose[:, j])
             np.add.at(full[:, i - j], motion.frame[:, j], part)
+    largest = np.einsum("nii->ni", full[:, 0]).max(axis=0, initial=0.0)
+    full[:, 0] += np.diag(_HOLD * (1 + largest))
     band = np.zeros((POSE * _REACH, POSE * frames))
     row, column = np.meshgrid(np.arange(POSE), np.arange(POSE), indexing="ij")
     for gap in range(_REACH):

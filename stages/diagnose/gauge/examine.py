@@ -23,6 +23,8 @@ from stages.diagnose.gauge.search import DETECTED, Search, search
 from stages.diagnose.inference import Stated, stated_belief
 from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
+# A gauge is straight and round: what only a pipe does is not asked about.
+OF_A_PIPE = frozenset({"ovality", "pipe_bend"})
 # What a fit leaves must be no rarer than this when only noise is left.
 ADEQUATE = 1e-5
 
@@ -77,6 +79,7 @@ def examine(run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe) 
         When the run does not determine its own poses.
     """
     stated = stated_belief(probe)
+    library = {name: model for name, model in library.items() if name not in OF_A_PIPE}
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
