@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from dataclasses import dataclass
 from importlib import import_module
@@ -197,6 +198,8 @@ def _print_outcome(outcome: RunOutcome, folder: Path) -> None:
                 typer.echo(f"{stage.name + ': ' + number.name:<48} {number.value} {number.unit}".rstrip())
     report = folder / "report.html"
     typer.echo(f"Report: {report.resolve()}" if report.is_file() else f"Run folder: {folder.resolve()}")
+    if report.is_file():
+        typer.echo(f"To go through it, decide and sign: boresight review {shlex.quote(str(folder))}")
 
 
 for _command in _ATTACHED:

@@ -89,7 +89,16 @@ export class FindingsPanel {
         : element("p", {}, wrong?.statement ?? "Made by hand."),
       element("p", { class: "quiet" }, wrong ? [wrong.pof_class && `POF ${wrong.pof_class}`, wrong.pacp_suggestion && `PACP ${wrong.pacp_suggestion}`,
         wrong.en13508_suggestion && `EN 13508-2 ${wrong.en13508_suggestion}`].filter(Boolean).join(" · ") : ""),
-      this.remarks(finding), this.curves(finding));
+      this.lacking(finding), this.remarks(finding), this.curves(finding));
+  }
+
+  /** Where to give what wall loss and strength still need. */
+  private lacking(finding: Finding): HTMLElement | string {
+    const { assumed } = this.session.state;
+    const isLoss = ["pit", "corrosion", "gouge", "crack"].includes(finding.kind);
+    const need = [assumed.wall_thickness_mm === null && "wall thickness", assumed.yield_mpa === null && "yield strength"].filter(Boolean);
+    if (!isLoss || !need.length || this.session.source.readOnly) return "";
+    return element("p", { class: "quiet" }, `For wall loss and failure pressure give ${need.join(" and ")} on page Sign-off.`);
   }
 
   private table(finding: Finding): HTMLElement {

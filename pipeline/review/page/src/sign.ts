@@ -37,7 +37,7 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
       open ? element("p", {}, `${open} findings are not decided yet; a signature covers them as undecided.`) : null,
       signing),
   ];
-  if (assumed) made.push(assumed);
+  if (assumed) made.unshift(assumed); // before the signature, which a later change would undo
   const folder = session.source.readOnly ? "" : "/api/papers/";
   made.push(element("section", {}, element("h2", {}, "Papers"), element("ul", { class: "papers" },
     ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: folder + file, target: "_blank", rel: "noopener" }, name))))));
@@ -51,6 +51,7 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
 
 function told(action: Record<string, unknown> & { do: string }): string {
   const about = action["finding"] ?? (Array.isArray(action["findings"]) ? (action["findings"] as string[]).join(" + ") : "");
+  if (action.do === "assume") return `takes for known wall ${String(action["wall_thickness_mm"] ?? "–")} mm, yield ${String(action["yield_mpa"] ?? "–")} MPa`;
   const more = action["text"] ?? action["kind"] ?? action["reason"] ?? "";
   return [action.do, about, more].filter((t) => t !== "").map(String).join(" ");
 }
@@ -73,7 +74,7 @@ function assumptions(session: Session): HTMLElement {
   const strength = element("input", { type: "number", min: "1", max: "5000", step: "any", id: "yield", value: String(assumed.yield_mpa ?? "") });
   const value = (input: HTMLInputElement) => (input.value ? Number(input.value) : null);
   return element("section", {}, element("h2", {}, "Taken for known"),
-    element("p", { class: "quiet" }, "Wall thickness gives wall loss and POF class; with the yield strength also the failure pressure by B31G."),
+    element("p", { class: "quiet" }, "Before signing. Wall thickness gives wall loss and POF class; with the yield strength also the failure pressure by B31G. Empty: not known."),
     element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "assume", wall_thickness_mm: value(wall), yield_mpa: value(strength) }); } },
       element("label", { for: "wall" }, "Wall thickness, mm"), wall,
       element("label", { for: "yield" }, "Yield strength, MPa"), strength,
