@@ -161,3 +161,16 @@ def test_a_full_disk_is_told_and_leaves_nothing_that_looks_whole(tmp_path: Path,
     assert not list(tmp_path.iterdir())
     store.write(tree(), PROVENANCE)
     assert store.read("grow", KEY, Tree) is not None
+
+
+def test_a_look_gives_what_is_whole_and_never_discards(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.write(tree(), PROVENANCE)
+    assert same(store.look("grow", KEY, Tree), tree())
+    assert store.look("grow", "ab" * 6 + "cd" * 26, Tree) is None, "the result of another key"
+    array = next(tmp_path.rglob("array.npy"))
+    content = array.read_bytes()
+    array.write_bytes(content[:-8])
+    assert store.look("grow", KEY, Tree) is None
+    array.write_bytes(content)
+    assert same(store.look("grow", KEY, Tree), tree()), "what is being written is left to whoever writes it"

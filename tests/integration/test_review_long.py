@@ -1,0 +1,84 @@
+"""A long pipe: the model by stretches, those next to the eye in detail."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.review.model_stretches import StretchedModel, model_of
+from pipeline.review.run_files import RunFiles
+from tests.long_run import write_long_run
+from tests.review_browser import chromium, tab
+from tests.review_server import ReviewServer
+
+LENGTH_MM = 2000.0
+
+
+@pytest.fixture(scope="module")
+def long(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The sample's run again and again."""
+    folder = tmp_path_factory.mktemp("long") / "run"
+    write_long_run(sample, folder, LENGTH_MM, coarser=4)
+    return folder
+
+
+def positions(glb: bytes) -> tuple[np.ndarray, dict[str, object]]:
+    length = struct.unpack_from("<I", glb, 12)[0]
+    document, binary = json.loads(glb[20 : 20 + length]), glb[28 + length :]
+    assert struct.unpack_from("<I", glb, 8)[0] == len(glb)
+    accessor = document["accessors"][document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
+    view = document["bufferViews"][accessor["bufferView"]]
+    part = binary[view["byteOffset"] :][: view["byteLength"]]
+    return np.frombuffer(part, np.float32).reshape(-1, 3), document
+
+
+def z_span(model: StretchedModel, number: int) -> tuple[float, float]:
+    z = 1000 * positions(model.stretch(number))[0][:, 2]
+    return float(z.min()), float(z.max())
+
+
+def test_stretches_follow_each_other_and_cover_the_pipe(long: Path) -> None:
+    model = model_of(RunFiles(long))
+    stretches = model.stretches()
+    assert len(stretches) > 15
+    assert stretches[-1].to_mm - stretches[0].from_mm == pytest.approx(LENGTH_MM, rel=0.06)
+    for k in (0, 7, len(stretches) - 1):
+        assert z_span(model, k) == pytest.approx((stretches[k].from_mm, stretches[k].to_mm), abs=0.5)
+
+
+def test_a_stretch_holds_all_that_it_uses_and_nothing_else(sample: Path) -> None:
+    model = model_of(RunFiles(sample))
+    whole = sample / "model.glb"
+    sizes = [len(model.stretch(k)) for k in range(len(model.stretches()))]
+    assert sum(sizes) == pytest.approx(whole.stat().st_size, rel=0.02)
+    _, document = positions(model.stretch(0))
+    assert len(document["materials"]) == len(document["images"]) == 4
+    assert len(document["bufferViews"]) == len(document["accessors"]) + 4
+    assert document["buffers"][0]["byteLength"] >= max(
+        v["byteOffset"] + v["byteLength"] for v in document["bufferViews"]
+    )
+
+
+def test_only_what_is_near_the_eye_is_there_in_detail(long: Path) -> None:
+    with chromium() as browser, ReviewServer(long) as server:
+        context = browser.new_context(viewport={"width": 1280, "height": 720})
+        with tab(context, server.origin) as page:
+            page.open(server.address)
+            for distance in (1500, 400):
+                page.js(f"boresight.session.moveTo([{distance}, 0])")
+                page.until("boresight.model.isReady", 60)
+                first, last = page.js("boresight.model.fine.span")
+                assert first < distance < last
+                assert last - first < LENGTH_MM / 2
+                assert page.js("boresight.model.fine.held.size") <= 10
+            seen = page.js("boresight.model.coarse.pieces.filter((p) => p.mesh.visible).length")
+            assert seen > 0, "what is far is seen coarsely"
+            page.until("boresight.model.coarse.pieces.some((p) => p.mesh.material[0].map)")
+            page.js("boresight.session.moveTo([1200, -1])")
+            at = page.js("[boresight.flat.x(1200), boresight.flat.size[0]]")
+            assert 0 <= at[0] <= at[1], "the wall follows the spot"
+        context.close()
