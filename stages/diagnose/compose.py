@@ -21,6 +21,10 @@ from stages.diagnose.travel.evidence import TravelEvidence
 # Below this chance, motion against encoder shows an effect.
 _TRAVEL_FOUND = 1e-6
 _SAME_FREQUENCY_HZ = 0.15
+_AGAIN = (
+    "To see what the pattern goes with, record the gauge again: rolled by 90° (probe or gauge), at another "
+    "speed (time), after warming up (drift)."
+)
 
 
 @dataclass(frozen=True)
@@ -64,13 +68,20 @@ def composed(field: Seen | None, gauge: Seen | None, probe: Probe) -> Diagnosis:
         members=members,
         identifiable=_identifiable(verdict, named, examined),
         fit=examined.quality if examined is not None else None,
-        record_next=record_next(asked) if verdict is Verdict.CLASS and asked else "",
+        record_next=_next(verdict, asked),
         feasibility=examined.feasibility if examined is not None else (),
         inseparable=examined.inseparable if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
         ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
     )
+
+
+def _next(verdict: Verdict, asked: Sequence[str]) -> str:
+    """Return what to record so that the answer becomes a name."""
+    if verdict is Verdict.UNEXPLAINED:
+        return _AGAIN
+    return record_next(asked) if verdict is Verdict.CLASS and asked else ""
 
 
 def _identifiable(verdict: Verdict, named: Sequence[EffectFound], examined: Examined | None) -> str:

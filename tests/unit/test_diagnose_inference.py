@@ -1,0 +1,222 @@
+"""Inference of the diagnosis against dense brute force, on small linear problems."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from stages.diagnose.effects.generic import VOCABULARY
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.evidence import INSTRUMENT, Column, Evidence, total
+from stages.diagnose.gauge import answer
+from stages.diagnose.gauge.elimination import (
+    Equations,
+    MotionPrior,
+    OwnUnknowns,
+    Part,
+    eliminate_globals,
+    eliminate_poses,
+)
+from stages.diagnose.gauge.feasible import APART, expected_gain
+from stages.diagnose.gauge.formula import joint_p
+from stages.diagnose.inference import Stated, estimate, places_of, score
+from stages.diagnose.result import Confirmation, Verdict
+
+FRAMES, GLOBALS = 9, 5
+TILT, CONE = LIBRARY["laser_tilt"], LIBRARY["laser_cone"]
+
+
+def equations(random: np.random.Generator, rows: int = 200) -> Equations:
+    by_global = random.normal(size=(rows, GLOBALS))
+    kind = random.integers(0, 2, rows)
+    # One global that one kind of measurement does not depend on.
+    by_global[kind == 1, 0] = 0.0
+    return Equations(
+        random.integers(0, FRAMES, rows), random.normal(size=(rows, 6)), by_global,
+        random.normal(size=rows), random.uniform(0.5, 2, rows), random.integers(0, 30, rows), kind,
+    )  # fmt: skip
+
+
+def motion(random: np.random.Generator) -> MotionPrior:
+    frame = np.arange(FRAMES - 3)[:, None] + np.arange(4)
+    shape = (len(frame), 4, 6)
+    return MotionPrior(
+        frame, random.normal(size=shape), random.normal(size=len(frame)), random.uniform(1, 2, len(frame))
+    )
+
+
+def dense(e: Equations, m: MotionPrior) -> tuple[np.ndarray, np.ndarray]:
+    """Return all weighted rows over poses and globals, and their residuals."""
+    of_poses = np.zeros((len(e.frame), FRAMES, 6))
+    of_poses[np.arange(len(e.frame)), e.frame] = e.by_pose
+    tied = np.zeros((len(m.frame), FRAMES, 6))
+    for k in range(4):
+        tied[np.arange(len(m.frame)), m.frame[:, k]] += m.by_pose[:, k]
+    measured = np.concatenate([of_poses.reshape(len(e.frame), -1), e.by_global], 1)
+    prior = np.concatenate([tied.reshape(len(m.frame), -1), np.zeros((len(m.frame), GLOBALS))], 1)
+    weight = np.sqrt(np.concatenate([e.weight, m.weight]))
+    return (
+        np.concatenate([measured, prior]) * weight[:, None],
+        np.concatenate([e.residual, m.residual]) * weight,
+    )
+
+
+def test_eliminating_poses_and_globals_is_dense_least_squares():
+    random = np.random.default_rng(1)
+    e, m = equations(random), motion(random)
+    reduced = eliminate_poses(e, m, FRAMES)
+    none = np.zeros(2)
+    own = OwnUnknowns(np.array([3, 4]), np.array([0, 1, 2]), none, none, none)
+    left = eliminate_globals(reduced, own)
+    rows, residual = dense(e, m)
+    nuisance = [*range(6 * FRAMES), 6 * FRAMES + 3, 6 * FRAMES + 4]
+    free = np.linalg.qr(rows[:, nuisance])[0]
+    kept = rows[:, 6 * FRAMES : 6 * FRAMES + 3]
+    kept = kept - free @ (free.T @ kept)
+    rest = residual - free @ (free.T @ residual)
+    assert left.information == pytest.approx(kept.T @ kept, rel=1e-6)
+    assert left.right == pytest.approx(-kept.T @ rest, rel=1e-6, abs=1e-6)
+    assert left.misfit == pytest.approx(rest @ rest, rel=1e-8)
+
+
+def test_a_part_with_frames_unseen_can_still_be_eliminated():
+    random = np.random.default_rng(2)
+    e, m = equations(random), motion(random)
+    frames = np.arange(FRAMES) < 2
+    part = e.of(Part(frames, (0, 1)))
+    assert set(part.frame) == {0, 1}
+    assert np.isfinite(eliminate_poses(part, replace(m, weight=0 * m.weight), FRAMES).information).all()
+
+
+def evidence_of(
+    design: np.ndarray, measured: np.ndarray, columns: tuple[Column, ...], inflation: float = 1.0
+) -> Evidence:
+    a = design.T @ design
+    return Evidence(columns, a, design.T @ measured, inflation * a, float(measured @ measured), len(measured))
+
+
+def test_the_surprise_is_the_marginal_likelihood():
+    random = np.random.default_rng(3)
+    design, measured = random.normal(size=(40, 3)), random.normal(size=40)
+    columns = (Column(INSTRUMENT, "fx"), Column("laser_cone", "a"), Column("baseline", "b"))
+    stated = Stated(("fx",), np.array([[4.0]]))
+    of = evidence_of(design, measured, columns)
+
+    def exact(sigma: np.ndarray) -> float:
+        covariance = np.eye(40) + design @ np.diag([0.25, *sigma**2]) @ design.T
+        return float(-2 * stats.multivariate_normal(np.zeros(40), covariance).logpdf(measured))
+
+    wide, narrow = np.array([1.0, 2.0]), np.array([0.1, 5.0])
+    surprise = [estimate(of, stated, np.array([np.inf, *s])).surprise for s in (wide, narrow)]
+    assert surprise[0] - surprise[1] == pytest.approx(exact(wide) - exact(narrow), abs=1e-8)
+
+
+def cone_and_sheet() -> tuple[tuple[Column, ...], Stated]:
+    columns = (Column(INSTRUMENT, "cone"), Column("laser_cone", CONE.amplitudes[0].name))
+    return columns, Stated(("cone",), np.array([[0.01**-2]]))
+
+
+def test_what_lies_within_the_stated_uncertainty_is_no_discovery():
+    columns, stated = cone_and_sheet()
+    one = np.random.default_rng(4).normal(size=(500, 1))
+    design = 1e3 * np.concatenate([one, one], 1)
+
+    def p_value(size: float) -> float:
+        of = evidence_of(design, design[:, 1] * size, columns)
+        found = score(of, stated, places_of(of, CONE, ()))
+        assert found is not None
+        assert found.amplitude[0] == pytest.approx(size, rel=1e-3)
+        return found.p_value
+
+    assert p_value(0.01) > 0.2
+    assert p_value(0.1) < 1e-8
+
+
+def test_neighbours_that_err_alike_widen_the_data_but_not_the_stated():
+    columns, stated = cone_and_sheet()
+    one = np.random.default_rng(5).normal(size=(500, 1))
+    design = 1e3 * np.concatenate([one, one], 1)
+    plain, alike = (
+        score(evidence_of(design, design[:, 1] * 0.05, columns, f), stated, np.array([1])) for f in (1.0, 9.0)
+    )
+    assert plain is not None
+    assert alike is not None
+    # The data know this to 1e-4; the stated uncertainty of 0.01 is all that counts.
+    assert alike.covariance == pytest.approx(plain.covariance, rel=1e-2)
+
+
+def test_scores_of_noise_are_uniform():
+    random = np.random.default_rng(6)
+    columns = (Column(INSTRUMENT, "cone"), *(Column("laser_tilt", a.name) for a in TILT.amplitudes))
+    stated = Stated(("cone",), np.array([[1.0]]))
+    design = random.normal(size=(300, 3))
+    p_values = []
+    for _ in range(300):
+        noise = random.normal(size=300) + design[:, 0] * random.normal()
+        found = score(evidence_of(design, noise, columns), stated, np.array([1, 2]))
+        assert found is not None
+        p_values.append(found.p_value)
+    assert stats.kstest(p_values, "uniform").pvalue > 1e-3
+
+
+def test_deflated_evidence_counts_measurements_that_err_alike_once():
+    columns, stated = cone_and_sheet()
+    random = np.random.default_rng(7)
+    design, noise = random.normal(size=(50, 2)), random.normal(size=50)
+    once = evidence_of(design, noise, columns)
+    three_times = total([once, once, once]).deflated(3.0)
+    sigma = np.array([np.inf, 1.0])
+    assert estimate(three_times, stated, sigma).surprise == pytest.approx(
+        estimate(once, stated, sigma).surprise
+    )
+
+
+def test_collinear_effects_are_not_told_apart_and_different_ones_are():
+    stated = Stated((), np.zeros((0, 0)))
+    columns = (Column("a", ""), Column("b", ""), Column("c", ""))
+    a, c = np.random.default_rng(8).normal(size=(2, 1000))
+    of = evidence_of(np.stack([a, 1.3 * a + 1e-3 * c, c], 1), 0 * a, columns)
+    first, size = np.array([0]), np.array([1.0])
+    assert expected_gain(of, stated, first, size, np.array([1])) < APART
+    assert expected_gain(of, stated, first, size, np.array([2])) == pytest.approx(a @ a, rel=0.01)
+
+
+@pytest.mark.parametrize(("hidden", "low", "high"), [(0.0, 1e-3, 1.0), (4.0, 0.0, 1e-6)])
+def test_what_is_left_is_noise_or_is_not(hidden, low, high):
+    random = np.random.default_rng(9)
+    columns = tuple(Column(m.name, a.name, s) for m, s in VOCABULARY for a in m.amplitudes)
+    design = random.normal(size=(2000, len(columns)))
+    strange = design[:, :40] @ random.normal(0, hidden / np.sqrt(2000), 40)
+    of = evidence_of(design, random.normal(size=2000) + strange, columns)
+    assert low <= joint_p(of, Stated((), np.zeros((0, 0))), np.zeros(0, np.int64)) <= high
+
+
+AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
+
+
+def examined(
+    named: bool = True, chance: float = 0.99, left: float = 0.5, unsplit: tuple[str, ...] = (),
+    confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),),
+) -> Any:  # fmt: skip
+    best = SimpleNamespace(named=named, names=("laser_tilt",))
+    verdicts = SimpleNamespace(adequacy=left, chance_of=lambda name: chance)
+    return cast(Any, SimpleNamespace(best=best, verdicts=verdicts, confirmed=confirmed, unsplit=unsplit))
+
+
+@pytest.mark.parametrize(
+    ("seen", "verdict"),
+    [
+        (examined(), Verdict.NAMED),
+        (examined(named=False), Verdict.UNEXPLAINED),
+        (examined(left=1e-9), Verdict.UNEXPLAINED),
+        (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),
+        (examined(confirmed=((),)), Verdict.CLASS),
+        (examined(chance=0.9), Verdict.CLASS),
+        (examined(unsplit=("principal_point",)), Verdict.CLASS),
+    ],
+)
+def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict):
+    assert answer.verdict_of(seen) is verdict
