@@ -159,9 +159,9 @@ def _adjusted(start: State, measured: Measurements, parameters: MotionParameters
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
-            free = adjust(start, measured, parameters, _ROUGHLY)
-            sigma = third_difference_sigma(free.state, measured.tracks.frames)
-            smooth = adjust(free.state, replace(measured, smooth_sigma=sigma), parameters, _CLOSELY)
+            free = adjust(start, measured, parameters, _ROUGHLY).state
+            sigma = third_difference_sigma(free, measured.tracks.frames)
+            smooth = adjust(free, replace(measured, smooth_sigma=sigma), parameters, _CLOSELY)
             return Estimate(smooth, smooth.equations.factor())
     except np.linalg.LinAlgError as error:
         raise UnusableError(

@@ -92,14 +92,17 @@ def adjust(state: State, measured: Measurements, parameters: MotionParameters, e
         if step is None:
             damping = damping.after(0.0)
             continue
-        promised = equations.decrease(step)
+        cost, promised = equations.cost, equations.decrease(step)
         moved = state.step(step.frames, step.border, step.landmarks)
-        there = linearised(moved, measured, parameters, scales)
-        gain = (equations.cost - there.cost) / promised
+        del equations  # two sets of them would be the most that the stage holds
+        equations = linearised(moved, measured, parameters, scales)
+        gain = (cost - equations.cost) / promised
         if gain > 0:
             state = moved
-            equations, scales = _judged_anew(there, measured, parameters)
-        if damping.spent or promised < damping.believed(gain, enough * equations.cost):
+            equations, scales = _judged_anew(equations, measured, parameters)
+        else:
+            equations = linearised(state, measured, parameters, scales)
+        if damping.spent or promised < damping.believed(gain, enough * cost):
             return Adjusted(state, equations, trial, True)
         damping = damping.after(gain)
     return Adjusted(state, equations, parameters.iterations, False)
