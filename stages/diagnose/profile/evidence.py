@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,6 +82,13 @@ def profile_evidence(
     UnusableError
         When too few frames are lit by the laser alone, or the ring never holds still for long enough.
     """
+    with warnings.catch_warnings():
+        # Frames and sectors without any line are all NaN, and so are their medians.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return _examined(recording, rings, probe, context)
+
+
+def _examined(recording: Recording, rings: RingSamples, probe: Probe, context: Context) -> ProfileEvidence:
     profiles = measure_profiles(recording, rings)
     if not len(profiles.row):
         raise UnusableError(
