@@ -25,6 +25,7 @@ from stages.diagnose.encoder import encoder_effects, with_true_readings
 
 Float = NDArray[np.float64]
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
+_EVEN = 0.2
 # What shows the geometry; the model is made of the corrected run alone.
 _GEOMETRY = frozenset({"rings", "triangulate", "motion", "accumulate", "texture", "defects"})
 _FILES = frozenset({"trajectory.csv", "radius_map.npz", "defects.json"})
@@ -131,9 +132,12 @@ def consequence(change: GeometryChange) -> str:
     if abs(size) < 0.005:
         return f"The geometry changes by {change.rms_mm:.3f} mm (r.m.s.): of no consequence for depths."
     seemed = "understated" if size > 0 else "overstated"
+    most = int(np.nanargmax(np.abs(change.max_mm)))
+    everywhere = float(np.nanstd(change.mean_mm)) < _EVEN * abs(size)
+    where = "all round" if everywhere else f"at {k or 12} o'clock"
     return (
-        f"The radius at {k or 12} o'clock was {seemed} by {abs(size):.2f} mm on average "
-        f"({change.rms_mm:.2f} mm r.m.s. all round); no defect's depth changes beyond its own σ."
+        f"The radius was {seemed} by {abs(size):.2f} mm {where}, and by up to {abs(change.max_mm[most]):.2f} mm "
+        f"at {most or 12} o'clock; no defect's depth changes beyond its own σ."
     )
 
 

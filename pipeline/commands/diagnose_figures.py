@@ -58,7 +58,7 @@ def azimuth_figure(picture: Picture) -> bytes:
 
 def image_figure(shown: OnImage) -> bytes:
     """Return the residual on the image, before and after, drawn outward so many times as large."""
-    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+    figure = Figure(figsize=(9.6, 5.0), layout="constrained")
     both = figure.subplots(1, 2, sharex=True, sharey=True)
     limit = max(float(np.percentile(np.abs(shown.before_px), _QUANTILE)), 0.05)
     longer = _LONGEST_PX / limit

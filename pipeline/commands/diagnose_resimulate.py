@@ -127,7 +127,9 @@ def _switchable(term: Term) -> bool:
 
 def _switch(term: Term) -> Switch:
     sizes = term.model.quantities(term.shape, term.amplitude)
-    return Switch(term.model.name, tuple(sizes[q.name] for q in effect(term.model.name).quantities))
+    return Switch(
+        term.model.name, tuple(float(f"{sizes[q.name]:.5g}") for q in effect(term.model.name).quantities)
+    )
 
 
 def scene_of(recording: Recording, found: Fit) -> SceneTruth:

@@ -47,8 +47,13 @@ def test_the_radius_change_lies_at_its_clock_and_the_deepest_change_is_told(tmp_
 
 
 def test_without_defects_the_radius_is_told_and_nothing_is_told_of_nothing():
-    flat = GeometryChange(np.where(np.arange(12) == 4, -0.12, 0.0), np.zeros(12), 0.03, ())
-    assert "radius at 4 o'clock was overstated by 0.12 mm" in consequence(flat)
+    at_four = np.where(np.arange(12) == 4, -0.12, 0.0)
+    assert "radius was overstated by 0.12 mm at 4 o'clock" in consequence(
+        GeometryChange(at_four, at_four, 0.03, ())
+    )
+    even, most = np.full(12, 0.1), np.where(np.arange(12) == 0, 0.3, 0.1)
+    told = consequence(GeometryChange(even, most, 0.1, ()))
+    assert "understated by 0.10 mm all round, and by up to 0.30 mm at 12 o'clock" in told
     assert "of no consequence" in consequence(GeometryChange(np.zeros(12), np.zeros(12), 0.001, ()))
     unseen = np.full(12, np.nan)
     assert consequence(GeometryChange(unseen, unseen, float("nan"), ())) == ""
