@@ -16,7 +16,7 @@ from stages.diagnose.gauge.confirm import confirmations
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
 from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.heldout import fit_quality
-from stages.diagnose.gauge.judge import Judged, Verdicts, judge
+from stages.diagnose.gauge.judge import Judged, Verdicts, judge, judged_of, regimes_of
 from stages.diagnose.gauge.locate import location_of
 from stages.diagnose.gauge.prepare import prepare
 from stages.diagnose.gauge.search import DETECTED, Search, search
@@ -90,12 +90,21 @@ def examine(run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe) 
             groups = inseparable(table, about, shapes, library, stated)
             searched = search(measurements, nothing, library, stated)
             if searched.steps[0].global_p > DETECTED:
-                return Examined(searched, None, (), table, groups)
+                return Examined(
+                    searched, None, (), table, groups, quality=_quality_of_stated(searched, stated)
+                )
             return _judged(
                 Examined(searched, judge(searched, library, stated), (), table, groups), library, stated
             )
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
+
+
+def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:
+    """Return how well the stated instrument, within its uncertainty, predicts the run."""
+    run, regimes = searched.run, regimes_of(searched.run)
+    nothing = judged_of(run, searched.nothing, regimes, stated, searched.alike)
+    return fit_quality(run, nothing, nothing, regimes, stated)
 
 
 def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) -> Examined:
