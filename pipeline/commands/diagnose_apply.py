@@ -135,8 +135,9 @@ def consequence(change: GeometryChange) -> str:
     most = int(np.nanargmax(np.abs(change.max_mm)))
     everywhere = float(np.nanstd(change.mean_mm)) < _EVEN * abs(size)
     where = "all round" if everywhere else f"at {k or 12} o'clock"
+    up_to = f"{abs(change.max_mm[most]):.2f} mm"
     return (
-        f"The radius was {seemed} by {abs(size):.2f} mm {where}, and by up to {abs(change.max_mm[most]):.2f} mm "
+        f"The radius was {seemed} by {abs(size):.2f} mm {where}, and by up to {up_to} "
         f"at {most or 12} o'clock; no defect's depth changes beyond its own σ."
     )
 
