@@ -16,7 +16,7 @@ from stages.diagnose.evidence import Anomaly
 from stages.diagnose.travel.events import StepFound, steps_found, with_events
 from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, EventKind, TravelFit
-from stages.diagnose.travel.sight import Sight
+from stages.diagnose.travel.sight import Sight, quantum_mm
 
 Float = NDArray[np.float64]
 _LEAST_FRAMES = 16
@@ -24,6 +24,7 @@ _DETECTED = 5.0
 _INSEPARABLE = 0.95
 # A frame's time may be that of the exposure's begin, middle or end.
 _STAMP_SIGMA_S = 1e-3
+# Where a counter turns back it may be off by up to a count, which is no play of the wheel.
 _QUANTUM_SHARE = 0.5
 _REPORTED = 1e-3
 _SHORTEST_MM = 20.0
@@ -134,7 +135,7 @@ def travel_evidence(
     steps = steps_found(fit, encoder)
     slips = tuple(s for s in steps if not s.rivals)
     doubtful = tuple(s for s in steps if s.rivals)
-    estimates = _estimates(source, fit, scale_sigma_stated)
+    estimates = _estimates(source, fit, scale_sigma_stated, quantum_mm(encoder))
     anomalies = (*_of_estimates(source, estimates, sight), *_of_steps(steps, sight), *_of_lines(lines, sight))
     return TravelEvidence(
         source, estimates, slips, doubtful, lines, fit, anomalies, (*missing, *_blind(estimates, sight))
@@ -149,9 +150,11 @@ def _covered(sight: Sight, encoder: Encoder) -> Sight:
     )
 
 
-def _estimates(source: str, fit: TravelFit, scale_sigma_stated: float) -> tuple[TravelEstimate, ...]:
-    quantum = max(fit.noise.white_mm, 1e-6)
-    stated = {SCALE: scale_sigma_stated, DELAY: _STAMP_SIGMA_S, PLAY: _QUANTUM_SHARE * quantum}
+def _estimates(
+    source: str, fit: TravelFit, scale_sigma_stated: float, count_mm: float
+) -> tuple[TravelEstimate, ...]:
+    turning = _QUANTUM_SHARE * max(fit.noise.white_mm, count_mm)
+    stated = {SCALE: scale_sigma_stated, DELAY: _STAMP_SIGMA_S, PLAY: turning}
     smooth = np.arange(4)
     usable = np.isfinite(fit.sigma[smooth])
     scale = np.where(usable, fit.sigma[smooth], 1.0)
