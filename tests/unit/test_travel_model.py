@@ -17,8 +17,9 @@ STATED = 0.002
 
 
 def estimates(seed: int, reverses: bool = True, **faults: float) -> dict[str, TravelEstimate]:
-    fit = with_events(seen(np.random.default_rng(seed), reverses), read(reverses, **faults))  # type: ignore[arg-type]
-    return {e.effect: e for e in _estimates("gauge", fit, STATED)}
+    encoder = read(reverses, **faults)  # type: ignore[arg-type]
+    fit = with_events(seen(np.random.default_rng(seed), reverses), encoder)
+    return {e.effect: e for e in _estimates("gauge", fit, STATED, quantum_mm(encoder))}
 
 
 @pytest.mark.parametrize(
@@ -72,8 +73,9 @@ def test_at_one_speed_to_and_fro_delay_and_play_are_one() -> None:
     back = np.where(sight.time_s < 4, 20 * sight.time_s, 160 - 20 * sight.time_s)
     encoder = read(False)
     steady = np.where(encoder.time_s < 4, 20 * encoder.time_s, 160 - 20 * encoder.time_s)
-    fit = with_events(replace(sight, distance_mm=back), replace(encoder, distance_mm=steady))
-    found = {e.effect: e for e in _estimates("gauge", fit, STATED)}
+    turning = replace(encoder, distance_mm=steady)
+    fit = with_events(replace(sight, distance_mm=back), turning)
+    found = {e.effect: e for e in _estimates("gauge", fit, STATED, quantum_mm(encoder))}
     alike = {other for other, _ in found["time_offset"].alike}
     assert "encoder_backlash" in alike or not np.isfinite(found["time_offset"].sigma)
 
