@@ -332,7 +332,7 @@ def test_assumed_wall_gives_loss_and_strength(page: Tab) -> None:
     shown = page.page.locator(".detail table").inner_text()
     assert "modified B31G" in shown
     assert "%" in shown
-    assert page.page.locator(".curves .chart").count() == 2
+    page.until("document.querySelectorAll('.curves .chart').length === 2")
 
 
 # Measuring

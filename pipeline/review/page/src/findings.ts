@@ -10,6 +10,7 @@ export class FindingsPanel {
   readonly root = element("div", { class: "findings" });
   private readonly list = element("ol", { class: "list", "aria-label": "Findings, most severe first" });
   private readonly detail = element("div", { class: "detail" });
+  private readonly rows = new Map<string, { key: string; row: HTMLElement }>();
   private wanted = 0;
 
   constructor(private readonly session: Session) {
@@ -37,15 +38,18 @@ export class FindingsPanel {
     this.progress.textContent = !order.length ? "Nothing was found on this wall."
       : open ? `${order.length - open} of ${order.length} decided, ${open} to go.` : `All ${order.length} decided. Next: Sign-off.`;
     const held = this.list.contains(document.activeElement);
-    this.list.replaceChildren(...order.map((f) => this.row(f)));
+    this.put(order.map((f) => this.kept(f)));
     if (held) this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus();
-    if (!this.isWriting) this.describe();
+    if (this.isWriting) return;
+    const isAtComment = document.activeElement?.matches(".comment input") && this.detail.dataset["finding"] === this.session.selected;
+    this.describe();
+    if (isAtComment) this.detail.querySelector<HTMLElement>(".comment input")?.focus();
   }
 
   /** Whether a remark or a reason is being written, which news from elsewhere must not wipe out. */
   private get isWriting(): boolean {
     const at = document.activeElement;
-    return at instanceof HTMLInputElement && at.type === "text" && at.value !== "" && this.detail.contains(at)
+    return at instanceof HTMLInputElement && at.type === "text" && (at.value !== "" || at.id === "reason") && this.detail.contains(at)
       && this.detail.dataset["finding"] === this.session.selected;
   }
 
@@ -53,6 +57,28 @@ export class FindingsPanel {
     const { marked } = this.session;
     if (!marked.delete(id)) marked.add(id);
     this.paint();
+  }
+
+  /** The finding's row; made anew only when it has changed, for a long pipe has thousands. */
+  private kept(finding: Finding): HTMLElement {
+    const { selected, marked } = this.session;
+    const key = JSON.stringify([finding.status, finding.kind, finding.size, finding.id === selected, marked.has(finding.id)]);
+    const known = this.rows.get(finding.id);
+    if (known?.key === key) return known.row;
+    const row = this.row(finding);
+    this.rows.set(finding.id, { key, row });
+    return row;
+  }
+
+  private put(rows: HTMLElement[]): void {
+    const staying = new Set<Element>(rows);
+    rows.forEach((row, k) => {
+      const there = this.list.children[k];
+      if (there === row) return;
+      if (there && !staying.has(there)) there.replaceWith(row);
+      else this.list.insertBefore(row, there ?? null);
+    });
+    while (this.list.children.length > rows.length) this.list.lastElementChild!.remove();
   }
 
   private row(finding: Finding): HTMLElement {

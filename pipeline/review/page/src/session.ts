@@ -85,7 +85,8 @@ export class Session {
     if (this.isAsking) return;
     this.isAsking = true;
     try {
-      const seal = await this.source.seal();
+      let seal = await this.source.seal();
+      while (seal.revision < this.state.revision) seal = await this.source.seal(); // asked before the last action
       if (this.isLost) { this.isLost = false; this.say(""); }
       if (seal.run_version !== this.run.version) this.tell("recomputed");
       const isNews = seal.revision !== this.state.revision || (this.seal !== null && seal.sha256 !== this.seal.sha256);
