@@ -1,0 +1,81 @@
+"""A field alone gives a class, never a name; against the gauge it bears out or contradicts."""
+
+import numpy as np
+import pytest
+
+from pipeline.physics.effect import Channel
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.evidence import ChannelEvidence, Column, Evidence
+from stages.diagnose.field.answer import field_answer
+from stages.diagnose.field.confirm import InField
+from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.field.join import _alone, _met
+from stages.diagnose.inference import Stated
+from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
+
+NOTHING_STATED = Stated((), np.zeros((0, 0)))
+AZIMUTH = np.linspace(-np.pi, np.pi, 400, endpoint=False)
+WAVE = np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)], 1)
+CONE = np.ones((400, 1))
+SIGMA = 0.1
+
+
+def field_with(signal):
+    """Evidence of one diameter: tilt and principal point make the same pattern, a cone makes another."""
+    names = ("laser_tilt", "principal_point", "laser_cone")
+    patterns = np.concatenate([2.0 * WAVE, 0.4 * WAVE, 2.0 * CONE], 1)
+    columns = [Column(n, a.name) for n in names for a in LIBRARY[n].amplitudes]
+    information = patterns.T @ patterns / SIGMA**2
+    right = patterns.T @ signal / SIGMA**2
+    misfit, cells = float(signal @ signal) / SIGMA**2, 400.0
+    whole = Evidence(tuple(columns), information, right, information, misfit, cells)
+    return FieldEvidence(None, None, ChannelEvidence("field", Channel.RING, whole))
+
+
+def test_noise_shows_nothing():
+    random = np.random.default_rng(0)
+    for _ in range(30):
+        answer = field_answer(field_with(SIGMA * random.standard_normal(400)), LIBRARY, NOTHING_STATED)
+        assert answer.shown == ()
+        assert answer.global_p > 1e-3
+
+
+def test_a_tilt_is_a_class_with_its_sizes_and_a_gauge_run_is_asked_for():
+    noise = SIGMA * np.random.default_rng(1).standard_normal(400)
+    field = field_with(2.0 * WAVE @ [0.3, 0.4] + noise)
+    answer = field_answer(field, LIBRARY, NOTHING_STATED)
+    assert answer.global_p < 1e-9
+    assert {s.model.name for s in answer.shown} == {"laser_tilt", "principal_point"}
+    assert "laser_cone" not in answer.members
+    assert {"laser_tilt", "principal_point", "sensor_tilt"} <= set(answer.members)
+    sizes = {s.model.name: np.linalg.norm(s.score.amplitude) for s in answer.shown}
+    assert sizes["laser_tilt"] == pytest.approx(0.5, rel=0.02)
+    assert sizes["principal_point"] == pytest.approx(2.5, rel=0.02)
+    assert "The laser sheet is tilted" in answer.identifiable
+    assert answer.next.startswith("A gauge run")
+    bare = Diagnosis("field", "", Verdict.NOT_IDENTIFIABLE, 1.0)
+    found = _alone(bare, answer, field, with_gauge=False)
+    assert found.verdict is Verdict.CLASS
+    assert found.effects == ()
+
+
+def met(agrees):
+    return InField(Confirmation("0.60", "0.59", agrees), 2.0, 0.1, 0.1)
+
+
+@pytest.mark.parametrize(("agrees", "verdict"), [(True, Verdict.NAMED), (False, Verdict.CLASS)])
+def test_the_field_bears_a_name_out_or_takes_it_back(agrees, verdict):
+    tilt = EffectFound("laser_tilt", 0.99, {"tilt_deg": Value(0.6, 0.01)}, "A tilt.", "")
+    named = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(tilt,))
+    found = _met(named, {"laser_tilt": met(agrees)})
+    assert found.verdict is verdict
+    assert found.effects[0].confirmed_by[-1].agrees is agrees
+    assert bool(found.record_next) is not agrees
+
+
+def test_a_field_that_cannot_tell_says_so_and_changes_no_verdict():
+    index = EffectFound("outside_index", 0.99, {}, "", "")
+    named = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(index,))
+    found = _met(named, {"outside_index": None})
+    assert found.verdict is Verdict.NAMED
+    assert "too little of outside_index" in found.shortcomings[0]
