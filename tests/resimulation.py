@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from pipeline.artefacts import RingSamples
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
@@ -67,25 +66,24 @@ def wall_of(folder: Path, told: dict) -> Wall:
     )  # fmt: skip
 
 
-def fitted_probe(truth: SceneTruth, rings: RingSamples, every: int = 12, columns: int = 48) -> Probe:
-    """Return the instrument that puts exact rings where they were measured, within what is stated."""
-    frames = np.arange(len(rings.frame))[::every]
-    take = np.arange(0, len(rings.azimuth_rad), len(rings.azimuth_rad) // columns)
-    measured = rings.radius_px[np.ix_(frames, take)].astype(float)
-    good = (rings.validity[np.ix_(frames, take)] == 0) & np.isfinite(measured)
+def fitted_probe(
+    truth: SceneTruth, frames: list[int], azimuth_rad: Float, centre_px: Float, radius_px: Float
+) -> Probe:
+    """Return the instrument, within what is stated, that puts exact rings where they were measured.
+
+    ``radius_px`` (F, A) lies along image azimuths about ``centre_px``, NaN where nothing was measured.
+    """
     probe = truth.stated
     directions = probe.principal_uncertainties()
-
-    outward = np.stack([np.cos(rings.azimuth_rad[take]), np.sin(rings.azimuth_rad[take])], -1)
+    outward = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
 
     def residual(x: Float) -> Float:
         scene = with_probe(truth, probe.with_parameters(probe.parameters + directions @ x, probe.covariance))
-        off = [off_line(scene, int(rings.frame[f]), rings.centre_px, outward, measured[n])
-               for n, f in enumerate(frames)]  # fmt: skip
-        off = np.where(good & np.isfinite(off), off, 0.0)
-        return np.concatenate([off.ravel() / 0.05, 0.1 * x])
+        off = np.stack([off_line(scene, frame, centre_px, outward, radius)
+                        for frame, radius in zip(frames, radius_px, strict=True)])  # fmt: skip
+        return np.concatenate([np.nan_to_num(off).ravel() / 0.05, 0.1 * x])
 
-    found = least_squares(residual, np.zeros(directions.shape[1]), loss="soft_l1", x_scale=1.0, max_nfev=6)
+    found = least_squares(residual, np.zeros(directions.shape[1]), loss="soft_l1", max_nfev=6)
     return probe.with_parameters(probe.parameters + directions @ found.x, probe.covariance)
 
 

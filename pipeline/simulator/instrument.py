@@ -139,7 +139,7 @@ class TrueSensor:
     Attributes
     ----------
     full_well_e : float
-        Electrons at which the sensor clips.
+        Electrons at which the sensor clips; nothing blooms, as with CMOS sensors.
     read_noise_e : float
     black_level : float
         Grey level without light, of 255.

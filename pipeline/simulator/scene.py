@@ -32,11 +32,16 @@ class LaserScene(Parameters):
 
 
 class LightScene(Parameters):
-    """Light of the LEDs."""
+    """Light of the LEDs.
+
+    A bare LED is a Lambertian emitter, cos θ: ``lobe`` 1. A lens over it narrows that: 1.5 to 5. What the
+    bore throws back and forth until it is about even, a few tenths of the direct light on a pale wall, is not
+    traced: ``even`` stands for it.
+    """
 
     level: float = Field(0.6, gt=0, le=50, description="brightest wall on the axis' side over full scale")
-    lobe: float = Field(1.0, ge=0, le=20, description="exponent of the emission cos^m")
-    even: float = Field(0.15, ge=0, le=1, description="share emitted evenly over the forward half")
+    lobe: float = Field(1.0, ge=0, le=20, description="exponent of the emission cos^m; 1: bare LED")
+    even: float = Field(0.15, ge=0, le=1, description="share that is even over the forward half: bounce")
     colour_bgr: Bgr = Field((1.0, 1.0, 1.0), description="share of each channel")
 
 

@@ -10,6 +10,7 @@ from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.premises.base import Premise, require
 from pipeline.simulator.premises.effect import effect_premises
 from pipeline.simulator.premises.pictures import chosen_frames, picture_premises
+from pipeline.simulator.premises.sampling import line_premise
 from pipeline.simulator.render import Renderer
 from pipeline.simulator.truth import SceneTruth
 
@@ -28,7 +29,8 @@ def require_scene(plain: SceneTruth, switches: Sequence[Switch], renderer: Rende
     """
     truth = renderer.truth
     pictures = {n: renderer.frame(n) for n in chosen_frames(truth)}
-    return require([*picture_premises(truth, pictures), *effect_premises(plain, switches)])
+    drawn = [line_premise(truth), *picture_premises(truth, pictures)]
+    return require([*drawn, *effect_premises(plain, switches)])
 
 
 def require_recording(folder: Path, truth: SceneTruth) -> tuple[Premise, ...]:

@@ -1,0 +1,81 @@
+"""A recorded frame against the same frame rendered: where the line lies in both, and how alike they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.recording.base import Illumination
+from pipeline.simulator.render import renderer_of
+from pipeline.simulator.sensor import through_lens
+from pipeline.simulator.truth import SceneTruth
+
+Float = NDArray[np.float64]
+Image = NDArray[np.uint8]
+_REACH_PX, _STEP_PX, _SIGMA_PX, _STEPS = 8.0, 0.5, 1.3, 4
+_LEAST_HEIGHT, _CLIPPED = 12.0, 250
+
+
+@dataclass(frozen=True)
+class Lights:
+    """What a frame would show by the laser alone and by the LEDs alone (H, W, 3), full scales, no noise."""
+
+    laser: Float
+    led: Float
+
+
+def lights_of(truth: SceneTruth, frame: int) -> Lights:
+    """Render a frame's two lights apart, each through the lens."""
+    parts = []
+    for kind in (Illumination.LASER, Illumination.LED):
+        alone = np.full(len(truth.frames.frame), kind.value)
+        renderer = renderer_of(replace(truth, frames=replace(truth.frames, illumination=alone)))
+        parts.append(through_lens(renderer.light(frame), truth.instrument.sensor, None).astype(float))
+    return Lights(*parts)
+
+
+def matched(recorded: Image, lights: Lights, kind: str) -> Image:
+    """Return the rendered frame, each light's share of each channel fitted to the recorded one, clipped."""
+    shown = {"laser": [lights.laser], "led": [lights.led], "both": [lights.laser, lights.led]}[kind]
+    out = np.empty(recorded.shape, np.uint8)
+    for c in range(3):
+        seen = recorded[..., c].astype(float)
+        columns = [light[..., c] for light in shown]
+        lit = sum(columns) > 1e-3
+        gain = np.array([255.0] * len(columns))
+        for _ in range(4):
+            model = sum(g * column for g, column in zip(gain, columns, strict=True))
+            use = lit & (seen < _CLIPPED) & (model < _CLIPPED)
+            gain = np.linalg.lstsq(np.stack([k[use] for k in columns], 1), seen[use], rcond=None)[0]
+        model = sum(g * column for g, column in zip(gain, columns, strict=True))
+        out[..., c] = np.clip(model + 0.5, 0, 255)
+    return out
+
+
+def line_radii(image: Image, near_px: Float, azimuth_rad: Float, centre_px: Float) -> Float:
+    """Return where the line lies (A,), px, along image azimuths about ``centre_px``; NaN where too faint.
+
+    A Gaussian over an even slope is fitted, from ``near_px`` (A,) on: a wall lit by LEDs beside
+    the line would move a centroid.
+    """
+    along = np.arange(-_REACH_PX, _REACH_PX + _STEP_PX / 2, _STEP_PX)
+    bell = np.exp(-0.5 * (along / _SIGMA_PX) ** 2)
+    design = np.stack([bell, bell * along / _SIGMA_PX**2, np.ones_like(along), along], 1)
+    solve = np.linalg.pinv(design)
+    green, rho = image[..., 1].astype(np.float32), near_px.copy()
+    for _ in range(_STEPS):
+        at = rho[:, None] + along
+        u = (centre_px[0] + at * np.cos(azimuth_rad)[:, None]).astype(np.float32)
+        v = (centre_px[1] + at * np.sin(azimuth_rad)[:, None]).astype(np.float32)
+        height, slope = (cv2.remap(green, u, v, cv2.INTER_LINEAR) @ solve.T)[:, :2].T
+        rho = rho + np.clip(slope / np.where(height > _LEAST_HEIGHT, height, np.nan), -1, 1)
+    return rho
+
+
+def psnr_db(recorded: Image, rendered: Image) -> float:
+    """Return the peak signal to noise ratio of two frames over all channels."""
+    off = recorded.astype(float) - rendered.astype(float)
+    return float(20 * np.log10(255 / np.sqrt(np.mean(off**2))))
