@@ -14,9 +14,13 @@ from pipeline.review.comparison.surface import CELLS_PER_RADIUS, COLUMNS, Surfac
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
+Int = NDArray[np.int64]
 _COARSER = 2
 _STRETCH_RADII = 0.8
-_MOST_STRETCHES = 48
+# Stretches that are looked for everywhere, and all that are then looked for near where those lie.
+_ANCHORS = 12
+_MOST_STRETCHES = 96
+_ROOM_CELLS = 3.0
 _CHUNK_ROWS = 1024
 # Encoders and calibrations agree on distance at least so well.
 LARGEST_STRAIN = 0.03
@@ -49,16 +53,33 @@ def coarse_course(earlier: Surface, now: Surface) -> Course:
     cell = _COARSER * now.radius_mm / CELLS_PER_RADIUS
     before, after = _coarse(earlier, cell), _coarse(now, cell)
     rows = min(round(_STRETCH_RADII * now.radius_mm / cell), len(before) // 2, len(after) - 1)
-    starts = np.unique(
-        np.linspace(0, len(before) - rows, min(2 * len(before) // rows, _MOST_STRETCHES)).astype(int)
-    )
-    found = np.array([_place(before[i : i + rows], after) for i in starts])
-    at = earlier.from_mm + (starts + rows / 2) * cell
-    shift = now.from_mm - earlier.from_mm + (found[:, 0] - starts) * cell
-    roll = found[:, 1] * 2 * np.pi / before.shape[1]
-    agree = _consensus(at, shift, roll, found[:, 2], 3 * cell, now.radius_mm)
-    turned = roll[agree][0] + _wrapped(roll[agree] - roll[agree][0])
-    return Course(at[agree], shift[agree], turned, 3 * cell)
+    count = 2 * len(before) // rows
+    at = _starts(len(before) - rows, min(count, _MOST_STRETCHES))
+    anchors = _starts(len(before) - rows, min(count, _ANCHORS))
+    found = np.array([_place(before[i : i + rows], after, 0) for i in anchors])
+    agree = _agreeing(anchors, found, now.radius_mm / cell)
+    if len(at) > len(anchors):
+        windows = [_window(i, anchors[agree], found[agree, 0], rows, len(after)) for i in at]
+        found = np.array(
+            [_place(before[i : i + rows], after[w], w.start) for i, w in zip(at, windows, strict=True)]
+        )
+        agree = _agreeing(at, found, now.radius_mm / cell)
+    roll = found[agree, 1] * 2 * np.pi / before.shape[1]
+    shift = now.from_mm - earlier.from_mm + (found[agree, 0] - at[agree]) * cell
+    middle = np.asarray(earlier.from_mm + (at[agree] + rows / 2) * cell, float)
+    return Course(middle, shift, roll[0] + _wrapped(roll - roll[0]), _ROOM_CELLS * cell)
+
+
+def _starts(last: int, count: int) -> Int:
+    return np.unique(np.linspace(0, last, max(count, 1)).astype(np.int64))
+
+
+def _window(start: int, anchors: Int, places: Float, rows: int, end: int) -> slice:
+    """Return the rows among which a stretch must lie, given where the anchors do."""
+    expected = float(np.interp(start, anchors, places - anchors)) + start
+    room = 2 * rows + int(LARGEST_STRAIN * np.abs(anchors - start).min())
+    first = int(np.clip(expected - room, 0, max(end - rows, 0)))
+    return slice(first, int(np.clip(expected + rows + room, first + rows, end)))
 
 
 def best_place(template: Float32, image: Float32) -> tuple[float, float, float]:
@@ -86,19 +107,23 @@ def _coarse(surface: Surface, cell_mm: float) -> Float32:
     )
 
 
-def _place(stretch: Float32, wall: Float32) -> tuple[float, float, float]:
-    """Return where a stretch lies on a wall: row, columns by which it is turned, correlation."""
+def _place(stretch: Float32, wall: Float32, first: int) -> tuple[float, float, float]:
+    """Return where a stretch lies on a wall whose rows begin with ``first``, its turn, the correlation."""
     row, column, score = best_place(stretch, np.concatenate([wall, wall[:, :-1]], 1))
-    return row, column, score
+    return first + row, column, score
 
 
-def _consensus(at: Float, shift: Float, roll: Float, score: Float, room_mm: float, radius_mm: float) -> Bool:
-    """Return which stretches agree with one of them, taking the one that most and best agree with."""
-    strain = LARGEST_STRAIN * np.abs(at[:, None] - at[None])
-    near = np.abs(shift[:, None] - shift[None]) < room_mm + strain
-    turned = np.abs(_wrapped(roll[:, None] - roll[None])) * radius_mm < 2 * room_mm + strain
+def _agreeing(starts: Int, found: Float, radius_cells: float) -> Bool:
+    """Return which stretches agree with one of them, taking the one that most and best agree with.
+
+    All in cells; ``found`` (N, 3) are the rows at which they lie, columns by which they turn, correlations.
+    """
+    strain = LARGEST_STRAIN * np.abs(starts[:, None] - starts[None])
+    moved, turn = found[:, 0] - starts, found[:, 1] * 2 * np.pi / (COLUMNS // _COARSER)
+    near = np.abs(moved[:, None] - moved[None]) < _ROOM_CELLS + strain
+    turned = np.abs(_wrapped(turn[:, None] - turn[None])) * radius_cells < 2 * _ROOM_CELLS + strain
     agree = near & turned
-    return np.asarray(agree[int(np.argmax(agree @ np.maximum(score, 0.0)))])
+    return np.asarray(agree[int(np.argmax(agree @ np.maximum(found[:, 2], 0.0)))])
 
 
 def _wrapped(angle: Float) -> Float:
