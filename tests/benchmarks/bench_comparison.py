@@ -3,12 +3,16 @@
 On made walls: how often growth lies within its 95 % interval, how z scatters, how often anything at all is
 declared in a family of twelve defects where nothing changed. With ``--runs EARLIER LATER`` and the folders of
 their truths: growth of simulated runs beside the true one, read off the true walls within the same outlines;
-the earlier run is to begin at distance 0 and roll 0, so that its places are those of its truth.
+the earlier run is to begin at distance 0 and roll 0, so that its places are those of its truth. ``--simulate
+FOLDER`` renders and runs such runs of one pipe, ``earlier``, ``later`` (two defects grown, one new, one gone)
+and ``same`` (none changed), and ``other``, another pipe: 5 minutes of CPU.
 """
 
 from __future__ import annotations
 
 import argparse
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +20,7 @@ import numpy as np
 from pipeline.review.comparison.comparison import Comparison
 from pipeline.review.review import open_review
 from pipeline.review.run_files import RunFiles
+from tests.simulated import rendered, shipped, smaller
 from tests.two_walls import PLACES, RADIUS, family
 
 
@@ -73,14 +78,64 @@ def _extreme(wall, place, half, sign) -> float:
     return float((sign * height[np.ix_(rows, columns)]).max())
 
 
+def simulate(folder: Path) -> None:
+    """Render four recordings of a welded 4 inch pipe and run them: each a drive of its own."""
+    stays = [
+        _defect("pit", 70, -20, 8, 7, 0.9), _defect("gouge", 98, 50, 16, 3, 0.6, 20),
+        _defect("dent", 64, -170, 24, 28, 1.2),
+    ]  # fmt: skip
+    before = [_defect("pit", 40, 122, 7, 6, 0.8), _defect("corrosion", 84, -110, 18, 20, 0.6), *stays]
+    after = [_defect("pit", 40, 122, 8, 7, 1.1), _defect("corrosion", 84, -110, 22, 24, 0.9), *stays]
+    gone, new = _defect("deposit", 132, 100, 12, 20, 1.0), _defect("pit", 104, -80, 7, 7, 0.8)
+    for name, defects, seed, start_mm, roll_deg, phase_deg in (
+        ("earlier", [*before, gone], 403, 0.0, 0.0, 0.0), ("later", [*after, new], 403, 7.0, 23.0, 77.0),
+        ("same", [*before, gone], 403, -5.0, -40.0, 190.0), ("other", [*after, new], 977, 4.0, 10.0, 33.0),
+    ):  # fmt: skip
+        scene = _drive(name, defects, seed, start_mm, roll_deg, phase_deg)
+        recording, _ = rendered(scene, folder)
+        command = [
+            sys.executable,
+            "-m",
+            "pipeline.cli",
+            "run",
+            str(recording),
+            "-o",
+            str(folder / "run" / name),
+        ]
+        subprocess.run(command, check=True)
+
+
+def _defect(kind, distance_mm, azimuth_deg, length_mm, width_mm, depth_mm, angle_deg=0.0):
+    names = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth_mm", "angle_deg")
+    sizes = map(float, (distance_mm, azimuth_deg, length_mm, width_mm, depth_mm, angle_deg))
+    return dict(zip(names, (kind, *sizes), strict=True))
+
+
+def _drive(name, defects, seed, start_mm, roll_deg, phase_deg):
+    """Return the welded pipe with these defects, driven otherwise."""
+    scene = shipped("welded-4-inch")
+    values = scene.model_dump(mode="json", exclude_defaults=True)
+    motion = values["motion"] | {"start_mm": start_mm, "legs": [{"duration_s": 20.0, "speed_mm_s": 18.0}]}
+    for sway in ("x_mm", "y_mm", "yaw_deg", "pitch_deg"):
+        for wave in motion[sway]["waves"]:
+            wave["phase_deg"] = wave.get("phase_deg", 0.0) + phase_deg
+    wave = {"amplitude": 7.0, "period_s": 8.0, "phase_deg": phase_deg}
+    motion["roll_deg"] = {"mean": roll_deg, "waves": [wave]}
+    pipe = values["pipe"] | {"joints": [], "defects": defects}
+    return smaller(scene, 2, 200, name=name, seed=seed, motion=motion, pipe=pipe | {"texel_mm": 0.22})
+
+
 def main() -> None:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--families", type=int, default=20)
     parser.add_argument("--runs", type=Path, nargs=2, metavar=("EARLIER", "LATER"))
     parser.add_argument("--truths", type=Path, nargs=2, metavar=("EARLIER", "LATER"))
+    parser.add_argument("--simulate", type=Path, metavar="FOLDER")
     wish = parser.parse_args()
-    if wish.runs and wish.truths:
+    if wish.simulate:
+        simulate(wish.simulate)
+    elif wish.runs and wish.truths:
         simulated_runs(wish.runs, wish.truths)
     else:
         made_walls(wish.families)
