@@ -117,7 +117,7 @@ def examine_gauge(
         travel = gauge_travel(recording, run, geometry.searched.found.state)
         missing += travel.shortcomings
     except UnusableError as error:
-        missing.append(f"Rings and fiducials of the gauge run tell nothing: {error}")
+        missing.append(f"Rings and fiducials of the gauge run tell nothing: {error.problem}.")
     return Seen(recording, geometry, travel, profile, tuple(missing))
 
 
@@ -139,7 +139,7 @@ def _profile(
     try:
         return profile_evidence(recording, rings, probe, context)
     except UnusableError as error:
-        missing.append(f"The line's profile tells nothing: {error}")
+        missing.append(f"The line's profile tells nothing: {error.problem}.")
         return None
 
 

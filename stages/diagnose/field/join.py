@@ -12,6 +12,7 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.answer import FieldAnswer, field_answer, location_in_field
 from stages.diagnose.field.confirm import InField, met_in_field
 from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.field.shortcomings import travels
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.result import Diagnosis, EffectFound, Verdict
 from stages.diagnose.seen import Seen
@@ -35,7 +36,7 @@ def with_field(
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
         return _alone(found, alone, field.field, gauge is not None)
-    if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None:
+    if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
         return replace(found, verdict=Verdict.CONSISTENT)
     return found
 

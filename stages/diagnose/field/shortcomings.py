@@ -47,8 +47,17 @@ def _diameter(run: FieldRun) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+def travels(run: FieldRun) -> bool:
+    """Return whether the probe travels far enough that agreement means anything."""
+    return _way_mm(run) > _SHORTEST_MM
+
+
+def _way_mm(run: FieldRun) -> float:
+    return float(np.abs(np.diff(run.trajectory.T_pc[:, 2, 3])).sum())
+
+
 def _length(run: FieldRun) -> tuple[str, ...]:
-    way = float(np.abs(np.diff(run.trajectory.T_pc[:, 2, 3])).sum())
+    way = _way_mm(run)
     if way > _SHORTEST_MM:
         return ()
     return (
