@@ -200,6 +200,20 @@ def test_the_keyboard_flies_inside(page: Tab) -> None:
     assert page.js("boresight.session.tool") == "none"
 
 
+def test_at_rest_the_model_is_sharp_and_not_drawn_on(page: Tab) -> None:
+    page.page.locator(".model canvas").focus()
+    for _ in range(12):
+        page.keys("w")
+    page.page.wait_for_timeout(900)
+    drawn = "boresight.model.renderer.info.render.frame"
+    before = page.js(drawn)
+    page.page.wait_for_timeout(900)
+    assert page.js(drawn) == before
+    assert page.js("boresight.model.renderer.getPixelRatio() / boresight.model.pixelRatio") == pytest.approx(
+        1
+    )
+
+
 # Findings
 
 

@@ -2,7 +2,8 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { CoarseWall } from "./coarse";
-import { Pipe, type Vector } from "./pipe";
+import { Pace, drawsPlainly, fromModel, toModel } from "./graphics";
+import { Pipe } from "./pipe";
 import type { Session } from "./session";
 import { Stretches } from "./stretches";
 import { element } from "./words";
@@ -10,14 +11,12 @@ import { element } from "./words";
 const MM = 1e-3;
 const FLIGHT_MM = 6;
 const MOST_PIXELS = 1280 * 720;
-// 30 pictures a second while moving; a longer gap is a rest, after which the picture is drawn sharply.
-const [WANTED_STEP_MS, LONGEST_STEP_MS, REST_MS, LEAST_SHARPNESS] = [34, 250, 300, 0.4];
 
 // From outside, no more of a long pipe is shown than this many radii: it would be a thread.
 const OUTSIDE_RADII = 16;
 
 export class ModelView {
-  private readonly isPlain = isSoftware(); // first: it says how colours are to be understood
+  private readonly isPlain = drawsPlainly(); // first: it says how colours are to be understood
   readonly root = element("div", { class: "model" });
   readonly frameTimes: number[] = [];
   private readonly canvas = element("canvas", {
@@ -31,9 +30,7 @@ export class ModelView {
   private readonly without = element("button", { "aria-pressed": "false", click: () => this.enter(false) }, "Outside");
   private readonly hint = element("p", { class: "hint view-hint" });
   private isInside = true;
-  private sharpness = 1; // of pictures while they move
-  private drawnAt = 0;
-  private resting = 0;
+  private readonly pace = new Pace((sharpness) => this.sharpen(sharpness), () => this.draw());
   private readonly pipe: Pipe;
   private readonly scene = new THREE.Scene();
   private readonly camera = new THREE.PerspectiveCamera(80, 1, 1e-3, 1000);
@@ -247,19 +244,7 @@ export class ModelView {
 
   private get isCut(): boolean { return this.cut.checked && !this.isInside; }
 
-  /** Draw less sharply while the view moves, where it would stutter otherwise; sharply again when it rests. */
-  private keepUp(now: number): void {
-    const took = now - this.drawnAt;
-    const isMoving = took < LONGEST_STEP_MS && this.drawnAt > 0;
-    this.drawnAt = now;
-    if (isMoving && took > WANTED_STEP_MS) this.sharpness = Math.max(LEAST_SHARPNESS, this.sharpness * 0.85);
-    if (isMoving && took < WANTED_STEP_MS / 2) this.sharpness = Math.min(1, this.sharpness * 1.05);
-    window.clearTimeout(this.resting);
-    if (isMoving) this.setSharpness(this.sharpness);
-    if (this.sharpness < 1) this.resting = window.setTimeout(() => { this.setSharpness(1); this.drawnAt = 0; this.draw(); }, REST_MS);
-  }
-
-  private setSharpness(share: number): void {
+  private sharpen(share: number): void {
     const ratio = this.pixelRatio * share;
     if (Math.abs(this.renderer!.getPixelRatio() - ratio) > 0.02 * ratio) this.renderer!.setPixelRatio(ratio);
   }
@@ -290,7 +275,7 @@ export class ModelView {
     this.asked = true;
     requestAnimationFrame((now) => {
       this.asked = false;
-      this.keepUp(now);
+      this.pace.step(now);
       this.frameTimes.push(now);
       if (this.frameTimes.length > 120) this.frameTimes.shift();
       this.lamp.position.copy(this.camera.position);
@@ -302,19 +287,4 @@ export class ModelView {
       this.renderer!.render(this.scene, this.camera);
     });
   }
-}
-
-/** The model's axes are glTF's: x right, y up, z toward the viewer; the pipe's are x right, y down, z forward. */
-function toModel([x, y, z]: Vector): THREE.Vector3 { return new THREE.Vector3(x, -y, -z); }
-function fromModel(v: THREE.Vector3): Vector { return [v.x / MM, -v.y / MM, -v.z / MM]; }
-
-/** Whether pictures are drawn by the processor, where smooth edges cost more than they are worth. */
-function isSoftware(): boolean {
-  const context = document.createElement("canvas").getContext("webgl2");
-  const named = context?.getExtension("WEBGL_debug_renderer_info");
-  const name = named ? String(context!.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
-  context?.getExtension("WEBGL_lose_context")?.loseContext();
-  const isSlow = /swiftshader|llvmpipe|software|basic render/i.test(name);
-  THREE.ColorManagement.enabled = !isSlow;
-  return isSlow;
 }

@@ -1,0 +1,43 @@
+/** What drawing needs to know of the machine and of glTF. */
+import * as THREE from "three";
+import type { Vector } from "./pipe";
+
+const MM = 1e-3;
+// 30 pictures a second while moving; a longer gap is a rest, after which the picture is drawn sharply.
+const [WANTED_STEP_MS, LONGEST_STEP_MS, REST_MS, LEAST_SHARPNESS] = [34, 250, 300, 0.4];
+
+/** Draws less sharply while the view moves, where it would stutter otherwise, and sharply again when it rests. */
+export class Pace {
+  private sharpness = 1;
+  private drawnAt = 0;
+  private resting = 0;
+
+  constructor(private readonly sharpen: (sharpness: number) => void, private readonly draw: () => void) {}
+
+  /** A picture is about to be drawn. */
+  step(now: number): void {
+    const took = now - this.drawnAt;
+    const isMoving = took < LONGEST_STEP_MS && this.drawnAt > 0;
+    this.drawnAt = now;
+    if (isMoving && took > WANTED_STEP_MS) this.sharpness = Math.max(LEAST_SHARPNESS, this.sharpness * 0.85);
+    if (isMoving && took < WANTED_STEP_MS / 2) this.sharpness = Math.min(1, this.sharpness * 1.05);
+    if (isMoving) this.sharpen(this.sharpness);
+    window.clearTimeout(this.resting);
+    if (isMoving && this.sharpness < 1) this.resting = window.setTimeout(() => { this.sharpen(1); this.drawnAt = 0; this.draw(); }, REST_MS);
+  }
+}
+
+/** The model's axes are glTF's: x right, y up, z toward the viewer; the pipe's are x right, y down, z forward. */
+export function toModel([x, y, z]: Vector): THREE.Vector3 { return new THREE.Vector3(x, -y, -z); }
+export function fromModel(v: THREE.Vector3): Vector { return [v.x / MM, -v.y / MM, -v.z / MM]; }
+
+/** Whether pictures are drawn by the processor; colours are then taken as they are, and edges not smoothed. */
+export function drawsPlainly(): boolean {
+  const context = document.createElement("canvas").getContext("webgl2");
+  const named = context?.getExtension("WEBGL_debug_renderer_info");
+  const name = named ? String(context!.getParameter(named.UNMASKED_RENDERER_WEBGL)) : "";
+  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  const isSlow = /swiftshader|llvmpipe|software|basic render/i.test(name);
+  THREE.ColorManagement.enabled = !isSlow;
+  return isSlow;
+}
