@@ -18,6 +18,7 @@ from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.result import Verdict
 from tests.simulated import SCENES, rendered, shipped, smaller
 
+pytestmark = pytest.mark.slow
 TILT = {"laser_tilt": {"tilt_deg": 0.8, "direction_deg": 40.0}}
 
 
