@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -16,42 +16,33 @@ from pipeline.simulator.truth import SceneTruth
 Float = NDArray[np.float64]
 Image = NDArray[np.uint8]
 _REACH_PX, _STEP_PX, _SIGMA_PX, _STEPS = 8.0, 0.5, 1.3, 4
-_LEAST_HEIGHT, _CLIPPED = 12.0, 250
+_LEAST_HEIGHT, _CLIPPED, _GAIN_STEPS = 12.0, 250, 4
 
 
-@dataclass(frozen=True)
-class Lights:
-    """What a frame would show by the laser alone and by the LEDs alone (H, W, 3), full scales, no noise."""
-
-    laser: Float
-    led: Float
-
-
-def lights_of(truth: SceneTruth, frame: int) -> Lights:
-    """Render a frame's two lights apart, each through the lens."""
+def lights_of(truth: SceneTruth, frame: int) -> list[Float]:
+    """Render each light (H, W, 3) of a frame alone, through the lens, full scales, without noise."""
+    shown = truth.frames.illumination[frame]
+    kinds = (Illumination.LASER, Illumination.LED) if shown == Illumination.BOTH else (Illumination(shown),)
     parts = []
-    for kind in (Illumination.LASER, Illumination.LED):
+    for kind in kinds:
         alone = np.full(len(truth.frames.frame), kind.value)
         renderer = renderer_of(replace(truth, frames=replace(truth.frames, illumination=alone)))
         parts.append(through_lens(renderer.light(frame), truth.instrument.sensor, None).astype(float))
-    return Lights(*parts)
+    return parts
 
 
-def matched(recorded: Image, lights: Lights, kind: str) -> Image:
+def matched(recorded: Image, lights: list[Float]) -> Image:
     """Return the rendered frame, each light's share of each channel fitted to the recorded one, clipped."""
-    shown = {"laser": [lights.laser], "led": [lights.led], "both": [lights.laser, lights.led]}[kind]
     out = np.empty(recorded.shape, np.uint8)
     for c in range(3):
         seen = recorded[..., c].astype(float)
-        columns = [light[..., c] for light in shown]
-        lit = sum(columns) > 1e-3
-        gain = np.array([255.0] * len(columns))
-        for _ in range(4):
-            model = sum(g * column for g, column in zip(gain, columns, strict=True))
-            use = lit & (seen < _CLIPPED) & (model < _CLIPPED)
-            gain = np.linalg.lstsq(np.stack([k[use] for k in columns], 1), seen[use], rcond=None)[0]
-        model = sum(g * column for g, column in zip(gain, columns, strict=True))
-        out[..., c] = np.clip(model + 0.5, 0, 255)
+        columns = np.stack([light[..., c] for light in lights], -1)
+        lit = columns.sum(-1) > 1e-3
+        gain = np.full(len(lights), 255.0)
+        for _ in range(_GAIN_STEPS):
+            use = lit & (seen < _CLIPPED) & (columns @ gain < _CLIPPED)
+            gain = np.linalg.lstsq(columns[use], seen[use], rcond=None)[0]
+        out[..., c] = np.clip(columns @ gain + 0.5, 0, 255)
     return out
 
 
