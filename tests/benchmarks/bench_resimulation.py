@@ -166,8 +166,6 @@ def study(name: str) -> None:
 
 if __name__ == "__main__":
     print("                                                         by grain:        recorded - exact:")
-    print(
-        "px               bias    rms   median typical steady      rms   typical    bias   rms    typical   PSNR"
-    )
+    print("px           bias    rms   median typical steady    rms   typical    bias   rms    typical   PSNR")
     for recording in sys.argv[1:] or ("open-1-field", "open-1-gauge", "open-3-field"):
         study(recording)
