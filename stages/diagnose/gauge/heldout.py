@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.evidence import INSTRUMENT, Column, Evidence, total
+from stages.diagnose.gauge.baseline import BASELINE_SIZE
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
 from stages.diagnose.gauge.fit import Fit, kept_columns, own_unknowns
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
@@ -66,6 +67,8 @@ def _rms_px(
 ) -> float:  # fmt: skip
     """Return the weighted r.m.s. of parts of the run, each with its poses and own unknowns at their best."""
     about = linearise(run, judged.fit.state, judged.fit.terms, asked, with_baseline=True)
+    # Smooth patterns of a hundredth of a pixel would take up what is asked about: they stay out of it.
+    about.equations.by_global[:, -BASELINE_SIZE:] = 0.0
     per_px = np.full(len(about.equations.frame), np.nan)
     per_px[about.equations.kind == RING] = ring_mm_per_px(about.rings)
     per_px[about.equations.kind == EDGE] = 1.0
