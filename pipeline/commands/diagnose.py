@@ -28,7 +28,6 @@ from pipeline.recording.checks import check_probe_fits
 from pipeline.stage import quiet_context
 from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import diagnose as diagnose_recordings
-from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.result import Diagnosis, to_json
 
 # Stated parameters farther apart than so many σ are not one probe's.
@@ -71,8 +70,9 @@ def diagnose(
         check_probe_fits(recording, stated)
     console = Console(stderr=True)
     with console.status("comparing the recordings with the stated instrument"):
-        library = library_without(without or ())
-        examination = diagnose_recordings(recordings[0], recordings[1], stated, library, quiet_context())
+        examination = diagnose_recordings(
+            recordings[0], recordings[1], stated, quiet_context(), tuple(without or ())
+        )
         simulated = resimulate(examination)
     found = examination.found
     if foreign:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,10 +38,16 @@ class Claim:
     where: str
 
 
-def composed(field: Seen | None, gauge: Seen | None, probe: Probe) -> Diagnosis:
-    """Return the answer to which the channels of both recordings come together."""
+def composed(
+    field: Seen | None, gauge: Seen | None, probe: Probe, without: Collection[str] = ()
+) -> Diagnosis:
+    """Return the answer to which the channels of both recordings come together.
+
+    Effects ``without`` which the library has to do may be seen, but not named.
+    """
     examined = gauge.geometry if gauge is not None else None
-    claims = _claims(field, gauge)
+    every = _claims(field, gauge)
+    claims = [c for c in every if c.found.name not in without]
     stated = stated_belief(probe)
     verdict = of_gauge.verdict_of(examined) if examined is not None else Verdict.NOT_IDENTIFIABLE
     effects = of_gauge.effects_found(examined, stated) if examined is not None else ()
@@ -54,16 +60,20 @@ def composed(field: Seen | None, gauge: Seen | None, probe: Probe) -> Diagnosis:
         verdict = Verdict.CLASS if doubted else Verdict.NAMED
         members = classes_of([*doubted, *(c.found.name for c in claims)]) if doubted else ()
     p_value = _global_p(field, gauge)
+    if len(claims) < len(every) and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE):
+        verdict = Verdict.UNEXPLAINED
     if verdict is Verdict.UNEXPLAINED:
         effects = ()
     named = (*effects, *(c.found for c in claims))
+    if verdict is Verdict.NAMED and (len(claims) < len(every) or not all(map(_confirmed, named))):
+        verdict, members = Verdict.CLASS, classes_of([e.name for e in named])
     asked = members if verdict is Verdict.CLASS else [e.name for e in named]
     return Diagnosis(
         recording=field.recording.name if field is not None else "",
         gauge=gauge.recording.name if gauge is not None else "",
         verdict=verdict,
         global_p=p_value,
-        location=_location(examined, claims),
+        location=_location(examined, every),
         effects=named,
         members=members,
         identifiable=_identifiable(verdict, named, examined),
@@ -75,6 +85,11 @@ def composed(field: Seen | None, gauge: Seen | None, probe: Probe) -> Diagnosis:
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
         ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
     )
+
+
+def _confirmed(found: EffectFound) -> bool:
+    """Return whether a second prediction of the same physics agrees."""
+    return any(c.agrees for c in found.confirmed_by)
 
 
 def _next(verdict: Verdict, asked: Sequence[str]) -> str:
@@ -135,7 +150,12 @@ def _of_travel(travel: TravelEvidence | None) -> list[Claim]:
             words = (
                 f"The encoder's wheel slips at {s.time_s:.2f} s and its reading gains {s.gain_mm:+.2f} mm."
             )
-            found = EffectFound("encoder_slip", 0.98, size, words, effect("encoder_slip").law)
+            evenly = Confirmation(
+                "a slip moves the reading alone: the pictures go on evenly", "no picture astray, no time lost",
+                True,
+            )  # fmt: skip
+            law = effect("encoder_slip").law
+            found = EffectFound("encoder_slip", 0.98, size, words, law, (evenly,))
             out.append(Claim(found, "motion", s.p_value, (), travel.source))
     for line in travel.lines:
         if line.p_value < _TRAVEL_FOUND and "probe_vibration" in line.explained_by:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from pipeline.artefacts import RingSamples
@@ -17,6 +17,7 @@ from stages.diagnose.compared import Compared, compared, with_pictures
 from stages.diagnose.compose import composed
 from stages.diagnose.correct import Correction, correction_by_gauge
 from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.evidence import field_evidence, travel_of_run
 from stages.diagnose.field.join import with_field
 from stages.diagnose.field.run import FieldRun, with_probe
@@ -63,10 +64,19 @@ def diagnose(
     field: Recording | None,
     gauge: Recording | None,
     probe: Probe,
-    library: Mapping[str, EffectModel],
     context: Context,
+    without: Collection[str] = (),
 ) -> Examination:
-    """Compare recordings of one probe with what the stated instrument predicts."""
+    """Compare recordings of one probe with what the stated instrument predicts.
+
+    Effects ``without`` which the library has to do may be seen, but not named.
+
+    Raises
+    ------
+    InputError
+        When the catalogue lacks one of them.
+    """
+    library = library_without(without)
     of_gauge = examine_gauge(gauge, probe, library, context) if gauge is not None else None
     of_field = examine_field(field, probe, library, context) if field is not None else None
     correction = _correction(of_gauge, probe)
@@ -74,7 +84,7 @@ def diagnose(
     if of_field is not None and corrected is not None:
         # The scale of the way seen is the instrument's: what is wrong with that is not the encoder's.
         of_field = _with_travel(of_field, travel_of_run(corrected, "field with the corrected probe"))
-    found = with_field(composed(of_field, of_gauge, probe), of_field, of_gauge, probe, library)
+    found = with_field(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe, library)
     run = of_field.field.run if of_field is not None and of_field.field is not None else None
     seen = compared(run, corrected, of_gauge, correction)
     return Examination(with_pictures(found, seen), correction, seen, of_field, of_gauge, corrected)

@@ -14,7 +14,6 @@ from pipeline.recording import open_recording
 from pipeline.simulator.scene import scene_from
 from pipeline.stage import quiet_context
 from stages.diagnose.diagnose import diagnose
-from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.result import Verdict
 from tests.simulated import SCENES, rendered, shipped, smaller
 
@@ -136,7 +135,7 @@ def of_another_size(recording):
 def test_what_a_recording_lacks_is_told_and_nothing_is_guessed(pair, spoilt, verdict, said):
     recording = spoilt(open_recording(pair[0]))
     probe = read_probe(pair[0] / "probe.yaml")
-    found = diagnose(recording, None, probe, LIBRARY, quiet_context()).found
+    found = diagnose(recording, None, probe, quiet_context()).found
     assert found.verdict is verdict
     assert not found.effects
     assert any(said in s for s in found.shortcomings), found.shortcomings
