@@ -16,6 +16,7 @@ from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Location, Value, Verdict
 from stages.diagnose.seen import Seen
+from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEvidence
 
 # Below this chance, motion against encoder shows an effect.
@@ -144,19 +145,7 @@ def _of_travel(travel: TravelEvidence | None) -> list[Claim]:
             size = {e.quantity: Value(e.value, e.sigma)}
             found = EffectFound(e.effect, 0.98, size, e.statement, effect(e.effect).law)
             out.append(Claim(found, "motion", e.p_value, tuple(n for n, _ in e.alike), travel.source))
-    for s in travel.slips:
-        if s.p_value < _TRAVEL_FOUND:
-            size = {"slip_mm": Value(s.gain_mm, s.sigma_mm), "time_s": Value(s.time_s, 0.05)}
-            words = (
-                f"The encoder's wheel slips at {s.time_s:.2f} s and its reading gains {s.gain_mm:+.2f} mm."
-            )
-            evenly = Confirmation(
-                "a slip moves the reading alone: the pictures go on evenly", "no picture astray, no time lost",
-                True,
-            )  # fmt: skip
-            law = effect("encoder_slip").law
-            found = EffectFound("encoder_slip", 0.98, size, words, law, (evenly,))
-            out.append(Claim(found, "motion", s.p_value, (), travel.source))
+    out += [_of_slip(s, travel.source) for s in travel.slips if s.p_value < _TRAVEL_FOUND]
     for line in travel.lines:
         if line.p_value < _TRAVEL_FOUND and "probe_vibration" in line.explained_by:
             turn = float(np.degrees(line.sigma_mm / line.amplitude_mm))
@@ -171,6 +160,18 @@ def _of_travel(travel: TravelEvidence | None) -> list[Claim]:
             found = EffectFound("probe_vibration", 0.98, size, words, effect("probe_vibration").law)
             out.append(Claim(found, "motion", line.p_value, others, travel.source))
     return out
+
+
+def _of_slip(step: StepFound, source: str) -> Claim:
+    size = {"slip_mm": Value(step.gain_mm, step.sigma_mm), "time_s": Value(step.time_s, 0.05)}
+    words = f"The encoder's wheel slips at {step.time_s:.2f} s and its reading gains {step.gain_mm:+.2f} mm."
+    evenly = Confirmation(
+        "a slip moves the reading alone: the pictures go on evenly",
+        "no picture is astray and no time is lost there",
+        True,
+    )
+    found = EffectFound("encoder_slip", 0.98, size, words, effect("encoder_slip").law, (evenly,))
+    return Claim(found, "motion", step.p_value, (), source)
 
 
 def _of_profile(seen: Seen) -> list[Claim]:

@@ -132,7 +132,7 @@ class TimeOffset(Scalar):
 
     name = "time_offset"
     amplitudes = one(name, 0.02)
-    words = "The encoder's clock is {delay_s:+.4f} s behind the camera's."
+    words = "The encoder's readings come {delay_s:+.4f} s late against the pictures."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
         """Return s(t − τ) − s(t), so that visual − encoder = v τ; speed held beyond the ends."""
