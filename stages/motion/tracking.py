@@ -138,8 +138,9 @@ class TextureTracker:
         """Match every landmark that should be in the strip."""
         m = self._map
         guess = np.stack([m.row - strip.first_row, m.column], -1) + m.offset
-        young = frame - m.born < self._parameters.max_track_frames
-        near = np.flatnonzero(self._in_view(strip, guess) & young & ~m.retired)
+        # Retired, they leave their places to new ones, should the probe come back.
+        m.retired |= frame - m.born >= self._parameters.max_track_frames
+        near = np.flatnonzero(self._in_view(strip, guess) & ~m.retired)
         found = match(strip.contrast, strip.usable, m.gather(near), guess[near, 0], guess[near, 1])
         at = guess[near] + found.offset + np.array([strip.first_row, 0])
         good = (found.correlation > self._parameters.min_correlation) & np.isfinite(at).all(1)
