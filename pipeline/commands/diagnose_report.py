@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import base64
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 
 from pipeline.commands.diagnose_apply import GeometryChange, consequence
 from pipeline.commands.diagnose_figures import (
@@ -21,6 +19,7 @@ from pipeline.commands.diagnose_figures import (
 )
 from pipeline.commands.diagnose_image import OnImage
 from pipeline.commands.diagnose_resimulate import Resimulated
+from pipeline.pages import page_template
 from stages.diagnose.result import Diagnosis, Verdict, to_json
 
 _HEADLINES = {
@@ -48,10 +47,8 @@ def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
     OSError
         When it cannot be written.
     """
-    page = files("pipeline.commands.diagnose_page").joinpath("page.html").read_text("utf-8")
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
     change = shown.change
-    text = environment.from_string(page).render(
+    text = page_template("pipeline.commands.diagnose_page").render(
         d=to_json(found), headline=headline(found), simulated=shown.simulated, change=change,
         consequence=consequence(change) if change is not None else "",
         hours=_by_hour(change) if change is not None else (), pictures=_pictures(found, shown),

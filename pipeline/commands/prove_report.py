@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
-
 from pipeline.commands.prove_cases import Worked
+from pipeline.pages import page_template
 from stages.diagnose.drill.figures import Figure, figures
 from stages.diagnose.drill.score import Trial, calibration, confusion
 
@@ -21,9 +19,9 @@ def write_report(done: Sequence[Worked], folder: Path) -> None:
     document = report_document(done)
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / "proof.json").write_text(text + "\n", "utf-8")
-    page = files("pipeline.commands.prove_page").joinpath("page.html").read_text("utf-8")
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
-    (folder / "proof.html").write_text(environment.from_string(page).render(d=document), "utf-8")
+    (folder / "proof.html").write_text(
+        page_template("pipeline.commands.prove_page").render(d=document), "utf-8"
+    )
 
 
 def report_document(done: Sequence[Worked]) -> dict[str, Any]:
