@@ -59,7 +59,8 @@ def composed(
     doubted = tuple(n for c in claims for n in c.alike)
     if claims and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE, Verdict.NAMED):
         verdict = Verdict.CLASS if doubted else Verdict.NAMED
-        members = classes_of([*doubted, *(c.found.name for c in claims)]) if doubted else ()
+        every_name = [*doubted, *(c.found.name for c in claims), *(e.name for e in effects)]
+        members = classes_of(every_name) if doubted else ()
     p_value = _global_p(field, gauge)
     if len(claims) < len(every) and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE):
         verdict = Verdict.UNEXPLAINED

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import subprocess
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -99,18 +99,19 @@ def of_positions(library: Mapping[str, EffectModel]) -> dict[str, EffectModel]:
     }
 
 
-def diagnosed(case: Drawn, library: Mapping[str, EffectModel]) -> dict[str, Any]:
+def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
     """Return the answer as in diagnosis.json, and the SNR that an oracle sees."""
     simulated = ring_level_run(case.scene, case.file, case.switches, case.noise)
     stated = simulated.truth.stated
     geometry, travel = None, None
     missing: tuple[str, ...] = ()
     try:
-        geometry = examine(simulated.measured, of_positions(library), stated)
+        geometry = examine(simulated.measured, of_positions(without(left_out)), stated)
         travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
     except UnusableError as error:
         missing = (str(error),)
-    found = to_json(composed(None, Seen(simulated.recording, geometry, travel, None, missing), stated))
+    seen = Seen(simulated.recording, geometry, travel, None, missing)
+    found = to_json(composed(None, seen, stated, left_out))
     answer = {k: found[k] for k in _KEPT if k in found}
     answer["candidates"] = [c for c in found["candidates"] if c["probability"] > 1e-3]  # type: ignore[attr-defined]
     answer["shortcomings"] = list(missing)
@@ -154,7 +155,7 @@ def _line(mode: Mode, seed: int, version: str) -> dict[str, Any]:
     left_out = names if mode is Mode.LEFTOUT else ()
     start = time.process_time()
     try:
-        told = diagnosed(case, without(left_out) if left_out else LIBRARY)
+        told = diagnosed(case, left_out)
     except BoresightError as error:
         told = {
             "answer": {"verdict": "not_identifiable", "effects": [], "class": []},

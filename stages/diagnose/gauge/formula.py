@@ -16,7 +16,7 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.run import GaugeRun, Term, linearise
 from stages.diagnose.inference import (
     DEGREES,
     Score,
@@ -32,6 +32,8 @@ Int = NDArray[np.int64]
 _MOST_TERMS = 4
 # A further term must be rarer than this by chance, corrected for all that were tried.
 _NEEDED = 1e-4
+# Laws are exact to a few tenths of a percent, and large patterns are seen far sharper than that.
+_SAME = 0.02
 # Directions seen less sharply than this part of the sharpest tell nothing of adequacy.
 _WEAK = 1e-3
 
@@ -48,6 +50,22 @@ def empirical(run: GaugeRun, nothing: Fit, stated: Stated) -> Fit:
         chosen.append(best)
     terms = [Term(model, shape, np.zeros(len(model.amplitudes))) for model, shape, _ in chosen]
     return fit(run, nothing.state, terms)
+
+
+def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
+    """Return whether a formula's pattern is, to within the accuracy of laws, one that the named effects make.
+
+    It is then those effects' own description, not a rival, however much of the noise it takes up besides.
+    """
+    asked = [(t.model, t.shape) for t in (*named.terms, *formula.terms)]
+    equations = linearise(run, named.state, (), asked).equations
+    size = [len(t.amplitude) for t in named.terms], [len(t.amplitude) for t in formula.terms]
+    weighted = np.sqrt(equations.weight)[:, None] * equations.by_global[:, -sum(size[0]) - sum(size[1]) :]
+    pattern = weighted[:, sum(size[0]) :] @ np.concatenate([t.amplitude for t in formula.terms])
+    effects = weighted[:, : sum(size[0])]
+    scale = np.maximum(np.linalg.norm(effects, axis=0), 1e-300)
+    left = pattern - effects @ (np.linalg.lstsq(effects / scale, pattern, rcond=1e-10)[0] / scale)
+    return bool(np.linalg.norm(left) < _SAME * np.linalg.norm(pattern))
 
 
 def adequacy(run: GaugeRun, found: Fit, stated: Stated) -> float:

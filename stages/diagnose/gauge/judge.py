@@ -15,13 +15,14 @@ from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.evidence import INSTRUMENT, Evidence, total
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.formula import adequacy, empirical
+from stages.diagnose.gauge.formula import adequacy, empirical, says_the_same
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import scan, span
 from stages.diagnose.gauge.search import Search, refits
 from stages.diagnose.inference import PRIOR_PLAUSIBLE, Stated, estimate
 
 Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 _STRETCHES = 2
 _LEAST_FRAMES = 8
 # Beforehand: each effect of the library is as likely as any other. A pattern without a cause that fits as
@@ -135,11 +136,22 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     # What predicts other regimes worse than the stated instrument does explains nothing.
     allowed = np.array([j.heldout <= nothing.heldout for j in judged])
     total_surprise = np.array([j.surprise + j.beforehand for j in judged])
+    allowed &= ~_redundant(run, judged, of_formula, total_surprise)
     weight = np.where(allowed, np.exp(-0.5 * (total_surprise - total_surprise[allowed].min())), 0.0)
     order = np.lexsort((total_surprise, -weight))
     ranked = tuple(judged[k] for k in order)
     left = adequacy(run, ranked[0].fit, stated)
     return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike)
+
+
+def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Mask:
+    """Return (H,) True for the formula where the likeliest named effects make its very pattern."""
+    out = np.zeros(len(judged), bool)
+    named = [k for k, j in enumerate(judged) if j.named]
+    if named and formula.fit.terms:
+        best = judged[min(named, key=lambda k: float(total_surprise[k]))]
+        out[[j is formula for j in judged]] = says_the_same(run, formula.fit, best.fit)
+    return out
 
 
 def beforehand(run: GaugeRun, found: Fit, effects: int) -> float:
