@@ -1,5 +1,5 @@
 /** What the page shows now, and who wants to know when it changes. */
-import { RefusedError, type Source } from "./source";
+import { LostError, RefusedError, type Source } from "./source";
 import type { Finding, Point, ReviewState, Run, Seal, Tool } from "./types";
 import { wrapped } from "./words";
 
@@ -109,7 +109,9 @@ export class Session {
       return true;
     } catch (error) {
       if (error instanceof RefusedError && error.stale) this.put(await this.source.state());
-      this.say(error instanceof Error ? error.message : String(error));
+      // A server that is back before it is next looked for takes back what was said of it.
+      if (error instanceof LostError) this.lose(error);
+      else this.say(error instanceof Error ? error.message : String(error));
       return false;
     }
   }

@@ -1,6 +1,9 @@
 /** Where the page gets its data: the local server, or the files of a read-only export. */
 import type { Comparison, Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Stretch, Tool } from "./types";
 
+/** The server cannot be reached. */
+export class LostError extends Error {}
+
 export class RefusedError extends Error {
   constructor(message: string, readonly stale: boolean) { super(message); }
 }
@@ -37,7 +40,7 @@ async function reached(address: string, init?: RequestInit): Promise<Response> {
   try {
     return await fetch(address, init);
   } catch {
-    throw new RefusedError("The server does not answer. Start it again: boresight review", false);
+    throw new LostError("The server does not answer. Start it again: boresight review");
   }
 }
 
