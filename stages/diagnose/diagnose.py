@@ -77,7 +77,7 @@ def diagnose(
         When the catalogue lacks one of them.
     """
     library = library_without(without)
-    of_gauge = examine_gauge(gauge, probe, library, context) if gauge is not None else None
+    of_gauge = examine_gauge(gauge, probe, library, context, without) if gauge is not None else None
     of_field = examine_field(field, probe, library, context) if field is not None else None
     correction = _correction(of_gauge, probe)
     corrected = _corrected(of_field, correction, context)
@@ -114,7 +114,11 @@ def _corrected(field: Seen | None, correction: Correction | None, context: Conte
 
 
 def examine_gauge(
-    recording: Recording, probe: Probe, library: Mapping[str, EffectModel], context: Context
+    recording: Recording,
+    probe: Probe,
+    library: Mapping[str, EffectModel],
+    context: Context,
+    without: Collection[str] = (),
 ) -> Seen:
     """Return what a gauge run's rings, fiducials, motion and line profile say."""
     missing: list[str] = []
@@ -123,7 +127,7 @@ def examine_gauge(
     geometry, travel = None, None
     try:
         run = measure_gauge(recording, rings, probe, GaugeParameters.model_validate({}), context)
-        geometry = examine(run, _of_geometry(library, profile), probe)
+        geometry = examine(run, _of_geometry(library, profile), probe, without)
         travel = gauge_travel(recording, run, geometry.searched.found.state)
         missing += travel.shortcomings
     except UnusableError as error:

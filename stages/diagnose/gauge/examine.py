@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +11,12 @@ from threadpoolctl import threadpool_limits
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.calibrate import MeasuredRun
+from stages.diagnose.classes import class_of
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.gauge.confirm import confirmations
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
 from stages.diagnose.gauge.fit import fit
+from stages.diagnose.gauge.formula import adequacy
 from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.judge import Judged, Verdicts, judge, judged_of, regimes_of
 from stages.diagnose.gauge.locate import location_of
@@ -48,6 +50,8 @@ class Examined:
         Effects that this run is not expected to tell from those found at the sizes found.
     location : Location or None
     quality : FitQuality or None
+    patterns_p : float
+        Chance of what patterns without a cause take up when nothing is hidden.
     """
 
     searched: Search
@@ -58,11 +62,12 @@ class Examined:
     unsplit: tuple[str, ...] = ()
     location: Location | None = None
     quality: FitQuality | None = None
+    patterns_p: float = 1.0
 
     @property
     def global_p(self) -> float:
-        """Chance of such measurements when nothing is hidden."""
-        return self.searched.steps[0].global_p
+        """Chance of this when nothing is hidden, by the library or by patterns without a cause."""
+        return min(2 * min(self.searched.steps[0].global_p, self.patterns_p), 1.0)
 
     @property
     def best(self) -> Judged | None:
@@ -70,8 +75,12 @@ class Examined:
         return self.verdicts.judged[0] if self.verdicts is not None else None
 
 
-def examine(run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe) -> Examined:
+def examine(
+    run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe, without: Collection[str] = ()
+) -> Examined:
     """Search a gauge run for left-out effects.
+
+    What is known to look like an effect ``without`` whose model the library has to do is not told from it.
 
     Raises
     ------
@@ -89,15 +98,22 @@ def examine(run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe) 
             table = feasibility(about, shapes, library, stated)
             groups = inseparable(table, about, shapes, library, stated)
             searched = search(measurements, nothing, library, stated)
-            if searched.steps[0].global_p > DETECTED:
-                return Examined(
-                    searched, None, (), table, groups, quality=_quality_of_stated(searched, stated)
-                )
-            return _judged(
-                Examined(searched, judge(searched, library, stated), (), table, groups), library, stated
-            )
+            # What the library does not know moves rings and fiducials all the same.
+            patterns_p = adequacy(searched.run, searched.nothing, stated)
+            seen = Examined(searched, None, (), table, groups, patterns_p=patterns_p)
+            if seen.global_p > DETECTED:
+                return replace(seen, quality=_quality_of_stated(searched, stated))
+            judged = _judged(replace(seen, verdicts=judge(searched, library, stated)), library, stated)
+            return replace(judged, unsplit=(*judged.unsplit, *_untested(judged, without)))
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
+
+
+def _untested(judged: Examined, without: Collection[str]) -> tuple[str, ...]:
+    """Return the effects of the found ones' classes that there is no model of."""
+    best = judged.best
+    names = best.names if best is not None and best.named else ()
+    return tuple(mate for name in names for mate in class_of(name) if mate in without)
 
 
 def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:

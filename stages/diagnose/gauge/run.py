@@ -123,7 +123,8 @@ def _baseline(edges: Edges, edge_at: ImagePoints, ring_at: ImagePoints, parts: S
     # The residual of a ring falls with its outward shift by the millimetres of a pixel.
     on_rings = -ring_mm_per_px(ring_at)[:, None] * ring_baseline(ring_at)
     count = len(parts[2].residual) if len(parts) > 2 else 0
-    return block_diag(on_edges, on_rings, np.zeros((count, 0)))
+    # A point on the rim of what the camera model covers has no slope; it is asked nothing.
+    return np.nan_to_num(block_diag(on_edges, on_rings, np.zeros((count, 0))), posinf=0.0, neginf=0.0)
 
 
 def ring_mm_per_px(points: ImagePoints) -> Float:
