@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import av
 import numpy as np
 
 from pipeline.errors import InputError
+from pipeline.recording.background import in_background
 from pipeline.recording.base import FrameTable, Image, Int, Planes
 from pipeline.recording.pixels import pixels
 from pipeline.recording.selection import ascending, complete
@@ -22,6 +24,8 @@ _THREADS = 4
 _RESTART_FRAMES = 8
 # A decoder holds back at most this many frames: 16 for reordering and one a thread.
 _HELD_BACK = 16 + _THREADS
+# Frames made ready while one is worked on, and from how many on a thread of its own is worth it.
+_AHEAD, _FEW = 4, 3
 # Times of a frame in video and table are the same when they differ by less than this part of a period.
 _SAME_TIME = 0.25
 
@@ -71,7 +75,8 @@ class VideoSource:
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`; frames that the file does not hold yield None."""
         wanted = ascending(frames)
-        return complete(wanted, self._read(np.flatnonzero(np.isin(self.numbers, wanted)), planes))
+        found = self._read(np.flatnonzero(np.isin(self.numbers, wanted)), planes)
+        return complete(wanted, found if wanted.size < _FEW else in_background(found, _AHEAD))
 
     def _read(self, places: Int, planes: Planes) -> Iterator[tuple[int, Image]]:
         for stretch in _stretches(places, self.index):
@@ -105,8 +110,7 @@ class VideoSource:
         start = int(self.index.key_of[wanted[0]])
         only = set(self.index.pts[wanted].tolist()) if self.index.intra else None
         expected = start
-        with av.open(str(self.path)) as container:
-            stream = _prepare(container)
+        with _opened(self.path) as (container, stream):
             if start > 0:
                 container.seek(int(self.index.pts[start]), stream=stream)
             for frame in _decoded(container, stream, only):
@@ -138,11 +142,20 @@ def open_video(path: Path) -> VideoSource:
     InputError
         When the file cannot be opened or holds no video frames.
     """
+    with _opened(path) as (container, stream):
+        size = (stream.codec_context.width, stream.codec_context.height)
+        index = list_frames(container, stream)
+    if index.pts.size == 0 or min(size) <= 0:
+        raise InputError(path, "holds no video frames", hint="the recording may have been stopped at once")
+    return VideoSource(path, index, size, np.arange(index.pts.size))
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[av.container.InputContainer, av.VideoStream]]:
+    """Lend a video's container and stream; raises `InputError` when they cannot be opened or listed."""
     try:
         with av.open(str(path)) as container:
-            stream = _prepare(container)
-            size = (stream.codec_context.width, stream.codec_context.height)
-            index = list_frames(container, stream)
+            yield container, _prepare(container)
     except (av.FFmpegError, OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError | av.FFmpegError) else error
         raise InputError(
@@ -150,9 +163,6 @@ def open_video(path: Path) -> VideoSource:
             expected="H.264, HEVC, MJPEG or FFV1 in a container that FFmpeg reads",
             hint="the copy may be incomplete: copy it again, or repair its container",
         )  from error  # fmt: skip
-    if index.pts.size == 0 or min(size) <= 0:
-        raise InputError(path, "holds no video frames", hint="the recording may have been stopped at once")
-    return VideoSource(path, index, size, np.arange(index.pts.size))
 
 
 def _prepare(container: av.container.InputContainer) -> av.VideoStream:
