@@ -34,6 +34,19 @@ class FileRecord:
         return path.is_file() and path.stat().st_size == self.bytes
 
 
+@dataclass(frozen=True)
+class FileStamp:
+    """What differs after a file was changed; to be asked for equality alone, since clocks are set back.
+
+    The time of the last change of the inode, which no program can set, is part of it.
+    """
+
+    bytes: int
+    changed_ns: int
+    inode_changed_ns: int
+    inode: int
+
+
 class HashingWriter:
     """A binary stream that passes everything on and keeps count and hash of it."""
 
@@ -59,6 +72,12 @@ def record_of(path: Path) -> FileRecord:
             total.update(chunk)
             size += len(chunk)
     return FileRecord(size, total.hexdigest())
+
+
+def stamp_of(path: Path) -> FileStamp:
+    """Return a file's stamp; raises OSError when it is not there."""
+    found = path.stat()
+    return FileStamp(found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_ino)
 
 
 def write_synced(path: Path, fill: Callable[[HashingWriter], object]) -> FileRecord:

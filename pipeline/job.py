@@ -21,7 +21,7 @@ from pipeline.outcome import RunOutcome
 from pipeline.plan import Plan, Source, make_plan
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
-from pipeline.recording.checks import check_probe_fits
+from pipeline.recording.checks import check_probe_fits, refuse_changed
 from pipeline.run_folder import claimed, logged
 from pipeline.runner import Runner, Selection
 from pipeline.stage import Stage
@@ -42,7 +42,12 @@ class Job:
     def plan(self) -> Plan:
         """Return the wired plan; raises `pipeline.plan.PipelineError` when stages do not fit together."""
         sources = (
-            Source(Recording, self.recording, self.recording.content_key),
+            Source(
+                Recording,
+                self.recording,
+                self.recording.content_key,
+                partial(refuse_changed, self.recording),
+            ),
             Source(Probe, self.probe, digest(self.probe)),
         )
         return make_plan(self.stages, self.configuration, sources)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from pipeline.codec import Json, canonical
 from pipeline.config import Configuration
@@ -29,11 +29,14 @@ class Source:
         The thing itself.
     key
         Hash of its content.
+    refuse_changed
+        Raises `pipeline.errors.InputError` when the content is no longer that of the key.
     """
 
     kind: type
     value: object
     key: str
+    refuse_changed: Callable[[], None] = field(default=lambda: None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from pipeline.headline import headline
 from pipeline.outcome import Number, Results, RunOutcome, StageOutcome, State
 from pipeline.plan import Plan, Step
 from pipeline.run_folder import RunFolder
+from pipeline.scratch import Scratch
 from pipeline.stage import Context
 from pipeline.store import Provenance, Stored
 
@@ -155,11 +156,7 @@ class Runner:
         self._logger.info("stage %s starts, key %s", name, step.key)
         numbers: list[Number] = []
         start = time.monotonic()
-        artefact = step.stage.function(
-            **{argument: self._artefacts[kind] for argument, kind in step.inputs},
-            parameters=step.parameters,
-            context=self._context(step, numbers),
-        )
+        artefact = self._artefact(step, numbers)
         provenance = Provenance(
             name, step.stage.version, step.key, round(time.monotonic() - start, 3), tuple(numbers)
         )
@@ -168,6 +165,18 @@ class Runner:
         if stored is None:
             raise TypeError(f"stage {name} made a {type(artefact).__name__} that does not read back")
         return stored
+
+    def _artefact(self, step: Step, numbers: list[Number]) -> object:
+        """Call a stage; what became of its input meanwhile goes before whatever else it raises."""
+        try:
+            return step.stage.function(
+                **{argument: self._artefacts[kind] for argument, kind in step.inputs},
+                parameters=step.parameters,
+                context=self._context(step, numbers),
+            )
+        finally:
+            for source in self._plan.sources:
+                source.refuse_changed()
 
     def _context(self, step: Step, numbers: list[Number]) -> Context:
         def progress(done: int, total: int) -> None:
@@ -179,7 +188,8 @@ class Runner:
             numbers.append(Number(name, value, unit))
 
         random = np.random.default_rng(step.seed)
-        return Context(self._logger, progress, report, random, self._workers)
+        scratch = Scratch(self._folder.internal)
+        return Context(self._logger, progress, report, random, self._workers, scratch)
 
     def _stop_if_wished(self) -> None:
         if self._wish.is_set():

@@ -126,7 +126,7 @@ class Store:
 
 def _write_arrays(folder: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, FileRecord]:
     remove(folder)
-    folder.mkdir(parents=True)
+    folder.mkdir()  # not its parents: a run folder removed meanwhile would come back without the rest
     files = {f"{name}.npy": _write_array(folder / f"{name}.npy", a) for name, a in sorted(arrays.items())}
     sync_folder(folder)
     return files

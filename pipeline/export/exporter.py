@@ -63,7 +63,7 @@ def publish(exporter: Exporter, artefacts: Mapping[type, object], key: str, run:
     with disk_errors_named(run.path):
         try:
             remove(temporary)
-            temporary.mkdir(parents=True)
+            temporary.mkdir()
             exporter.write(**arguments, folder=temporary)
             _put_in_place(exporter, temporary, key, run)
         finally:

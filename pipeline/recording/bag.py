@@ -27,12 +27,13 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import InputError
-from pipeline.recording.bag_file import BAG_ERRORS, Bag, RosBag, open_mcap
+from pipeline.recording.bag_file import BAG_ERRORS, Bag, RosBag, bag_files, open_mcap
 from pipeline.recording.bag_images import ENCODINGS, message_image
 from pipeline.recording.bag_topics import Topics, choose_topics, encoder_of, frames_of
 from pipeline.recording.base import FrameTable, Image, Int, Planes, Recording
-from pipeline.recording.checks import content_key, encoder_warnings
+from pipeline.recording.checks import encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe
+from pipeline.recording.input_file import content_key, input_file
 from pipeline.recording.selection import ascending, complete, decoded_ahead
 from pipeline.yaml_file import read_yaml
 
@@ -125,16 +126,17 @@ def open_mcap_recording(path: Path) -> Recording:
 
 
 def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
-    section = read_yaml(_sidecar(path))
+    description = input_file(_sidecar(path))
+    section = read_yaml(description.path)
     section.refuse_unknown(_KEYS)
     described = describe(section)
     try:
+        files = (description, *map(input_file, bag_files(path)))
         bag = opener(path)
         topics = choose_topics(bag.topics(), section, path)
         recorded_ns, frames, start_ns = frames_of(bag, topics, section)
         encoder = encoder_of(bag, topics, start_ns)
         source = _source(bag, topics, recorded_ns)
-        key = content_key([section.file, *bag.files])
     except BAG_ERRORS as error:
         raise InputError(
             path,
@@ -151,8 +153,9 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
         frame_rate=described.frame_rate or _rate(frames),
         source=source,
         probe_file=described.probe_file,
-        content_key=key,
+        content_key=content_key(files),
         warnings=(*described.warnings, *encoder_warnings(encoder, frames)),
+        files=files,
     )
 
 

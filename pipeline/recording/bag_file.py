@@ -59,9 +59,7 @@ class RosBag:
     @property
     def files(self) -> list[Path]:
         """See `Bag.files`."""
-        if self.path.is_file():
-            return [self.path]
-        return sorted(f for f in self.path.iterdir() if f.suffix in (".yaml", ".db3", ".mcap", ".zstd"))
+        return bag_files(self.path)
 
     def topics(self) -> dict[str, str]:
         """See `Bag.topics`."""
@@ -93,7 +91,7 @@ class McapFile:
     @property
     def files(self) -> list[Path]:
         """See `Bag.files`."""
-        return [self.path]
+        return bag_files(self.path)
 
     def topics(self) -> dict[str, str]:
         """See `Bag.topics`; topics in other encodings than ROS's are passed over."""
@@ -114,6 +112,13 @@ class McapFile:
     def decode(self, coded: bytes, message_type: str) -> Any:
         """See `Bag.decode`."""
         return _decode(coded, message_type, ros1=self.encoding == "ros1")
+
+
+def bag_files(path: Path) -> list[Path]:
+    """Return all files that hold the content of a bag: itself, or those of its folder."""
+    if path.is_file():
+        return [path]
+    return sorted(f for f in path.iterdir() if f.suffix in (".yaml", ".db3", ".mcap", ".zstd"))
 
 
 def open_mcap(path: Path) -> McapFile:

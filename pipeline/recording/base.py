@@ -11,6 +11,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.recording.input_file import InputFile
+
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Image = NDArray[np.uint8]
@@ -120,6 +122,8 @@ class Recording:
         Hash of everything that determines the content (files' bytes, not their times).
     warnings
         What the reader noticed and mended, for the report.
+    files
+        What it is read from, as it was when it was opened: see `pipeline.recording.checks.refuse_changed`.
     """
 
     name: str
@@ -133,6 +137,7 @@ class Recording:
     probe_file: Path | None
     content_key: str
     warnings: tuple[str, ...] = ()
+    files: tuple[InputFile, ...] = ()
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -87,10 +86,7 @@ def check_probe_fits(recording: Recording, probe: Probe) -> None:
         )  # fmt: skip
 
 
-def content_key(files: Iterable[Path]) -> str:
-    """Return the SHA-256 of files' bytes, in order."""
-    digest = hashlib.sha256()
-    for file in files:
-        with file.open("rb") as opened:
-            digest.update(hashlib.file_digest(opened, "sha256").digest())
-    return digest.hexdigest()
+def refuse_changed(recording: Recording) -> None:
+    """Raise `InputError` when a file of a recording is no longer as it was when it was opened."""
+    for file in recording.files:
+        file.refuse_changed()

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.recording.base import FrameTable, Recording
-from pipeline.recording.checks import common_frames, content_key, encoder_warnings
+from pipeline.recording.checks import common_frames, encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe, inside, optional_file, required_file
 from pipeline.recording.images import ImageSequence, is_pattern, open_images
+from pipeline.recording.input_file import InputFile, content_key, input_file
 from pipeline.recording.tables import read_encoder, read_frame_table
 from pipeline.recording.video import VideoSource, open_video
 from pipeline.yaml_file import Section, read_yaml
@@ -34,17 +35,19 @@ def open_folder(path: Path) -> Recording:
     InputError
         When a file is missing or wrong; what can be mended is named in `Recording.warnings` instead.
     """
-    section = read_yaml(path / DESCRIPTION)
+    description = input_file(path / DESCRIPTION)
+    section = read_yaml(description.path)
     section.refuse_unknown(_KEYS)
     described = describe(section)
     frame_rate = section.number("frame_rate", above=0)
     frames_file = required_file(section, "frames")
-    table = read_frame_table(frames_file)
     encoder_file, no_encoder = optional_file(section, "encoder")
+    tables = [input_file(f) for f in (frames_file, encoder_file) if f is not None]
+    table = read_frame_table(frames_file)
     encoder = read_encoder(encoder_file) if encoder_file else None
     source, image_files = _open_source(section, table)
     frames, mended = _match(frames_file, table, source)
-    files = [section.file, frames_file, *([encoder_file] if encoder_file else []), *image_files]
+    files = (description, *tables, *image_files)
     return Recording(
         name=described.name,
         kind=described.kind,
@@ -57,6 +60,7 @@ def open_folder(path: Path) -> Recording:
         probe_file=described.probe_file,
         content_key=content_key(files),
         warnings=(*described.warnings, *no_encoder, *mended, *encoder_warnings(encoder, frames)),
+        files=files,
     )
 
 
@@ -74,14 +78,14 @@ def _match(
     return frames, (*gaps, *cut)
 
 
-def _open_source(section: Section, table: FrameTable) -> tuple[VideoSource | ImageSequence, list[Path]]:
-    """Return the source of images and the files it reads."""
+def _open_source(section: Section, table: FrameTable) -> tuple[VideoSource | ImageSequence, list[InputFile]]:
+    """Return the source of images and the files it reads, as they were before."""
     if is_pattern(section.text("video")):
         inside(section, "video")
         images = open_images(section.file.parent, section.text("video"))
-        return images, images.files
-    file = required_file(section, "video")
-    return open_video(file).numbered_by(table), [file]
+        return images, [input_file(f) for f in images.files]
+    video = input_file(required_file(section, "video"))
+    return open_video(video.path).numbered_by(table), [video]
 
 
 def _check_numbers(source: VideoSource | ImageSequence, table: FrameTable) -> tuple[str, ...]:
