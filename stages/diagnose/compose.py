@@ -12,7 +12,6 @@ from pipeline.physics.catalogue import effect
 from stages.diagnose.classes import classes_of, record_next
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Location, Value, Verdict
 from stages.diagnose.seen import Seen
@@ -49,9 +48,8 @@ def composed(
     examined = gauge.geometry if gauge is not None else None
     every = _claims(field, gauge)
     claims = [c for c in every if c.found.name not in without]
-    stated = stated_belief(probe)
     verdict = of_gauge.verdict_of(examined) if examined is not None else Verdict.NOT_IDENTIFIABLE
-    effects = of_gauge.effects_found(examined, stated) if examined is not None else ()
+    effects = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(claims, effects)
     members: tuple[str, ...] = ()
     if verdict is Verdict.CLASS and examined is not None:

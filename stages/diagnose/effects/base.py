@@ -147,6 +147,12 @@ class EffectModel(ABC):
 
     name: str
     amplitudes: tuple[Amplitude, ...]
+    # 1 σ of what the law leaves out, as a part of the effect's size.
+    law_sigma: float = 0.002
+
+    def shape_step(self, shape: Shape) -> float | None:
+        """Return by how much the shape's number may be off the grid; None where it is a choice."""
+        return None
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return the shapes to be searched; one empty shape when there is nothing to search."""

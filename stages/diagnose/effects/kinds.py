@@ -52,6 +52,10 @@ class Drifting(Worded):
         parts = np.array([0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4])
         return _within(effect(self.name).quantity("time_s"), duration_s * parts)
 
+    def shape_step(self, shape: Shape) -> float:
+        """Return a part of the time constant."""
+        return 0.3 * shape[0]
+
     def course(self, time_s: Float, shape: Shape) -> Float:
         """Return (M,) the part of the final size that is reached."""
         return np.asarray(-np.expm1(-time_s / shape[0]))
@@ -93,6 +97,10 @@ class Periodic(Worded):
         step = 0.5 / duration_s
         frequencies = np.arange(2 * step, frame_rate / 2 + step / 2, step)
         return _within(effect(self.name).quantity("frequency_hz"), frequencies)
+
+    def shape_step(self, shape: Shape) -> float:
+        """Return a frequency that some seconds of recording tell from none."""
+        return 0.05
 
     def size_at(self, time_s: Float, shape: Shape, amplitude: Float) -> Float:
         """Return (M, 2) size along x and y at the times (M,)."""

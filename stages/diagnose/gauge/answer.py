@@ -6,64 +6,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.diagnose.classes import alike as of_one_class
-from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.examine import ADEQUATE, Examined
-from stages.diagnose.gauge.judge import Judged
-from stages.diagnose.gauge.run import Term
-from stages.diagnose.inference import Stated
-from stages.diagnose.result import (
-    Candidate,
-    Confirmation,
-    EffectFound,
-    Picture,
-    Value,
-    Verdict,
-)
+from stages.diagnose.gauge.sizes import quantities
+from stages.diagnose.result import Candidate, EffectFound, Picture, Verdict
 
 Float = NDArray[np.float64]
 CONFIDENT = 0.97
 _IN_CLASS = 0.01
-_DRAWS = 400
 
 
-def effects_found(examined: Examined, stated: Stated) -> tuple[EffectFound, ...]:
+def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     """Return the effects of the likeliest hypothesis with sizes and chances."""
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None or not best.named:
         return ()
-    out = []
-    for term, confirmed in zip(best.fit.terms, examined.confirmed, strict=True):
-        chance = verdicts.chance_of(term.model.name)
-        out.append(_found(term, best, chance, confirmed, stated))
-    return tuple(out)
-
-
-def _found(
-    term: Term, best: Judged, chance: float, confirmed: tuple[Confirmation, ...], stated: Stated
-) -> EffectFound:
-    part = partial_of("all", best.evidence, best, term, stated)
-    covariance = part.covariance if part is not None else np.zeros((len(term.amplitude),) * 2)
-    return EffectFound(
-        term.model.name, chance, quantities(term, covariance),
-        term.model.statement(term.shape, term.amplitude), term.model.equation(term.shape, term.amplitude),
-        confirmed,
+    each = zip(best.fit.terms, examined.sizes, examined.confirmed, strict=True)
+    return tuple(
+        EffectFound(
+            term.model.name, verdicts.chance_of(term.model.name), quantities(sized),
+            term.model.statement(term.shape, term.amplitude), term.model.equation(term.shape, term.amplitude),
+            confirmed,
+        )
+        for term, sized, confirmed in each
     )  # fmt: skip
-
-
-def quantities(term: Term, covariance: Float) -> dict[str, Value]:
-    """Return the catalogue's quantities with 1 σ, by draws of the amplitudes."""
-    random = np.random.default_rng(0)
-    draws = random.multivariate_normal(term.amplitude, covariance, _DRAWS, check_valid="ignore")
-    middle = term.model.quantities(term.shape, term.amplitude)
-    drawn = [term.model.quantities(term.shape, a) for a in draws]
-    out = {}
-    for name, value in middle.items():
-        apart = np.array([d[name] for d in drawn]) - value
-        if name.endswith("_deg") and name.startswith("direction"):
-            apart = (apart + 180) % 360 - 180
-        out[name] = Value(value, float(np.sqrt(np.mean(apart**2))))
-    return out
 
 
 def candidates(examined: Examined) -> tuple[Candidate, ...]:

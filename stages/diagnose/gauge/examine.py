@@ -22,6 +22,7 @@ from stages.diagnose.gauge.judge import Judged, Verdicts, judge, judged_of, regi
 from stages.diagnose.gauge.locate import location_of
 from stages.diagnose.gauge.prepare import prepare
 from stages.diagnose.gauge.search import DETECTED, Search, search
+from stages.diagnose.gauge.sizes import Sized, sizes_of
 from stages.diagnose.inference import Stated, stated_belief
 from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
@@ -42,6 +43,8 @@ class Examined:
         None when nothing beyond the stated instrument was found.
     confirmed : tuple of tuple of Confirmation
         For each term of the likeliest hypothesis.
+    sizes : tuple of Sized
+        The same terms' amplitudes with their covariances.
     feasibility : tuple of Feasible
         What could be seen of each effect, before any residual was looked at.
     inseparable : tuple of tuple of str
@@ -62,6 +65,7 @@ class Examined:
     unsplit: tuple[str, ...] = ()
     location: Location | None = None
     quality: FitQuality | None = None
+    sizes: tuple[Sized, ...] = ()
     patterns_p: float = 1.0
 
     @property
@@ -138,6 +142,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
         seen,
         confirmed=tuple(confirmations(run, best, regimes, term, stated) for term in terms),
         unsplit=unsplit,
+        sizes=sizes_of(run, best, stated) if terms else (),
         location=location_of(run, shown, regimes, stated),
         quality=fit_quality(run, nothing, shown, regimes, stated),
     )

@@ -81,7 +81,8 @@ def _rms_px(
         left = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.by_global.shape[1]))
         step = left.step + left.follow @ rule(Shared(columns, value, left.information, left.right))
         residual = _residual(equations, reduced.pose_step - reduced.pose_by_global @ step, step)
-        shown = np.isin(equations.kind, (RING, EDGE))
+        # What is off the camera model has no weight, and no residual either.
+        shown = np.isin(equations.kind, (RING, EDGE)) & (equations.weight > 0)
         weight = equations.weight[shown] * per_px[use][shown] ** 2
         squares += float(weight @ (residual[shown] / per_px[use][shown]) ** 2)
         weights += float(weight.sum())

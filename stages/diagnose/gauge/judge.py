@@ -19,6 +19,7 @@ from stages.diagnose.gauge.formula import adequacy, empirical, says_the_same
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import scan, span
 from stages.diagnose.gauge.search import Search, refits
+from stages.diagnose.gauge.shapes import refined
 from stages.diagnose.inference import PRIOR_PLAUSIBLE, Stated, estimate
 
 Float = NDArray[np.float64]
@@ -130,6 +131,7 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     fits = _distinct(
         [searched.nothing, searched.found, *searched.rivals, *_decoyed(searched, stated), formula]
     )
+    fits = [refined(run, f) for f in fits]
     judged = [judged_of(run, f, regimes, stated, alike, beforehand(run, f, len(library))) for f in fits]
     of_formula = next(j for j in judged if j.fit is formula) if formula.terms else judged[0]
     nothing = next(j for j in judged if not j.fit.terms)

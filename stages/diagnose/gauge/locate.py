@@ -32,7 +32,7 @@ def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated
     return Location(
         "ring", fixed_to, time, harmonic, _exponent(run, judged, regimes, term, stated),
         frames=(int(run.rings.frame.min()), int(run.rings.frame.max())),
-        distance_mm=(float(distance.min()), float(distance.max())), azimuth_deg=(-180.0, 180.0),
+        distance_mm=(float(np.nanmin(distance)), float(np.nanmax(distance))), azimuth_deg=(-180.0, 180.0),
     )  # fmt: skip
 
 
