@@ -16,6 +16,7 @@ from pipeline.codec import Json
 from pipeline.errors import InputError
 
 _CHUNK = 1 << 20
+_GO_ON = "free space or give another folder with -o; the same command then continues"
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def remove(path: Path) -> None:
 
 
 @contextmanager
-def disk_errors_named(folder: Path) -> Iterator[None]:
+def disk_errors_named(folder: Path, hint: str = _GO_ON) -> Iterator[None]:
     """Turn the operating system's refusals into an `InputError` about ``folder``."""
     try:
         yield
@@ -141,5 +142,5 @@ def disk_errors_named(folder: Path) -> Iterator[None]:
             folder,
             f"cannot be written: {error.strerror or error}",
             expected="a folder that can be written, on a disk with room",
-            hint="free space or give another folder with -o; the same command then continues",
+            hint=hint,
         ) from error

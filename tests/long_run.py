@@ -33,7 +33,7 @@ def write_long_run(source: Path, folder: Path, length_mm: float, coarser: int) -
     rows = len(wall.distance_mm) // coarser * coarser
     step = float(wall.distance_mm[1] - wall.distance_mm[0]) * rows
     times = round(length_mm / step)
-    folder.mkdir(parents=True)
+    RunFolder(folder).internal.mkdir(parents=True)
     store = RunFolder(folder).store
     for stage, kind in STAGES.items():
         made = _repeated(run.artefact(kind), times, step, rows, coarser)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import socket
 import webbrowser
+from contextlib import suppress
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -86,7 +87,8 @@ def serve(opened: Review, page: Path, port: int, browser: bool, compared: Compar
     last = opened.files.path / FOLDER / "port"
     with _listening(port) if port else _listening_again(last) as listener:
         number = int(listener.getsockname()[1])
-        last.write_text(f"{number}\n", "ascii")
+        with suppress(OSError):  # a comfort only: see _listening_again
+            last.write_text(f"{number}\n", "ascii")
         token = secrets.token_urlsafe(24)
         address = f"http://127.0.0.1:{number}/?token={token}"
         typer.echo(f"Review of {opened.files.path.name}: {address}\nStop with Ctrl-C.")

@@ -15,6 +15,7 @@ from pipeline.disk import disk_errors_named, replace_json
 from pipeline.outcome import Number, RunOutcome, StageOutcome
 from pipeline.plan import Plan
 from pipeline.recording.base import Recording
+from pipeline.recording.input_file import content_key
 
 _FORMAT = 1
 # What computes; another version of these may change a result's last digits.
@@ -53,7 +54,12 @@ def write_run_record(
         "libraries": dict(library_versions()),
         "state": outcome.state.value,
         "problem": outcome.problem,
-        "recording": {"name": recording.name, "kind": recording.kind, "path": str(recording.path.resolve())},
+        "recording": {
+            "name": recording.name,
+            "kind": recording.kind,
+            "path": str(recording.path.resolve()),
+            "files_sha256": content_key(recording.files),
+        },
         "probe": {"path": str(probe_file.resolve())},
         "input_sha256": dict(plan.input_hashes()),
         "configuration": {c.stage: c.parameters.model_dump(mode="json") for c in configuration.stages},

@@ -31,8 +31,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
     """Return what does not change while the run stays as it is."""
     record = files.record()
     overlays = files.artefact(Overlays)
-    recording = files.recording()
-    pipe = recording.pipe if recording is not None else None
+    pipe = files.pipe()
     return {
         "name": record["recording"]["name"],
         "metrics": record["metrics"],
@@ -40,7 +39,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "warnings": record["reader_warnings"],
         "program": record["program"],
         "inputs": record["input_sha256"],
-        "has_recording": recording is not None,
+        "has_recording": pipe is not None,
         "nominal_diameter_mm": 2 * overlays.nominal_radius_mm,
         "wall_thickness_mm": pipe.wall_thickness_mm if pipe is not None else None,
         "distance_mm": [float(overlays.distance_mm[0]), float(overlays.distance_mm[-1])],
@@ -50,13 +49,13 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),
         "diagnosis": _diagnosis(files),
-        "version": str(files.version),
+        "version": files.version,
     }
 
 
 def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:
     """Return by what the page sees that something has changed, and whether it is signed."""
-    return asdict(seal) | {"signed": seal.signed, "run_version": str(files.version)}
+    return asdict(seal) | {"signed": seal.signed, "run_version": files.version}
 
 
 def state_document(state: State, files: RunFiles) -> dict[str, Any]:

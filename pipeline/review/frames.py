@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import RingSamples, RingValidity, Trajectory
-from pipeline.errors import BoresightError
+from pipeline.errors import BoresightError, InputError
 from pipeline.geometry.axis import from_pipe, to_pipe
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.model import Overlays
 from pipeline.recording.base import Recording
+from pipeline.recording.checks import refuse_changed
 from pipeline.review.run_files import RunFiles
 
 Float = NDArray[np.float64]
@@ -116,7 +117,11 @@ class FrameFinder:
         """
         if frame not in self.recording.frames.frame:
             raise UnseenError(f"the recording has no frame {frame}")
-        _, image = next(iter(self.recording.read([frame], "bgr")))
+        try:
+            _, image = next(iter(self.recording.read([frame], "bgr")))
+            refuse_changed(self.recording)
+        except InputError as error:
+            raise UnseenError(str(error)) from error
         if image is None:
             raise UnseenError(f"frame {frame} cannot be decoded")
         encoded, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
@@ -172,9 +177,10 @@ def finder_of(files: RunFiles) -> FrameFinder:
 
 
 @lru_cache(maxsize=_KEPT)
-def _finder(files: RunFiles, _version: int) -> FrameFinder:
-    recording, probe = files.recording(), files.probe()
-    if recording is None or probe is None:
-        raise UnseenError("the recording is not where it was when the run was made")
+def _finder(files: RunFiles, _version: str) -> FrameFinder:
+    try:
+        recording, probe = files.recording(), files.probe()
+    except InputError as error:
+        raise UnseenError(str(error)) from error
     radius_mm = float(files.artefact(Overlays).nominal_radius_mm)
     return FrameFinder(recording, probe, files.artefact(Trajectory), files.artefact(RingSamples), radius_mm)

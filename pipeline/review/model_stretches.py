@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import PipeAxis, Trajectory
+from pipeline.disk import FileStamp, stamp_of
 from pipeline.errors import InputError
 from pipeline.geometry.axis import to_pipe
 from pipeline.review.run_files import RunFiles
@@ -95,11 +96,11 @@ def model_of(files: RunFiles) -> StretchedModel:
     file = files.file("model.glb")
     if not file.is_file():
         raise InputError(file, "is missing", hint="finish the run: boresight run")
-    return _model(file, file.stat().st_mtime_ns, files)
+    return _model(file, stamp_of(file), files)
 
 
 @lru_cache(maxsize=2)
-def _model(file: Path, _changed: int, files: RunFiles) -> StretchedModel:
+def _model(file: Path, _as_it_is: FileStamp, files: RunFiles) -> StretchedModel:
     with file.open("rb") as stream:
         head = stream.read(20)
         if len(head) < 20:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import RingSamples, RingValidity, Trajectory
+from pipeline.errors import InputError
 from pipeline.findings import Sections
 from pipeline.review.accounts import REASONS
 from pipeline.review.documents import cleaned
@@ -95,16 +96,18 @@ def _samples(rings: RingSamples) -> list[dict[str, Any]]:
 def _instrument(files: RunFiles) -> list[dict[str, Any]]:
     """Return where the probe's numbers come from, and how old its file is."""
     file = Path(files.record()["probe"]["path"])
-    probe = files.probe()
-    if probe is None:
-        return [{"name": "probe file", "value": "not where it was", "unit": ""}]
-    written = datetime.fromtimestamp(file.stat().st_mtime, UTC)
-    made = datetime.fromtimestamp(files.version / 1e9, UTC)
+    try:
+        probe = files.probe()
+    except InputError as error:
+        return [{"name": "probe file", "value": error.problem, "unit": ""}]
+    written, made = (datetime.fromtimestamp(f.stat().st_mtime, UTC) for f in (file, files.file("run.json")))
     source = probe.calibrated_from or "a data sheet: not calibrated"
+    # A copy or a clock set back dates the file after the run: its age is not known then.
+    age = (made - written).days if written <= made else "unknown: dated after the run"
     return [
         {"name": "numbers from", "value": source, "unit": ""},
         {"name": "probe file written", "value": f"{written:%Y-%m-%d}", "unit": ""},
-        {"name": "its age when the run was made", "value": max((made - written).days, 0), "unit": "days"},
+        {"name": "its age when the run was made", "value": age, "unit": "days" if written <= made else ""},
     ]
 
 

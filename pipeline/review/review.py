@@ -8,6 +8,7 @@ from functools import lru_cache
 
 from pipeline.artefacts import Wall
 from pipeline.codec import Json, canonical
+from pipeline.disk import FileStamp, stamp_of
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.actions import Action
 from pipeline.review.decisions.carry import carried, same_findings
@@ -146,7 +147,7 @@ class Review:
     def _basis(self) -> tuple[str, tuple[Finding, ...]]:
         """Return the hash of the findings as measured now, and the findings."""
         file = self.files.file("defects.json")
-        return _measured(self.files, file.stat().st_mtime_ns if file.exists() else 0)
+        return _measured(self.files, stamp_of(file) if file.exists() else None)
 
     def _translations(
         self, entries: tuple[Entry, ...], basis: str, findings: tuple[Finding, ...]
@@ -162,7 +163,7 @@ class Review:
 
 
 @lru_cache(maxsize=4)
-def _measured(files: RunFiles, _changed: int) -> tuple[str, tuple[Finding, ...]]:
+def _measured(files: RunFiles, _as_it_is: FileStamp | None) -> tuple[str, tuple[Finding, ...]]:
     text = files.defects_text()
     found = measured_findings(text, files.path / "defects.json")
     return hashlib.sha256(text.encode()).hexdigest(), found

@@ -12,13 +12,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.codec import digest
+from pipeline.disk import FileStamp, stamp_of
 from pipeline.errors import InputError
 from pipeline.findings import DefectKind, Sections
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.model import Overlays
 from pipeline.recording import open_recording
-from pipeline.recording.base import Recording
+from pipeline.recording.base import PipeFacts, Recording
+from pipeline.recording.input_file import content_key
 from pipeline.review.decisions.replay import Finding, Measured
 from pipeline.run_folder import RunFolder
 
@@ -38,10 +41,12 @@ class RunFiles:
     path: Path
 
     @property
-    def version(self) -> int:
-        """Changes whenever the run is computed again."""
-        file = self.file("run.json")
-        return file.stat().st_mtime_ns if file.is_file() else 0
+    def version(self) -> str:
+        """Changes whenever the run is computed again; by content, since clocks are set back."""
+        try:
+            return hashlib.sha256(self.file("run.json").read_bytes()).hexdigest()
+        except OSError:
+            return ""
 
     def file(self, name: str) -> Path:
         """Return where a file of the run lies.
@@ -83,15 +88,35 @@ class RunFiles:
         found: _Artefact = _artefact(self, kind, self.version)  # type: ignore[arg-type]
         return found
 
-    def recording(self) -> Recording | None:
-        """Return the recording, None when it is not where it was any more."""
-        path = Path(self.record()["recording"]["path"])
-        return open_recording(path) if path.exists() else None
+    def recording(self) -> Recording:
+        """Return the recording that the run was made from.
 
-    def probe(self) -> Probe | None:
-        """Return the probe as the run found it, None when its file is not there any more."""
+        Raises
+        ------
+        InputError
+            When it is not where it was any more, cannot be opened, or has changed since.
+        """
+        path = Path(self.record()["recording"]["path"])
+        opened = open_recording(path)
+        record = self.record()
+        # Of the files alone: a run may have been given other readings of the encoder beside them.
+        made_from = record["recording"].get("files_sha256", record["input_sha256"]["recording"])
+        _refuse_other(path, "recording", content_key(opened.files), made_from)
+        return opened
+
+    def pipe(self) -> PipeFacts | None:
+        """Return what the recording says of the pipe, None when there is no `recording` any more."""
+        try:
+            return self.recording().pipe
+        except InputError:
+            return None
+
+    def probe(self) -> Probe:
+        """Return the probe as the run found it; raises as `recording`."""
         path = Path(self.record()["probe"]["path"])
-        return read_probe(path).as_found_in(self.artefact(Trajectory)) if path.is_file() else None
+        stated = read_probe(path)
+        _refuse_other(path, "probe", digest(stated), self.record()["input_sha256"]["probe"])
+        return stated.as_found_in(self.artefact(Trajectory))
 
     def defects_text(self) -> str:
         """Return defects.json as it stands."""
@@ -117,8 +142,17 @@ class RunFiles:
             raise InputError(file, f"is not JSON: {error}") from error
 
 
+def _refuse_other(path: Path, role: str, found: str, made_from: str) -> None:
+    if found != made_from:
+        raise InputError(
+            path, "has changed since the run was made",
+            expected=f"the {role} that run.json names by its hash",
+            hint=f"put the {role} back as it was, or run it again: boresight run",
+        )  # fmt: skip
+
+
 @lru_cache(maxsize=16)
-def _artefact(files: RunFiles, kind: type, _version: int) -> Any:
+def _artefact(files: RunFiles, kind: type, _version: str) -> Any:
     stage = _MAKERS[kind]
     key = next((s["key"] for s in files.record()["stages"] if s["name"] == stage), "")
     found = RunFolder(files.path).store.look(stage, key, kind) if key else None
@@ -156,11 +190,10 @@ def _number(value: object) -> float:
 
 
 def _hash_of(file: Path) -> str:
-    found = file.stat()
-    return _sha256(file, found.st_mtime_ns, found.st_size)
+    return _sha256(file, stamp_of(file))
 
 
 @lru_cache(maxsize=64)
-def _sha256(file: Path, _changed: int, _size: int) -> str:
+def _sha256(file: Path, _as_it_is: FileStamp) -> str:
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

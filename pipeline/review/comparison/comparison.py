@@ -44,7 +44,7 @@ class Comparison:
     years: float | None = None
 
     @property
-    def versions(self) -> tuple[int, int]:
+    def versions(self) -> tuple[str, str]:
         """Those of both runs' results."""
         return self.now.files.version, self.earlier.files.version
 
@@ -73,8 +73,10 @@ class Comparison:
     def wall_thickness_mm(self) -> float | None:
         """As assumed in the review, else as the recording says; None where unknown."""
         assumed = self.now.state().assumed.wall_thickness_mm
-        recording = self.now.files.recording()
-        return assumed or (recording.pipe.wall_thickness_mm if recording is not None else None)
+        if assumed:
+            return assumed
+        pipe = self.now.files.pipe()
+        return pipe.wall_thickness_mm if pipe is not None else None
 
     def changes(self) -> tuple[Change, ...]:
         """Return what became of every finding of either run as it stands."""
@@ -125,7 +127,7 @@ class Comparison:
 
 # Results are kept with the versions of the runs they were made of, which callers give.
 @lru_cache(maxsize=2)
-def _pair(comparison: Comparison, _versions: tuple[int, int]) -> PairedWalls:
+def _pair(comparison: Comparison, _versions: tuple[str, str]) -> PairedWalls:
     before, after = _surface(comparison.earlier), _surface(comparison.now)
     welds = [_middle_mm(f) for f in comparison.earlier_findings if f.kind == DefectKind.WELD]
     return PairedWalls(before.wall, after.wall, register(before, after, np.array(welds)))
@@ -133,7 +135,7 @@ def _pair(comparison: Comparison, _versions: tuple[int, int]) -> PairedWalls:
 
 @lru_cache(maxsize=2)
 def _changes(
-    comparison: Comparison, _versions: tuple[int, int], _revisions: tuple[int, int]
+    comparison: Comparison, _versions: tuple[str, str], _revisions: tuple[int, int]
 ) -> tuple[Change, ...]:
     pair = comparison.pair
     radius = float(np.nanmedian(pair.now.radius_mm[:: max(len(pair.now.distance_mm) // 200, 1)]))
@@ -143,12 +145,12 @@ def _changes(
 
 
 @lru_cache(maxsize=1)
-def _difference_layers(comparison: Comparison, _versions: tuple[int, int]) -> DifferenceLayers:
+def _difference_layers(comparison: Comparison, _versions: tuple[str, str]) -> DifferenceLayers:
     return difference_layers(comparison.pair, comparison.now.files.artefact(Overlays))
 
 
 @lru_cache(maxsize=2)
-def _diameter(comparison: Comparison, _versions: tuple[int, int]) -> Value:
+def _diameter(comparison: Comparison, _versions: tuple[str, str]) -> Value:
     wall = comparison.pair.now
     grown = np.concatenate([
         comparison.pair.stretch(i, i + _ROWS_AT_ONCE).diameter_mm

@@ -11,10 +11,18 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from pipeline.disk import disk_errors_named
 from pipeline.errors import BoresightError, InputError
 from pipeline.review.decisions.actions import Action, action_of
 
 _BUSY_S = 10.0
+_KEPT = "free space or mend its permissions, then do the last step again; what was decided before is kept"
+# What the disk refuses, in whatever variant; anything else is the fault of the file's content.
+_PRIMARY = 0xFF
+_DISK_REFUSALS = (
+    sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_PERM,
+)  # fmt: skip
 _SIGNED = "name, standard, remarks, at, revision, sha256"
 
 
@@ -60,7 +68,8 @@ class Ledger:
         InputError
             When it is no ledger, or one of a newer program.
         """
-        self.file.parent.mkdir(parents=True, exist_ok=True)
+        with disk_errors_named(self.file.parent, _KEPT):
+            self.file.parent.mkdir(exist_ok=True)
         with self._open() as connection:
             _migrate(connection, self.file)
 
@@ -137,6 +146,11 @@ class Ledger:
             connection.execute("PRAGMA synchronous = FULL")
             yield connection
         except sqlite3.DatabaseError as error:
+            if error.sqlite_errorcode & _PRIMARY in _DISK_REFUSALS:
+                raise InputError(
+                    self.file, f"cannot be written: {error}",
+                    expected="a folder that can be written, on a disk with room", hint=_KEPT,
+                ) from error  # fmt: skip
             hint = "move it away to start anew, or restore it from a copy"
             raise InputError(self.file, f"cannot be used as a ledger: {error}", hint=hint) from error
         finally:
