@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.ndimage import map_coordinates
 
 from pipeline.artefacts import Float
@@ -17,14 +18,26 @@ def irradiance(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
     Each LED is a Lambert source facing forward: cos(at LED) cos(at wall) / distance²; mean over the LEDs.
     The wall is Lambertian, so this is also what the camera sees up to a factor.
     """
-    total = np.zeros(xyz_c.shape[:-1])
-    for turn in 2 * np.pi * np.arange(lighting.leds) / lighting.leds:
-        x, y = lighting.radius_mm * np.cos(turn), lighting.radius_mm * np.sin(turn)
-        ray = xyz_c - np.array([x, y, lighting.z_mm])
-        square = np.sum(ray * ray, -1)
-        at_wall = np.maximum(-np.sum(ray * normal_c, -1), 0)
-        total += np.maximum(ray[..., 2], 0) * at_wall / (square * square)
-    return np.asarray(total / lighting.leds)
+    turn = 2 * np.pi * np.arange(lighting.leds) / lighting.leds
+    led_xy = lighting.radius_mm * np.stack([np.cos(turn), np.sin(turn)], -1)
+    normal = np.broadcast_to(normal_c, xyz_c.shape).reshape(-1, 3)
+    light = _lit_by(led_xy, lighting.z_mm, xyz_c.reshape(-1, 3), normal)
+    return np.asarray(light.reshape(xyz_c.shape[:-1]))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _lit_by(led_xy, led_z, xyz, normal):  # type: ignore[no-untyped-def]
+    """Return the mean irradiance (N,) of points (N, 3) by LEDs at ``led_xy`` (L, 2) in one plane."""
+    out = np.empty(len(xyz))
+    for k in range(len(xyz)):
+        total, dz = 0.0, xyz[k, 2] - led_z
+        for j in range(len(led_xy)):
+            dx, dy = xyz[k, 0] - led_xy[j, 0], xyz[k, 1] - led_xy[j, 1]
+            square = dx * dx + dy * dy + dz * dz
+            at_wall = -(dx * normal[k, 0] + dy * normal[k, 1] + dz * normal[k, 2])
+            total += max(dz, 0.0) * max(at_wall, 0.0) / (square * square)
+        out[k] = total / len(led_xy)
+    return out
 
 
 @dataclass(frozen=True)

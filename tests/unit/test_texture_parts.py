@@ -62,6 +62,20 @@ def test_one_led_on_the_axis_follows_lambert_and_inverse_square():
     assert irradiance(lamp, point, np.array([1.0, 0.0, 0.0])).max() == 0
 
 
+def test_a_ring_of_leds_is_the_mean_of_its_leds():
+    lamp = Lighting(leds=5, radius_mm=9.0, z_mm=-2.0)
+    random = np.random.default_rng(3)
+    point = random.normal(0, 30, (4, 6, 3))
+    normal = -point / np.linalg.norm(point, axis=-1, keepdims=True)
+    expected = np.zeros((4, 6))
+    for turn in 2 * np.pi * np.arange(5) / 5:
+        ray = point - np.array([9 * np.cos(turn), 9 * np.sin(turn), -2.0])
+        forward, at_wall = np.maximum(ray[..., 2], 0), np.maximum(-(ray * normal).sum(-1), 0)
+        expected += forward * at_wall / (ray * ray).sum(-1) ** 2 / 5
+    assert expected.max() > 0
+    assert np.allclose(irradiance(lamp, point, normal), expected, rtol=1e-12, atol=0)
+
+
 def drawn_samples(wall_slope, gain, views=40, wall_rows=80):
     """Samples of a wall of random cells under a light that falls with θ; view v sees rows v to v + 30."""
     random = np.random.default_rng(5)
