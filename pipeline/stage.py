@@ -10,6 +10,8 @@ from typing import Any, Protocol, get_type_hints
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from pipeline.scratch import Scratch
+
 
 class Parameters(BaseModel):
     """Base of every stage's parameters: strict, immutable, unknown keys refused.
@@ -51,6 +53,8 @@ class Context:
         Generator seeded from the key of the result, so that a repeated run draws the same numbers.
     workers
         How many threads or processes the stage may use.
+    scratch
+        Room for arrays larger than memory should hold.
     """
 
     logger: logging.Logger
@@ -58,6 +62,7 @@ class Context:
     report: Report
     random: np.random.Generator
     workers: int = 2
+    scratch: Scratch = field(default_factory=Scratch)
 
 
 def _silent_progress(done: int, total: int) -> None:

@@ -1,0 +1,95 @@
+"""Room for arrays that are larger than memory should hold: unnamed files, gone when no array needs them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+_MAP_FROM_BYTES = 1 << 25
+
+
+@dataclass(frozen=True)
+class Scratch:
+    """Where large intermediate arrays go.
+
+    The files have no name, so that nothing is left behind however the program ends.
+
+    Attributes
+    ----------
+    folder : Path or None
+        A folder on a disk with room; None for the system's temporary folder.
+    """
+
+    folder: Path | None = None
+
+    def zeros(self, shape: Sequence[int], dtype: DTypeLike) -> NDArray[Any]:
+        """Return an array of zeros: in memory where it is small, else mapped from a file."""
+        kind = np.dtype(dtype)
+        size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
+        if size < _MAP_FROM_BYTES:
+            return np.zeros(shape, kind)
+        with self._file() as stream:
+            stream.truncate(size)
+            return _mapped(stream, kind, tuple(shape))
+
+    def full(self, shape: Sequence[int], value: float, dtype: DTypeLike) -> NDArray[Any]:
+        """Return an array of one value, as `zeros` does; filled piece by piece."""
+        out = self.zeros(shape, dtype)
+        for start in range(0, len(out), 4096):
+            out[start : start + 4096] = value
+        return out
+
+    def spool(self, dtype: DTypeLike) -> Spool:
+        """Return an empty list of records that grows on the disk."""
+        return Spool(np.dtype(dtype), self._file())
+
+    def _file(self) -> IO[bytes]:
+        if self.folder is not None:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        return tempfile.TemporaryFile(dir=self.folder)
+
+
+@dataclass
+class Spool:
+    """Records of one kind, appended at the end and read back in stretches.
+
+    Attributes
+    ----------
+    dtype : numpy.dtype
+    count : int
+        Records so far.
+    """
+
+    dtype: np.dtype[Any]
+    stream: IO[bytes] = field(repr=False)
+    count: int = 0
+
+    def append(self, records: NDArray[Any]) -> None:
+        """Append records (N,)."""
+        self.stream.write(np.ascontiguousarray(records, self.dtype).data)
+        self.count += len(records)
+
+    def part(self, first: int, last: int) -> NDArray[Any]:
+        """Return a copy of records ``first`` to ``last`` (exclusive)."""
+        here = self.stream.tell()
+        self.stream.seek(first * self.dtype.itemsize)
+        content = self.stream.read((last - first) * self.dtype.itemsize)
+        self.stream.seek(here)
+        return np.frombuffer(content, self.dtype).copy()
+
+    def array(self) -> NDArray[Any]:
+        """Return all records, mapped from the file."""
+        self.stream.flush()
+        return _mapped(self.stream, self.dtype, (self.count,))
+
+
+def _mapped(stream: IO[bytes], kind: np.dtype[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+    if 0 in shape:
+        return np.zeros(shape, kind)
+    return np.asarray(np.memmap(stream, kind, "r+", shape=shape))
