@@ -205,8 +205,12 @@ def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> Left:
     return Left((left + left.T) / 2, right[own.kept] - response.T @ pulled, misfit, follow, step)
 
 
-def score_inflation(equations: Equations, reduced: Reduced, left: Left) -> Float:
-    """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1."""
+def score_inflation(equations: Equations, reduced: Reduced, left: Left, group: Int) -> Float:
+    """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1.
+
+    Columns of one ``group`` (K,) are one effect: what they explain together is no error of theirs, else a
+    large effect would hide itself. −1 is none.
+    """
     pose_by_kept = reduced.pose_by_global @ left.follow
     follow, step = np.zeros((len(equations.frame), left.follow.shape[1])), np.zeros(len(equations.frame))
     for rows, used in _by_kind(equations):
@@ -217,11 +221,21 @@ def score_inflation(equations: Equations, reduced: Reduced, left: Left) -> Float
         step[own] += by_pose @ (reduced.pose_step[k] - reduced.pose_by_global[k] @ left.step)
     residual = equations.residual + step
     plain = equations.weight @ follow**2
-    scores = follow * (equations.weight * residual)[:, None]
+    scores = follow * (equations.weight[:, None] * _unexplained(equations.weight, follow, residual, group))
     cells, frames = (np.unique(x, return_inverse=True)[1] for x in (equations.cell, equations.frame))
     both = np.unique(cells * (frames.max(initial=0) + 1) + frames, return_inverse=True)[1]
     robust = _clustered(scores, cells) + _clustered(scores, frames) - _clustered(scores, both)
     return np.asarray(np.sqrt(np.maximum(robust / np.maximum(plain, 1e-300), 1.0)))
+
+
+def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> Float:
+    """Return (M, K) the residual that each column's own group leaves."""
+    out = np.repeat(residual[:, None], follow.shape[1], axis=1)
+    for own in (np.flatnonzero(group == g) for g in np.unique(group[group >= 0])):
+        columns = follow[:, own]
+        best = np.linalg.lstsq((columns.T * weight) @ columns, columns.T @ (weight * residual))[0]
+        out[:, own] -= (columns @ best)[:, None]
+    return out
 
 
 def _by_kind(equations: Equations) -> Iterator[tuple[Int, Int]]:

@@ -16,7 +16,7 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.gauge.confirm import confirmations
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
 from stages.diagnose.gauge.fit import fit
-from stages.diagnose.gauge.formula import adequacy
+from stages.diagnose.gauge.formula import patterns_p
 from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.judge import Judged, Verdicts, judge, judged_of, regimes_of
 from stages.diagnose.gauge.locate import location_of
@@ -103,8 +103,8 @@ def examine(
             groups = inseparable(table, about, shapes, library, stated)
             searched = search(measurements, nothing, library, stated)
             # What the library does not know moves rings and fiducials all the same.
-            patterns_p = adequacy(searched.run, searched.nothing, stated)
-            seen = Examined(searched, None, (), table, groups, patterns_p=patterns_p)
+            beyond = patterns_p(searched.run, searched.nothing, stated)
+            seen = Examined(searched, None, (), table, groups, patterns_p=beyond)
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))
             judged = _judged(replace(seen, verdicts=judge(searched, library, stated)), library, stated)

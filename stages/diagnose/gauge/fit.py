@@ -123,8 +123,8 @@ def _reduced(
     reduced = eliminate_poses(equations, motion, len(found.state.T_pc))
     own = own_unknowns(run, found, equations.by_global.shape[1])
     left = eliminate_globals(reduced, own)
-    inflation = score_inflation(equations, reduced, left)
     names, value = kept_columns(found, asked)
+    inflation = score_inflation(equations, reduced, left, _by_effect(names))
     information, right = left.information, left.right
     # From the linearisation's place back to nothing beyond the stated.
     misfit = left.misfit + float(2 * right @ value + value @ information @ value)
@@ -137,6 +137,13 @@ def _reduced(
         (information * np.outer(inflation, inflation))[pick], misfit,
         float(len(np.unique(equations.cell[equations.weight > 0]))),
     )  # fmt: skip
+
+
+def _by_effect(names: Sequence[Column | None]) -> NDArray[np.int64]:
+    """Return (K,) a number for the columns of each effect and shape, −1 for the instrument's."""
+    keys = [(c.effect, c.shape) if c is not None and c.effect != INSTRUMENT else None for c in names]
+    number = {key: k for k, key in enumerate(dict.fromkeys(k for k in keys if k is not None))}
+    return np.array([-1 if key is None else number[key] for key in keys], np.int64)
 
 
 def own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:

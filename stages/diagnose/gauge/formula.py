@@ -14,9 +14,12 @@ from scipy import stats
 
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
+from stages.diagnose.effects.swings import SWINGS
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term, linearise
+from stages.diagnose.gauge.scan import Scored, scan
+from stages.diagnose.gauge.shapes import freed, refined
 from stages.diagnose.inference import (
     DEGREES,
     Score,
@@ -40,16 +43,30 @@ _WEAK = 1e-3
 
 def empirical(run: GaugeRun, nothing: Fit, stated: Stated) -> Fit:
     """Return the fit with the few patterns that explain the most."""
-    about = evidence(run, nothing, VOCABULARY)[0]
+    swinging = [s for s in swings(run, nothing, stated) if s.p_value * len(SWINGS) < _NEEDED]
+    words = [*VOCABULARY, *((s.model, s.shape) for s in swinging)]
+    about = evidence(run, nothing, words)[0]
     chosen: list[tuple[EffectModel, Shape, Score]] = []
     for _ in range(_MOST_TERMS):
         given = _places(about, [(m, s) for m, s, _ in chosen])
-        best = _next(about, stated, given, [(m, s) for m, s, _ in chosen])
+        left = [w for w in words if w not in [(m, s) for m, s, _ in chosen]]
+        best = _next(about, stated, given, left)
         if best is None:
             break
         chosen.append(best)
     terms = [Term(model, shape, np.zeros(len(model.amplitudes))) for model, shape, _ in chosen]
-    return fit(run, nothing.state, terms)
+    return refined(run, fit(run, nothing.state, terms))
+
+
+def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
+    """Return what each swing without a cause takes up at its best frequency."""
+    return scan(run, found, {model.name: model for model in SWINGS}, stated)
+
+
+def patterns_p(run: GaugeRun, nothing: Fit, stated: Stated) -> float:
+    """Return the chance of what patterns and swings without a cause take up when nothing is hidden."""
+    swinging = min((s.p_value for s in swings(run, nothing, stated)), default=1.0) * len(SWINGS)
+    return float(min(2 * min(adequacy(run, nothing, stated), swinging), 1.0))
 
 
 def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
@@ -57,9 +74,9 @@ def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
 
     It is then those effects' own description, not a rival, however much of the noise it takes up besides.
     """
-    asked = [(t.model, t.shape) for t in (*named.terms, *formula.terms)]
-    equations = linearise(run, named.state, (), asked).equations
-    size = [len(t.amplitude) for t in named.terms], [len(t.amplitude) for t in formula.terms]
+    terms = freed(named).terms
+    equations = linearise(run, named.state, terms, [(t.model, t.shape) for t in formula.terms]).equations
+    size = [len(t.amplitude) for t in terms], [len(t.amplitude) for t in formula.terms]
     weighted = np.sqrt(equations.weight)[:, None] * equations.by_global[:, -sum(size[0]) - sum(size[1]) :]
     pattern = weighted[:, sum(size[0]) :] @ np.concatenate([t.amplitude for t in formula.terms])
     effects = weighted[:, : sum(size[0])]
@@ -97,12 +114,12 @@ def joint_p(about: Evidence, stated: Stated, given: Int) -> float:
 
 
 def _next(
-    about: Evidence, stated: Stated, given: Int, chosen: Sequence[tuple[EffectModel, Shape]]
+    about: Evidence, stated: Stated, given: Int, words: Sequence[tuple[EffectModel, Shape]]
 ) -> tuple[EffectModel, Shape, Score] | None:
     scored = [
         (model, shape, result)
-        for model, shape in VOCABULARY
-        if (model, shape) not in chosen and (result := _score(about, stated, model, shape, given)) is not None
+        for model, shape in words
+        if (result := _score(about, stated, model, shape, given)) is not None
     ]
     best = max(scored, key=lambda s: s[2].statistic / len(s[2].amplitude), default=None)
     needed = best is not None and best[2].p_value * len(VOCABULARY) < _NEEDED
