@@ -108,8 +108,9 @@ class VideoSource:
     def _numbered(self, wanted: Int, damaged: set[int]) -> Iterator[tuple[int, av.VideoFrame]]:
         """Yield decoded frames in order with their numbers; ``damaged`` grows by those that are not sound."""
         start = int(self.index.key_of[wanted[0]])
-        only = set(self.index.pts[wanted].tolist()) if self.index.intra else None
-        expected = start
+        needed = self.index.needed(wanted)
+        only = set(self.index.pts[needed].tolist()) if self.index.timed else None
+        listed, expected = set(needed.tolist()), start
         with _opened(self.path) as (container, stream):
             if start > 0:
                 container.seek(int(self.index.pts[start]), stream=stream)
@@ -117,13 +118,13 @@ class VideoSource:
                 number = self._number(frame, expected)
                 if number is None or number < start:
                     continue
-                damaged.update(range(expected, number))
+                damaged.update(listed.intersection(range(expected, number)))
                 if frame is None or frame.is_corrupt:
                     damaged.add(number)
                 if frame is not None:
                     yield number, frame
                 expected = number + 1
-            damaged.update(range(expected, self.index.pts.size))
+            damaged.update(listed.intersection(range(expected, self.index.pts.size)))
 
     def _number(self, frame: av.VideoFrame | None, expected: int) -> int | None:
         """Return a frame's number; None where it is not known."""
@@ -184,7 +185,7 @@ def _decoded(
 ) -> Iterator[av.VideoFrame | None]:
     """Yield decoded frames in order of presentation; None where the decoder met damage.
 
-    Where every frame stands for itself, just the packets presented at the times ``only`` are decoded.
+    Just the packets presented at the times ``only`` are decoded, where times are known.
     """
     packets = container.demux(stream)
     while (packet := _next_packet(packets)) is not None:

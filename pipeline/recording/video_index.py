@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 import av
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.recording.base import Int
 from pipeline.recording.ffv1 import checksums_hold
+from pipeline.recording.h264 import is_reference, length_bytes
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,8 @@ class VideoIndex:
     broken : (B,) int
         Numbers of frames that cannot be trusted: by their checksum, or since what they are predicted from
         is not in the file.
+    expendable : (N,) bool
+        Frames that no other frame is predicted from: they need not be decoded unless they are wanted.
     """
 
     pts: Int
@@ -41,6 +45,7 @@ class VideoIndex:
     keyframes: Int
     timed: bool
     broken: Int
+    expendable: NDArray[np.bool_]
 
     @property
     def intra(self) -> bool:
@@ -56,6 +61,10 @@ class VideoIndex:
     def key_of(self) -> Int:
         """(N,) Number of the keyframe from which each frame can be decoded."""
         return self.keyframes[np.searchsorted(self.keyframes, np.arange(self.pts.size), "right") - 1]
+
+    def needed(self, wanted: Int) -> Int:
+        """Return the numbers of the frames to be decoded for the ``wanted`` ones, ascending."""
+        return np.union1d(wanted, np.flatnonzero(~self.expendable))
 
     def reached(self, number: int, damaged: Collection[int]) -> bool:
         """Tell whether one of the damaged frames may be part of the prediction of a frame.
@@ -85,20 +94,24 @@ class VideoIndex:
 def list_frames(container: av.container.InputContainer, stream: av.VideoStream) -> VideoIndex:
     """List a stream's packets; what lies behind damage of the container is left out."""
     packets: list[_Packet] = []
-    checked = stream.codec_context.name == "ffv1"
+    codec = stream.codec_context
+    checked = codec.name == "ffv1"
+    length_size = length_bytes(codec.extradata) if codec.name == "h264" else 0
     try:
         for packet in container.demux(stream):
             if packet.size:
                 sound = checked and checksums_hold(bytes(packet))
-                packets.append(_Packet(packet.pts, packet.is_keyframe, sound))
+                needed = not length_size or is_reference(bytes(packet), length_size)
+                packets.append(_Packet(packet.pts, packet.is_keyframe, sound, needed))
     except av.FFmpegError:
         pass  # the table of frames tells what is missing behind this place
-    reordered = stream.codec_context.has_b_frames
+    reordered = codec.has_b_frames
     # AVI keeps no times of presentation: with frames out of order, what it gives are times of decoding.
     timed = not (container.format.name == "avi" and reordered) and all(p.pts is not None for p in packets)
     pts = np.array([p.pts for p in packets] if timed else range(len(packets)), np.int64)
     order = np.argsort(pts, kind="stable")
     key = np.array([timed and p.key for p in packets], bool)[order]
+    free = np.array([not p.reference for p in packets], bool)[order]
     intact = np.array([p.sound for p in packets], bool)[order]
     return VideoIndex(
         pts=pts[order],
@@ -107,12 +120,14 @@ def list_frames(container: av.container.InputContainer, stream: av.VideoStream) 
         keyframes=np.union1d(np.flatnonzero(key), [0]),
         timed=timed,
         broken=np.flatnonzero(~intact & intact.any()),
+        expendable=free | bool(key.all()),
     )
 
 
 class _Packet(NamedTuple):
-    """A coded frame: time of presentation, whether decoding can begin there, whether its checksum holds."""
+    """A coded frame: its time, can decoding begin there, does its checksum hold, do others refer to it."""
 
     pts: int | None
     key: bool
     sound: bool
+    reference: bool

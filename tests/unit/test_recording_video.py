@@ -175,6 +175,28 @@ def test_packets_lost_on_the_way_to_the_disk_neither_shift_nor_falsify_others(
     assert recording.warnings == (f"{end - lost} images are missing between the first and the last",)
 
 
+@pytest.mark.parametrize("ext", ["mkv", "mp4"])
+def test_frames_that_no_other_needs_are_passed_over_and_change_none(tmp_path: Path, ext: str) -> None:
+    file = tmp_path / f"v.{ext}"
+    options = {"g": "8", "x264-params": "log-level=none:bframes=2:b-adapt=0:b-pyramid=none:scenecut=0"}
+    write_video(file, "libx264", "yuv420p", options)
+    source = open_video(file)
+    kinds = np.array([frame.pict_type for frame in _decoded(file)])
+    between = kinds == av.video.frame.PictureType.B
+    assert 3 <= between.sum() < COUNT
+    np.testing.assert_array_equal(source.index.expendable, between)
+    whole = {n: image.copy() for n, image in source.read(range(COUNT), "grey")}
+    for wanted in (np.flatnonzero(~between), np.flatnonzero(between)[1::2], np.arange(1, COUNT, 3)):
+        images = dict(source.read(wanted, "grey"))
+        assert list(images) == wanted.tolist()
+        assert all(np.array_equal(image, whole[n]) for n, image in images.items())
+
+
+def test_frames_without_lengths_are_all_decoded(tmp_path: Path) -> None:
+    write_video(tmp_path / "v.avi", "libx264", "yuv420p", GOP4)
+    assert not open_video(tmp_path / "v.avi").index.expendable.any()
+
+
 @pytest.mark.parametrize("content", [b"", b"not a video at all", b"\x1aE\xdf\xa3" + bytes(500)])
 def test_what_is_no_video_is_refused(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "v.mkv"
