@@ -13,6 +13,7 @@ from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
 from stages.diagnose.gauge.baseline import BASELINE_SIZE, SIGMA_PX
+from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
     Equations,
     MotionPrior,
@@ -28,6 +29,8 @@ from stages.diagnose.inference import instrument_information
 
 Float = NDArray[np.float64]
 _CONVERGED = 0.5
+# mm and rad: a pose's step squared, over the distance of the wall, is far below what a ring shows.
+_STILL = 1e-3
 _PARTS = (1.0, 0.5, 0.2, 0.05)
 _ITERATIONS = 8
 _DELAY_SIGMA_S = 0.002
@@ -72,7 +75,7 @@ def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int =
         information = found.reduced.information + prior
         downhill = found.reduced.right - pull
         step = np.asarray(np.linalg.solve(information, downhill), np.float64)
-        if float(step @ downhill) < _CONVERGED:
+        if float(step @ downhill) < _CONVERGED and _still(found):
             break
         better = _shortened(run, found, step)
         if better is None:
@@ -81,6 +84,13 @@ def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int =
         if gain < _CONVERGED:
             break
     return found
+
+
+def _still(found: Fit) -> bool:
+    """Return whether the poses that are measured stay so near that their linearisation holds."""
+    equations = found.linearised.equations
+    measured = np.unique(equations.frame[(equations.kind != ENCODER_ROW) & (equations.weight > 0)])
+    return bool(np.abs(found.reduced.pose_step[measured]).max(initial=0.0) < _STILL)
 
 
 def _shortened(run: GaugeRun, found: Fit, step: Float) -> Fit | None:

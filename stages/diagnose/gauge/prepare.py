@@ -36,13 +36,18 @@ _FREE = GaugeParameters.model_validate(
 
 
 def prepare(measured_run: MeasuredRun) -> tuple[GaugeRun, Unknowns]:
-    """Return the run's measurements, and poses by an instrument free to follow whatever is there."""
-    measured, source = measured_run.measured, measured_run.source
+    """Return the run's measurements, and poses by an instrument free to follow whatever is there.
+
+    Rings before the first frame with fiducials and after the last do not count: a ring alone does not tell
+    how the probe is turned, and poses drift there.
+    """
+    measured, source, posed = measured_run.measured, measured_run.source, measured_run.posed
+    measured = replace(measured, rings=_between(measured.rings, posed))
     loose = adjust(_freed(measured_run.start), measured, _FREE).state
-    rings = source.on_bore(loose.T_pc, loose.probe, _FREE)
-    sigma = learned_sigma(loose.T_pc, measured_run.posed)
+    rings = _between(source.on_bore(loose.T_pc, loose.probe, _FREE), posed)
+    sigma = learned_sigma(loose.T_pc, posed)
     smooth = adjust(loose, replace(measured, rings=rings, smooth_sigma=sigma), _FREE).state
-    rings = source.on_bore(smooth.T_pc, smooth.probe, _FREE)
+    rings = _between(source.on_bore(smooth.T_pc, smooth.probe, _FREE), posed)
     run = GaugeRun(
         measured.edges, rings, bin_widths(source.rings, source.index, rings),
         measured.time_s, measured.encoder,
@@ -70,6 +75,10 @@ def weighed(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> GaugeRun:
         edge_weight=_weight(found.frame[edges], found.residual[edges], run.edges.sigma_px),
         ring_weight=_weight(found.frame[rings], found.residual[rings], _ring_sigma_mm(run.rings, state)),
     )
+
+
+def _between(rings: BoreRings, posed: NDArray[np.int64]) -> BoreRings:
+    return rings.select((rings.frame >= posed.min()) & (rings.frame <= posed.max()))
 
 
 def _freed(state: Unknowns) -> Unknowns:
