@@ -4,22 +4,27 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 Item = TypeVar("Item")
+Pairs = Iterator[tuple[int, Item]]
+Coming = Future[tuple[int, Item] | None]
 
 
-def in_background(items: Iterator[tuple[int, Item]], ahead: int) -> Iterator[tuple[int, Item]]:
-    """Yield ``items`` in order while one thread makes up to ``ahead`` of the next ones.
+def in_background(items: Pairs[Item], ahead: int) -> Pairs[Item]:
+    """Return ``items`` in order, of which one thread makes up to ``ahead`` before they are asked for.
 
-    What making an item raises is raised here, in its place.
+    It starts at once. What making an item raises is raised in the item's place.
     """
-    with ThreadPoolExecutor(1) as pool:
-        coming = deque(pool.submit(next, items, None) for _ in range(ahead))
-        try:
-            while (item := coming.popleft().result()) is not None:
-                coming.append(pool.submit(next, items, None))
-                yield item
-        finally:
-            pool.shutdown(cancel_futures=True)
+    pool = ThreadPoolExecutor(1)
+    return _as_made(items, pool, deque(pool.submit(next, items, None) for _ in range(ahead)))
+
+
+def _as_made(items: Pairs[Item], pool: ThreadPoolExecutor, coming: deque[Coming[Item]]) -> Pairs[Item]:
+    try:
+        while (item := coming.popleft().result()) is not None:
+            coming.append(pool.submit(next, items, None))
+            yield item
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -25,7 +25,7 @@ _RESTART_FRAMES = 8
 # A decoder holds back at most this many frames: 16 for reordering and one a thread.
 _HELD_BACK = 16 + _THREADS
 # Frames made ready while one is worked on, and from how many on a thread of its own is worth it.
-_AHEAD, _FEW = 4, 3
+_AHEAD, _FEW = 12, 3
 # Times of a frame in video and table are the same when they differ by less than this part of a period.
 _SAME_TIME = 0.25
 

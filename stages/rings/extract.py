@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from pydantic import Field
 from pipeline.artefacts import Float, Int, RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
-from pipeline.recording.base import Illumination, Planes, Recording
+from pipeline.recording.base import Illumination, Image, Recording
 from pipeline.stage import Context, Parameters
 from stages.rings.colour import discriminant_weights, excess_weights, mix
 from stages.rings.noise import clip_level_of, noise_response
@@ -20,6 +21,8 @@ from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
 from stages.rings.validity import mark_outliers, wander_px
 
+Images = Iterator[tuple[int, Image | None]]
+Found = tuple[int, RingTrace | None]
 _LEARNING_FRAMES = 4
 
 
@@ -50,9 +53,13 @@ def extract_rings(
         raise UnusableError(
             "rings", "the laser is on in no frame", hint="check frames.csv, column illumination"
         )
+    # Decoding goes on in the background from here.
+    lasers = recording.read(recording.frames.of(Illumination.LASER), "grey")
+    both = recording.read(recording.frames.of(Illumination.BOTH), "bgr")
     sectors = cut_sectors(recording.source.image_size, probe.camera.centre_px, parameters.azimuths)
+    found = chain(_laser_traces(lasers, recording, sectors), _lit_traces(both, probe, sectors))
     traces: dict[int, RingTrace] = {}
-    for done, (frame, trace) in enumerate(_traces(recording, probe, sectors), 1):
+    for done, (frame, trace) in enumerate(found, 1):
         if trace is not None and trace.coverage >= parameters.least_coverage:
             traces[frame] = trace
         context.progress(done, len(frames))
@@ -67,28 +74,20 @@ def extract_rings(
     return replace(samples, sigma_px=np.hypot(samples.sigma_px, np.float32(wander)))
 
 
-def _traces(recording: Recording, probe: Probe, sectors: Sectors) -> Iterator[tuple[int, RingTrace | None]]:
-    yield from _laser_traces(recording, recording.frames.of(Illumination.LASER), sectors)
-    yield from _lit_traces(recording, recording.frames.of(Illumination.BOTH), probe, sectors)
-
-
-def _laser_traces(
-    recording: Recording, frames: Int, sectors: Sectors
-) -> Iterator[tuple[int, RingTrace | None]]:
+def _laser_traces(images: Images, recording: Recording, sectors: Sectors) -> Iterator[Found]:
     """Trace frames lit by the laser alone, in the luma plane."""
-    trace = _first_trace(recording, frames[:_LEARNING_FRAMES], sectors)
+    first = [(frame, None if i is None else i.copy()) for frame, i in islice(images, _LEARNING_FRAMES)]
+    trace = _first_trace(first, recording, sectors)
     clip_level = np.inf if trace is None else trace.response.clip_level
-    for frame, image in recording.read(frames, "grey"):
+    for frame, image in chain(first, images):
         trace = None if image is None else trace_ring(image, sectors, clip_level, trace)
         yield frame, trace
 
 
-def _lit_traces(
-    recording: Recording, frames: Int, probe: Probe, sectors: Sectors
-) -> Iterator[tuple[int, RingTrace | None]]:
+def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Found]:
     """Trace frames in which the wall is lit too, in the mixture of channels that shows the line best."""
     weights, trace = excess_weights(probe.laser.wavelength_nm), None
-    for frame, bgr in recording.read(frames, "bgr"):
+    for frame, bgr in images:
         if bgr is None:
             yield frame, None
             continue
@@ -109,22 +108,19 @@ def _first_weights(bgr: NDArray[np.uint8], sectors: Sectors, probe: Probe) -> Fl
     return weights if trace is None else discriminant_weights(bgr, sectors, trace, weights)
 
 
-def _first_trace(recording: Recording, frames: Int, sectors: Sectors) -> RingTrace | None:
-    """Return the ring of the first of ``frames`` that shows one, with the grey level at which it clips."""
-    for frame in frames:
-        grey, bgr = _single(recording, frame, "grey"), _single(recording, frame, "bgr")
-        trace = None if grey is None or bgr is None else trace_ring(grey, sectors, np.inf)
+def _first_trace(
+    images: Sequence[tuple[int, Image | None]], recording: Recording, sectors: Sectors
+) -> RingTrace | None:
+    """Return the ring of the first of ``images`` that shows one, with the grey level at which it clips."""
+    for frame, grey in images:
+        trace = None if grey is None else trace_ring(grey, sectors, np.inf)
+        _, bgr = (frame, None) if trace is None else next(recording.read([frame], "bgr"))
         if trace is None or grey is None or bgr is None:
             continue
         line = sectors.pixels_near(trace.radius_everywhere(), 0, trace.width_px)
         clips = trace.response._replace(clip_level=clip_level_of(grey, bgr, line))
         return replace(trace, response=noise_response(grey, sectors, trace.fit, clips))
     return None
-
-
-def _single(recording: Recording, frame: int, planes: Planes) -> NDArray[np.uint8] | None:
-    _, image = next(iter(recording.read([frame], planes)))
-    return None if image is None else image.copy()
 
 
 def _samples(frames: Int, sectors: Sectors, traces: dict[int, RingTrace]) -> RingSamples:
