@@ -15,7 +15,7 @@ from pipeline.instrument.probe import Probe
 from stages.motion.equations import MATCH_BIASES, Measurements
 from stages.motion.state import GLOBALS, EncoderReadings, State, straight_start
 from stages.motion.terms import RingBins
-from stages.motion.tracking import Tracks
+from stages.motion.tracks import Tracks
 
 Float = NDArray[np.float64]
 RADIUS = 50.0

@@ -4,35 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from pipeline.artefacts import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from pipeline.stage import Context, Stage
-from stages.motion.adjustment import adjust, third_difference_sigma
 from stages.motion.encoder import contradicted, encoder_at_frames
-from stages.motion.equations import MATCH_BIASES, Measurements
 from stages.motion.events import find_events
-from stages.motion.output import Estimate, in_pipe_frame
+from stages.motion.output import trajectory_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.prediction import Predictor
-from stages.motion.sections import at_all_frames, ring_bins, ring_centres
-from stages.motion.state import EncoderReadings, State, straight_start
+from stages.motion.sections import at_all_frames, ring_centres
+from stages.motion.sliding import RunEstimate, adjust_run
+from stages.motion.state import EncoderReadings
 from stages.motion.strip import StripGrid
-from stages.motion.tracking import TextureTracker, Tracks, track_texture
+from stages.motion.submaps import Estimate
+from stages.motion.tracking import Followed, TextureTracker, track_texture
+from stages.motion.tracks import Course, Tracks
+from stages.motion.windows import MeasuredRun
 
 __all__ = ["MOTION", "MotionParameters", "estimate_motion"]
 
 Float = NDArray[np.float64]
-_LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
-_MARGIN_MM = 20.0
 _LARGEST_CHANGE = 0.1
-_ROUGHLY, _CLOSELY = 1e-2, 1e-5
 _BLUE, _RED = 0, 2
 _YELLOW_NM = 575.0
 
@@ -49,7 +48,7 @@ def estimate_motion(
 
     Texture tracks are landmarks on the wall; rings lie on the wall; the encoder has a scale and slips; the
     motion is smooth; the axis bends as little as it may; the instrument is as stated within its uncertainty.
-    All of it is one least-squares problem with robust weights.
+    All of it is one least-squares problem with robust weights; a long run is a chain of them.
 
     Raises
     ------
@@ -61,22 +60,19 @@ def estimate_motion(
     encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
     all_centres = at_all_frames(_index_of(recording, points.frame), centre_c, len(recording.frames.frame))
     predictor = Predictor(recording.frames.time_s, encoder, all_centres)
-    tracks = _tracked(recording, probe, grid, predictor, parameters, context)
-    if encoder is not None and contradicted(encoder, tracks, context):
+    followed = _followed(recording, probe, grid, predictor, parameters, context)
+    if encoder is not None and contradicted(encoder, followed, context):
         encoder, predictor = None, Predictor(recording.frames.time_s, None, all_centres)
-        tracks = _tracked(recording, probe, grid, predictor, parameters, context)
-    _require_distance(tracks, encoder)
+        followed = _followed(recording, probe, grid, predictor, parameters, context)
+    _require_distance(followed, encoder)
+    place = _index_of(recording, rings.frame)
     unsure = probe.principal_uncertainties()
-    bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
-    bins = replace(bins, frame=_index_of(recording, bins.frame))
-    measured = Measurements(tracks, bins, recording.frames.time_s, encoder, probe, unsure, _LOOSE)
-    T_pc = predictor.between(tracks.frames, tracks.T_pc, len(recording.frames.frame))
-    start = _first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
-    estimate = _adjusted(start, measured, parameters)
-    _require_convergence(estimate, radius_mm, context)
-    trajectory = in_pipe_frame(estimate, recording.frames, measured)
-    events = find_events(recording.frames, trajectory, tracks, estimate.state.slip, encoder is not None)
-    _report(context, estimate, tracks, trajectory)
+    T_pc = predictor.between(followed.frames, followed.T_pc, len(recording.frames.frame))
+    run = MeasuredRun(followed, rings, place, recording.frames.time_s, T_pc, encoder, probe, unsure)
+    estimate = adjust_run(run, parameters, partial(_require_pipe, radius_mm), context.progress)
+    trajectory = trajectory_of(estimate.joined, recording.frames, probe, unsure, encoder is not None)
+    events = find_events(recording.frames, trajectory, followed, estimate.joined.slip, encoder is not None)
+    _report(context, estimate, followed, trajectory)
     return replace(trajectory, events=events)
 
 
@@ -112,12 +108,25 @@ def _tracked(
     parameters: MotionParameters,
     context: Context,
 ) -> Tracks:
+    """Return the tracks of a whole recording at once."""
+    followed = _followed(recording, probe, grid, predictor, parameters, context)
+    return followed.between(0, len(recording.frames.frame))
+
+
+def _followed(
+    recording: Recording,
+    probe: Probe,
+    grid: StripGrid,
+    predictor: Predictor,
+    parameters: MotionParameters,
+    context: Context,
+) -> Followed:
     lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
     both = bool(np.any(recording.frames.illumination == Illumination.BOTH.value))
     # The line is a few σ wide on the wall; its glow is a slope that the normalisation takes out.
     half = 12 * probe.laser.line_sigma_mm if both else 0.0
     blocked = (probe.laser.baseline_mm - half, probe.laser.baseline_mm + half)
-    tracker = TextureTracker(probe, grid, parameters, blocked)
+    tracker = TextureTracker(probe, grid, parameters, blocked, context.scratch)
     images = zip(_index_of(recording, lit), _wall_images(recording, lit, both, probe), strict=False)
     return track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
 
@@ -134,7 +143,7 @@ def _wall_images(
         yield None if image is None else np.ascontiguousarray(image[..., channel])
 
 
-def _require_distance(tracks: Tracks, encoder: EncoderReadings | None) -> None:
+def _require_distance(tracks: Course, encoder: EncoderReadings | None) -> None:
     tracked = float(np.mean(~tracks.lost[1:])) if len(tracks.lost) > 1 else 0.0
     if encoder is None and tracked < 0.5:
         raise UnusableError(
@@ -146,36 +155,13 @@ def _require_distance(tracks: Tracks, encoder: EncoderReadings | None) -> None:
         )
 
 
-def _first_guess(
-    T_pc: Float, xyz: Float, grid: StripGrid, unsure: int, parameters: MotionParameters
-) -> State:
-    z = T_pc[:, 2, 3]
-    span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
-    return straight_start(T_pc, xyz, *span, grid.radius_mm, parameters.axis_knot_mm, unsure)
-
-
-def _adjusted(start: State, measured: Measurements, parameters: MotionParameters) -> Estimate:
-    """Adjust with free motion first, learn from it how smooth the motion is, then adjust again."""
-    try:
-        # More threads gain nothing on blocks this small, and stall when the machine is busy.
-        with threadpool_limits(1):
-            free = adjust(start, measured, parameters, _ROUGHLY).state
-            sigma = third_difference_sigma(free, measured.tracks.frames)
-            smooth = adjust(free, replace(measured, smooth_sigma=sigma), parameters, _CLOSELY)
-            return Estimate(smooth, smooth.equations.factor())
-    except np.linalg.LinAlgError as error:
-        raise UnusableError(
-            "motion",
-            f"the motion is not determined by this recording ({error})",
-            hint="record more lit frames or rings, or give an encoder",
-        ) from error
-
-
 def _require_convergence(estimate: Estimate, radius_mm: float, context: Context) -> None:
     """Refuse an estimate that ran away from the pipe that the rings show; say if it could still gain."""
-    context.report("steps of the joint adjustment", estimate.adjusted.trials, "")
-    if not estimate.adjusted.settled:
-        context.logger.warning("the joint adjustment has not settled after all its steps")
+    _report_steps(context, estimate.adjusted.trials, int(not estimate.adjusted.settled))
+    _require_pipe(radius_mm, estimate)
+
+
+def _require_pipe(radius_mm: float, estimate: Estimate) -> None:
     found = float(estimate.state.globals[0])
     if not abs(found - radius_mm) < _LARGEST_CHANGE * radius_mm:
         raise UnusableError(
@@ -186,11 +172,18 @@ def _require_convergence(estimate: Estimate, radius_mm: float, context: Context)
         )
 
 
-def _report(context: Context, estimate: Estimate, tracks: Tracks, trajectory: Trajectory) -> None:
-    context.report("landmarks", len(tracks.xyz), "")
-    context.report("texture observations", len(tracks.uv), "")
-    context.report("lit frames without enough texture", int(tracks.lost[1:].sum()), "frames")
-    context.report("median reprojection error", estimate.adjusted.equations.reprojection_px, "px")
+def _report_steps(context: Context, steps: int, unsettled: int) -> None:
+    context.report("steps of the joint adjustment", steps, "")
+    if unsettled:
+        context.logger.warning("the joint adjustment has not settled after all its steps")
+
+
+def _report(context: Context, estimate: RunEstimate, followed: Followed, trajectory: Trajectory) -> None:
+    _report_steps(context, estimate.trials, estimate.unsettled)
+    context.report("landmarks", followed.store.landmarks, "")
+    context.report("texture observations", followed.store.spool.count, "")
+    context.report("lit frames without enough texture", int(followed.lost[1:].sum()), "frames")
+    context.report("median reprojection error", estimate.reprojection_px, "px")
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
     context.report("distance travelled", float(np.ptp(trajectory.T_pc[:, 2, 3])), "mm")

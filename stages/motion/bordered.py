@@ -227,16 +227,31 @@ class Factor:
         """Return (B, B)."""
         return np.asarray(cho_solve(self.corner, np.eye(self.border.shape[1])))
 
-    def frame_covariance(self, frames: Int) -> Float:
-        """Return (len(frames), 7, 7) marginal covariances."""
+    def joint_covariance(self, frames: Int) -> Float:
+        """Return the covariance (K, 7, K, 7) of K frames with each other."""
         border = self.border_covariance()
         rows = (BLOCK * frames[:, None] + np.arange(BLOCK)).ravel()
         unit = np.zeros((len(self.right), len(rows)))
         unit[rows, np.arange(len(rows))] = 1
         own = self.band.solve(unit)[rows] + self.solved_border[rows] @ border @ self.solved_border[rows].T
-        blocks = own.reshape(len(frames), BLOCK, len(frames), BLOCK)
+        return np.asarray(own.reshape(len(frames), BLOCK, len(frames), BLOCK))
+
+    def frame_covariance(self, frames: Int) -> Float:
+        """Return (len(frames), 7, 7) marginal covariances."""
         each = np.arange(len(frames))
-        return np.asarray(blocks[each, :, each])
+        return np.asarray(self.joint_covariance(frames)[each, :, each])
+
+    def response(self, which: Int) -> tuple[Float, Float]:
+        """Return how frames (N, 7, S) and border (B, S) follow when S numbers of the border are moved.
+
+        All other unknowns take their best values for them.
+        """
+        information = np.triu(self.corner[0]).T @ np.triu(self.corner[0])
+        other = np.setdiff1d(np.arange(len(information)), which)
+        border = np.zeros((len(information), len(which)))
+        border[which, np.arange(len(which))] = 1
+        border[other] = -np.linalg.solve(information[np.ix_(other, other)], information[np.ix_(other, which)])
+        return (-self.solved_border @ border).reshape(-1, BLOCK, len(which)), border
 
 
 def landmark_steps(

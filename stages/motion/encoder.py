@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipeline.recording.base import Recording
 from pipeline.stage import Context
 from stages.motion.state import EncoderReadings
-from stages.motion.tracking import Tracks
+from stages.motion.tracks import Course
 
 Float = NDArray[np.float64]
 _JUMP_MM = 3.0
@@ -44,7 +44,7 @@ def encoder_at_frames(
     return EncoderReadings(at_frames, sigma, known)
 
 
-def contradicted(encoder: EncoderReadings, tracks: Tracks, context: Context) -> bool:
+def contradicted(encoder: EncoderReadings, tracks: Course, context: Context) -> bool:
     """Return whether the wall's texture says that the probe moved otherwise; reported if so."""
     if len(tracks.frames) < 2:
         return False

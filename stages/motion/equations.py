@@ -16,7 +16,7 @@ from stages.motion.parameters import MotionParameters
 from stages.motion.robust import Cauchy, GemanMcClure
 from stages.motion.state import EncoderReadings, State
 from stages.motion.terms import RingBins
-from stages.motion.tracking import Tracks
+from stages.motion.tracks import Tracks
 
 Float = NDArray[np.float64]
 MATCH_BIASES = 2
@@ -44,6 +44,8 @@ class Measurements:
         Its principal uncertainties.
     smooth_sigma : (6,)
         1 σ of the pose's third difference from frame to frame, mm and rad.
+    settled : (1 + Q,) or None
+        Encoder scale and instrument, where the rest of the run has settled them.
     """
 
     tracks: Tracks
@@ -53,6 +55,7 @@ class Measurements:
     probe: Probe
     unsure: Float
     smooth_sigma: Float
+    settled: Float | None = None
 
     def camera_at(self, state: State) -> Camera:
         """Return the camera with the corrections found so far."""
@@ -156,7 +159,8 @@ def linearised(
     else:
         rows.extend(terms.encoder_rows(state, measured.encoder, parameters.encoder_slip_sigma_mm))
     rows.append(terms.axis_rows(state, parameters.axis_bend_sigma))
-    rows.append(terms.prior_rows(state, measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm))
+    scale_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm
+    rows.append(terms.prior_rows(state, scale_sigma, radius_sigma_mm, measured.settled))
     rings = terms.ring_rows(state, measured.rings, GemanMcClure(_REDESCENT * scales.wall_mm))
     texture = landmark_rows(state, measured, parameters)
     return rescaled(Equations(len(state.T_pc), tuple(rows), rings, texture), measured.tracks, scales)

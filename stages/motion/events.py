@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts import MotionEvent, Trajectory
 from pipeline.recording.base import FrameTable
-from stages.motion.tracking import Tracks
+from stages.motion.tracks import Course
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -19,7 +19,7 @@ _SLIP_MM = 0.3
 
 
 def find_events(
-    frames: FrameTable, trajectory: Trajectory, tracks: Tracks, slip: Float, has_encoder: bool
+    frames: FrameTable, trajectory: Trajectory, tracks: Course, slip: Float, has_encoder: bool
 ) -> tuple[MotionEvent, ...]:
     """Return the events in the order of their frames."""
     z, t, f = trajectory.T_pc[:, 2, 3], frames.time_s, frames.frame
@@ -64,7 +64,7 @@ def _gaps(f: NDArray[np.int64], t: Float) -> Iterator[MotionEvent]:
         yield MotionEvent("dropped_frames", int(f[k]), int(f[k + 1]), lost, "frames", "the clock jumps")
 
 
-def _duplicates(f: NDArray[np.int64], z: Float, tracks: Tracks) -> Iterator[MotionEvent]:
+def _duplicates(f: NDArray[np.int64], z: Float, tracks: Course) -> Iterator[MotionEvent]:
     step = np.abs(np.diff(z[tracks.frames]))
     if len(step) < 3:
         return
@@ -75,7 +75,7 @@ def _duplicates(f: NDArray[np.int64], z: Float, tracks: Tracks) -> Iterator[Moti
             yield MotionEvent("duplicated_frame", int(f[a]), int(f[b]), 1.0, "frames", "no motion between")
 
 
-def _lost(f: NDArray[np.int64], tracks: Tracks) -> Iterator[MotionEvent]:
+def _lost(f: NDArray[np.int64], tracks: Course) -> Iterator[MotionEvent]:
     for a, b in _runs(tracks.lost & (np.arange(len(tracks.lost)) > 0)):
         first, last = int(f[tracks.frames[a]]), int(f[tracks.frames[b]])
         yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", "too little texture")

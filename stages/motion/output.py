@@ -2,68 +2,58 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import PipeAxis, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
+from pipeline.instrument.probe import Probe
 from pipeline.recording.base import FrameTable
-from stages.motion.adjustment import Adjusted
-from stages.motion.bordered import Factor
-from stages.motion.equations import Measurements
-from stages.motion.state import GLOBALS, State
+from stages.motion.equations import MATCH_BIASES, Measurements
+from stages.motion.joining import Joined
+from stages.motion.sliding import of_one_window
+from stages.motion.submaps import Estimate
 
 Float = NDArray[np.float64]
-_COVARIANCES = 60
 _START_MM = 60.0
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """The adjustment's end and the factorised equations there."""
-
-    adjusted: Adjusted
-    factor: Factor
-
-    @property
-    def state(self) -> State:
-        """Return the state at the optimum."""
-        return self.adjusted.state
-
-
 def in_pipe_frame(estimate: Estimate, frames: FrameTable, measured: Measurements) -> Trajectory:
+    """Return the trajectory in P of an estimate of all frames at once."""
+    run, has_encoder = of_one_window(estimate), measured.encoder is not None
+    return trajectory_of(run, frames, measured.probe, measured.unsure, has_encoder)
+
+
+def trajectory_of(
+    run: Joined, frames: FrameTable, probe: Probe, unsure: Float, has_encoder: bool
+) -> Trajectory:
     """Return the trajectory in P: distance 0 and roll those of the first camera, z along the pipe there."""
-    state = estimate.state
-    T_po = _pipe_of_origin(state.T_pc[0], state.axis)
-    first = float(to_pipe(state.axis, state.T_pc[0, :3, 3])[0])
+    T_po = _pipe_of_origin(run.T_pc[0], run.axis)
+    first = float(to_pipe(run.axis, run.T_pc[0, :3, 3])[0])
     axis = PipeAxis(
-        state.axis.distance_mm - first,
-        transform(T_po, state.axis.origin_p),
-        T_po[:3, :3] @ state.axis.R_pa @ _roll_of(T_po, state.axis, first),
+        run.axis.distance_mm - first,
+        transform(T_po, run.axis.origin_p),
+        T_po[:3, :3] @ run.axis.R_pa @ _roll_of(T_po, run.axis, first),
     )
-    T_pc = T_po @ state.T_pc
-    covariance = _covariances(estimate, T_po[:3, :3])
-    border = estimate.factor.border_covariance()
-    unsure = measured.unsure.shape[1]
-    own = slice(len(border) - len(state.instrument), len(border) - len(state.instrument) + unsure)
-    instrument = border[own, own]
-    has_encoder = measured.encoder is not None
+    turn = np.eye(6)
+    turn[:3, :3] = T_po[:3, :3]
+    own = slice(1, -MATCH_BIASES)
+    found, spread = run.settled.value[own], run.settled.covariance[own, own]
+    scale_sigma = float(np.sqrt(run.settled.covariance[0, 0]))
     return Trajectory(
         frame=frames.frame,
         time_s=frames.time_s,
-        T_pc=T_pc,
-        covariance=covariance,
+        T_pc=T_po @ run.T_pc,
+        covariance=turn @ run.covariance @ turn.T,
         axis=axis,
-        radius_mm=float(state.globals[0]),
-        encoder_scale=float(state.globals[3]) if has_encoder else float("nan"),
-        encoder_scale_sigma=float(np.sqrt(border[GLOBALS - 1, GLOBALS - 1])) if has_encoder else float("nan"),
-        scale_sigma=float(np.sqrt(border[0, 0]) / state.globals[0]),
+        radius_mm=run.radius_mm,
+        encoder_scale=float(run.settled.value[0]) if has_encoder else float("nan"),
+        encoder_scale_sigma=scale_sigma if has_encoder else float("nan"),
+        scale_sigma=run.radius_sigma_mm / run.radius_mm,
         events=(),
-        instrument=measured.probe.parameters + measured.unsure @ state.instrument[:unsure],
-        instrument_covariance=measured.unsure @ instrument @ measured.unsure.T,
+        instrument=probe.parameters + unsure @ found,
+        instrument_covariance=unsure @ spread @ unsure.T,
     )
 
 
@@ -84,17 +74,3 @@ def _roll_of(T_po: Float, axis: PipeAxis, distance_mm: float) -> Float:
     angle = np.arctan2(rotation[1, 0], rotation[0, 0])
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])
-
-
-def _covariances(estimate: Estimate, rotation: Float) -> Float:
-    """Return (N, 6, 6) in P; computed for some frames and interpolated, because it varies slowly."""
-    n = len(estimate.state.T_pc)
-    some = np.unique(np.linspace(0, n - 1, min(n, _COVARIANCES)).round().astype(int))
-    own = estimate.factor.frame_covariance(some)[:, :6, :6]
-    turn = np.eye(6)
-    turn[:3, :3] = rotation
-    own = turn @ own @ turn.T
-    right = np.clip(np.searchsorted(some, np.arange(n)), min(1, len(some) - 1), len(some) - 1)
-    left = np.maximum(right - 1, 0)
-    weight = ((np.arange(n) - some[left]) / np.maximum(some[right] - some[left], 1))[:, None, None]
-    return np.asarray(own[left] * (1 - weight) + own[right] * weight)

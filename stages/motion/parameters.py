@@ -63,3 +63,9 @@ class MotionParameters(Parameters):
     max_track_frames: int = Field(
         240, ge=20, le=2000, description="longest span of frames, over which one landmark is followed"
     )
+    window_frames: int = Field(
+        800, ge=40, le=20000, description="frames adjusted jointly; a longer run is cut in windows of so many"
+    )
+    overlap_frames: int = Field(
+        200, ge=10, le=10000, description="frames that neighbouring windows share at least"
+    )

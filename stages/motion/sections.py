@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import interp1d
 
-from pipeline.artefacts import RingPoints, RingSamples
+from pipeline.artefacts import Float32, RingPoints, RingSamples
 from pipeline.instrument.probe import Probe
 from stages.motion.terms import RingBins
 
@@ -14,6 +14,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 _FEWEST = 0.3
 _CORRELATED_FRAMES = 4.0
+_AT_ONCE = 256
 
 
 def ring_centres(points: RingPoints) -> tuple[Float, Float, Float]:
@@ -21,7 +22,14 @@ def ring_centres(points: RingPoints) -> tuple[Float, Float, Float]:
 
     Algebraic circle fit (Kåsa), reweighted: the wall is round to a few tenths of a millimetre.
     """
-    xy = points.xyz_c[..., :2].astype(float)
+    parts = [_circles(points.xyz_c[a : a + _AT_ONCE, :, :2]) for a in range(0, len(points.frame), _AT_ONCE)]
+    centre, radius, coverage = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return centre, radius, coverage
+
+
+def _circles(xy_c: Float32) -> tuple[Float, Float, Float]:
+    """Return centre, radius and coverage of rings (F, A, 2)."""
+    xy = xy_c.astype(float)
     seen = np.isfinite(xy).all(-1)
     x = np.where(seen[..., None], xy, 0.0)
     design = np.concatenate([x, np.ones_like(x[..., :1])], -1)

@@ -15,7 +15,7 @@ from pipeline.geometry.rigid import from_parts, rotation_from_vector
 Float = NDArray[np.float64]
 GLOBALS = 4
 _DEGREE = 3
-_AXIS_STEP_MM = 2.0
+AXIS_STEP_MM = 2.0
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def straight_start(
 
     ``unsure`` is the number of corrections of the instrument and of texture matching.
     """
-    steps = max(int(np.ceil((to_mm - from_mm) / _AXIS_STEP_MM)), 2)
+    steps = max(int(np.ceil((to_mm - from_mm) / AXIS_STEP_MM)), 2)
     z = np.linspace(from_mm, to_mm, steps + 1)
     axis = axis_through(np.stack([0 * z, 0 * z, z], -1), np.array([1.0, 0, 0]), from_mm)
     knots = int(np.ceil((to_mm - from_mm) / knot_mm)) + _DEGREE

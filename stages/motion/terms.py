@@ -15,6 +15,8 @@ from stages.motion.state import GLOBALS, EncoderReadings, State
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+ORIGIN_SIGMA = np.array([1e-4] * 3 + [1e-6] * 3)  # mm and rad
+_SETTLED = 1e-3  # of the stated σ: what is held is not held exactly, so that the equations stay regular
 _VIEW_RAD = 0.2  # 1 σ of the angle between the first camera and the pipe
 
 
@@ -138,8 +140,9 @@ def origin_rows(state: State) -> Rows:
     """Hold the first frame where it is: it defines the frame of the estimate."""
     by_frame = np.zeros((6, 1, BLOCK))
     by_frame[np.arange(6), 0, np.arange(6)] = 1
-    sigma = np.array([1e-4] * 3 + [1e-6] * 3)
-    return Rows(np.zeros((6, 1), np.int64), by_frame, np.zeros((6, state.border_size)), np.zeros(6), sigma)
+    return Rows(
+        np.zeros((6, 1), np.int64), by_frame, np.zeros((6, state.border_size)), np.zeros(6), ORIGIN_SIGMA
+    )
 
 
 def axis_rows(state: State, bend_sigma: float) -> Rows:
@@ -159,12 +162,19 @@ def axis_rows(state: State, bend_sigma: float) -> Rows:
     return _border_only(by_border, residual, np.array(2 * sigma), Cauchy())
 
 
-def prior_rows(state: State, encoder_sigma: float, radius_sigma_mm: float) -> Rows:
-    """Return what is known of the global numbers beforehand: pipe, encoder scale and instrument."""
+def prior_rows(
+    state: State, encoder_sigma: float, radius_sigma_mm: float, settled: Float | None = None
+) -> Rows:
+    """Return what is known of the global numbers beforehand: pipe, encoder scale and instrument.
+
+    ``settled`` (1 + Q,) are encoder scale and instrument as the whole run has them: then all but held.
+    """
     size, unsure = state.border_size, len(state.instrument)
-    start = state.globals - np.array([state.nominal_radius_mm, 0.0, 0.0, 1.0])
-    residual = np.concatenate([start, state.instrument])
-    sigma = np.array([radius_sigma_mm] * 3 + [encoder_sigma] + [1.0] * unsure)
+    pipe = state.globals[:3] - np.array([state.nominal_radius_mm, 0.0, 0.0])
+    mean = np.concatenate([[1.0], np.zeros(unsure)]) if settled is None else settled
+    residual = np.concatenate([pipe, np.append(state.globals[3], state.instrument) - mean])
+    shared = np.array([encoder_sigma] + [1.0] * unsure) * (1.0 if settled is None else _SETTLED)
+    sigma = np.concatenate([[radius_sigma_mm] * 3, shared])
     return _border_only(np.eye(size)[np.r_[0:GLOBALS, size - unsure : size]], residual, sigma, Squares())
 
 

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
+from pipeline.scratch import Scratch
 from stages.motion.landmarks import LandmarkMap
 from stages.motion.matching import cut, match
 from stages.motion.parameters import MotionParameters
 from stages.motion.prediction import Predictor
 from stages.motion.strip import Strip, StripGrid, unroll
+from stages.motion.tracks import Tracks, TrackStore
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -27,38 +29,6 @@ _FEWEST_ALIKE = 0.4
 _ALIKE_PX = 1.5
 _MOST_MISSES = 8
 _BORDER_PX = 3
-
-
-@dataclass(frozen=True)
-class Tracks:
-    """Observations of landmarks, sorted by landmark, then frame.
-
-    Attributes
-    ----------
-    landmark, frame : (M,) int
-        Index into ``xyz`` and index into the list of all frames.
-    uv : (M, 2)
-        Observed pixels.
-    sigma_px : (M,)
-        1 σ, px, of each coordinate.
-    xyz : (L, 3)
-        First guess of the landmarks in the straightened pipe.
-    frames : (K,) int
-        Frames that were tracked.
-    T_pc : (K, 4, 4)
-        First guess of their poses in the straightened pipe.
-    lost : (K,) bool
-        Frames in which too little texture was found to move the pose.
-    """
-
-    landmark: Int
-    frame: Int
-    uv: Float
-    sigma_px: Float
-    xyz: Float
-    frames: Int
-    T_pc: Float
-    lost: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -83,6 +53,41 @@ class _Found:
         return float(np.sum(apart < _ALIKE_PX)) / max(in_view, 1)
 
 
+@dataclass(frozen=True)
+class Followed:
+    """What following the wall's texture gave.
+
+    Attributes
+    ----------
+    store : TrackStore
+    grid : StripGrid
+        Of the landmarks' strip positions.
+    frames : (K,) int
+        Frames that were tracked, as places in the list of all frames.
+    T_pc : (K, 4, 4)
+        First guess of their poses in the straightened pipe.
+    lost : (K,) bool
+        Frames in which too little texture was found to move the pose.
+    """
+
+    store: TrackStore
+    grid: StripGrid
+    frames: Int
+    T_pc: Float
+    lost: Mask
+
+    def between(self, first: int, last: int) -> Tracks:
+        """Return the tracks through frames ``first`` to ``last`` (exclusive), counted from ``first``."""
+        seen = self.store.between(first, last)
+        _, start, landmark = np.unique(seen["landmark"], return_index=True, return_inverse=True)
+        at = seen["at"][start]
+        near = (self.frames >= first) & (self.frames < last)
+        return Tracks(
+            landmark, seen["frame"] - first, seen["uv"], seen["sigma"], self.grid.wall(at[:, 0], at[:, 1]),
+            self.frames[near] - first, self.T_pc[near], self.lost[near],
+        )  # fmt: skip
+
+
 class TextureTracker:
     """Follows the wall's texture; distance and roll follow from it, the rest of the pose from the rings.
 
@@ -91,11 +96,16 @@ class TextureTracker:
     """
 
     def __init__(
-        self, probe: Probe, grid: StripGrid, parameters: MotionParameters, blocked_mm: tuple[float, float]
+        self,
+        probe: Probe,
+        grid: StripGrid,
+        parameters: MotionParameters,
+        blocked_mm: tuple[float, float],
+        scratch: Scratch | None = None,
     ) -> None:
         self._probe, self._grid, self._parameters, self._blocked = probe, grid, parameters, blocked_mm
         self._map = LandmarkMap(parameters.patch_half_px)
-        self._rows: list[tuple[Int, Int, Float, Float]] = []
+        self._store = TrackStore.on(scratch or Scratch(), parameters.most_observations)
         self._poses: list[tuple[int, Float, bool]] = []
         self._last: Strip | None = None
 
@@ -114,22 +124,15 @@ class TextureTracker:
         self._grow(strip, frame, drift)
         self._poses.append((frame, T_better, lost))
         self._last = strip
+        if self._map.is_crowded:
+            self._store.settle(self._map.drop(self._map.retired))
         return T_better
 
-    def tracks(self) -> Tracks:
-        """Return all observations of landmarks seen at least three times."""
-        none = np.zeros(0, np.int64)
-        self._rows.append((none, none, np.zeros((0, 2)), np.zeros(0)))
-        landmark, frame, uv, sigma = (np.concatenate(c) for c in zip(*self._rows, strict=True))
-        count = np.bincount(landmark, minlength=len(self._map.row))
-        keep = count >= 3
-        use = keep[landmark] & _thinned(landmark, frame, count, self._parameters.most_observations)
-        renumber = np.cumsum(keep) - 1
-        order = np.lexsort((frame[use], landmark[use]))
-        xyz = self._grid.wall(self._map.row, self._map.column)[keep]
-        return Tracks(
-            renumber[landmark[use]][order], frame[use][order], uv[use][order], sigma[use][order], xyz,
-            np.array([p[0] for p in self._poses], np.int64),
+    def followed(self) -> Followed:
+        """Return what was followed, all observations settled."""
+        self._store.settle()
+        return Followed(
+            self._store, self._grid, np.array([p[0] for p in self._poses], np.int64),
             np.array([p[1] for p in self._poses]).reshape(-1, 4, 4),
             np.array([p[2] for p in self._poses], bool),
         )  # fmt: skip
@@ -171,7 +174,8 @@ class TextureTracker:
             return np.zeros(2), True
         at = found.at[good]
         sigma = np.maximum(found.sigma[good], 0.02) * self._px_per_strip(strip, at)
-        self._rows.append((index, np.full(len(index), frame), strip.pixel(at[:, 0], at[:, 1]), sigma))
+        start = np.stack([m.row, m.column], -1)[index]
+        self._store.note(m.number[index], frame, strip.pixel(at[:, 0], at[:, 1]), sigma, start)
         drift = np.median(found.offset[good], 0)
         m.offset[index] += found.offset[good] - drift
         return drift, False
@@ -218,19 +222,6 @@ class TextureTracker:
         return np.asarray(out)
 
 
-def _thinned(landmark: Int, frame: Int, count: Int, most: int) -> Mask:
-    """Return (M,) which observations to keep: at most ``most`` of each landmark, spread evenly.
-
-    Neighbouring observations err alike, so the rest would cost memory and tell nothing.
-    """
-    order = np.lexsort((frame, landmark))
-    rank = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-    share = np.minimum(most / np.maximum(count[landmark[order]], 1), 1.0)
-    keep = np.zeros(len(order), bool)
-    keep[order] = np.floor((rank + 1) * share) > np.floor(rank * share)
-    return keep
-
-
 def _displacement(before: Strip, now: Strip) -> Float:
     """Return by how many rows and columns the wall in ``now`` lies off where ``before`` had it."""
     lag = now.first_row - before.first_row
@@ -263,7 +254,7 @@ def track_texture(
     predict: Predictor,
     tracker: TextureTracker,
     progress: Callable[[int], None],
-) -> Tracks:
+) -> Followed:
     """Follow the wall through all lit frames; undecodable ones are passed over.
 
     ``progress`` is told the number of frames done.
@@ -272,4 +263,4 @@ def track_texture(
         if image is not None:
             predict.learn(frame, tracker.follow(frame, image, predict(frame)))
         progress(done + 1)
-    return tracker.tracks()
+    return tracker.followed()

@@ -9,7 +9,7 @@ from pipeline.recording.base import Encoder, FrameTable
 from pipeline.stage import quiet_context
 from stages.motion.encoder import contradicted, encoder_at_frames
 from stages.motion.state import EncoderReadings
-from stages.motion.tracking import Tracks
+from stages.motion.tracks import Tracks
 
 RATE = 30.0
 SPEED = 18.0

@@ -10,7 +10,7 @@ from pipeline.artefacts import MotionEvent, Trajectory
 from pipeline.geometry.axis import straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events
-from stages.motion.tracking import Tracks
+from stages.motion.tracks import Tracks
 
 Float = NDArray[np.float64]
 FRAMES, RATE, STEP = 120, 30.0, 0.6

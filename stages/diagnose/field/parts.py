@@ -12,7 +12,7 @@ from stages.motion.bordered import LandmarkRows, Rows
 from stages.motion.equations import Equations
 from stages.motion.state import EncoderReadings
 from stages.motion.terms import RingBins
-from stages.motion.tracking import Tracks
+from stages.motion.tracks import Tracks
 
 Mask = NDArray[np.bool_]
 Int = NDArray[np.int64]

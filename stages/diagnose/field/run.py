@@ -21,6 +21,8 @@ from stages.motion.output import in_pipe_frame
 from stages.motion.prediction import Predictor
 from stages.motion.sections import at_all_frames, ring_bins
 from stages.motion.state import EncoderReadings, State
+from stages.motion.submaps import estimated
+from stages.motion.windows import LOOSE, first_guess
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 
@@ -89,9 +91,9 @@ def field_run(
     unsure = probe.principal_uncertainties()
     bins = ring_bins(rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
     bins = replace(bins, frame=np.searchsorted(frames.frame, bins.frame))
-    measured = Measurements(tracks, bins, frames.time_s, None, probe, unsure, motion._LOOSE)
+    measured = Measurements(tracks, bins, frames.time_s, None, probe, unsure, LOOSE)
     T_pc = predictor.between(tracks.frames, tracks.T_pc, len(frames.frame))
-    start = motion._first_guess(T_pc, tracks.xyz, grid, unsure.shape[1] + MATCH_BIASES, parameters)
+    start = first_guess(T_pc, measured, grid.radius_mm, grid.far_mm, parameters)
     encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
     source = _Source(recording, rings, encoder, np.asarray(ring_frames), parameters)
     return _adjusted(source, measured, start, radius_mm, context)
@@ -108,7 +110,7 @@ def with_probe(run: FieldRun, probe: Probe, context: Context) -> FieldRun:
     parameters, unsure = run.parameters, probe.principal_uncertainties()
     bins = ring_bins(run.rings, probe, unsure, parameters.ring_bins, parameters.surface_sigma_mm)
     bins = replace(bins, frame=np.searchsorted(run.recording.frames.frame, bins.frame))
-    measured = replace(run.measured, rings=bins, probe=probe, unsure=unsure, smooth_sigma=motion._LOOSE)
+    measured = replace(run.measured, rings=bins, probe=probe, unsure=unsure, smooth_sigma=LOOSE)
     points = triangulate_rings(run.rings, probe, TriangulateParameters.model_validate({}), context)
     start = replace(run.state, instrument=np.zeros(unsure.shape[1] + MATCH_BIASES))
     source = _Source(run.recording, run.rings, run.encoder, run.ring_frames, parameters)
@@ -128,7 +130,7 @@ def _adjusted(
     source: _Source, measured: Measurements, start: State, radius_mm: float, context: Context
 ) -> FieldRun:
     recording, parameters = source.recording, source.parameters
-    estimate = motion._adjusted(start, measured, parameters)
+    estimate = estimated(start, measured, parameters)
     motion._require_convergence(estimate, radius_mm, context)
     trajectory = in_pipe_frame(estimate, recording.frames, measured)
     events = find_events(recording.frames, trajectory, measured.tracks, estimate.state.slip, False)
