@@ -13,7 +13,8 @@ import numpy as np
 
 from pipeline.display import Display
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
-from pipeline.export.exporter import Exporter, is_published, publish, published_key, withdraw
+from pipeline.export.exporter import Exporter, published_key, withdraw
+from pipeline.export.writer import Writer
 from pipeline.headline import headline
 from pipeline.outcome import Number, Results, RunOutcome, StageOutcome, State
 from pipeline.plan import Plan, Step
@@ -100,6 +101,7 @@ class Runner:
             s.stage.name: StageOutcome(s.stage.name, s.stage.version, s.key) for s in plan.steps
         }
         self._artefacts: dict[type, object] = {s.kind: s.value for s in plan.sources}
+        self._writer = Writer(folder, logger)
         self._at = ""
 
     def run(self, selection: Selection) -> RunOutcome:
@@ -114,15 +116,18 @@ class Runner:
         """
         selection.check(self._plan)
         try:
-            self._withdraw_stale()
-            self._note(State.RUNNING)
-            for step in self._plan.steps:
-                self._complete(step, selection)
-            return self._finish(selection)
+            with self._writer:
+                self._withdraw_stale()
+                self._note(State.RUNNING)
+                for step in self._plan.steps:
+                    self._complete(step, selection)
+                self._publish_results(selection)
+            return self._note(State.COMPLETED)
         except BoresightError as error:
             self._end(_state_of(error), str(error))
             raise
         except Exception as error:
+            self._at = self._writer.failed or self._at
             self._logger.exception("%s failed", self._at)
             problem = f"{type(error).__name__}: {str(error)[:_LONGEST_PROBLEM]}"
             self._end(State.FAILED, problem)
@@ -212,15 +217,11 @@ class Runner:
         self._note(State.RUNNING)
 
     def _publish_ready(self) -> None:
+        self._writer.check()
         for exporter in self._exporters:
             kinds = exporter.inputs().values()
-            self._at = f"writing {exporter.name}"
             if all(k in self._artefacts for k in kinds):
-                key = exporter.key(self._keys)
-                if not is_published(exporter, key, self._folder):
-                    start = time.monotonic()
-                    publish(exporter, self._artefacts, key, self._folder)
-                    self._logger.info("wrote %s, %.1f s", exporter.name, time.monotonic() - start)
+                self._writer.offer(exporter, exporter.key(self._keys), self._artefacts)
 
     def _withdraw_stale(self) -> None:
         for exporter in self._exporters:
@@ -228,12 +229,11 @@ class Runner:
             if not known or published_key(exporter, self._folder) != exporter.key(self._keys):
                 withdraw(exporter, self._folder)
 
-    def _finish(self, selection: Selection) -> RunOutcome:
+    def _publish_results(self, selection: Selection) -> None:
         if not selection.only:
             outcome = self._outcome(State.COMPLETED, "")
             self._artefacts[Results] = Results(outcome, tuple(self._artefacts.values()))
             self._publish_ready()
-        return self._note(State.COMPLETED)
 
     def _end(self, state: State, problem: str) -> None:
         """Account for an ending that is not completion; the disk may be the very cause of it."""
