@@ -10,6 +10,8 @@ from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
 from pipeline.recording.base import Encoder
+from stages.diagnose.agreement import Agreement
+from stages.diagnose.travel.jump import jump_of_reading
 from stages.diagnose.travel.model import (
     Event,
     EventKind,
@@ -47,6 +49,8 @@ class StepFound:
         What explains it as well.
     missing_s : float
         Time of missing pictures that would explain it.
+    agreements : tuple of Agreement
+        What the reading alone says of it.
     """
 
     place: int
@@ -56,6 +60,7 @@ class StepFound:
     p_value: float
     rivals: tuple[EventKind, ...]
     missing_s: float
+    agreements: tuple[Agreement, ...] = ()
 
 
 def with_events(sight: Sight, encoder: Encoder) -> TravelFit:
@@ -66,6 +71,17 @@ def with_events(sight: Sight, encoder: Encoder) -> TravelFit:
         if chance(score, count, len(sight.time_s)) > _ENTERS:
             break
         fit = fitted(sight, encoder, (*fit.events, event), None)
+    return _without_needless(fit, encoder)
+
+
+def _without_needless(fit: TravelFit, encoder: Encoder) -> TravelFit:
+    """Return the fit less the events that those found later have made needless."""
+    while fit.events:
+        z2 = (fit.values[4:] / fit.sigma[4:]) ** 2
+        least = int(np.argmin(z2))
+        if chance(float(z2[least]), 2 * len(fit.sight.time_s), len(fit.sight.time_s)) <= _ENTERS:
+            break
+        fit = fitted(fit.sight, encoder, fit.events[:least] + fit.events[least + 1 :], None)
     return fit
 
 
@@ -123,9 +139,10 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     count = len(sight.time_s)
     k = moment(sight, encoder, event.place)
     time_s = (encoder.time_s[k] + encoder.time_s[k + 1]) / 2
+    again = jump_of_reading(encoder, k, float(fit.values[at]), sigma)
     return StepFound(
         event.place, float(time_s), float(fit.values[at]), sigma,
-        chance(z2, 2 * count, count), rivals, size[EventKind.LOST_TIME],
+        chance(z2, 2 * count, count), rivals, size[EventKind.LOST_TIME], () if again is None else (again,),
     )  # fmt: skip
 
 

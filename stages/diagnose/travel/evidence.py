@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,15 @@ from scipy.stats import norm
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel
 from pipeline.recording.base import Encoder, Recording
+from stages.diagnose.agreement import Agreement
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.evidence import Anomaly
 from stages.diagnose.travel.events import StepFound, steps_found, with_events
 from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, EventKind, TravelFit
+from stages.diagnose.travel.parts import second_predictions
 from stages.diagnose.travel.sight import Sight, quantum_mm
+from stages.diagnose.travel.swings import swings_again
 
 Float = NDArray[np.float64]
 _LEAST_FRAMES = 16
@@ -48,6 +51,8 @@ class TravelEstimate:
         Least size that would stand out here (5 σ), from motion and noise alone.
     alike : tuple of (str, float)
         Effects that this motion cannot tell from it, with the correlation of the estimates.
+    agreements : tuple of Agreement
+        What disjoint parts of the travel say of each other.
     """
 
     effect: str
@@ -59,6 +64,7 @@ class TravelEstimate:
     p_value: float
     detectable: float
     alike: tuple[tuple[str, float], ...]
+    agreements: tuple[Agreement, ...] = ()
 
     @property
     def statement(self) -> str:
@@ -122,7 +128,7 @@ def travel_evidence(
     first = int(np.searchsorted(recording.frames.frame, sight.frame[0])) if len(sight.frame) else 0
     span = slice(first, first + len(T_pc))
     lit = recording.frames.illumination[span] != "laser"
-    lines = find_lines(recording.frames.time_s[span], T_pc[:, :2, 3], lit)
+    lines = _lines(recording.frames.time_s[span], T_pc[:, :2, 3], lit)
     missing = _shortcomings(source, recording, sight)
     encoder = recording.encoder
     if encoder is None or len(encoder.time_s) < 2 or len(sight.frame) < _LEAST_FRAMES:
@@ -139,6 +145,14 @@ def travel_evidence(
     anomalies = (*_of_estimates(source, estimates, sight), *_of_steps(steps, sight), *_of_lines(lines, sight))
     return TravelEvidence(
         source, estimates, slips, doubtful, lines, fit, anomalies, (*missing, *_blind(estimates, sight))
+    )
+
+
+def _lines(time_s: Float, xy_mm: Float, lit: NDArray[np.bool_]) -> tuple[Line, ...]:
+    """Return the lines with what disjoint pictures say of each."""
+    return tuple(
+        replace(line, agreements=swings_again(time_s, xy_mm, lit, line))
+        for line in find_lines(time_s, xy_mm, lit)
     )
 
 
@@ -176,9 +190,10 @@ def _estimates(
         if k == SCALE and source == "field":
             # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.
             alike = (*alike, ("baseline", 1.0))
+        again = second_predictions(fit, k) if p < _REPORTED else ()
         out.append(
             TravelEstimate(
-                name, quantity.name, quantity.unit, value, sigma, allowed, p, _DETECTED * total, alike
+                name, quantity.name, quantity.unit, value, sigma, allowed, p, _DETECTED * total, alike, again
             )
         )
     return tuple(out)

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from scipy.signal.windows import dpss
 from scipy.stats import f as fisher
 
+from stages.diagnose.agreement import Agreement
+
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _BANDWIDTH = 3.0
@@ -21,7 +23,7 @@ _PADDING = 4
 # Below this the way a towed probe wanders is made of lines itself.
 _SLOWEST_HZ = 1.5
 _WANDER_HZ = 1.2
-_LEAST_SAMPLES = 48
+LEAST_SAMPLES = 48
 _LEAST_MM = 0.003
 _ABOVE_FLOOR = 4.0
 _REPORTED = 1e-4
@@ -46,6 +48,8 @@ class Line:
     lit_mm, laser_mm, share_sigma_mm : float
         The amplitudes in lit and in laser pictures alone, and their 1 σ; NaN where one kind is missing or
         its own rate hides the frequency among the probe's wander.
+    agreements : tuple of Agreement
+        What disjoint pictures say of each other's swing.
     """
 
     frequency_hz: float
@@ -56,6 +60,7 @@ class Line:
     lit_mm: float
     laser_mm: float
     share_sigma_mm: float
+    agreements: tuple[Agreement, ...] = ()
 
     @property
     def explained_by(self) -> tuple[str, ...]:
@@ -75,7 +80,7 @@ def find_lines(time_s: Float, xy_mm: Float, lit: Mask) -> tuple[Line, ...]:
     ``lit`` (N,) tells the pictures in which the wall shows, with the laser or without it.
     """
     lines: list[Line] = []
-    if len(time_s) < _LEAST_SAMPLES:
+    if len(time_s) < LEAST_SAMPLES:
         return ()
     left = xy_mm
     while len(lines) < _MOST:
@@ -121,12 +126,12 @@ def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
 def _measured(time_s: Float, xy_mm: Float, lit: Mask, frequency: float, p_value: float) -> Line:
     laser_only = ~lit
     frequency = _refined(time_s, xy_mm, frequency)
-    both, sigma = _amplitudes(time_s, xy_mm, frequency)
+    both, sigma = amplitudes(time_s, xy_mm, frequency)
     direction = np.linalg.svd(both)[0][:, 0] if np.any(both) else np.array([1.0, 0.0])
     shares = []
     for kind in (lit, laser_only):
-        clear = kind.sum() >= _LEAST_SAMPLES / 2 and _clear(time_s[kind], frequency)
-        shares.append(_amplitudes(time_s[kind], xy_mm[kind], frequency) if clear else (both * np.nan, np.nan))
+        clear = kind.sum() >= LEAST_SAMPLES / 2 and shows_apart(time_s[kind], frequency)
+        shares.append(amplitudes(time_s[kind], xy_mm[kind], frequency) if clear else (both * np.nan, np.nan))
     one, other = (float(np.linalg.norm(direction @ s[0])) for s in shares)
     return Line(
         frequency, float(np.linalg.norm(direction @ both)), sigma,
@@ -139,19 +144,24 @@ def _refined(time_s: Float, xy_mm: Float, frequency: float) -> float:
     """Return the frequency near ``frequency`` at which a sinusoid takes most."""
     width = 1 / (time_s[-1] - time_s[0])
     trial = frequency + width * np.linspace(-0.5, 0.5, 41)
-    return float(trial[np.argmax([np.linalg.norm(_amplitudes(time_s, xy_mm, f)[0]) for f in trial])])
+    return float(trial[np.argmax([np.linalg.norm(amplitudes(time_s, xy_mm, f)[0]) for f in trial])])
 
 
-def _clear(time_s: Float, frequency: float) -> bool:
+def shows_apart(time_s: Float, frequency: float) -> bool:
     """Return whether pictures at these times show the frequency apart from the probe's wander."""
     rate = 1 / float(np.median(np.diff(time_s)))
     alias = abs(frequency - rate * round(frequency / rate))
     return bool(alias > _SLOWEST_HZ or frequency < rate / 2)
 
 
-def _amplitudes(time_s: Float, xy_mm: Float, frequency: float) -> tuple[Float, float]:
-    """Return amplitudes (2, 2) along x and y of sine and cosine, wander taken out, and their 1 σ."""
-    t = time_s - time_s[0]
+def amplitudes(
+    time_s: Float, xy_mm: Float, frequency: float, start_s: float | None = None
+) -> tuple[Float, float]:
+    """Return amplitudes (2, 2) along x and y of sine and cosine, wander taken out, and their 1 σ.
+
+    Phases count from ``start_s``, else from the first picture.
+    """
+    t = time_s - (time_s[0] if start_s is None else start_s)
     line = [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)]
     design = np.concatenate([np.stack(line, 1), _wander(time_s)], 1)
     if len(t) < 1.3 * design.shape[1]:
@@ -175,7 +185,7 @@ def _without(time_s: Float, xy_mm: Float, lit: Mask, line: Line) -> Float:
     out = xy_mm.copy()
     whole = np.ones(len(time_s), bool)
     for kind in (lit, ~lit) if np.isfinite(line.share_sigma_mm) else (whole,):
-        amplitudes = _amplitudes(time_s[kind], xy_mm[kind], line.frequency_hz)[0]
+        swing = amplitudes(time_s[kind], xy_mm[kind], line.frequency_hz)[0]
         phase = 2 * np.pi * line.frequency_hz * (time_s[kind] - time_s[kind][0])
-        out[kind] -= np.stack([np.sin(phase), np.cos(phase)], 1) @ amplitudes.T
+        out[kind] -= np.stack([np.sin(phase), np.cos(phase)], 1) @ swing.T
     return out

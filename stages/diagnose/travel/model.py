@@ -23,12 +23,21 @@ from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 Float = NDArray[np.float64]
 OFFSET, SCALE, DELAY, PLAY = range(4)
 SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
-_ROUNDS = 4
+_ROUNDS = 6
 _LONGEST_S = 1.0
 _AROUND = 10
 # The search for delay and play: points a side, finest step, tries of the play, rounds; speeds that differ by
 # less than this share tell nothing of a delay.
-_SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 2, 8, 0.02
+_SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
+_WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Where the probe turned between two pictures: before picture ``place`` (K,), at ``distance_mm`` (K,)."""
+
+    place: NDArray[np.int64]
+    distance_mm: Float
 
 
 class EventKind(StrEnum):
@@ -64,6 +73,8 @@ class TravelFit:
         Reading − sight, less the offset only.
     whitened : Whitened
         Around ``values``.
+    columns : (N, 4 + E)
+        What each value adds to reading − sight, per unit.
     """
 
     sight: Sight
@@ -73,6 +84,7 @@ class TravelFit:
     noise: DriftNoise
     difference_mm: Float
     whitened: Whitened
+    columns: Float
 
     @property
     def sigma(self) -> Float:
@@ -91,13 +103,12 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     delay_s, play_mm = _nearest_start(sight, steady, events, speed)
     for _ in range(_ROUNDS):
         reading = readings_at(steady, sight.time_s + delay_s)
-        columns = np.concatenate(
-            [_smooth_columns(sight, speed, play_mm), event_columns(sight, events, speed)], 1
-        )
-        # The delay already in the reading is put back, so that every round gives the values in full.
-        difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s
+        smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
+        columns = np.concatenate([smooth, event_columns(sight, events, speed)], 1)
+        # What is in the reading already is put back, so that every round gives the values in full.
+        difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s + off
         found = robust_coefficients(difference, columns)
-        delay_s, play_mm = float(np.clip(found[DELAY], -_LONGEST_S, _LONGEST_S)), float(found[PLAY])
+        delay_s, play_mm = _within(found[DELAY], _LONGEST_S), _within(found[PLAY], _WIDEST_MM)
     if noise is None:
         noise = estimated_noise(difference, columns, sight.path_mm, quantum_mm(encoder) / np.sqrt(12))
     whitened = whitened_fit(difference, columns, noise.covariance(sight.path_mm))
@@ -106,7 +117,7 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     covariance[SCALE, SCALE] += sight.scale_sigma**2
     values[4:] += [_gain(encoder, sight, e) for e in events]
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
-    return TravelFit(sight, events, values, covariance, noise, plain - np.median(plain), whitened)
+    return TravelFit(sight, events, values, covariance, noise, plain - np.median(plain), whitened, columns)
 
 
 def _nearest_start(
@@ -136,11 +147,40 @@ def _astray(
     difference = readings_at(steady, sight.time_s + delay_s) - sight.distance_mm
     of_events, left, play_mm = event_columns(sight, events, speed), np.inf, 0.0
     for _ in range(_PLAYS):
-        columns = np.concatenate([np.delete(_smooth_columns(sight, speed, play_mm), DELAY, 1), of_events], 1)
-        found = robust_coefficients(difference, columns, _QUICKLY)
-        left = float(np.sum(np.abs(np.diff(difference - columns @ found))))
-        play_mm = float(found[PLAY - 1])
+        smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
+        columns = np.concatenate([np.delete(smooth, DELAY, 1), of_events], 1)
+        found = robust_coefficients(difference + off, columns, _QUICKLY)
+        left = float(np.sum(np.abs(np.diff(difference + off - columns @ found))))
+        play_mm = _within(found[PLAY - 1], _WIDEST_MM)
     return left, play_mm
+
+
+def _within(value: float, most: float) -> float:
+    return float(np.clip(value, -most, most))
+
+
+def turns_between(sight: Sight, steady: Encoder, delay_s: float) -> Turns:
+    """Return where the probe turned between pictures: as far beyond the last one as the reading still went.
+
+    Until it turns, the reading follows the probe, whatever play there is after that.
+    """
+    way = sight.direction
+    before = np.flatnonzero(way[1:] != way[:-1])
+    place, distance = [], []
+    for turn in before:
+        # The direction is a mean over neighbours: the turn may be a picture later or earlier.
+        first, last = max(int(turn) - 1, 0), min(int(turn) + 2, len(way) - 1)
+        inside = (steady.time_s > sight.time_s[first] + delay_s) & (
+            steady.time_s < sight.time_s[last] + delay_s
+        )
+        if not inside.any():
+            continue
+        at = np.flatnonzero(inside)[np.argmax(way[turn] * steady.distance_mm[inside])]
+        k = int(np.clip(np.searchsorted(sight.time_s, steady.time_s[at] - delay_s), 1, len(way) - 1))
+        went = steady.distance_mm[at] - readings_at(steady, sight.time_s[k - 1 : k] + delay_s)[0]
+        place.append(k)
+        distance.append(sight.distance_mm[k - 1] + went)
+    return Turns(np.array(place, np.int64), np.array(distance, float))
 
 
 def moment(sight: Sight, encoder: Encoder, place: int) -> int:
@@ -187,10 +227,24 @@ def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Float:
     return after if kind is EventKind.STEP else -after * speed[:, None]
 
 
-def _smooth_columns(sight: Sight, speed: Float, play_mm: float) -> Float:
-    """Return (N, 4) columns of offset, scale, delay and play; the latter per mm, at its present size."""
-    travel = Travel(sight.time_s, sight.distance_mm, speed, sight.distance_mm)
-    play = LIBRARY["encoder_backlash"]
-    size = float(np.clip(abs(play_mm), 0.05, 10.0)) * (1 if play_mm >= 0 else -1)
-    lag = play.reading_shift_mm(travel, (), np.array([size])) / size
-    return np.stack([np.ones(len(speed)), sight.distance_mm - sight.distance_mm[0], -speed, lag], 1)
+def _smooth_columns(
+    sight: Sight, steady: Encoder, speed: Float, delay_s: float, play_mm: float
+) -> tuple[Float, Float]:
+    """Return (N, 4) columns of offset, scale, delay and play, and what (N,) the play's is off at its size.
+
+    What the play does to a reading is the column times the size less the second.
+    """
+    turns = turns_between(sight, steady, delay_s)
+    low, here, high = (_lag(sight, turns, play_mm + step) for step in (-_PLAY_STEP_MM, 0.0, _PLAY_STEP_MM))
+    slope = (high - low) / (2 * _PLAY_STEP_MM)
+    way = sight.distance_mm - sight.distance_mm[0]
+    return np.stack([np.ones(len(speed)), way, -speed, slope], 1), slope * play_mm - here
+
+
+def _lag(sight: Sight, turns: Turns, play_mm: float) -> Float:
+    """Return (N,) by how much readings are ahead for play of that size."""
+    way = np.insert(sight.distance_mm, turns.place, turns.distance_mm)
+    same = np.zeros(len(way))
+    travel = Travel(same, way, same, way)
+    lag = LIBRARY["encoder_backlash"].reading_shift_mm(travel, (), np.array([play_mm]))
+    return np.asarray(np.delete(lag, turns.place + np.arange(len(turns.place))))

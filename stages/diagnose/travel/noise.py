@@ -10,8 +10,6 @@ from scipy.linalg import cho_factor, cho_solve
 
 Float = NDArray[np.float64]
 _LEAST_WHITE_MM = 0.002
-# Readings of an even motion may by chance hit their quanta, but not throughout.
-_LEAST_SHARE = 0.5
 _LAGS = (2, 4, 8, 16, 32)
 # Of so many increments one step spoils no more than medians bear, nor do two.
 _PER_LAG = 12
@@ -37,11 +35,12 @@ def estimated_noise(difference_mm: Float, columns: Float, path_mm: Float, least_
 
     Steps of the differences are few, whatever slips there are, so least absolute deviations and medians of
     increments see past them. Drift is the largest that increments over several lags show, so that drift
-    smoother than a random walk is not mistaken for events.
+    smoother than a random walk is not mistaken for events. No less than ``least_mm`` is believed: increments
+    of an even motion may hit the readings' quanta alike.
     """
     left = difference_mm - columns @ robust_coefficients(difference_mm, columns)
     one = _increment_variance(left, 1)
-    white = max(one / 2, (_LEAST_SHARE * least_mm) ** 2, _LEAST_WHITE_MM**2)
+    white = max(one / 2, least_mm**2, _LEAST_WHITE_MM**2)
     step, drift = float(np.median(np.diff(path_mm))), 0.0
     for lag in _LAGS:
         if lag == _LAGS[0] or _PER_LAG * lag <= len(left):

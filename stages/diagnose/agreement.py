@@ -1,0 +1,72 @@
+"""Whether two measurements of the same physics, each on data of its own, agree in sign and size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from stages.diagnose.inference import DEGREES
+from stages.diagnose.result import Confirmation
+
+Float = NDArray[np.float64]
+# They agree when their difference is no rarer than this.
+_AGREE = 1e-3
+# Predictions are good to this part of an effect's size.
+_LAW = 0.05
+# A measurement tells something only when it is known to this part of the effect.
+TELLING = 0.25
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one part of the measurements says of an effect: a name of the part, words, and numbers (Q,)."""
+
+    where: str
+    words: str
+    value: Float
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """A second prediction, and by how much it favours the named cause.
+
+    Attributes
+    ----------
+    confirmation : Confirmation
+    ratio : float
+        Likelihood of the second measurement if the first one's cause made both, over that if it were of a
+        like size but owed nothing to the first, sign included.
+    """
+
+    confirmation: Confirmation
+    ratio: float
+
+
+def agreement(first: Part, second: Part, own: tuple[Float, Float], gap: Float) -> Agreement | None:
+    """Return whether two parts agree; None when either tells too little.
+
+    Parameters
+    ----------
+    own : two of (Q, Q)
+        Each part's covariance.
+    gap : (Q, Q)
+        Covariance of their difference: less than the sum where they share unknowns.
+    """
+    square = max(float(first.value @ first.value), float(second.value @ second.value))
+    telling = all(np.all(np.isfinite(c)) and np.trace(c) <= TELLING**2 * square for c in own)
+    if not telling or not np.all(np.isfinite(gap)):
+        return None
+    count = len(first.value)
+    spread = gap + _LAW**2 * square * np.eye(count)
+    apart = second.value - first.value
+    statistic = float(apart @ np.linalg.solve(spread, apart))
+    rare = float(stats.f.sf(statistic / count, count, DEGREES))
+    agrees = rare > _AGREE and float(first.value @ second.value) > 0
+    unrelated = own[1] + square / count * np.eye(count)
+    like = stats.multivariate_normal(np.zeros(count), spread).logpdf(apart)
+    unlike = stats.multivariate_normal(np.zeros(count), unrelated).logpdf(second.value)
+    told = Confirmation(f"{first.where}: {first.words}", f"{second.where}: {second.words}", bool(agrees))
+    return Agreement(told, float(np.exp(np.clip(like - unlike, -50, 50))))

@@ -1,0 +1,76 @@
+"""One effect from disjoint parts of one recording's travel, each a prediction of the other.
+
+A column is split by increments: what it adds between two pictures belongs to one part, so that a part keeps
+what it has gained. Everything else stays shared, and the difference of the parts has its true covariance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.physics.catalogue import effect
+from stages.diagnose.agreement import Agreement, Part, agreement
+from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, TravelFit
+from stages.diagnose.travel.noise import whitened_fit
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def second_predictions(fit: TravelFit, column: int) -> tuple[Agreement, ...]:
+    """Return what disjoint parts of the travel say of the effect of a column, those that tell enough."""
+    each = [_compared(fit, column, words, first) for words, first in _splits(fit, column)]
+    return tuple(a for a in each if a is not None)
+
+
+def _splits(fit: TravelFit, column: int) -> list[tuple[tuple[str, str], Mask]]:
+    """Return names of two parts, and which steps (N − 1,) from picture to picture belong to the first."""
+    if column == SCALE:
+        path = fit.sight.path_mm
+        halves = (("first half of the way", "second half of the way"), path[1:] <= path[-1] / 2)
+        return [halves, (("forward travel", "backward travel"), np.diff(fit.sight.distance_mm) > 0)]
+    change = np.abs(np.diff(fit.columns[:, column]))
+    if column == DELAY:
+        early = np.cumsum(change) <= np.sum(change) / 2
+        return [(("earlier changes of speed", "later changes of speed"), early)]
+    turn = _turn(np.diff(fit.columns[:, PLAY]))
+    return [(("first reversal", "later reversals"), turn == 0)] if turn.max(initial=0) > 0 else []
+
+
+def _turn(step: Float) -> NDArray[np.int64]:
+    """Return the number (N − 1,) of the reversal to which each step of the play's column belongs."""
+    moved = np.flatnonzero(np.abs(step) > 1e-9)
+    if not len(moved):
+        return np.zeros(len(step), np.int64)
+    sign = np.sign(step)[moved]
+    number = np.concatenate([[0], np.cumsum(sign[1:] != sign[:-1])])
+    return np.asarray(number[np.clip(np.searchsorted(moved, np.arange(len(step))), 0, len(moved) - 1)])
+
+
+def _compared(fit: TravelFit, column: int, where: tuple[str, str], first: Mask) -> Agreement | None:
+    value, covariance = split(fit, column, first)
+    if not np.all(np.isfinite(covariance)):
+        return None
+    parts = [
+        Part(name, _words(column, v, float(np.sqrt(variance))), np.array([v]))
+        for name, v, variance in zip(where, value, np.diag(covariance), strict=True)
+    ]
+    gap = covariance[0, 0] + covariance[1, 1] - 2 * covariance[0, 1]
+    own = (covariance[:1, :1], covariance[1:, 1:])
+    return agreement(parts[0], parts[1], own, np.array([[gap]]))
+
+
+def split(fit: TravelFit, column: int, first: Mask) -> tuple[Float, Float]:
+    """Return a column's size (2,) in two parts with its covariance (2, 2), all others shared."""
+    step = np.diff(fit.columns[:, column])
+    halves = [np.concatenate([[0.0], np.cumsum(np.where(mask, step, 0.0))]) for mask in (first, ~first)]
+    design = np.column_stack([np.delete(fit.columns, column, 1), *halves])
+    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
+    found = whitened_fit(difference, design, fit.noise.covariance(fit.sight.path_mm))
+    return found.estimate[-2:], found.covariance[-2:, -2:]
+
+
+def _words(column: int, value: float, sigma: float) -> str:
+    quantity = effect(SMOOTH[column]).quantities[0]
+    return f"{quantity.name} {value:.4g} (± {sigma:.2g}{f' {quantity.unit}' if quantity.unit else ''})"
