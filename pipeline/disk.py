@@ -140,7 +140,7 @@ def disk_errors_named(folder: Path, hint: str = _GO_ON) -> Iterator[None]:
     except OSError as error:
         raise InputError(
             folder,
-            f"cannot be written: {error.strerror or error}",
+            f"cannot be written: {error.strerror or f'{error}; is the disk full?'}",
             expected="a folder that can be written, on a disk with room",
             hint=hint,
         ) from error

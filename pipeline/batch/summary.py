@@ -8,22 +8,27 @@ from pathlib import Path
 
 from pipeline.batch.work import Ending
 from pipeline.codec import Json
-from pipeline.disk import replace_json
+from pipeline.disk import disk_errors_named, replace_json, replace_text
 from pipeline.pages import page_template
 
 SHOWN_METRICS = ("inspected length", "wall seen", "mean diameter", "defects", "deepest defect")
 
 
 def write_summary(endings: Iterable[Ending], folder: Path) -> None:
-    """Write batch.json and batch.html; the order is that of the names, whoever came first."""
+    """Write batch.json and batch.html; the order is that of the names, whoever came first.
+
+    Raises
+    ------
+    InputError
+        When the disk is full or cannot be written.
+    """
     ordered = sorted(endings, key=lambda e: e.name)
     runs: list[Json] = [_document(e) for e in ordered]
-    replace_json(folder / "batch.json", {"format": 1, "runs": runs, "states": dict(_states(ordered))})
     rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
     text = page_template("pipeline.batch").render(rows=rows, states=_states(ordered), metrics=SHOWN_METRICS)
-    temporary = folder / ".new-batch.html"
-    temporary.write_text(text, "utf-8")
-    temporary.replace(folder / "batch.html")
+    with disk_errors_named(folder):
+        replace_json(folder / "batch.json", {"format": 1, "runs": runs, "states": dict(_states(ordered))})
+        replace_text(folder / "batch.html", text)
 
 
 def _states(endings: list[Ending]) -> Counter[str]:

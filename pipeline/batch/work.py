@@ -80,8 +80,9 @@ def _end_with_parent() -> None:
 
 def _ending(work: Work, code: int, told: str) -> Ending:
     record = _record(work.folder)
-    if code and (record is None or record.get("state") == "completed"):
-        last = " ".join(told.strip().splitlines()[-_TOLD_LINES:])
+    if code and (record is None or not record.get("problem") or record["problem"] not in told):
+        # The record is of an earlier call, or could not be brought up to date: the disk may be the cause.
+        last = " ".join(told.strip().splitlines()[-_TOLD_LINES:]) or f"it ended with status {code}"
         return Ending(work.name, "refused" if code == _REFUSED else "failed", last)
     if record is None:
         return Ending(work.name, "failed", "the run left no record")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +15,7 @@ from pipeline.batch.summary import write_summary
 from pipeline.batch.work import Ending, Work
 from pipeline.config import resolve
 from pipeline.disk import disk_errors_named
+from pipeline.errors import InputError
 from stages.catalogue import PIPELINE
 
 _EXIT_SOME_FAILED = 3
@@ -47,12 +49,14 @@ def batch(
     done: list[Ending] = []
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
-        works = [Work(n, p.resolve(), (output / n).resolve(), options) for n, p in found.items()]
-        with workers(count, scheduler) as client:
-            for ending in endings(client, works):
-                done.append(ending)
-                console.print(f"{len(done)}/{len(works)}  {ending.name}: {ending.state}", highlight=False)
+    works = [Work(n, p.resolve(), (output / n).resolve(), options) for n, p in found.items()]
+    with workers(count, scheduler) as client:
+        for ending in endings(client, works):
+            done.append(ending)
+            console.print(f"{len(done)}/{len(works)}  {ending.name}: {ending.state}", highlight=False)
+            with suppress(InputError):  # the runs go on where the disk is full; it is told at the end
                 write_summary(done, output)
+    write_summary(done, output)
     typer.echo(f"Summary: {(output / 'batch.html').resolve()}")
     if any(e.state != "completed" for e in done):
         raise typer.Exit(_EXIT_SOME_FAILED)

@@ -74,4 +74,11 @@ def _glimpse(place: Path, *, resting: bool) -> Glimpse:
 def _size(place: Path) -> int:
     """Return the bytes of all files of a recording, 0 before there are any."""
     files = [place] if place.is_file() else [p for p in place.rglob("*") if p.is_file()]
-    return sum(f.stat().st_size for f in files)
+    return sum(map(_bytes, files))
+
+
+def _bytes(file: Path) -> int:
+    try:
+        return file.stat().st_size
+    except OSError:  # gone since it was listed, or on a drive that is away for a while
+        return 0

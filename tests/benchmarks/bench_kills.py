@@ -6,7 +6,6 @@ killed, in which stages, and what was lost or came out different; it fails when 
 
 from __future__ import annotations
 
-import hashlib
 import os
 import random
 import signal
@@ -19,12 +18,11 @@ from pathlib import Path
 
 from tests.bad_recordings import cut_sample
 from tests.review_server import ReviewServer
+from tests.run_content import run_content
 from tests.shared_data import PROJECT_ROOT
 
 SEED = 20261121
 QUICK = ("--set", "rings.azimuths=360")
-# The record of a call and the report bear times.
-DATED = ("run.json", "report.html", "batch.json", "batch.html")
 
 
 def main(kills: tuple[int, int, int]) -> int:
@@ -88,7 +86,7 @@ def _killed(folder: Path, name: str, words: list[str], kills: int) -> int:
     """Kill one command again and again, finishing now and then; return the number of files that differ."""
     started = time.perf_counter()
     _finish(words, folder / f"whole-{name}")
-    duration, whole = time.perf_counter() - started, _files(folder / f"whole-{name}")
+    duration, whole = time.perf_counter() - started, run_content(folder / f"whole-{name}")
     chance, stages, wrong, done = random.Random(SEED), Counter[str](), 0, 0
     while done < kills:
         output = folder / f"{name}-{done}"
@@ -104,7 +102,7 @@ def _killed(folder: Path, name: str, words: list[str], kills: int) -> int:
             else:
                 break
         _finish(words, output)
-        found = _files(output)
+        found = run_content(output)
         different = sorted(k for k in whole.keys() | found.keys() if whole.get(k) != found.get(k))
         print("".join(f"  {name}: {file} differs\n" for file in different), end="")
         wrong += len(different)
@@ -129,15 +127,6 @@ def _stage(output: Path) -> str:
         line.split(" stage ")[1] for log in logs for line in log.read_text().splitlines() if " stage " in line
     ]
     return told[-1] if told else "before the first stage"
-
-
-def _files(output: Path) -> dict[str, str]:
-    files = (p for p in output.rglob("*") if p.is_file() and ".boresight" not in p.parts)
-    return {
-        p.relative_to(output).as_posix(): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in files
-        if p.name not in DATED
-    }
 
 
 if __name__ == "__main__":
