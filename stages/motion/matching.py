@@ -7,6 +7,7 @@ offset are taken out by matching zero-mean patches and scaling by the least-squa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numba
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 _STEPS = 30
+_THREADS = 2
 
 
 @dataclass(frozen=True)
@@ -76,14 +78,23 @@ def match(
 ) -> Matches:
     """Find patches near predicted strip positions (N,); they move by at most half a patch."""
     inverse = np.linalg.inv(patches.information + 1e-9 * np.eye(2))
-    offset, correlation, residual = _match(
-        contrast, usable, patches.value, patches.by_row, patches.by_column, inverse, row, column, _STEPS
-    )
+
+    def matched(part: slice) -> tuple[Float, Float, Float]:
+        templates = (a[part] for a in (patches.value, patches.by_row, patches.by_column, inverse))
+        found: tuple[Float, Float, Float] = _match(
+            contrast, usable, *templates, row[part], column[part], _STEPS
+        )
+        return found
+
+    cuts = np.linspace(0, len(row), _THREADS + 1).astype(int)
+    with ThreadPoolExecutor(_THREADS) as pool:
+        parts = list(pool.map(matched, map(slice, cuts[:-1], cuts[1:])))
+    offset, correlation, residual = (np.concatenate(p) for p in zip(*parts, strict=True))
     sigma = residual * np.sqrt(np.trace(inverse, axis1=1, axis2=2) / 2)
     return Matches(offset, correlation, sigma)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _look(contrast, usable, r, c, out):  # type: ignore[no-untyped-def]
     """Sample a patch centred on (r, c) into ``out``; False where it leaves the usable strip."""
     n = out.shape[0]
@@ -111,7 +122,7 @@ def _look(contrast, usable, r, c, out):  # type: ignore[no-untyped-def]
     return True
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _match(contrast, usable, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]
     count, n = value.shape[0], value.shape[1]
     offset = np.full((count, 2), np.nan)
@@ -144,7 +155,7 @@ def _match(contrast, usable, value, by_row, by_column, inverse, row, column, ste
     return offset, correlation, residual
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _products(template, seen):  # type: ignore[no-untyped-def]
     """Return Σ t², Σ t s and Σ s²."""
     tt, ts, ss = 0.0, 0.0, 0.0
@@ -157,7 +168,7 @@ def _products(template, seen):  # type: ignore[no-untyped-def]
     return tt, ts, ss
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _step(template, by_row, by_column, inverse, seen, gain):  # type: ignore[no-untyped-def]
     """Return the Gauss-Newton step along rows and columns."""
     g0, g1 = 0.0, 0.0
