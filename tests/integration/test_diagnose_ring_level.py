@@ -9,7 +9,6 @@ from pipeline.simulator.scene import read_scene
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
 from stages.diagnose.gauge.examine import Examined, examine
-from stages.diagnose.inference import stated_belief
 from stages.diagnose.result import Verdict
 from tests.benchmarks.ring_level import ring_level_run
 
@@ -35,7 +34,7 @@ def test_a_run_with_nothing_hidden_is_consistent_and_tells_what_it_could_see():
 
 def test_a_tilt_is_named_with_its_size():
     found = seen(("laser_tilt=0.3@-70",), FEW, 62)
-    (effect,) = effects_found(found, stated_belief(found.searched.nothing.state.stated))
+    (effect,) = effects_found(found)
     assert verdict_of(found) is Verdict.NAMED
     size = effect.parameters["tilt_deg"]
     assert size.value == pytest.approx(0.3, abs=4 * size.sd)
@@ -48,3 +47,31 @@ def test_a_tilt_that_the_library_lacks_is_not_misnamed_but_described():
     assert found.location is not None
     assert found.location.harmonic == 1
     assert "cos 1(ψ − ψ₀)" in formula(found)
+
+
+def test_a_swing_is_named_at_its_own_frequency_and_found_without_a_name_too():
+    hidden, between_bins = ("laser_rocking=1.2@40/3.217Hz",), 3.217
+    named = seen(hidden, ("laser_rocking", "laser_tilt"), 63)
+    (effect,) = effects_found(named)
+    size, frequency = effect.parameters["amplitude_mrad"], effect.parameters["frequency_hz"]
+    assert size.value == pytest.approx(1.2, abs=4 * size.sd)
+    assert frequency.value == pytest.approx(between_bins, abs=4 * frequency.sd)
+    assert 0 < frequency.sd < 0.02
+    unknown = seen(hidden, ("laser_tilt",), 63)
+    assert verdict_of(unknown) is Verdict.UNEXPLAINED
+    assert "sin(2πft" in formula(unknown)
+
+
+def test_a_drift_is_sized_with_its_time_constant():
+    found = seen(("focal_drift=0.003/2.2s",), ("focal_drift", "baseline_drift", "focal_scale"), 64)
+    (effect,) = effects_found(found)
+    for name, true in (("relative", 0.003), ("time_s", 2.2)):
+        assert effect.parameters[name].value == pytest.approx(true, abs=4 * effect.parameters[name].sd)
+        assert 0 < effect.parameters[name].sd < 0.25 * true
+
+
+def test_rings_beyond_the_last_fiducials_do_not_count():
+    found = seen((), FEW, 61)
+    run = found.searched.run
+    assert run.edges.frame.min() <= run.rings.frame.min()
+    assert run.rings.frame.max() <= run.edges.frame.max() < len(run.time_s) - 1

@@ -14,6 +14,7 @@ from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.prepare import weighed
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import Scored, scan
+from stages.diagnose.gauge.shapes import refined
 from stages.diagnose.inference import Stated
 
 Float = NDArray[np.float64]
@@ -74,13 +75,16 @@ def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated
         steps.append(step)
         if better is None or len(better.terms) > _MOST_EFFECTS:
             break
+        better = refined(run, better)
         if found.terms:
+            earlier = (found, *rivals)
             found, rivals = _exchanged(run, better, step.tried, library, stated)
+            rivals = (*rivals, *earlier)
             continue
         run = weighed(run, better.state, better.terms)
         nothing = fit(run, start.state, ())
         near = [f for f in step.tried if f.cost < better.cost + _FAR * alike(step.scores)][:_REWEIGHED]
-        found, *rest = (fit(run, f.state, f.terms, _RIVAL_ITERATIONS) for f in near)
+        found, *rest = (refined(run, fit(run, f.state, f.terms, _RIVAL_ITERATIONS)) for f in near)
         found, rivals = _sorted(found, rest)
     return Search(run, nothing, found, tuple(rivals), tuple(steps), alike(steps[-1].scores))
 

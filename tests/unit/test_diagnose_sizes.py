@@ -1,0 +1,71 @@
+"""Sizes of effects: shapes set free, laws that are not exact, scores that no large effect may widen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stages.diagnose.effects.base import ImagePoints
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.swings import SWINGS
+from stages.diagnose.gauge.elimination import Left, Reduced, score_inflation
+from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.shapes import FreeShape
+from stages.diagnose.gauge.sizes import Sized, quantities
+from tests.unit.test_diagnose_inference import FRAMES, GLOBALS, equations
+from tests.unit.wall_points import Bore, plain_probe, ring_points
+
+DRIFT = LIBRARY["focal_drift"]
+
+
+def points_of_a_bore() -> ImagePoints:
+    return ring_points(plain_probe(), Bore(50.8), 90, 1.3)
+
+
+def test_a_free_shape_is_the_effect_at_that_shape():
+    points = points_of_a_bore()
+    free = FreeShape(DRIFT, (3.0,), 0.9)
+    moved = free.image_shift_px(points, (), np.array([0.002, 0.6]))
+    assert moved == pytest.approx(DRIFT.image_shift_px(points, (3.6,), np.array([0.002])))
+    assert free.quantities((), np.array([0.002, 0.6])) == {"relative": 0.002, "time_s": 3.6}
+    far_below_nothing = free.quantities((), np.array([0.002, -10.0]))["time_s"]
+    assert 0 < far_below_nothing < 0.3
+
+
+def test_a_time_constant_carries_the_uncertainty_of_its_shape():
+    free = FreeShape(DRIFT, (3.0,), 0.9)
+    found = quantities(Sized(Term(free, (), np.array([0.002, 0.0])), np.diag([1e-5, 0.2]) ** 2))
+    assert found["time_s"].value == 3.0
+    assert found["time_s"].sd == pytest.approx(0.2, rel=0.15)
+    assert found["relative"].sd == pytest.approx(1e-5, rel=0.15)
+
+
+def test_scores_of_a_large_effect_are_not_widened_by_the_effect_itself():
+    random = np.random.default_rng(3)
+    e = replace(equations(random, 3000), by_pose=np.zeros((3000, 6)))
+    # The effect is strong in some cells and absent in others, as a swing is from frame to frame.
+    pattern = np.where(e.cell % 2 == 0, 1.0, 0.0)
+    e.by_global[:, 2] = pattern
+    e = replace(e, residual=e.residual / np.sqrt(e.weight) - 3 * pattern)
+    reduced = Reduced(
+        np.eye(GLOBALS), np.zeros(GLOBALS), 0.0, np.zeros((FRAMES, 6, GLOBALS)), np.zeros((FRAMES, 6))
+    )
+    left = Left(np.eye(GLOBALS), np.zeros(GLOBALS), 0.0, np.eye(GLOBALS), np.zeros(GLOBALS))
+    alone = score_inflation(e, reduced, left, np.full(GLOBALS, -1))
+    explained = score_inflation(e, reduced, left, np.array([-1, -1, 0, -1, -1]))
+    assert alone[2] > 5
+    assert explained[2] == pytest.approx(1.0, abs=0.5)
+    assert explained[[0, 1, 3, 4]] == pytest.approx(alone[[0, 1, 3, 4]])
+
+
+@pytest.mark.parametrize("swing", SWINGS, ids=lambda s: s.name)
+def test_a_swing_repeats_after_its_period_and_is_nothing_off_the_line(swing):
+    points = points_of_a_bore()
+    amplitude = np.linspace(0.1, 0.2, len(swing.amplitudes))
+    here = swing.wall_shift_mm(points, (4.0,), amplitude)
+    later = swing.wall_shift_mm(replace(points, time_s=points.time_s + 0.25), (4.0,), amplitude)
+    half = swing.wall_shift_mm(replace(points, time_s=points.time_s + 0.125), (4.0,), amplitude)
+    assert np.abs(here).max() > 0.05
+    assert later == pytest.approx(here)
+    assert half == pytest.approx(-here)
+    assert not swing.wall_shift_mm(replace(points, on_line=False), (4.0,), amplitude).any()
