@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -69,6 +70,9 @@ class Spool:
     dtype: np.dtype[Any]
     stream: IO[bytes] = field(repr=False)
     count: int = 0
+
+    def __post_init__(self) -> None:
+        weakref.finalize(self, self.stream.close)
 
     def append(self, records: NDArray[Any]) -> None:
         """Append records (N,)."""

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from pipeline.artefacts import PointCloud, RadiusMap, RingPoints, RingSamples, Trajectory, Wall
+from pipeline.artefacts import RingPoints, RingSamples, Trajectory, Wall
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.stage import Context, Parameters, Stage
-from stages.accumulate.calibration import calibration_sigma
-from stages.accumulate.centring import centred
-from stages.accumulate.grid import gridded, map_grid, rings_on_columns
-from stages.accumulate.samples import WallSamples, wall_samples
+from stages.accumulate.calibration import CalibrationSpread, calibration_spread
+from stages.accumulate.grid import map_grid
+from stages.accumulate.samples import RingsOnWall
+from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
+from stages.accumulate.survey import survey_of
 
 __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 
-Float = NDArray[np.float64]
+_REPORTED_ROWS = 2000
 
 
 class AccumulateParameters(Parameters):
@@ -52,77 +52,35 @@ def accumulate_wall(
         When no ring sample lies on the wall.
     """
     found = probe.as_found_in(trajectory)
-    samples = centred(wall_samples(found, rings, points, trajectory))
-    if not samples.valid.any():
+    on_wall = RingsOnWall(found, rings, points, trajectory)
+    survey = survey_of(on_wall)
+    if not survey.count.any():
         hint = "see the rejected samples of stage rings"
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
-    grid = map_grid(samples, parameters.distance_step_mm, parameters.azimuth_samples)
-    columns = rings_on_columns(samples, grid)
-    radius, random, count, misalignment = gridded(
-        columns, grid, parameters.smoothing_mm, parameters.largest_gap_mm, context.progress
-    )
-    calibration = calibration_sigma(found, rings, trajectory, grid)
-    total = np.hypot(random, calibration).astype(np.float32)
-    total[~np.isfinite(radius)] = np.nan
-    radius_map = RadiusMap(grid.distance_mm, grid.azimuth_rad, radius, total, random, count, misalignment)
-    cloud = _cloud(samples, radius_map)
-    _report(context, radius_map, samples, calibration)
-    return Wall(cloud, radius_map, trajectory.axis)
+    grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
+    spread = calibration_spread(found, rings, trajectory, survey)
+    wall = empty_wall(grid, survey, trajectory.axis, context.scratch)
+    smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
+    stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
+    for done, stretch in enumerate(stretches, 1):
+        radius_map = map_of(stretch, on_wall, survey, grid, spread, smoothing_mm, gap_mm)
+        fill(wall, stretch, radius_map, on_wall, survey)
+        context.progress(done, len(stretches))
+    _report(context, wall, spread)
+    return wall
 
 
-def _cloud(samples: WallSamples, radius_map: RadiusMap) -> PointCloud:
-    """Return the valid samples as points with inward normals of the smoothed wall and total 1 σ."""
-    ok = samples.valid
-    row, column = _nearest(samples, radius_map, ok)
-    normal = _normals(radius_map, row, column, samples.section[ok])
-    total = radius_map.sigma_mm[row, column]
-    random = radius_map.sigma_random_mm[row, column]
-    systematic2 = np.nan_to_num(total) ** 2 - np.nan_to_num(random) ** 2
-    sigma = np.sqrt(samples.sigma_mm[ok] ** 2 + np.maximum(systematic2, 0))
-    single = np.float32
-    frame = np.broadcast_to(samples.frame[:, None], ok.shape)[ok]
-    return PointCloud(
-        samples.xyz_p[ok].astype(single), normal.astype(single), sigma.astype(single),
-        samples.radius_mm[ok].astype(single), samples.distance_mm[ok].astype(single),
-        samples.azimuth_rad[ok].astype(single), frame.astype(np.int64),
-    )  # fmt: skip
-
-
-def _nearest(
-    samples: WallSamples, radius_map: RadiusMap, ok: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    s, a = radius_map.distance_mm, radius_map.azimuth_rad
-    row = np.clip(np.rint((samples.distance_mm[ok] - s[0]) / (s[1] - s[0])), 0, len(s) - 1).astype(np.int64)
-    column = np.rint((samples.azimuth_rad[ok] - a[0]) / (a[1] - a[0])).astype(np.int64) % len(a)
-    return row, column
-
-
-def _normals(
-    radius_map: RadiusMap, row: NDArray[np.int64], column: NDArray[np.int64], section: Float
-) -> Float:
-    """Return unit normals (M, 3) in P, toward the axis, from the map's slopes."""
-    r = radius_map.radius_mm.astype(float)
-    by_s = np.gradient(r, radius_map.distance_mm, axis=0)
-    step = radius_map.azimuth_rad[1] - radius_map.azimuth_rad[0]
-    by_psi = (np.roll(r, -1, 1) - np.roll(r, 1, 1)) / (2 * step)
-    slope_s = np.nan_to_num(by_s[row, column])
-    slope_around = np.nan_to_num(by_psi[row, column] / r[row, column])
-    psi = radius_map.azimuth_rad[column]
-    outward = np.stack([np.cos(psi), np.sin(psi), 0 * psi], -1)
-    around = np.stack([-np.sin(psi), np.cos(psi), 0 * psi], -1)
-    local = -outward + slope_around[:, None] * around + slope_s[:, None] * np.array([0, 0, 1.0])
-    normal = np.einsum("mij,mj->mi", section, local)
-    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
-
-
-def _report(context: Context, radius_map: RadiusMap, samples: WallSamples, calibration: Float) -> None:
-    seen = np.isfinite(radius_map.radius_mm)
-    context.report("wall points", int(samples.valid.sum()), "")
-    context.report("coverage", float(100 * seen.mean()), "%")
+def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
+    radius_map = wall.radius_map
+    # Medians and means of some thousand rows are those of all.
+    some = slice(None, None, max(len(radius_map.distance_mm) // _REPORTED_ROWS, 1))
+    radius, random = radius_map.radius_mm[some], radius_map.sigma_random_mm[some]
+    context.report("wall points", len(wall.cloud.frame), "")
+    context.report("coverage", float(100 * np.isfinite(radius).mean()), "%")
     context.report("length of wall measured", float(np.ptp(radius_map.distance_mm)), "mm")
-    context.report("mean radius", float(np.nanmean(radius_map.radius_mm)), "mm")
-    context.report("1 σ of the radius, random, median", float(np.nanmedian(radius_map.sigma_random_mm)), "mm")
-    context.report("1 σ of the radius, calibration, median", float(np.median(calibration)), "mm")
+    context.report("mean radius", float(np.nanmean(radius)), "mm")
+    context.report("1 σ of the radius, random, median", float(np.nanmedian(random)), "mm")
+    context.report("1 σ of the radius, calibration, median", float(np.median(spread.sigma_mm)), "mm")
 
 
 ACCUMULATE = Stage(

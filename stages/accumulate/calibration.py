@@ -2,38 +2,57 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, Trajectory
+from pipeline.artefacts import RingSamples, RingValidity, Trajectory
+from pipeline.geometry.axis import frames_at
 from pipeline.instrument.probe import Probe
 from stages.accumulate.grid import MapGrid
+from stages.accumulate.survey import RingSurvey
 
 Float = NDArray[np.float64]
 _AZIMUTHS = 72
 _RINGS = 24
+_EVERY = 500
 
 
-def calibration_sigma(probe: Probe, rings: RingSamples, trajectory: Trajectory, grid: MapGrid) -> Float:
-    """Return the 1 σ (S, A) of the radius from the probe's covariance.
+@dataclass(frozen=True)
+class CalibrationSpread:
+    """1 σ of the radius from the probe's covariance at some distances (K,), around the circle (K, 72)."""
 
-    Computed on some rings; rows take the nearest, columns are interpolated. The first harmonic of each change
-    is taken out, because the pipe's axis follows the rings' centres.
+    distance_mm: Float
+    sigma_mm: Float
+
+    def on(self, grid: MapGrid) -> Float:
+        """Return the 1 σ (S, A): rows take the nearest distance, columns are interpolated."""
+        rows = self.sigma_mm[_nearest(self.distance_mm, grid.distance_mm)]
+        wide = np.concatenate([rows, rows[:, :1]], 1)
+        fine = (grid.azimuth_rad + np.pi) / (2 * np.pi / _AZIMUTHS)
+        left = np.minimum(fine.astype(int), _AZIMUTHS - 1)
+        part = fine - left
+        return np.asarray(wide[:, left] * (1 - part) + wide[:, left + 1] * part)
+
+
+def calibration_spread(
+    probe: Probe, rings: RingSamples, trajectory: Trajectory, survey: RingSurvey
+) -> CalibrationSpread:
+    """Return what the instrument's uncertainty does to the radius, from some rings.
+
+    The first harmonic of each change is taken out, because the pipe's axis follows the rings' centres.
     """
     azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
-    seen = rings.valid.mean(1)
-    usable = np.flatnonzero(seen > min(0.3, 0.99 * seen.max()))
-    some = usable[np.unique(np.linspace(0, len(usable) - 1, min(len(usable), _RINGS)).astype(int))]
+    usable = np.flatnonzero(survey.seen > min(0.3, 0.99 * survey.seen.max()))
+    count = min(len(usable), max(_RINGS, len(usable) // _EVERY))
+    some = usable[np.unique(np.linspace(0, len(usable) - 1, count).astype(int))]
     index = np.searchsorted(trajectory.frame, rings.frame[some])
-    distance = trajectory.T_pc[index, 2, 3] + probe.laser.baseline_mm
-    roll = np.arctan2(trajectory.T_pc[index, 1, 0], trajectory.T_pc[index, 0, 0])
-    profiles = np.stack([_around(probe, rings, k, azimuth, t) for k, t in zip(some, roll, strict=True)])
-    rows = profiles[_nearest(distance, grid.distance_mm)]
-    wide = np.concatenate([rows, rows[:, :1]], 1)
-    fine = (grid.azimuth_rad + np.pi) / (2 * np.pi / _AZIMUTHS)
-    left = np.minimum(fine.astype(int), _AZIMUTHS - 1)
-    part = fine - left
-    return np.asarray(wide[:, left] * (1 - part) + wide[:, left + 1] * part)
+    section = frames_at(trajectory.axis, survey.middle_mm[some])[1]
+    turn = np.swapaxes(section, 1, 2) @ trajectory.T_pc[index, :3, :3]
+    roll = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
+    profiles = [_around(probe, rings, k, azimuth, t) for k, t in zip(some, roll, strict=True)]
+    return CalibrationSpread(survey.middle_mm[some], np.stack(profiles))
 
 
 def _nearest(distance: Float, wanted: Float) -> NDArray[np.int64]:
@@ -46,7 +65,8 @@ def _nearest(distance: Float, wanted: Float) -> NDArray[np.int64]:
 def _around(probe: Probe, rings: RingSamples, row: int, azimuth_p: Float, roll: float) -> Float:
     """Return the 1 σ of the radius at azimuths of P (72,) for one ring."""
     azimuth_c = (azimuth_p - roll + np.pi) % (2 * np.pi) - np.pi
-    radius_px = float(np.median(rings.radius_px[row][rings.valid[row]]))
+    valid = rings.validity[row] == RingValidity.VALID
+    radius_px = float(np.median(rings.radius_px[row][valid]))
     outward = np.stack([np.cos(azimuth_c), np.sin(azimuth_c)], -1)
     by_parameters = probe.triangulate_jacobian(rings.centre_px + radius_px * outward)[1]
     change = np.einsum("ai,aip->ap", outward, by_parameters[:, :2])

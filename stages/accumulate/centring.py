@@ -18,15 +18,8 @@ _RINGS = 31
 _SMOOTH_RINGS = 7
 
 
-def centred(samples: WallSamples) -> WallSamples:
-    """Return the samples with each ring shifted across the pipe so that its sound wall has no first harmonic.
-
-    The radius is counted from the pipe's own axis, so a first harmonic of a whole ring is no shape but a pose
-    error. It is found with Geman-McClure weights beside mean and ovality, so that a dent or a deposit does
-    not pull the ring (S. Geman, D. McClure, 1987), and its course over the rings is smoothed, so that a ring
-    that lies across a weld keeps its shape. Rings seen over less than half of the circle count as 0.
-    """
-    shift = _slow(_first_harmonic(samples))
+def centred(samples: WallSamples, shift: Float) -> WallSamples:
+    """Return the samples with each ring moved back across the pipe by its shift (F, 2), mm."""
     psi = np.where(samples.valid, samples.azimuth_rad, 0.0)
     outward = np.stack([np.cos(psi), np.sin(psi)], -1)
     along = np.einsum("fai,fi->fa", outward, shift)
@@ -34,14 +27,19 @@ def centred(samples: WallSamples) -> WallSamples:
     return replace(samples, radius_mm=samples.radius_mm - along, xyz_p=samples.xyz_p - move)
 
 
-def _slow(shift: Float) -> Float:
-    """Return the running median of shifts (F, 2), smoothed."""
+def slow(shift: Float) -> Float:
+    """Return the running median of shifts (F, 2), smoothed, so that a ring across a weld keeps its shape."""
     middle = median_filter(shift, size=(min(_RINGS, len(shift)), 1), mode="nearest")
     return np.asarray(uniform_filter1d(middle, _SMOOTH_RINGS, axis=0, mode="nearest"))
 
 
-def _first_harmonic(samples: WallSamples) -> Float:
-    """Return the first harmonic (F, 2), mm, of every ring's radius; 0 where it is not determined."""
+def first_harmonic(samples: WallSamples) -> Float:
+    """Return the first harmonic (F, 2), mm, of every ring's sound wall; 0 where it is not determined.
+
+    The radius is counted from the pipe's own axis, so a first harmonic of a whole ring is no shape but a pose
+    error. It is found with Geman-McClure weights beside mean and ovality, so that a dent or a deposit does
+    not pull the ring (S. Geman, D. McClure, 1987). Rings seen over less than half of the circle count as 0.
+    """
     psi = np.where(samples.valid, samples.azimuth_rad, 0.0)
     radius = np.where(samples.valid, samples.radius_mm, 0.0)
     design = np.stack([np.cos(psi), np.sin(psi), np.ones_like(psi), np.cos(2 * psi), np.sin(2 * psi)], -1)

@@ -6,6 +6,7 @@ rings' uneven spacing, and its variance follows from its weights.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from pipeline.stage import Progress
 from stages.accumulate.samples import WallSamples
+from stages.accumulate.survey import RingSurvey
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -31,6 +32,10 @@ class MapGrid:
 
     distance_mm: Float
     azimuth_rad: Float
+
+    def rows(self, first: int, last: int) -> MapGrid:
+        """Return some of its rows."""
+        return MapGrid(self.distance_mm[first:last], self.azimuth_rad)
 
 
 @dataclass(frozen=True)
@@ -60,31 +65,36 @@ class RingColumns:
         )  # fmt: skip
 
 
-def map_grid(samples: WallSamples, step_mm: float, azimuths: int) -> MapGrid:
+def map_grid(survey: RingSurvey, step_mm: float, azimuths: int) -> MapGrid:
     """Return the grid that covers the distances at which at least a tenth of a ring was seen."""
-    s = np.where(samples.valid, samples.distance_mm, np.nan)
-    some = samples.valid.mean(1) > _SEEN_SHARE
+    some = survey.seen > _SEEN_SHARE
     if not some.any():
-        some = samples.valid.any(1)
-    middle = np.nanmedian(s[some], axis=1)
+        some = survey.count > 0
+    middle = survey.middle_mm[some]
     first, last = np.ceil(middle.min() / step_mm), np.floor(middle.max() / step_mm)
     distance = step_mm * np.arange(first, max(last, first + 1) + 1, dtype=float)
     azimuth = 2 * np.pi / azimuths * np.arange(azimuths) - np.pi
     return MapGrid(distance.astype(np.float64), azimuth.astype(np.float64))
 
 
-def rings_on_columns(samples: WallSamples, grid: MapGrid) -> RingColumns:
-    """Average each ring's samples in every column's bin, with weights from their noise."""
+def rings_on_columns(parts: Iterable[WallSamples], rings: int, grid: MapGrid) -> RingColumns:
+    """Average each ring's samples in every column's bin, with weights from their noise.
+
+    ``parts`` are the samples of ``rings`` rings, some at a time.
+    """
     columns = len(grid.azimuth_rad)
-    frames = samples.valid.shape[0]
-    turn = np.nan_to_num(samples.azimuth_rad + np.pi) / (2 * np.pi)
-    bin_of = np.rint(turn * columns).astype(np.int64) % columns
-    sums = np.zeros((4, columns, frames))
-    count = np.zeros((columns, frames), np.int64)
-    _bin(
-        samples.valid, bin_of, samples.distance_mm, samples.radius_mm, samples.misalignment_mm,
-        samples.sigma_mm, sums, count,
-    )  # fmt: skip
+    sums = np.zeros((4, columns, rings))
+    count = np.zeros((columns, rings), np.int64)
+    done = 0
+    for samples in parts:
+        mine = slice(done, done + len(samples.valid))
+        turn = np.nan_to_num(samples.azimuth_rad + np.pi) / (2 * np.pi)
+        bin_of = np.rint(turn * columns).astype(np.int64) % columns
+        _bin(
+            samples.valid, bin_of, samples.distance_mm, samples.radius_mm, samples.misalignment_mm,
+            samples.sigma_mm, sums[:, :, mine], count[:, mine],
+        )  # fmt: skip
+        done = mine.stop
     weight = np.where(count > 0, sums[0], np.nan)
     distance, radius, misalignment = (part / weight for part in sums[1:])
     order = np.argsort(distance, axis=1, kind="stable")
@@ -93,7 +103,7 @@ def rings_on_columns(samples: WallSamples, grid: MapGrid) -> RingColumns:
 
 
 def gridded(
-    columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float, progress: Progress
+    columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float
 ) -> tuple[Float32, Float32, NDArray[np.int64], Float32]:
     """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen.
 
@@ -101,17 +111,16 @@ def gridded(
     an error of its pose. What rings really differ by is measured from two maps, each of every other ring.
     """
     width = max(smoothing_mm, _WIDTH_IN_RINGS * _usual_spacing(columns))
-    radius, sigma, count, misalignment = _map_of(columns, grid, width, largest_gap_mm, progress)
+    radius, sigma, count, misalignment = _map_of(columns, grid, width, largest_gap_mm)
     halves = [
-        _map_of(columns.every_other(first), grid, 2 * width, 2 * largest_gap_mm, _no_progress)[:2]
-        for first in (0, 1)
+        _map_of(columns.every_other(first), grid, 2 * width, 2 * largest_gap_mm)[:2] for first in (0, 1)
     ]
     sigma = sigma * _excess(halves)
     return radius, sigma * _roughness(radius, sigma), count, misalignment
 
 
 def _map_of(
-    columns: RingColumns, grid: MapGrid, width: float, gap: float, progress: Progress
+    columns: RingColumns, grid: MapGrid, width: float, gap: float
 ) -> tuple[Float32, Float32, NDArray[np.int64], Float32]:
     shape = (len(grid.distance_mm), len(grid.azimuth_rad))
     radius, sigma, misalignment = (np.full(shape, np.nan, np.float32) for _ in range(3))
@@ -123,7 +132,6 @@ def _map_of(
             columns.misalignment_mm[part], columns.count[part], grid.distance_mm, width, gap,
             radius[:, part], sigma[:, part], count[:, part], misalignment[:, part],
         )  # fmt: skip
-        progress(part.stop, shape[1])
     return radius, sigma, count, misalignment
 
 
@@ -146,10 +154,6 @@ def _roughness(radius: Float32, sigma: Float32) -> np.float32:
     ratio = np.abs(fine) / sigma
     ratio = ratio[np.isfinite(ratio)]
     return np.float32(max(1.0, 1.4826 * np.median(ratio))) if ratio.size else np.float32(1)
-
-
-def _no_progress(done: int, total: int) -> None:
-    """Keep silent."""
 
 
 def _usual_spacing(columns: RingColumns) -> float:
