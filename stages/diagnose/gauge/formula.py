@@ -74,7 +74,7 @@ def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
 
     It is then those effects' own description, not a rival, however much of the noise it takes up besides.
     """
-    terms = freed(named).terms
+    terms = freed(run, named).terms
     equations = linearise(run, named.state, terms, [(t.model, t.shape) for t in formula.terms]).equations
     size = [len(t.amplitude) for t in terms], [len(t.amplitude) for t in formula.terms]
     weighted = np.sqrt(equations.weight)[:, None] * equations.by_global[:, -sum(size[0]) - sum(size[1]) :]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.scan import span
 
 Float = NDArray[np.float64]
-_LEAST_PART = 0.05
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class FreeShape(EffectModel):
     model: EffectModel
     middle: Shape
     step: float
+    bounds: tuple[float, float]
     name: str = field(init=False)
     amplitudes: tuple[Amplitude, ...] = field(init=False)
     law_sigma: float = field(init=False)
@@ -33,8 +34,9 @@ class FreeShape(EffectModel):
         object.__setattr__(self, "law_sigma", self.model.law_sigma)
 
     def at(self, amplitude: Float) -> tuple[Shape, Float]:
-        """Return the effect's own shape and amplitudes; what comes near none at all is kept from it."""
-        shape = max(self.middle[0] + float(amplitude[-1]), _LEAST_PART * self.middle[0])
+        """Return the effect's own shape, within bounds, and its amplitudes."""
+        low, high = self.bounds
+        shape = min(max(self.middle[0] + float(amplitude[-1]), low), high)
         return (shape, *self.middle[1:]), amplitude[:-1]
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -66,14 +68,17 @@ class FreeShape(EffectModel):
         return self.model.statement(*self.at(amplitude))
 
 
-def freed(found: Fit) -> Fit:
-    """Return the fit as it is, with continuous shapes as amplitudes."""
-    return replace(found, terms=tuple(_freed(t) for t in found.terms))
+def freed(run: GaugeRun, found: Fit) -> Fit:
+    """Return the fit as it is, with continuous shapes as amplitudes, within what was searched.
+
+    A drift quicker than all that were searched is none: it is what it comes to.
+    """
+    return replace(found, terms=tuple(_freed(run, t) for t in found.terms))
 
 
 def refined(run: GaugeRun, found: Fit) -> Fit:
     """Return the fit with continuous shapes at their best, unless it then fits worse."""
-    free = freed(found)
+    free = freed(run, found)
     if free.terms == found.terms:
         return found
     better = fit(run, found.state, free.terms)
@@ -81,11 +86,13 @@ def refined(run: GaugeRun, found: Fit) -> Fit:
     return bound if bound.cost < found.cost else found
 
 
-def _freed(term: Term) -> Term:
+def _freed(run: GaugeRun, term: Term) -> Term:
     step = term.model.shape_step(term.shape)
     if step is None or isinstance(term.model, FreeShape):
         return term
-    return Term(FreeShape(term.model, term.shape, step), (), np.append(term.amplitude, 0.0))
+    searched = [shape[0] for shape in term.model.shapes(*span(run))]
+    bounds = min(searched), max(searched)
+    return Term(FreeShape(term.model, term.shape, step, bounds), (), np.append(term.amplitude, 0.0))
 
 
 def _bound(term: Term) -> Term:
