@@ -20,6 +20,7 @@ from tests.ring_images import exposed, off_centre, ring_light
 
 SIZE, CENTRE, AZIMUTHS, WIDTH, AMPLITUDE, BLACK = (640, 480), (318.7, 241.3), 720, 1.2, 90.0, 16.0
 ROUNDS = 3
+NOISES = ((0.7, 0.0), (1.0, 0.1), (2.0, 0.4), (4.0, 1.0), (8.0, 1.0))
 
 
 def seconds(work):
@@ -32,7 +33,8 @@ def seconds(work):
     return np.min(spent, axis=0)
 
 
-def speed(folder):
+def rates(folder):
+    """Seconds (wall, processor) of decoding alone and of decoding with extraction, and how many frames."""
     recording = open_recording(folder)
     probe = read_probe(recording.probe_file)
     planes = "bgr" if "both" in recording.frames.illumination else "grey"
@@ -42,19 +44,23 @@ def speed(folder):
 
     extract()
     alone = seconds(lambda: sum(1 for _ in recording.read(recording.frames.frame, planes)))
-    whole = seconds(extract)
-    frames = len(recording.frames.frame)
+    return alone, seconds(extract), len(recording.frames.frame)
+
+
+def speed(folder):
+    alone, whole, frames = rates(folder)
     for clock, one, both in zip(("wall", "processor"), alone, whole, strict=True):
-        print(f"{recording.name}, {clock} time: decoding alone ({planes}) {frames / one:.0f} frames/s, "
-              f"with extraction {frames / both:.0f} frames/s, ratio {one / both:.2f}")  # fmt: skip
+        print(f"{folder.name}, {clock} time: decoding alone {frames / one:.0f} frames/s, "
+              f"with extraction {frames / both:.0f} frames/s, ratio {one / both:.2f}; "
+              f"extraction's own share {both - one:.2f} s")  # fmt: skip
 
 
 def resampled(image, sectors, truth):
     """Distances (N,) and grey levels above black (A, N) along each ray about the ring."""
     x = np.arange(-6 * WIDTH, 6 * WIDTH, 0.2)
     rho = (truth[:, None] + x).astype(np.float32)
-    u = CENTRE[0] + rho * np.cos(sectors.azimuth_rad)[:, None]
-    v = CENTRE[1] + rho * np.sin(sectors.azimuth_rad)[:, None]
+    u = sectors.centre_px[0] + rho * np.cos(sectors.azimuth_rad)[:, None]
+    v = sectors.centre_px[1] + rho * np.sin(sectors.azimuth_rad)[:, None]
     grey = cv2.remap(image.astype(np.float32), u.astype(np.float32), v.astype(np.float32), cv2.INTER_CUBIC)
     return x, grey - BLACK
 
@@ -91,30 +97,31 @@ def bound(sectors, truth, read, shot):
     return np.sqrt(np.mean(variance))
 
 
-def accuracy():
+def rms_errors(sectors, ring, truth, read, shot):
+    """Root mean square errors, px, of the matched fit, of Steger's method and of the centre of gravity."""
+    rows = []
+    for seed in range(4):
+        light = ring_light(SIZE, CENTRE, ring, WIDTH, AMPLITUDE)
+        image = exposed(light, np.random.default_rng(seed), read=read, shot=shot)
+        fit = fit_line(image, sectors, truth, WIDTH, Response(BLACK, read**2 + 1 / 12, shot, 255.0))
+        others = steger(image, sectors, truth), centre_of_gravity(image, sectors, truth, read)
+        rows.append((fit.radius_px - truth, *others))
+    return [float(np.sqrt(np.nanmean(np.square(r)))) for r in zip(*rows, strict=True)]
+
+
+def accuracies():
+    """For each noise level: read noise, shot noise, the bound, and the three methods' errors, px."""
     sectors, ring = cut_sectors(SIZE, np.array(CENTRE), AZIMUTHS), off_centre(170.0, 2.0)
     truth = ring(sectors.azimuth_rad)
+    return [
+        (read, shot, float(bound(sectors, truth, read, shot)), *rms_errors(sectors, ring, truth, read, shot))
+        for read, shot in NOISES
+    ]
+
+
+def accuracy():
     print("read  shot   bound  matched  ratio  Steger  centre of gravity   (rms error, px)")
-    for read, shot in ((0.7, 0.0), (1.0, 0.1), (2.0, 0.4), (4.0, 1.0), (8.0, 1.0)):
-        rows = []
-        for seed in range(4):
-            image = exposed(
-                ring_light(SIZE, CENTRE, ring, WIDTH, AMPLITUDE),
-                np.random.default_rng(seed),
-                read=read,
-                shot=shot,
-            )
-            response = Response(BLACK, read**2 + 1 / 12, shot, 255.0)
-            fit = fit_line(image, sectors, truth, WIDTH, response)
-            rows.append(
-                (
-                    fit.radius_px - truth,
-                    steger(image, sectors, truth),
-                    centre_of_gravity(image, sectors, truth, read),
-                )
-            )
-        matched, ridge, gravity = (np.sqrt(np.nanmean(np.square(r))) for r in zip(*rows, strict=True))
-        least = bound(sectors, truth, read, shot)
+    for read, shot, least, matched, ridge, gravity in accuracies():
         print(f"{read:4.1f}  {shot:4.1f}  {least:6.4f}  {matched:6.4f}  {matched / least:5.2f}  "
               f"{ridge:6.4f}  {gravity:6.4f}")  # fmt: skip
 
