@@ -15,6 +15,7 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Face = NDArray[np.int32]
 Byte = NDArray[np.uint8]
+Int = NDArray[np.int64]
 
 VARIANTS = ("photo", "deviation", "uncertainty", "misalignment")
 
@@ -126,6 +127,8 @@ class MeshTile:
         sRGB colours; grey where nothing was textured.
     errors : tuple of ErrorTexture
         On the same UV, possibly coarser.
+    distance_mm : (float, float)
+        Where along the pipe it begins and ends.
     """
 
     vertex_p: Float32
@@ -134,6 +137,69 @@ class MeshTile:
     face: Face
     photo_bgr: Byte
     errors: tuple[ErrorTexture, ...]
+    distance_mm: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class PackedTiles:
+    """All tiles of a model in a few long arrays, so that a long pipe need not be held in memory.
+
+    Attributes
+    ----------
+    vertex_p, normal_p : (V, 3) float32
+    uv : (V, 2) float32
+    face : (T, 3) int32
+        Vertices counted within the tile.
+    photo, level : (B,) uint8
+        Pixels of the photo textures and of the error textures, one tile after the other.
+    vertex_start, face_start, photo_start, level_start : (n + 1,) int
+        Where the parts of each tile begin.
+    photo_px, level_px : (n, 2) int
+        Height and width of the textures; a tile's error textures are all of one size.
+    distance_mm : (n, 2)
+    variants : tuple of str
+        Of the error textures, in their order.
+    palette_bgr : (E, 256, 3) uint8
+    """
+
+    vertex_p: Float32
+    normal_p: Float32
+    uv: Float32
+    face: Face
+    photo: Byte
+    level: Byte
+    vertex_start: Int
+    face_start: Int
+    photo_start: Int
+    level_start: Int
+    photo_px: Int
+    level_px: Int
+    distance_mm: Float
+    variants: tuple[str, ...]
+    palette_bgr: Byte
+
+    @property
+    def count(self) -> int:
+        """Number of tiles."""
+        return len(self.photo_px)
+
+    def tile(self, number: int) -> MeshTile:
+        """Return a tile, its arrays views of the long ones."""
+        vertex, face, photo = (
+            slice(int(start[number]), int(start[number + 1]))
+            for start in (self.vertex_start, self.face_start, self.photo_start)
+        )
+        low, high = self.distance_mm[number]
+        return MeshTile(
+            self.vertex_p[vertex], self.normal_p[vertex], self.uv[vertex], self.face[face],
+            self.photo[photo].reshape(*self.photo_px[number], 3), self._errors(number),
+            (float(low), float(high)),
+        )  # fmt: skip
+
+    def _errors(self, number: int) -> tuple[ErrorTexture, ...]:
+        level = self.level[self.level_start[number] : self.level_start[number + 1]]
+        pictures = level.reshape(len(self.variants), *self.level_px[number])
+        return tuple(map(ErrorTexture, self.variants, self.palette_bgr, pictures))
 
 
 @dataclass(frozen=True)
@@ -142,7 +208,7 @@ class TexturedMesh:
 
     Attributes
     ----------
-    tiles : tuple of MeshTile
+    packed : PackedTiles
         In order of distance. Positions on the border of two tiles agree to the bit.
     surface : str
         ``grid`` or ``poisson``: how the surface was made.
@@ -156,7 +222,7 @@ class TexturedMesh:
         Root mean square of the same distances.
     """
 
-    tiles: tuple[MeshTile, ...]
+    packed: PackedTiles
     surface: str
     texel_mm: float
     wall_triangles: int
@@ -164,6 +230,11 @@ class TexturedMesh:
     decimation_rms_mm: float
 
     @property
+    def tiles(self) -> tuple[MeshTile, ...]:
+        """All tiles in order of distance."""
+        return tuple(self.packed.tile(k) for k in range(self.packed.count))
+
+    @property
     def triangles(self) -> int:
         """Triangles of all tiles."""
-        return sum(len(t.face) for t in self.tiles)
+        return len(self.packed.face)

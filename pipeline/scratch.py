@@ -46,9 +46,9 @@ class Scratch:
             out[start : start + 4096] = value
         return out
 
-    def spool(self, dtype: DTypeLike) -> Spool:
-        """Return an empty list of records that grows on the disk."""
-        return Spool(np.dtype(dtype), self._file())
+    def spool(self, dtype: DTypeLike, record: tuple[int, ...] = ()) -> Spool:
+        """Return an empty list of records, each of a shape, that grows on the disk."""
+        return Spool(np.dtype(dtype), record, self._file())
 
     def _file(self) -> IO[bytes]:
         if self.folder is not None:
@@ -63,11 +63,14 @@ class Spool:
     Attributes
     ----------
     dtype : numpy.dtype
+    record : tuple of int
+        Shape of a record.
     count : int
         Records so far.
     """
 
     dtype: np.dtype[Any]
+    record: tuple[int, ...]
     stream: IO[bytes] = field(repr=False)
     count: int = 0
 
@@ -82,15 +85,16 @@ class Spool:
     def part(self, first: int, last: int) -> NDArray[Any]:
         """Return a copy of records ``first`` to ``last`` (exclusive)."""
         here = self.stream.tell()
-        self.stream.seek(first * self.dtype.itemsize)
-        content = self.stream.read((last - first) * self.dtype.itemsize)
+        size = self.dtype.itemsize * int(np.prod(self.record, dtype=np.int64))
+        self.stream.seek(first * size)
+        content = self.stream.read((last - first) * size)
         self.stream.seek(here)
-        return np.frombuffer(content, self.dtype).copy()
+        return np.frombuffer(content, self.dtype).reshape(-1, *self.record).copy()
 
     def array(self) -> NDArray[Any]:
         """Return all records, mapped from the file."""
         self.stream.flush()
-        return _mapped(self.stream, self.dtype, (self.count,))
+        return _mapped(self.stream, self.dtype, (self.count, *self.record))
 
 
 def _mapped(stream: IO[bytes], kind: np.dtype[Any], shape: tuple[int, ...]) -> NDArray[Any]:

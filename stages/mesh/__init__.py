@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -13,13 +14,16 @@ from pydantic import Field
 from pipeline.artefacts import Wall, WallTexture
 from pipeline.errors import UnusableError
 from pipeline.isolated import CrashError, TimeLimitError, call_isolated
-from pipeline.model import MeshTile, Overlays, TexturedMesh
+from pipeline.model import Overlays, PackedTiles, TexturedMesh
 from pipeline.stage import Context, Parameters, Stage
 from stages.mesh.bake import bake_tile
 from stages.mesh.charts import cut_charts, pack, tile_count, tile_length, unroll
 from stages.mesh.decimate import Decimated, decimate
+from stages.mesh.packing import TilePacker
 from stages.mesh.poisson import folded_cells, poisson_surface
-from stages.mesh.surface import Surface, grid_surface, row_pieces, vertex_normals, weld
+from stages.mesh.surface import Surface, grid_surface, row_pieces, with_normals
+
+_SAMPLED_ROWS = 2000
 
 
 class MeshParameters(Parameters):
@@ -74,17 +78,35 @@ def make_mesh(
         pieces = _grid_pieces(wall, tile_mm, parameters, context)
     else:
         pieces = _poisson_pieces(wall, parameters, context)
-    surface = weld([p.surface for p in pieces])
-    if len(surface.face) == 0:
+    tally, packer = Tally(), TilePacker(context.scratch)
+    for surface, normal in with_normals(map(tally.note, pieces)):
+        unrolled = unroll(surface, wall.axis)
+        for charts in cut_charts(unrolled, surface, tile_mm, parameters.texel_mm):
+            atlas = pack(charts, parameters.texel_mm)
+            packer.add(bake_tile(atlas, surface, normal, unrolled, texture, overlays, parameters.texel_mm))
+    mesh = _assemble(packer.packed(), kind, tally, parameters)
+    if mesh.triangles == 0:
         raise UnusableError("mesh", "no triangle could be made: too few measured cells lie side by side")
-    normal = vertex_normals(surface)
-    unrolled = unroll(surface, wall.axis)
-    charts = cut_charts(unrolled, surface, tile_mm, parameters.texel_mm)
-    atlases = [pack(c, parameters.texel_mm) for c in charts]
-    tiles = [bake_tile(a, surface, normal, unrolled, texture, overlays, parameters.texel_mm) for a in atlases]
-    mesh = _assemble(tiles, kind, pieces, parameters)
     _report(mesh, context)
     return mesh
+
+
+@dataclass
+class Tally:
+    """What decimation cost, piece by piece."""
+
+    faces: int = 0
+    vertices: int = 0
+    largest_error_mm: float = 0.0
+    square_mm2: float = 0.0
+
+    def note(self, piece: Decimated) -> Surface:
+        """Count a piece and return its surface."""
+        self.faces += piece.original_faces
+        self.vertices += piece.original_vertices
+        self.largest_error_mm = max(self.largest_error_mm, piece.largest_error_mm)
+        self.square_mm2 += piece.mean_square_mm2 * piece.original_vertices
+        return piece.surface
 
 
 def _choose_surface(wall: Wall, parameters: MeshParameters, context: Context) -> str:
@@ -97,7 +119,8 @@ def _choose_surface(wall: Wall, parameters: MeshParameters, context: Context) ->
 
 def _tile_length(wall: Wall, parameters: MeshParameters) -> float:
     radius = wall.radius_map.radius_mm
-    measured = radius[np.isfinite(radius)]
+    some = radius[:: max(len(radius) // _SAMPLED_ROWS, 1)]
+    measured = some[np.isfinite(some)]
     if len(measured) == 0:
         raise UnusableError("mesh", "no cell of the wall was measured", hint="see the stages before")
     return tile_length(
@@ -105,23 +128,27 @@ def _tile_length(wall: Wall, parameters: MeshParameters) -> float:
     )
 
 
-def _grid_pieces(wall: Wall, tile_mm: float, parameters: MeshParameters, context: Context) -> list[Decimated]:
-    """Return the radius map's surface in decimated pieces, made side by side so that memory stays bounded."""
+def _grid_pieces(
+    wall: Wall, tile_mm: float, parameters: MeshParameters, context: Context
+) -> Iterator[Decimated]:
+    """Yield the radius map's surface in decimated pieces, a few of them made at a time."""
     radius_map = wall.radius_map
     length = float(np.ptp(radius_map.distance_mm))
     rows = row_pieces(len(radius_map.distance_mm), tile_count(length, tile_mm))
-    noise = np.nan_to_num(radius_map.sigma_random_mm.astype(float))
-    allowance = parameters.error_mm + parameters.noise_factor * noise
-    done: list[Decimated] = []
+
+    def piece(part: slice) -> Decimated:
+        noise = np.nan_to_num(radius_map.sigma_random_mm[part].astype(float))
+        allowance = parameters.error_mm + parameters.noise_factor * noise
+        return _thin_out(grid_surface(wall, part, allowance), parameters)
+
     with ThreadPoolExecutor(context.workers) as pool:
-        for piece in pool.map(lambda r: _thin_out(grid_surface(wall, r, allowance), parameters), rows):
-            done.append(piece)
-            context.progress(len(done), len(rows))
-    return done
+        for start in range(0, len(rows), context.workers):
+            yield from pool.map(piece, rows[start : start + context.workers])
+            context.progress(min(start + context.workers, len(rows)), len(rows))
 
 
-def _poisson_pieces(wall: Wall, parameters: MeshParameters, context: Context) -> list[Decimated]:
-    """Return the cloud's Poisson surface, decimated."""
+def _poisson_pieces(wall: Wall, parameters: MeshParameters, context: Context) -> Iterator[Decimated]:
+    """Yield the cloud's Poisson surface, decimated: one piece."""
     cloud = wall.cloud
     allowance = parameters.error_mm + parameters.noise_factor * float(np.median(cloud.sigma_mm))
     xyz, normal = cloud.xyz_p.astype(float), cloud.normal_p.astype(float)
@@ -138,7 +165,7 @@ def _poisson_pieces(wall: Wall, parameters: MeshParameters, context: Context) ->
     context.progress(1, 2)
     piece = _thin_out(surface, parameters)
     context.progress(2, 2)
-    return [piece]
+    yield piece
 
 
 def _thin_out(surface: Surface, parameters: MeshParameters) -> Decimated:
@@ -160,18 +187,9 @@ def _native_failures(what: str) -> Iterator[None]:
         raise UnusableError("mesh", f"{what}: {error}", hint=hint) from error
 
 
-def _assemble(
-    tiles: Sequence[MeshTile], kind: str, pieces: Sequence[Decimated], parameters: MeshParameters
-) -> TexturedMesh:
-    vertices = sum(p.original_vertices for p in pieces)
-    return TexturedMesh(
-        tuple(tiles),
-        kind,
-        parameters.texel_mm,
-        sum(p.original_faces for p in pieces),
-        max(p.largest_error_mm for p in pieces),
-        float(np.sqrt(sum(p.mean_square_mm2 * p.original_vertices for p in pieces) / max(vertices, 1))),
-    )
+def _assemble(tiles: PackedTiles, kind: str, tally: Tally, parameters: MeshParameters) -> TexturedMesh:
+    rms = float(np.sqrt(tally.square_mm2 / max(tally.vertices, 1)))
+    return TexturedMesh(tiles, kind, parameters.texel_mm, tally.faces, tally.largest_error_mm, rms)
 
 
 def _report(mesh: TexturedMesh, context: Context) -> None:
@@ -182,4 +200,4 @@ def _report(mesh: TexturedMesh, context: Context) -> None:
     context.report("mesh: RMS decimation error", mesh.decimation_rms_mm, "mm")
 
 
-MESH = Stage("mesh", "1", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")
+MESH = Stage("mesh", "2", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")

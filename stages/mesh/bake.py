@@ -51,7 +51,12 @@ def bake_tile(
         face.astype(np.int32),
         _photo(texture, fine),
         tuple(_error(v, overlays, coarse) for v in VARIANTS[1:]),
+        _span(unrolled.distance_mm[np.concatenate([c.face for c in atlas.charts])]),
     )
+
+
+def _span(distance_mm: Float) -> tuple[float, float]:
+    return float(distance_mm.min()), float(distance_mm.max())
 
 
 def texel_places(atlas: Atlas, unrolled: Unrolled, texel_mm: float, coarser: int) -> TexelPlaces:

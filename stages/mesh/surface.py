@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -50,6 +50,7 @@ def grid_surface(wall: Wall, rows: slice, allowance_mm: Float) -> Surface:
     """Return the structured surface of some rows of the radius map: a vertex for each measured cell.
 
     The first azimuth follows the last, so the tube is closed; cells that were not measured stay holes.
+    ``allowance_mm`` is that of the same rows.
     """
     radius_map = wall.radius_map
     radius = radius_map.radius_mm[rows].astype(float)
@@ -60,7 +61,7 @@ def grid_surface(wall: Wall, rows: slice, allowance_mm: Float) -> Surface:
     border = np.zeros(measured.shape, bool)
     border[0] = rows.start > 0
     border[-1] |= rows.stop < len(radius_map.distance_mm)
-    return Surface(xyz[measured], _grid_faces(corner), allowance_mm[rows][measured], border[measured])
+    return Surface(xyz[measured], _grid_faces(corner), allowance_mm[measured], border[measured])
 
 
 def _grid_faces(corner: Index) -> Face:
@@ -98,3 +99,43 @@ def vertex_normals(surface: Surface) -> Float:
         o3d.utility.Vector3dVector(surface.vertex_p), o3d.utility.Vector3iVector(surface.face)
     )
     return np.asarray(mesh.compute_vertex_normals().vertex_normals)
+
+
+def with_normals(pieces: Iterable[Surface]) -> Iterator[tuple[Surface, Float]]:
+    """Yield pieces with their vertices' normals (V, 3), which go on smoothly from piece to piece.
+
+    Unused vertices are dropped, and pieces without a triangle. Of the pieces, given in order, three at a time
+    are held.
+    """
+    before: Surface | None = None
+    this: Surface | None = None
+    for after in pieces:
+        if this is not None:
+            yield from _with_neighbours(before, this, after)
+            before = this
+        this = after
+    if this is not None:
+        yield from _with_neighbours(before, this, None)
+
+
+def _with_neighbours(
+    before: Surface | None, this: Surface, after: Surface | None
+) -> Iterator[tuple[Surface, Float]]:
+    own = _compact(this)
+    if len(own.face):
+        # Its own vertices come first and keep their order.
+        both = weld([own, *(_at_border(p) for p in (before, after) if p is not None)])
+        yield own, vertex_normals(both)[: len(own.vertex_p)]
+
+
+def _compact(surface: Surface) -> Surface:
+    """Return the surface without the vertices that no triangle uses."""
+    used, face = np.unique(surface.face, return_inverse=True)
+    corner = face.reshape(-1, 3).astype(np.int32)
+    return Surface(surface.vertex_p[used], corner, surface.allowance_mm[used], surface.locked[used])
+
+
+def _at_border(piece: Surface) -> Surface:
+    """Return the triangles of a piece that touch its neighbours."""
+    touching = piece.locked[piece.face].any(axis=1)
+    return replace(piece, face=piece.face[touching])

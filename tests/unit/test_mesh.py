@@ -116,7 +116,7 @@ def test_pieces_share_their_border_rows() -> None:
     assert all(a.stop - 1 == b.start for a, b in pairwise(pieces))
     wall = small_wall()
     none = np.zeros(wall.radius_map.radius_mm.shape)
-    surface = weld([grid_surface(wall, p, none) for p in pieces])
+    surface = weld([grid_surface(wall, p, none[p]) for p in pieces])
     assert len(boundary_edges(surface.face)) == 2 * 360
     assert len(surface.vertex_p) == none.size
 
