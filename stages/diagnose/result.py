@@ -53,11 +53,14 @@ class EffectFound:
 
 @dataclass(frozen=True)
 class Location:
-    """Where the mismatch is: channel, what its pattern is fixed to, and where and when it shows."""
+    """Where the mismatch is: channel, what its pattern is fixed to, and where and when it shows.
+
+    None is what was not measured.
+    """
 
     channel: str
-    fixed_to: str
-    time: str
+    fixed_to: str | None
+    time: str | None
     harmonic: int | None = None
     radial_exponent: tuple[float, float] | None = None
     frames: tuple[int, int] | None = None

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
+from stages.diagnose.agreement import Agreement
+from stages.diagnose.claims import rocking_excluded
 from stages.diagnose.compose import composed
-from stages.diagnose.result import Diagnosis, Verdict
+from stages.diagnose.result import Confirmation, Diagnosis, Verdict
 from stages.diagnose.seen import Seen
 from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
+from stages.diagnose.travel.lines import Line
 from tests.shared_data import PROJECT_ROOT
 from tests.toys import toy_recording
+
+AGREES = Agreement(Confirmation("first half: 0.02", "second half: 0.02", True), 30.0)
+DIFFERS = Agreement(Confirmation("first half: 0.02", "second half: -0.01", False), 1e-12)
+SCALE = TravelEstimate("encoder_scale", "relative", "", 0.02, 0.0004, 0.002, 1e-12, 0.01, ())
+PLAY = TravelEstimate("encoder_backlash", "backlash_mm", "mm", 1.0, 0.02, 0.02, 1e-30, 0.1, ())
+SLIP = StepFound(40, 1.3, 2.0, 0.05, 1e-20, (), 0.0)
+SWING = Line(5.0, 0.3, 0.002, 20.0, 1e-12, float("nan"), 0.3, float("nan"), 0.01, (AGREES,))
 
 
 @pytest.fixture
 def real_probe() -> Probe:
     """The probe of the sample recording."""
     return read_probe(PROJECT_ROOT / "data" / "sample" / "probe.yaml")
-
-
-SCALE = TravelEstimate("encoder_scale", "scale", "", 0.02, 0.0004, 0.002, 1e-12, 0.01, ())
-SLIP = StepFound(40, 1.3, 2.0, 0.05, 1e-20, (), 0.0)
 
 
 def seen(source: str, **shown: object) -> Seen:
@@ -36,25 +45,78 @@ def answer(probe: Probe, field: Seen | None, gauge: Seen | None, *without: str) 
     return composed(field, gauge, probe, without)
 
 
+def of_gauge(probe: Probe, **shown: object) -> Diagnosis:
+    return answer(probe, None, seen("gauge", **shown))
+
+
 def test_what_one_recording_shows_once_is_a_class(real_probe: Probe) -> None:
-    found = answer(real_probe, None, seen("gauge", estimates=(SCALE,)))
+    found = of_gauge(real_probe, estimates=(SCALE,))
     assert found.verdict is Verdict.CLASS
     assert "encoder_scale" in found.members
+    assert found.effects[0].probability < 0.95
 
 
-def test_what_both_recordings_show_is_named(real_probe: Probe) -> None:
+def test_what_two_parts_of_one_recording_show_alike_is_named(real_probe: Probe) -> None:
+    found = of_gauge(real_probe, estimates=(replace(SCALE, agreements=(AGREES,)),))
+    assert found.verdict is Verdict.NAMED
+    assert found.effects[0].confirmed_by == (AGREES.confirmation,)
+    assert 0.95 < found.effects[0].probability < 0.99
+
+
+def test_parts_that_contradict_each_other_take_the_name_away(real_probe: Probe) -> None:
+    found = of_gauge(real_probe, estimates=(replace(PLAY, agreements=(AGREES, DIFFERS)),))
+    assert found.verdict is Verdict.CLASS
+    assert set(found.members) == {"encoder_backlash", "time_offset"}
+    assert found.effects[0].probability < 1e-6
+
+
+def test_what_both_recordings_show_alike_is_named(real_probe: Probe) -> None:
     both = (seen(source, estimates=(SCALE,)) for source in ("field", "gauge"))
     found = answer(real_probe, *both)
     assert found.verdict is Verdict.NAMED
     (effect,) = found.effects
     assert effect.name == "encoder_scale"
-    assert effect.confirmed_by
+    assert [c.agrees for c in effect.confirmed_by] == [True]
 
 
-def test_a_slip_is_confirmed_by_the_pictures_going_on(real_probe: Probe) -> None:
-    found = answer(real_probe, None, seen("gauge", slips=(SLIP,)))
+@pytest.mark.parametrize("other", [-0.02, 0.03])
+def test_another_size_in_the_other_recording_is_no_confirmation(real_probe: Probe, other: float) -> None:
+    there = replace(SCALE, value=other)
+    found = answer(real_probe, seen("field", estimates=(there,)), seen("gauge", estimates=(SCALE,)))
+    assert found.verdict is Verdict.CLASS
+    assert found.effects[0].probability < 0.1
+
+
+def test_an_effect_that_the_other_recording_would_show_and_does_not_is_not_named(real_probe: Probe) -> None:
+    sure = replace(PLAY, agreements=(AGREES,))
+    none = replace(PLAY, value=0.01, p_value=0.7)
+    found = answer(real_probe, seen("field", estimates=(none,)), seen("gauge", estimates=(sure,)))
+    assert found.verdict is Verdict.CLASS
+    blind = replace(none, sigma=float("inf"))
+    found = answer(real_probe, seen("field", estimates=(blind,)), seen("gauge", estimates=(sure,)))
     assert found.verdict is Verdict.NAMED
-    assert [e.name for e in found.effects] == ["encoder_slip"]
+
+
+def test_a_rival_that_one_recording_excludes_is_excluded(real_probe: Probe) -> None:
+    doubted = replace(SCALE, alike=(("baseline", 1.0),))
+    alone = answer(real_probe, seen("field", estimates=(doubted,)), None)
+    assert {"baseline", "encoder_scale"} <= set(alone.members)
+    assert alone.effects[0].probability < 0.5
+    both = answer(real_probe, seen("field", estimates=(doubted,)), seen("gauge", estimates=(SCALE,)))
+    assert both.verdict is Verdict.NAMED
+
+
+def test_a_slip_is_named_only_when_the_reading_alone_shows_it_too(real_probe: Probe) -> None:
+    alone = of_gauge(real_probe, slips=(SLIP,))
+    assert alone.verdict is Verdict.CLASS
+    assert alone.members == ("encoder_slip",)
+    again = of_gauge(real_probe, slips=(replace(SLIP, agreements=(AGREES,)),))
+    assert again.verdict is Verdict.NAMED
+
+
+def test_a_slip_of_another_recording_confirms_nothing(real_probe: Probe) -> None:
+    found = answer(real_probe, seen("field", slips=(SLIP,)), seen("gauge", slips=(SLIP,)))
+    assert found.verdict is Verdict.CLASS
 
 
 def test_what_the_library_lacks_is_seen_but_not_named(real_probe: Probe) -> None:
@@ -63,11 +125,53 @@ def test_what_the_library_lacks_is_seen_but_not_named(real_probe: Probe) -> None
     assert found.verdict is Verdict.UNEXPLAINED
     assert found.effects == ()
     assert found.location is not None
-    assert found.location.channel == "motion"
+    assert (found.location.channel, found.location.fixed_to) == ("motion", "pipe")
 
 
 def test_what_is_within_the_stated_uncertainty_is_nothing(real_probe: Probe) -> None:
-    quiet = replace(SCALE, p_value=0.2)
-    found = answer(real_probe, None, seen("gauge", estimates=(quiet,)))
+    found = of_gauge(real_probe, estimates=(replace(SCALE, p_value=0.2),))
     assert found.verdict is Verdict.NOT_IDENTIFIABLE
     assert found.effects == ()
+
+
+def test_what_goes_with_speed_as_well_as_with_turning_back_is_not_placed_in_time(real_probe: Probe) -> None:
+    doubted = replace(PLAY, alike=(("time_offset", 0.99),), agreements=(AGREES,))
+    found = of_gauge(real_probe, estimates=(doubted,))
+    assert found.verdict is Verdict.CLASS
+    assert found.location is not None
+    assert found.location.time is None
+    clear = of_gauge(real_probe, estimates=(replace(PLAY, agreements=(AGREES,)),))
+    assert clear.location is not None
+    assert clear.location.time == "reversal"
+
+
+def geometry(detectable_mrad: float, *suspected: str) -> Any:
+    """Return rings of a 40 mm bore, sheet 20 mm ahead: 1 mrad of tilt looks like 0.08 mm off the axis."""
+    laser = SimpleNamespace(baseline_mm=20.0)
+    rings = SimpleNamespace(radius_mm=np.array([40.0]), probe=SimpleNamespace(laser=laser))
+    searched = SimpleNamespace(nothing=SimpleNamespace(linearised=SimpleNamespace(rings=rings)))
+    verdicts = SimpleNamespace(probability=(0.6,), judged=(SimpleNamespace(names=suspected),))
+    table = (SimpleNamespace(name="laser_rocking", detectable=detectable_mrad),)
+    return SimpleNamespace(searched=searched, verdicts=verdicts, feasibility=table, unsplit=())
+
+
+@pytest.mark.parametrize(
+    ("of", "excluded"),
+    [
+        (geometry(1.0), True),
+        (geometry(5.0), False),
+        (geometry(1.0, "laser_rocking"), False),
+        (geometry(1.0, "laser_tilt"), True),
+        (None, False),
+    ],
+)
+def test_a_sheet_that_would_be_seen_rocking_is_excluded(of: Any, excluded: bool) -> None:
+    assert rocking_excluded(SWING, replace(seen("gauge"), geometry=cast(Any, of))) is excluded
+
+
+def test_a_swing_that_a_rocking_sheet_may_make_is_a_class(real_probe: Probe) -> None:
+    found = of_gauge(real_probe, lines=(SWING,))
+    assert found.verdict is Verdict.CLASS
+    assert set(found.members) == {"probe_vibration", "laser_rocking"}
+    lit = replace(SWING, lit_mm=0.3, share_sigma_mm=0.003)
+    assert of_gauge(real_probe, lines=(lit,)).verdict is Verdict.NAMED

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import FixedTo
+from stages.diagnose.agreement import Agreement
 
 Float = NDArray[np.float64]
 # One in ten million by the estimate's own σ, and never less than this many σ of what image formation does.
 FOUND_P, FOUND_Z = 1e-7, 6.0
+# Looked for at the same pixels or azimuths of the image, while the pipe goes by.
+_OF_THE_SENSOR = frozenset({"fixed_pattern", "pixel_locking", "dust", "vignetting", "saturation"})
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,10 @@ class Finding:
         Two-sided, with the degrees of freedom σ was estimated with; 1 when it could not be tested.
     sizes : tuple of Size
         Quantities of the catalogue; empty when the test gives none.
-    fixed_to : FixedTo
-    time : str
+    fixed_to : FixedTo or None
+        As far as this test itself measures it.
+    time : str or None
+        Likewise.
     statement : str
         What was seen, with numbers.
     curve : Curve or None
@@ -63,19 +67,22 @@ class Finding:
         Sizes of other effects that this measurement gives independently, named ``effect.quantity``.
     alike : tuple of str
         Effects that would show the same here.
+    agreements : tuple of Agreement
+        What the two halves of the frames say of each other.
     """
 
     effect: str
     z: float
     p_value: float
     sizes: tuple[Size, ...]
-    fixed_to: FixedTo
-    time: str
+    fixed_to: FixedTo | None
+    time: str | None
     statement: str
     curve: Curve | None = None
     shift_px: Float | None = None
     confirms: tuple[Size, ...] = ()
     alike: tuple[str, ...] = ()
+    agreements: tuple[Agreement, ...] = ()
 
     @property
     def found(self) -> bool:
@@ -87,11 +94,10 @@ def finding(
     name: str, z: float, p_value: float, sizes: tuple[Size, ...], statement: str, curve: Curve | None = None,
     shift_px: Float | None = None, confirms: tuple[Size, ...] = (), alike: tuple[str, ...] = (),
 ) -> Finding:  # fmt: skip
-    """Return the finding of an effect that behaves as the catalogue says."""
-    known = effect(name)
-    return Finding(
-        name, z, p_value, sizes, known.fixed_to, known.time, statement, curve, shift_px, confirms, alike
-    )
+    """Return the finding of an effect; what it is fixed to only where its test is for that very thing."""
+    fixed_to = FixedTo.CAMERA if name in _OF_THE_SENSOR else None
+    time = "speed" if name == "motion_blur" else None
+    return Finding(name, z, p_value, sizes, fixed_to, time, statement, curve, shift_px, confirms, alike)
 
 
 def untestable(name: str, why: str) -> Finding:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, EventKind, TravelFit
 from stages.diagnose.travel.parts import second_predictions
 from stages.diagnose.travel.sight import Sight, quantum_mm
-from stages.diagnose.travel.swings import swings_again
 
 Float = NDArray[np.float64]
 _LEAST_FRAMES = 16
@@ -30,6 +29,7 @@ _STAMP_SIGMA_S = 1e-3
 # Where a counter turns back it may be off by up to a count, which is no play of the wheel.
 _QUANTUM_SHARE = 0.5
 _REPORTED = 1e-3
+_SELDOM = 0.02
 _SHORTEST_MM = 20.0
 
 
@@ -53,6 +53,8 @@ class TravelEstimate:
         Effects that this motion cannot tell from it, with the correlation of the estimates.
     agreements : tuple of Agreement
         What disjoint parts of the travel say of each other.
+    where : tuple of int or None
+        Places of the `Sight`, both included, between which it adds to the readings.
     """
 
     effect: str
@@ -65,13 +67,18 @@ class TravelEstimate:
     detectable: float
     alike: tuple[tuple[str, float], ...]
     agreements: tuple[Agreement, ...] = ()
+    where: tuple[int, int] | None = None
+
+    @property
+    def size_sigma(self) -> float:
+        """1 σ of the size: stamps and counts err in the measurement, what a wheel is stated to does not."""
+        return self.sigma if self.effect == SMOOTH[SCALE] else float(np.hypot(self.sigma, self.stated_sigma))
 
     @property
     def statement(self) -> str:
         """Return the effect in a plain sentence with its size and uncertainty."""
-        return (
-            LIBRARY[self.effect].statement((), np.array([self.value])) + f" (± {self.sigma:.2g} {self.unit})"
-        )
+        words = LIBRARY[self.effect].statement((), np.array([self.value]))
+        return f"{words} (± {self.size_sigma:.2g} {self.unit})"
 
 
 @dataclass(frozen=True)
@@ -110,8 +117,9 @@ class TravelEvidence:
 
 
 def travel_evidence(
-    source: str, recording: Recording, sight: Sight, T_pc: Float, scale_sigma_stated: float
-) -> TravelEvidence:
+    source: str, recording: Recording, sight: Sight, T_pc: Float, scale_sigma_stated: float,
+    shown: NDArray[np.bool_] | None = None,
+) -> TravelEvidence:  # fmt: skip
     """Compare the way seen with the encoder, and look for lines in the way across the pipe.
 
     Parameters
@@ -124,11 +132,13 @@ def travel_evidence(
         Poses of the recording's frames from the first to the last of ``sight``, both included.
     scale_sigma_stated
         Relative 1 σ of the encoder's scale as stated.
+    shown : (K,) bool, optional
+        Whether a frame's own picture places the camera across the pipe; without it, all do.
     """
     first = int(np.searchsorted(recording.frames.frame, sight.frame[0])) if len(sight.frame) else 0
     span = slice(first, first + len(T_pc))
     lit = recording.frames.illumination[span] != "laser"
-    lines = _lines(recording.frames.time_s[span], T_pc[:, :2, 3], lit)
+    lines = find_lines(recording.frames.time_s[span], T_pc[:, :2, 3], lit, shown)
     missing = _shortcomings(source, recording, sight)
     encoder = recording.encoder
     if encoder is None or len(encoder.time_s) < 2 or len(sight.frame) < _LEAST_FRAMES:
@@ -145,14 +155,6 @@ def travel_evidence(
     anomalies = (*_of_estimates(source, estimates, sight), *_of_steps(steps, sight), *_of_lines(lines, sight))
     return TravelEvidence(
         source, estimates, slips, doubtful, lines, fit, anomalies, (*missing, *_blind(estimates, sight))
-    )
-
-
-def _lines(time_s: Float, xy_mm: Float, lit: NDArray[np.bool_]) -> tuple[Line, ...]:
-    """Return the lines with what disjoint pictures say of each."""
-    return tuple(
-        replace(line, agreements=swings_again(time_s, xy_mm, lit, line))
-        for line in find_lines(time_s, xy_mm, lit)
     )
 
 
@@ -190,13 +192,24 @@ def _estimates(
         if k == SCALE and source == "field":
             # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.
             alike = (*alike, ("baseline", 1.0))
-        again = second_predictions(fit, k) if p < _REPORTED else ()
+        # At each turn the counter may be off anew; the wheel and the stamps are the same all along.
+        again = second_predictions(fit, k, turning if k == PLAY else 0.0) if p < _REPORTED else ()
         out.append(
             TravelEstimate(
-                name, quantity.name, quantity.unit, value, sigma, allowed, p, _DETECTED * total, alike, again
+                name, quantity.name, quantity.unit, value, sigma, allowed, p, _DETECTED * total, alike, again,
+                _where(fit.columns[:, k]),
             )
-        )
+        )  # fmt: skip
     return tuple(out)
+
+
+def _where(column: Float) -> tuple[int, int] | None:
+    """Return the first and the last place between which a column does nearly all that it does."""
+    moved = np.cumsum(np.abs(np.diff(column)))
+    if not len(moved) or moved[-1] <= 0:
+        return None
+    low, high = np.searchsorted(moved, np.array([_SELDOM, 1 - _SELDOM]) * moved[-1])
+    return int(low), int(high) + 1
 
 
 def _of_estimates(source: str, estimates: tuple[TravelEstimate, ...], sight: Sight) -> tuple[Anomaly, ...]:

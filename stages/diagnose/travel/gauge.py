@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.recording.base import Recording
 from stages.calibrate.gauge.calibrate import MeasuredRun
@@ -11,6 +12,7 @@ from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_poses
 
 _PLACEMENT_SIGMA_MM = 0.05
+_MOST_OF_RING = 0.5
 
 
 def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> TravelEvidence:
@@ -30,7 +32,15 @@ def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> Tra
     places = np.array([m.distance_mm for m in fiducials.markers]) if fiducials else np.zeros(1)
     spread = float(np.sqrt(np.sum((places - places.mean()) ** 2)))
     sight = sight_of_poses(recording, state.T_pc, run.posed, _PLACEMENT_SIGMA_MM / max(spread, 1.0))
-    first, last = int(run.posed[0]), int(run.posed[-1])
+    span = slice(int(run.posed[0]), int(run.posed[-1]) + 1)
     return travel_evidence(
-        "gauge", recording, sight, state.T_pc[first : last + 1], state.stated.encoder_scale_sigma
+        "gauge", recording, sight, state.T_pc[span], state.stated.encoder_scale_sigma, _shown(run)[span]
     )
+
+
+def _shown(run: MeasuredRun) -> NDArray[np.bool_]:
+    """Return the frames (N,) placed by fiducials or most of a ring; others only lie between neighbours."""
+    count = np.bincount(run.measured.rings.frame, minlength=len(run.measured.time_s))
+    shown = count > _MOST_OF_RING * np.max(count, initial=1)
+    shown[run.posed] = True
+    return np.asarray(shown)

@@ -6,7 +6,7 @@ Harmonic F-test over orthogonal tapers: D. Thomson, "Spectrum estimation and har
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +14,20 @@ from scipy.signal.windows import dpss
 from scipy.stats import f as fisher
 
 from stages.diagnose.agreement import Agreement
+from stages.diagnose.travel.swings import swings_again
+from stages.diagnose.travel.wave import LEAST_SAMPLES, SLOWEST_HZ, amplitudes, shows_apart, wander
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _BANDWIDTH = 3.0
 _TAPERS = 5
 _PADDING = 4
-# Below this the way a towed probe wanders is made of lines itself.
-_SLOWEST_HZ = 1.5
-_WANDER_HZ = 1.2
-LEAST_SAMPLES = 48
 _LEAST_MM = 0.003
 _ABOVE_FLOOR = 4.0
 _REPORTED = 1e-4
 _MOST = 4
 _SIGNIFICANT = 5.0
+_TRIALS = 40
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,7 @@ class Line:
     lit_mm, laser_mm, share_sigma_mm : float
         The amplitudes in lit and in laser pictures alone, and their 1 σ; NaN where one kind is missing or
         its own rate hides the frequency among the probe's wander.
+    frequency_sigma_hz : float
     agreements : tuple of Agreement
         What disjoint pictures say of each other's swing.
     """
@@ -60,6 +60,7 @@ class Line:
     lit_mm: float
     laser_mm: float
     share_sigma_mm: float
+    frequency_sigma_hz: float
     agreements: tuple[Agreement, ...] = ()
 
     @property
@@ -74,23 +75,27 @@ class Line:
         return ("probe_vibration", "laser_rocking")
 
 
-def find_lines(time_s: Float, xy_mm: Float, lit: Mask) -> tuple[Line, ...]:
+def find_lines(time_s: Float, xy_mm: Float, lit: Mask, shown: Mask | None = None) -> tuple[Line, ...]:
     """Return the lines in places (N, 2) at times (N,), the strongest first.
 
-    ``lit`` (N,) tells the pictures in which the wall shows, with the laser or without it.
+    ``lit`` (N,) tells the pictures in which the wall shows, with the laser or without it; ``shown`` (N,)
+    those that place the camera across the pipe themselves, else all. Places only carried over from
+    neighbours swing too little to be measured by.
     """
     lines: list[Line] = []
     if len(time_s) < LEAST_SAMPLES:
         return ()
+    use = np.ones(len(time_s), bool) if shown is None else shown
     left = xy_mm
     while len(lines) < _MOST:
         found = _strongest(time_s, left)
         if found is None:
             break
-        line = _measured(time_s, left, lit, *found)
-        if line.amplitude_mm < max(_LEAST_MM, _SIGNIFICANT * line.sigma_mm):
+        line = _measured(time_s[use], left[use], lit[use], *found)
+        if not line.amplitude_mm >= max(_LEAST_MM, _SIGNIFICANT * line.sigma_mm):
             break
-        lines.append(line)
+        again = swings_again(time_s[use], left[use], lit[use], line.frequency_hz)
+        lines.append(replace(line, agreements=again))
         left = _without(time_s, left, lit, line)
     return tuple(lines)
 
@@ -100,8 +105,8 @@ def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
     rate = 1 / float(np.median(np.diff(time_s)))
     even = time_s[0] + np.arange(int(np.round((time_s[-1] - time_s[0]) * rate)) + 1) / rate
     series = np.stack([np.interp(even, time_s, xy_mm[:, k]) for k in range(2)], 1)
-    wander = _wander(even)
-    centred = series - wander @ np.linalg.lstsq(wander, series, rcond=1e-6)[0]
+    slow = wander(even)
+    centred = series - slow @ np.linalg.lstsq(slow, series, rcond=1e-6)[0]
     count = len(series)
     tapers = dpss(count, _BANDWIDTH, _TAPERS)
     size = _PADDING * count
@@ -112,7 +117,7 @@ def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
     rest = np.sum(np.abs(spectrum - area[:, None, None] * mean) ** 2, (0, 2))
     power = np.sum(area**2) * np.sum(np.abs(mean) ** 2, 1)
     ratio = (_TAPERS - 1) * power / np.maximum(rest, 1e-30)
-    band = (frequency > _SLOWEST_HZ) & (frequency < rate / 2 - _BANDWIDTH / count * rate)
+    band = (frequency > SLOWEST_HZ) & (frequency < rate / 2 - _BANDWIDTH / count * rate)
     floor = np.median(np.sqrt(power[band])) if band.any() else np.inf
     ratio = np.where(band & (np.sqrt(power) > _ABOVE_FLOOR * floor), ratio, 0.0)
     chance = np.minimum(fisher.sf(ratio, 4, 4 * (_TAPERS - 1)) * count, 1.0)
@@ -132,52 +137,22 @@ def _measured(time_s: Float, xy_mm: Float, lit: Mask, frequency: float, p_value:
     for kind in (lit, laser_only):
         clear = kind.sum() >= LEAST_SAMPLES / 2 and shows_apart(time_s[kind], frequency)
         shares.append(amplitudes(time_s[kind], xy_mm[kind], frequency) if clear else (both * np.nan, np.nan))
+    size, span = float(np.linalg.norm(direction @ both)), float(time_s[-1] - time_s[0])
+    # Of one line in white noise, and the grid it was sought on.
+    turning = np.hypot(np.sqrt(3) / np.pi * sigma / max(size, 1e-9), 1 / _TRIALS) / span
     one, other = (float(np.linalg.norm(direction @ s[0])) for s in shares)
     return Line(
-        frequency, float(np.linalg.norm(direction @ both)), sigma,
+        frequency, size, sigma,
         float(np.degrees(np.arctan2(direction[1], direction[0]))) % 180.0, p_value, one, other,
-        float(np.hypot(shares[0][1], shares[1][1])),
+        float(np.hypot(shares[0][1], shares[1][1])), float(turning),
     )  # fmt: skip
 
 
 def _refined(time_s: Float, xy_mm: Float, frequency: float) -> float:
     """Return the frequency near ``frequency`` at which a sinusoid takes most."""
     width = 1 / (time_s[-1] - time_s[0])
-    trial = frequency + width * np.linspace(-0.5, 0.5, 41)
+    trial = frequency + width * np.linspace(-0.5, 0.5, _TRIALS + 1)
     return float(trial[np.argmax([np.linalg.norm(amplitudes(time_s, xy_mm, f)[0]) for f in trial])])
-
-
-def shows_apart(time_s: Float, frequency: float) -> bool:
-    """Return whether pictures at these times show the frequency apart from the probe's wander."""
-    rate = 1 / float(np.median(np.diff(time_s)))
-    alias = abs(frequency - rate * round(frequency / rate))
-    return bool(alias > _SLOWEST_HZ or frequency < rate / 2)
-
-
-def amplitudes(
-    time_s: Float, xy_mm: Float, frequency: float, start_s: float | None = None
-) -> tuple[Float, float]:
-    """Return amplitudes (2, 2) along x and y of sine and cosine, wander taken out, and their 1 σ.
-
-    Phases count from ``start_s``, else from the first picture.
-    """
-    t = time_s - (time_s[0] if start_s is None else start_s)
-    line = [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)]
-    design = np.concatenate([np.stack(line, 1), _wander(time_s)], 1)
-    if len(t) < 1.3 * design.shape[1]:
-        return np.full((2, 2), np.nan), float("nan")
-    solution = np.linalg.lstsq(design, xy_mm, rcond=1e-6)[0]
-    left = xy_mm - design @ solution
-    noise = float(np.sqrt(np.mean(left**2) * len(t) / (len(t) - design.shape[1])))
-    return np.asarray(solution[:2].T), noise * float(np.sqrt(2 / len(t)))
-
-
-def _wander(time_s: Float) -> Float:
-    """Return (N, K) columns of whatever changes more slowly than lines are looked for."""
-    span = float(time_s[-1] - time_s[0])
-    t = time_s - time_s[0]
-    phase = np.pi / span * np.arange(1, int(2 * span * _WANDER_HZ) + 1) * t[:, None]
-    return np.concatenate([np.stack([np.ones_like(t), t / span], 1), np.cos(phase), np.sin(phase)], 1)
 
 
 def _without(time_s: Float, xy_mm: Float, lit: Mask, line: Line) -> Float:

@@ -18,9 +18,12 @@ Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def second_predictions(fit: TravelFit, column: int) -> tuple[Agreement, ...]:
-    """Return what disjoint parts of the travel say of the effect of a column, those that tell enough."""
-    each = [_compared(fit, column, words, first) for words, first in _splits(fit, column)]
+def second_predictions(fit: TravelFit, column: int, allowed: float = 0.0) -> tuple[Agreement, ...]:
+    """Return what disjoint parts of the travel say of the effect of a column, those that tell enough.
+
+    ``allowed`` is 1 σ by which each part may be off for what is no noise of single readings.
+    """
+    each = [_compared(fit, column, words, first, allowed) for words, first in _splits(fit, column)]
     return tuple(a for a in each if a is not None)
 
 
@@ -48,8 +51,11 @@ def _turn(step: Float) -> NDArray[np.int64]:
     return np.asarray(number[np.clip(np.searchsorted(moved, np.arange(len(step))), 0, len(moved) - 1)])
 
 
-def _compared(fit: TravelFit, column: int, where: tuple[str, str], first: Mask) -> Agreement | None:
+def _compared(
+    fit: TravelFit, column: int, where: tuple[str, str], first: Mask, allowed: float
+) -> Agreement | None:
     value, covariance = split(fit, column, first)
+    covariance = covariance + allowed**2 * np.eye(2)
     if not np.all(np.isfinite(covariance)):
         return None
     parts = [

@@ -1,0 +1,234 @@
+"""What motion and the line's profile say of each recording, each effect once, with what bears it out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import Channel, FixedTo
+from stages.diagnose.agreement import Agreement, Part, agreement
+from stages.diagnose.chance import chance_of_name
+from stages.diagnose.profile.evidence import ProfileEvidence
+from stages.diagnose.profile.finding import Finding
+from stages.diagnose.result import EffectFound, Location, Value
+from stages.diagnose.seen import Seen
+from stages.diagnose.travel.events import StepFound
+from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
+from stages.diagnose.travel.lines import Line
+
+Float = NDArray[np.float64]
+# Below this chance, motion against encoder shows an effect: of 300 recordings without any, with three smooth
+# effects each, a hundredth of one would.
+TRAVEL_FOUND = 1e-5
+# Cases drilled with effects of each channel; see tests/benchmarks/bench_diagnosis for motion.
+_DRILLED = {Channel.MOTION: 30, Channel.PROFILE: 10}
+# What the fitted pattern goes with: distance along the pipe, turning back, or speed.
+_GOES_WITH = {
+    "encoder_scale": (FixedTo.PIPE, "static"),
+    "encoder_backlash": (FixedTo.TIME, "reversal"),
+    "time_offset": (FixedTo.TIME, "speed"),
+}
+# Another recording has its own events, its own aliases, and a P that is rolled otherwise.
+_OF_ONE_RECORDING = frozenset({"time_s", "slip_mm", "frequency_hz", "direction_deg"})
+_ROCKING_P = 0.01
+# Of a swing: what one ring takes for a turn of the camera.
+_TURNED = 0.01
+
+
+@dataclass(frozen=True)
+class Claim:
+    """An effect that a channel other than rings and fiducials shows.
+
+    Attributes
+    ----------
+    name : str
+    parameters : dict of str to Value
+    statement : str
+    p_value : float
+    alike : tuple of str
+        Effects that would show the same and that nothing excludes.
+    where : str
+        The recording.
+    location : Location
+        As far as it was measured.
+    agreements : tuple of Agreement
+        Second predictions of the same physics that tell enough.
+    """
+
+    name: str
+    parameters: dict[str, Value]
+    statement: str
+    p_value: float
+    alike: tuple[str, ...]
+    where: str
+    location: Location
+    agreements: tuple[Agreement, ...] = ()
+
+    @property
+    def found(self) -> EffectFound:
+        """The effect with the chance that it is the right name."""
+        drilled = _DRILLED[Channel(self.location.channel)]
+        return EffectFound(
+            self.name, chance_of_name(self.p_value, len(self.alike), self.agreements, drilled),
+            self.parameters, self.statement, effect(self.name).law,
+            tuple(a.confirmation for a in self.agreements),
+        )  # fmt: skip
+
+
+def claims_of(field: Seen | None, gauge: Seen | None) -> list[Claim]:
+    """Return what travel and profile show; of one effect the clearer, the other recording set beside it."""
+    of_gauge, of_field = _of_recording(gauge), _of_recording(field)
+    out = []
+    for name in dict.fromkeys((*of_gauge, *of_field)):
+        each = [c for c in (of_gauge.get(name), of_field.get(name)) if c is not None]
+        if len(each) == 2:
+            out.append(_borne_out(*sorted(each, key=lambda c: c.p_value)))
+        else:
+            out.append(_against(each[0], field if name in of_gauge else gauge))
+    return sorted(out, key=lambda c: c.p_value)
+
+
+def _of_recording(seen: Seen | None) -> dict[str, Claim]:
+    """Return the claims of a recording by name; of several events the clearest."""
+    if seen is None:
+        return {}
+    return {c.name: c for c in sorted(_every(seen), key=lambda c: -c.p_value)}
+
+
+def _every(seen: Seen) -> Iterable[Claim]:
+    if seen.travel is not None:
+        travel = seen.travel
+        yield from (_of_estimate(e, travel) for e in travel.estimates if e.p_value < TRAVEL_FOUND)
+        yield from (_of_slip(s, travel) for s in travel.slips if s.p_value < TRAVEL_FOUND)
+        yield from (_of_swing(line, seen, travel) for line in travel.lines if _is_swing(line))
+    if seen.profile is not None:
+        yield from (_of_finding(f, seen.profile, seen.recording.name) for f in seen.profile.found)
+
+
+def _of_estimate(e: TravelEstimate, travel: TravelEvidence) -> Claim:
+    goes_with = {_GOES_WITH[n] for n in (e.effect, *(n for n, _ in e.alike)) if n in _GOES_WITH}
+    fixed_to, time = goes_with.pop() if len(goes_with) == 1 else (None, None)
+    return Claim(
+        e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value,
+        tuple(n for n, _ in e.alike), travel.source, _stretch(travel, e.where, fixed_to, time), e.agreements,
+    )  # fmt: skip
+
+
+def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
+    size = {"slip_mm": Value(step.gain_mm, step.sigma_mm), "time_s": Value(step.time_s, 0.05)}
+    words = f"The encoder's wheel slips at {step.time_s:.2f} s and its reading gains {step.gain_mm:+.2f} mm."
+    where = (step.place - 1, step.place)
+    location = _stretch(travel, where, FixedTo.TIME, "event")
+    return Claim("encoder_slip", size, words, step.p_value, (), travel.source, location, step.agreements)
+
+
+def _is_swing(line: Line) -> bool:
+    return line.p_value < TRAVEL_FOUND and "probe_vibration" in line.explained_by
+
+
+def _of_swing(line: Line, seen: Seen, travel: TravelEvidence) -> Claim:
+    turn = float(np.degrees(line.sigma_mm / line.amplitude_mm))
+    size = {
+        "amplitude_mm": Value(line.amplitude_mm, float(np.hypot(line.sigma_mm, _TURNED * line.amplitude_mm))),
+        "frequency_hz": Value(line.frequency_hz, line.frequency_sigma_hz),
+        "direction_deg": Value(line.direction_deg, turn),
+    }
+    excluded = ("probe_vibration", "laser_rocking") if rocking_excluded(line, seen) else ("probe_vibration",)
+    others = tuple(n for n in line.explained_by if n not in excluded)
+    words = (
+        f"The camera swings across the pipe by {line.amplitude_mm:.3f} mm at {line.frequency_hz:.2f} Hz "
+        "or an alias of it."
+    )
+    location = _stretch(travel, None, FixedTo.TIME, "periodic")
+    return Claim(
+        "probe_vibration", size, words, line.p_value, others, travel.source, location, line.agreements
+    )
+
+
+def rocking_excluded(line: Line, seen: Seen) -> bool:
+    """Return whether a sheet that rocks as much as the ring swings would show, and rings show none.
+
+    Seen with the sheet believed at rest, a tilt φ of the sheet moves the ring as a camera r² φ / l off the
+    axis does; but only a sheet moves rings against fiducials, the more the wider the bore.
+    """
+    if seen.geometry is None or "laser_rocking" in seen.geometry.unsplit:
+        return False
+    rings, verdicts = seen.geometry.searched.nothing.linearised.rings, seen.geometry.verdicts
+    about = [f for f in seen.geometry.feasibility if f.name == "laser_rocking"]
+    suspected = verdicts is not None and any(
+        p > _ROCKING_P and "laser_rocking" in j.names
+        for p, j in zip(verdicts.probability, verdicts.judged, strict=True)
+    )
+    if not about or suspected:
+        return False
+    widest_mm = float(np.max(rings.radius_mm))
+    needed_mrad = 1e3 * line.amplitude_mm * rings.probe.laser.baseline_mm / widest_mm**2
+    return bool(needed_mrad > about[0].detectable)
+
+
+def _of_finding(f: Finding, profile: ProfileEvidence, where: str) -> Claim:
+    size = {s.name: Value(float(s.value), float(s.sigma)) for s in f.sizes}
+    frames = (int(profile.frame[0]), int(profile.frame[-1])) if len(profile.frame) else None
+    azimuth = None
+    if {"azimuth_deg", "width_deg"} <= size.keys():
+        middle, width = size["azimuth_deg"].value, size["width_deg"].value
+        azimuth = (middle - width, middle + width)
+    fixed_to = str(f.fixed_to) if f.fixed_to is not None else None
+    location = Location(str(Channel.PROFILE), fixed_to, f.time, frames=frames, azimuth_deg=azimuth)
+    return Claim(f.effect, size, f.statement, f.p_value, f.alike, where, location, f.agreements)
+
+
+def _stretch(
+    travel: TravelEvidence, places: tuple[int, int] | None, fixed_to: FixedTo | None, time: str | None
+) -> Location:
+    """Return where motion shows it: in the frames between two places of the sight, else in all."""
+    sight = travel.fit.sight if travel.fit is not None else None
+    frames, stretch = None, None
+    if sight is not None and len(sight.frame):
+        here = slice(None) if places is None else slice(places[0], places[1] + 1)
+        frame, distance = sight.frame[here], sight.distance_mm[here]
+        frames = (int(frame[0]), int(frame[-1]))
+        stretch = (float(distance.min()), float(distance.max()))
+    fixed = str(fixed_to) if fixed_to is not None else None
+    return Location(str(Channel.MOTION), fixed, time, frames=frames, distance_mm=stretch)
+
+
+def _borne_out(claim: Claim, other: Claim) -> Claim:
+    """Return the claim with what the other recording says; a rival stays only where both leave it."""
+    alike = tuple(n for n in claim.alike if n in other.alike)
+    both = _agreements(claim, other.where, other.parameters)
+    return replace(claim, alike=alike, agreements=(*claim.agreements, *both))
+
+
+def _against(claim: Claim, other: Seen | None) -> Claim:
+    """Return the claim with the other recording's estimate, though that be too small to be a claim itself."""
+    travel = other.travel if other is not None else None
+    estimate = travel.estimate(claim.name) if travel is not None else None
+    if travel is None or estimate is None or not np.isfinite(estimate.sigma) or estimate.alike:
+        return claim
+    same = {estimate.quantity: Value(estimate.value, estimate.size_sigma)}
+    return replace(claim, agreements=(*claim.agreements, *_agreements(claim, travel.source, same)))
+
+
+def _agreements(claim: Claim, where: str, parameters: dict[str, Value]) -> Iterable[Agreement]:
+    """Return, for each quantity that two recordings share, whether they agree on it."""
+    for name, value in claim.parameters.items():
+        if name not in parameters or name in _OF_ONE_RECORDING:
+            continue
+        first, second = _part(claim.where, name, value), _part(where, name, parameters[name])
+        found = agreement(first[0], second[0], (first[1], second[1]), first[1] + second[1])
+        if found is not None:
+            yield found
+
+
+def _part(where: str, name: str, value: Value) -> tuple[Part, Float]:
+    """Return a quantity with its covariance; an azimuth as a direction."""
+    words = f"{name} {value.value:.4g} (± {value.sd:.2g})"
+    if not name.endswith("azimuth_deg"):
+        return Part(where, words, np.array([value.value])), np.array([[value.sd**2]])
+    angle = np.radians(value.value)
+    return Part(where, words, np.array([np.cos(angle), np.sin(angle)])), np.radians(value.sd) ** 2 * np.eye(2)
