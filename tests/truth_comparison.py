@@ -7,7 +7,9 @@ begin.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -47,22 +49,39 @@ class MotionComparison:
 
 
 def compare_wall(found: RadiusMap, folder: Path, cells: int = 20000) -> WallComparison:
+    s, psi, r, sigma = _drawn_cells(found, cells)
     seen = np.isfinite(found.radius_mm)
-    row, column = np.nonzero(seen)
-    pick = np.random.default_rng(0).choice(len(row), min(cells, len(row)), replace=False)
-    row, column = row[pick], column[pick]
-    s, psi = found.distance_mm[row], found.azimuth_rad[column]
-    r, sigma = found.radius_mm[row, column].astype(float), found.sigma_mm[row, column].astype(float)
-    truth = _true_radius(folder)
-    x = (s - s.mean()) / np.ptp(s)
-    shape = np.stack([f(psi) * x**k for k in range(3) for f in (np.cos, np.sin)], -1)
+    error = wall_error(found, folder, cells)
+    return WallComparison(error(s, psi, r), sigma, float(seen[seen.any(1)].mean()))
 
-    def error(p: Float) -> Float:
+
+def wall_error(found: RadiusMap, folder: Path, cells: int = 20000) -> Callable[[Float, Float, Float], Float]:
+    """Return what tells the error of a radius at a distance and azimuth of the run's own pipe frame."""
+    s, psi, r, _ = _drawn_cells(found, cells)
+    truth, middle, length = _true_radius(folder), s.mean(), np.ptp(s)
+
+    def error(p: Float, s: Float, psi: Float, r: Float) -> Float:
+        x = (s - middle) / length
+        shape = np.stack([f(psi) * x**k for k in range(3) for f in (np.cos, np.sin)], -1)
         return r - truth(np.stack([s + p[0] + 10 * x * p[1], psi + p[2]], -1)) - shape @ p[3:]
 
-    start = min(np.arange(-6, 6.1, 0.5), key=lambda d: np.median(np.abs(error(np.array([d, *[0] * 8])))))
-    best = least_squares(error, [start, *[0.0] * 8], loss="cauchy", f_scale=0.1, x_scale=0.1, diff_step=1e-4)
-    return WallComparison(error(best.x), sigma, float(seen[seen.any(1)].mean()))
+    def all_errors(p: Float) -> Float:
+        return error(p, s, psi, r)
+
+    start = min(np.arange(-6, 6.1, 0.5), key=lambda d: np.median(np.abs(all_errors(np.array([d, *[0] * 8])))))
+    best = least_squares(
+        all_errors, [start, *[0.0] * 8], loss="cauchy", f_scale=0.1, x_scale=0.1, diff_step=1e-4
+    )
+    return partial(error, best.x)
+
+
+def _drawn_cells(found: RadiusMap, cells: int) -> tuple[Float, Float, Float, Float]:
+    """Distance, azimuth, radius and its σ of cells drawn at random."""
+    row, column = np.nonzero(np.isfinite(found.radius_mm))
+    pick = np.random.default_rng(0).choice(len(row), min(cells, len(row)), replace=False)
+    row, column = row[pick], column[pick]
+    radius, sigma = (a[row, column].astype(float) for a in (found.radius_mm, found.sigma_mm))
+    return found.distance_mm[row], found.azimuth_rad[column], radius, sigma
 
 
 def compare_motion(found: Trajectory, folder: Path) -> MotionComparison:

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from pipeline.artefacts import PointCloud, Trajectory, Wall
-from pipeline.export.catalogue import EXPORTERS
 from pipeline.config import resolve
+from pipeline.export.catalogue import EXPORTERS
 from pipeline.instrument.probe import Probe
 from pipeline.job import open_job
 from pipeline.recording.base import Illumination, Recording
@@ -79,7 +79,7 @@ class Inputs:
         return [image.copy() for _, image in self.recording.read(self.lit[::step], "grey")]
 
     def driven_mm(self, frames: np.ndarray) -> float:
-        """Return how far the encoder says that the probe went between the first and the last of ``frames``."""
+        """Return how far the probe went by the encoder between the first and the last of ``frames``."""
         table, encoder = self.recording.frames, self.recording.encoder
         times = table.time_s[np.searchsorted(table.frame, frames[[0, -1]])]
         return float(np.ptp(np.interp(times, encoder.time_s, encoder.distance_mm)))

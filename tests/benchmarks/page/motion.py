@@ -13,8 +13,9 @@ from tests.benchmarks.page.section import TIMES, Method, Quantity, Section, cloc
 _SETUP = (
     "All methods get the same LED frames and the probe's camera model. Visual odometry (OpenCV): features "
     "between 20° and 78° off the optical axis on contrast-equalised pictures, rays by the fisheye model, "
-    "essential matrix by RANSAC, each step scaled by the pipe's known radius, and the whole path once more by "
-    "the encoder's total. Its first pose is the true one. Boresight uses rings, texture and encoder together.",
+    "essential matrix by RANSAC, each step scaled by the pipe's known radius, and the whole path once more "
+    "by the encoder's total: its distance at the end is the encoder's, not its own. Its first pose is the "
+    "true one. Boresight uses rings, texture and encoder together.",
     "Errors are against the true poses from the first LED frame on: distance along the pipe, roll about it, "
     "and place across it after a straight line is taken out. Boresight's time is that of its stage motion.",
 )
@@ -43,7 +44,9 @@ def section(inputs: Inputs) -> Section:
             poses = odometry(images, inputs.probe, radius, tracker)
         poses = truth[0] @ poses
         before = _driven(poses)
-        poses[:, :3, 3] = truth[0, :3, 3] + (poses[:, :3, 3] - poses[0, :3, 3]) * inputs.driven_mm(lit) / before
+        poses[:, :3, 3] = (
+            truth[0, :3, 3] + (poses[:, :3, 3] - poses[0, :3, 3]) * inputs.driven_mm(lit) / before
+        )
         tracks[name] = poses
         unscaled = {"unscaled_percent": 100 * (before / _driven(truth) - 1)}
         methods.append(Method(name, _errors(poses, truth) | unscaled | spent.figures))

@@ -8,6 +8,7 @@ comparable by the pipe's known radius, which a textbook's chain of scales would 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -39,7 +40,9 @@ def orb(before: np.ndarray, after: np.ndarray, mask: np.ndarray) -> Pairs:
     detector = cv2.ORB_create(_FEATURES, fastThreshold=8)
     (first, a), (second, b) = (detector.detectAndCompute(image, mask) for image in (before, after))
     matches = cv2.BFMatcher(cv2.NORM_HAMMING).knnMatch(a, b, k=2)
-    good = [m for m, other in (pair for pair in matches if len(pair) == 2) if m.distance < _RATIO * other.distance]
+    good = [
+        m for m, other in (pair for pair in matches if len(pair) == 2) if m.distance < _RATIO * other.distance
+    ]
     return np.array([first[m.queryIdx].pt for m in good]), np.array([second[m.trainIdx].pt for m in good])
 
 
@@ -49,7 +52,7 @@ def odometry(images: Sequence[np.ndarray], probe: Probe, radius_mm: float, track
     poses, step = [np.eye(4)], np.eye(4)
     equalise = cv2.createCLAHE(3.0, (16, 16))
     flat = [equalise.apply(image) for image in images]
-    for before, after in zip(flat, flat[1:], strict=False):
+    for before, after in pairwise(flat):
         found = _step(tracker(before, after, mask), probe, radius_mm)
         step = step if found is None else found
         poses.append(poses[-1] @ step)
@@ -89,7 +92,7 @@ def _normalised(probe: Probe, uv: np.ndarray) -> np.ndarray:
 def _wall_mask(probe: Probe) -> np.ndarray:
     """Return the pixels in which the wall is looked for features."""
     width, height = probe.camera.image_size
-    centre = tuple(int(round(float(c))) for c in probe.camera.centre_px)
+    centre = tuple(round(float(c)) for c in probe.camera.centre_px)
     low, high = (int(r) for r in _ring_radii(probe))
     mask = cv2.circle(np.zeros((height, width), np.uint8), centre, high, 255, -1)
     return cv2.circle(mask, centre, low, 0, -1)

@@ -19,11 +19,11 @@ _FRAMES, _AZIMUTHS = 20, 1440
 _SETUP = (
     "Accuracy: synthetic rings of known place (720 samples, line 1.2 px wide, 90 grey levels high), read and "
     "shot noise as listed, rounded to 8 bits; four images a level. All three are told where to look, to a "
-    "pixel. Steger's smoothing also averages along the line, over neighbouring samples: in strong noise it may "
-    "fall below the bound of a single sample, at the price of neighbours that err together.",
+    "pixel. Steger's smoothing also averages along the line, over neighbouring samples: in strong noise it "
+    "may fall below the bound of a single sample, at the price of neighbours that err together.",
     "Rate: rings a second of processor time over decoded frames of the recording at 1440 samples a ring. "
-    "Boresight's time includes finding the ring, judging each sample and learning the noise; that of the other "
-    "two is just their measurement along rays, the ring's place given to them.",
+    "Boresight's time includes finding the ring, judging each sample and learning the noise; that of the "
+    "other two is just their measurement along rays, the ring's place given to them.",
 )
 
 
@@ -43,13 +43,18 @@ def section(inputs: Inputs) -> Section:
     methods = tuple(
         Method(
             name,
-            {"best_over_bound": float(over_bound[:, k].min()), "worst_over_bound": float(over_bound[:, k].max())}
+            {
+                "best_over_bound": float(over_bound[:, k].min()),
+                "worst_over_bound": float(over_bound[:, k].max()),
+            }
             | {"rings_per_cpu_s": float(per_ring[k])}
             | (shared if k == 0 else {}),
         )
         for k, name in enumerate(_NAMES)
     )
-    return Section("rings", "Ring extraction", (*_SETUP, _table(levels)), _QUANTITIES, methods, _charts(levels, per_ring))
+    return Section(
+        "rings", "Ring extraction", (*_SETUP, _table(levels)), _QUANTITIES, methods, _charts(levels, per_ring)
+    )
 
 
 _QUANTITIES = (

@@ -1,4 +1,4 @@
-"""What every part of the page hands over: methods side by side, their figures, charts, and how it was set up."""
+"""What every part of the page hands over: methods side by side, figures, charts, and how it was set up."""
 
 from __future__ import annotations
 
