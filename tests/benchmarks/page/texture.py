@@ -27,7 +27,7 @@ _SETUP = (
     "All get boresight's poses, wall and LED frames. open3d (t.geometry, project_images_to_albedo) takes "
     f"pinhole pictures: each {_EVERY}th LED frame is cut into {_SIDES} undistorted views of {_FIELD_DEG:g}° "
     f"that look {_TILT_DEG:g}° off the axis, {_VIEW_PX} px wide, half as fine again as the fisheye itself. "
-    f"Its mesh is the radius map, its texture {_TEXTURE_PX} px square over the unrolled wall, then brought to "
+    f"Its mesh is the radius map, its texture {_TEXTURE_PX} px square over the unrolled wall, brought to "
     "the size of boresight's picture.",
     "Score: shared/score_run.py, which compares the flat picture with the true albedo after one gain per "
     "colour, and finds the shift of 10 mm patches. Boresight estimates the light, the projection just blends "
