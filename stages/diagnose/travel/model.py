@@ -100,24 +100,39 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     """
     steady = _without_steps(sight, encoder, events)
     speed = np.gradient(sight.distance_mm, sight.time_s)
-    delay_s, play_mm = _nearest_start(sight, steady, events, speed)
-    for _ in range(_ROUNDS):
-        reading = readings_at(steady, sight.time_s + delay_s)
-        smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
-        columns = np.concatenate([smooth, event_columns(sight, events, speed)], 1)
-        # What is in the reading already is put back, so that every round gives the values in full.
-        difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s + off
-        found = robust_coefficients(difference, columns)
-        delay_s, play_mm = _within(found[DELAY], _LONGEST_S), _within(found[PLAY], _WIDEST_MM)
+    searched = _nearest_start(sight, steady, events, speed)
+    # Play and delay can stand in for each other: nothing at all is a start too, and the better end counts.
+    from_search, from_nothing = (_refined(sight, steady, events, speed, s) for s in (searched, (0.0, 0.0)))
     if noise is None:
-        noise = estimated_noise(difference, columns, sight.path_mm, quantum_mm(encoder) / np.sqrt(12))
-    whitened = whitened_fit(difference, columns, noise.covariance(sight.path_mm))
+        noise = estimated_noise(*from_search, sight.path_mm, quantum_mm(encoder) / np.sqrt(12))
+    covariance_mm = noise.covariance(sight.path_mm)
+    whitened, columns = min(
+        ((whitened_fit(y, columns, covariance_mm), columns) for y, columns in (from_nothing, from_search)),
+        key=lambda end: float(end[0].residual @ end[0].weighted),
+    )
     values = np.where(np.isfinite(np.diag(whitened.covariance)), whitened.estimate, 0.0)
     covariance = whitened.covariance.copy()
     covariance[SCALE, SCALE] += sight.scale_sigma**2
     values[4:] += [_gain(encoder, sight, e) for e in events]
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
     return TravelFit(sight, events, values, covariance, noise, plain - np.median(plain), whitened, columns)
+
+
+def _refined(
+    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float, start: tuple[float, float]
+) -> tuple[Float, Float]:
+    """Return reading − sight (N,) and the columns (N, 4 + E) about the delay and play found from a start."""
+    delay_s, play_mm = start
+    of_events = event_columns(sight, events, speed)
+    for _ in range(_ROUNDS):
+        reading = readings_at(steady, sight.time_s + delay_s)
+        smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
+        columns = np.concatenate([smooth, of_events], 1)
+        # What is in the reading already is put back, so that every round gives the values in full.
+        difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s + off
+        found = robust_coefficients(difference, columns)
+        delay_s, play_mm = _within(found[DELAY], _LONGEST_S), _within(found[PLAY], _WIDEST_MM)
+    return difference, columns
 
 
 def _nearest_start(
