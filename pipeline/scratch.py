@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -90,6 +90,11 @@ class Spool:
         content = self.stream.read((last - first) * size)
         self.stream.seek(here)
         return np.frombuffer(content, self.dtype).reshape(-1, *self.record).copy()
+
+    def parts(self, records: int) -> Iterator[NDArray[Any]]:
+        """Yield all records, so many at a time."""
+        for first in range(0, self.count, records):
+            yield self.part(first, min(first + records, self.count))
 
     def array(self) -> NDArray[Any]:
         """Return all records, mapped from the file."""

@@ -10,6 +10,7 @@ from pipeline.export.overlays import write_overlays
 from pipeline.export.radius_map import write_radius_map
 from pipeline.export.report import write_report_page
 from pipeline.export.rings import write_rings
+from pipeline.export.tileset import write_tileset
 from pipeline.export.trajectory import write_trajectory
 from pipeline.export.unrolled import write_unrolled
 
@@ -19,6 +20,7 @@ EXPORTERS = (
     Exporter("radius_map.npz", write_radius_map),
     Exporter("cloud.ply", write_cloud),
     Exporter("model.glb", write_model),
+    Exporter("tileset", write_tileset),
     Exporter("overlays", write_overlays),
     Exporter("unrolled.png", write_unrolled),
     Exporter("sections.csv", write_sections),

@@ -12,7 +12,7 @@ from pathlib import Path
 from pipeline.codec import Json
 from pipeline.config import Configuration
 from pipeline.disk import disk_errors_named, replace_json
-from pipeline.outcome import Number, RunOutcome, StageOutcome
+from pipeline.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.plan import Plan
 from pipeline.recording.base import Recording
 from pipeline.recording.input_file import content_key
@@ -66,6 +66,7 @@ def write_run_record(
         "stages": [_stage(s) for s in outcome.stages],
         "metrics": _numbers(outcome.metrics),
         "reader_warnings": list(recording.warnings),
+        "warnings": list(warnings_of(outcome.stages)),
         "peak_memory_mib": {"program": _peak_mib()},
     }
     with disk_errors_named(folder):

@@ -12,7 +12,7 @@ from plyfile import PlyData
 
 from pipeline.artefacts import Wall
 from pipeline.export.cloud import write_cloud
-from pipeline.export.glb import model_bytes, write_model
+from pipeline.export.glb import write_model
 from pipeline.export.overlays import write_overlays
 from pipeline.model import VARIANTS, TexturedMesh
 from pipeline.review.picture import inside_view, render
@@ -69,8 +69,9 @@ def test_model_is_metres_with_twelve_up(mesh: TexturedMesh, tmp_path: Path) -> N
         np.testing.assert_array_equal(np.float32(accessor.max), position.max(axis=0))
 
 
-def test_every_tile_has_all_variants_on_one_uv(mesh: TexturedMesh) -> None:
-    document = pygltflib.GLTF2.load_from_bytes(model_bytes(mesh))
+def test_every_tile_has_all_variants_on_one_uv(mesh: TexturedMesh, tmp_path: Path) -> None:
+    write_model(mesh, tmp_path)
+    document = pygltflib.GLTF2().load(str(tmp_path / "model.glb"))
     assert set(document.extensionsUsed) == {"KHR_materials_variants", "KHR_materials_unlit"}
     names = [v["name"] for v in document.extensions["KHR_materials_variants"]["variants"]]
     assert tuple(names) == VARIANTS
@@ -89,8 +90,9 @@ def test_every_tile_has_all_variants_on_one_uv(mesh: TexturedMesh) -> None:
             np.testing.assert_array_equal(shown[..., ::-1], error.palette_bgr[error.level])
 
 
-def test_model_views_are_aligned_and_inside_the_buffer(mesh: TexturedMesh) -> None:
-    document = pygltflib.GLTF2.load_from_bytes(model_bytes(mesh))
+def test_model_views_are_aligned_and_inside_the_buffer(mesh: TexturedMesh, tmp_path: Path) -> None:
+    write_model(mesh, tmp_path)
+    document = pygltflib.GLTF2().load(str(tmp_path / "model.glb"))
     length = document.buffers[0].byteLength
     for view in document.bufferViews:
         assert view.byteOffset % 4 == 0
