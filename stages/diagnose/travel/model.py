@@ -111,10 +111,12 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
         key=lambda end: float(end[0].residual @ end[0].weighted),
     )
     values = np.where(np.isfinite(np.diag(whitened.covariance)), whitened.estimate, 0.0)
-    covariance = whitened.covariance.copy()
+    plain = readings_at(encoder, sight.time_s) - sight.distance_mm
+    # Noise is measured from the pictures' usual steps: what is left in all may be more, never less.
+    left = float(whitened.residual @ whitened.weighted) / max(len(plain) - len(values), 1)
+    covariance = max(left, 1.0) * whitened.covariance
     covariance[SCALE, SCALE] += sight.scale_sigma**2
     values[4:] += [_gain(encoder, sight, e) for e in events]
-    plain = readings_at(encoder, sight.time_s) - sight.distance_mm
     return TravelFit(sight, events, values, covariance, noise, plain - np.median(plain), whitened, columns)
 
 
