@@ -25,6 +25,7 @@ Byte = NDArray[np.uint8]
 _NOT_MEASURED_BGR = (128, 128, 128)
 _HARMONICS = (1, 2)
 _HUBER = 1.345
+_ROWS, _AT_ONCE = 4096, 1 << 24
 
 
 class OverlayParameters(Parameters):
@@ -65,14 +66,15 @@ def draw_overlays(
 
 def overlays_of(radius_map: RadiusMap, nominal_diameter_mm: float, parameters: OverlayParameters) -> Overlays:
     """Return the error colours of a radius map that holds measured cells."""
-    radius, fitted, nominal = radius_map.radius_mm, fitted_pipe(radius_map), nominal_diameter_mm / 2
+    radius, fitted = radius_map.radius_mm, fitted_pipe(radius_map).astype(np.float32)
+    nominal = np.float32(nominal_diameter_mm / 2)
     signed, growing = parameters.signed_colours, parameters.growing_colours
     misaligned = radius_map.misalignment_mm
     return Overlays(
         radius_map.distance_mm,
         radius_map.azimuth_rad,
-        fitted,
-        nominal,
+        fitted.astype(float),
+        nominal_diameter_mm / 2,
         _signed("deviation", "Deviation from the fitted pipe", radius - fitted, signed, parameters),
         _signed("deviation_nominal", "Deviation from the nominal pipe", radius - nominal, signed, parameters),
         _growing("uncertainty", "Uncertainty of the radius (1 σ)", radius_map.sigma_mm, growing, parameters),
@@ -87,7 +89,9 @@ def fitted_pipe(radius_map: RadiusMap) -> Float:
     harmonics with Huber weights: neither defects nor gaps move it.
     """
     seen = np.isfinite(radius_map.radius_mm).any(axis=0)
-    profile = np.nanmedian(radius_map.radius_mm[:, seen].astype(float), axis=0)
+    columns = np.array_split(np.flatnonzero(seen), max(radius_map.radius_mm.size // _AT_ONCE, 1))
+    medians = [np.nanmedian(radius_map.radius_mm[:, c].astype(float), axis=0) for c in columns if len(c)]
+    profile = np.concatenate(medians)
     basis = _harmonic_basis(radius_map.azimuth_rad)
     weight = np.ones(len(profile))
     for _ in range(20):
@@ -121,7 +125,8 @@ def _growing(
 
 def _range(size_mm: NDArray[np.floating], parameters: OverlayParameters) -> float:
     """Return the round upper end (two digits) below which the wished share of the wall lies."""
-    measured = size_mm[np.isfinite(size_mm)]
+    some = size_mm[:: max(size_mm.size // _AT_ONCE, 1)]
+    measured = some[np.isfinite(some)]
     size = float(np.quantile(measured, parameters.shown_quantile)) if len(measured) else 0.0
     size = max(size, parameters.smallest_range_mm)
     unit = 10.0 ** (np.floor(np.log10(size)) - 1)
@@ -131,12 +136,16 @@ def _range(size_mm: NDArray[np.floating], parameters: OverlayParameters) -> floa
 def _overlay(
     name: str, title: str, value_mm: NDArray[np.floating], low: float, high: float, colours: str
 ) -> Overlay:
-    measured = np.isfinite(value_mm)
-    scaled = np.where(measured, (value_mm - low) / (high - low), 0.0)
-    level = np.where(measured, 1 + np.rint(np.clip(scaled, 0, 1) * 254), 0).astype(np.uint8)
-    outside = int(np.count_nonzero(measured & ((scaled < 0) | (scaled > 1))))
-    beyond = outside / max(1, int(np.count_nonzero(measured)))
-    return Overlay(name, title, colours, low, high, beyond, _palette(colours), level)
+    level = np.zeros(value_mm.shape, np.uint8)
+    outside, known = 0, 0
+    for start in range(0, len(value_mm), _ROWS):
+        value = value_mm[start : start + _ROWS].astype(float)
+        measured = np.isfinite(value)
+        scaled = np.where(measured, (value - low) / (high - low), 0.0)
+        level[start : start + _ROWS] = np.where(measured, 1 + np.rint(np.clip(scaled, 0, 1) * 254), 0)
+        outside += int(np.count_nonzero(measured & ((scaled < 0) | (scaled > 1))))
+        known += int(np.count_nonzero(measured))
+    return Overlay(name, title, colours, low, high, outside / max(1, known), _palette(colours), level)
 
 
 def _palette(colours: str) -> Byte:

@@ -104,7 +104,7 @@ def _stations(distance_mm: Float, spacing_mm: float) -> Float:
 def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
     step = float(np.diff(radius_map.distance_mm[:2])[0]) if len(radius_map.distance_mm) > 1 else spacing_mm
     half = max(spacing_mm, step) / 2
-    rows = (radius_map.distance_mm >= station - half) & (radius_map.distance_mm < station + half)
+    rows = slice(*np.searchsorted(radius_map.distance_mm, [station - half, station + half]))
     radius = radius_map.radius_mm[rows].astype(float)
     random = radius_map.sigma_random_mm[rows].astype(float) ** 2
     total = radius_map.sigma_mm[rows].astype(float) ** 2

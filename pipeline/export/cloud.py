@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts import PointCloud, Wall, WallTexture
 from pipeline.export.unrolled import display_colours
 
+_AT_ONCE = 1 << 20
 _GREY = 128
 _ROW = np.dtype(
     [
@@ -24,16 +26,25 @@ _PLY_TYPES = {"f4": "float", "u1": "uchar", "i4": "int"}
 
 def write_cloud(wall: Wall, texture: WallTexture, folder: Path) -> None:
     """Write ``cloud.ply`` (binary, little endian), mm in P; grey where the wall has no photo."""
-    cloud = wall.cloud
+    points = len(wall.cloud.xyz_p)
+    with (folder / "cloud.ply").open("wb") as stream:
+        stream.write(_header(points).encode("ascii"))
+        for start in range(0, points, _AT_ONCE):
+            stream.write(_rows(_part(wall.cloud, slice(start, start + _AT_ONCE)), texture).tobytes())
+
+
+def _part(cloud: PointCloud, points: slice) -> PointCloud:
+    return PointCloud(*(getattr(cloud, f.name)[points] for f in fields(cloud)))
+
+
+def _rows(cloud: PointCloud, texture: WallTexture) -> NDArray[np.void]:
     row = np.zeros(len(cloud.xyz_p), _ROW)
     for i, axis in enumerate("xyz"):
         row[axis], row[f"n{axis}"] = cloud.xyz_p[:, i], cloud.normal_p[:, i]
     for name in ("sigma_mm", "radius_mm", "distance_mm", "azimuth_rad", "frame"):
         row[name] = getattr(cloud, name)
     row["blue"], row["green"], row["red"] = point_colours(cloud, texture).T
-    with (folder / "cloud.ply").open("wb") as stream:
-        stream.write(_header(len(row)).encode("ascii"))
-        stream.write(row.tobytes())
+    return row
 
 
 def point_colours(cloud: PointCloud, texture: WallTexture) -> NDArray[np.uint8]:

@@ -39,7 +39,9 @@ def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     half = (distance[-1] - distance[0]) / max(len(distance) - 1, 1) / 2
-    rgb = overlay.palette_bgr[_twelve_in_the_middle(overlays, overlay), ::-1]
+    # No finer than the picture's own dots.
+    every = max(len(distance) // int(_LONGEST_INCH * _DPI), 1)
+    rgb = overlay.palette_bgr[_twelve_in_the_middle(overlays, overlay.level[::every]), ::-1]
     axes.imshow(
         rgb.transpose(1, 0, 2),
         extent=(distance[0] - half, distance[-1] + half, -6, 6),
@@ -56,10 +58,10 @@ def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:
     return figure
 
 
-def _twelve_in_the_middle(overlays: Overlays, overlay: Overlay) -> NDArray[np.uint8]:
-    """Return the levels with columns from 6 o'clock over 12 (azimuth −90°) to 6 o'clock."""
+def _twelve_in_the_middle(overlays: Overlays, level: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return levels (S, A) with columns from 6 o'clock over 12 (azimuth −90°) to 6 o'clock."""
     clock = (overlays.azimuth_rad + np.pi / 2 + np.pi) % (2 * np.pi)
-    return np.asarray(overlay.level[:, np.argsort(clock, kind="stable")])
+    return np.asarray(level[:, np.argsort(clock, kind="stable")])
 
 
 def _add_colour_bar(figure: Figure, overlay: Overlay) -> None:
