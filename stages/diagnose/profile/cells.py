@@ -56,6 +56,15 @@ class Cells:
     height: Float
     frames: tuple[NDArray[np.int64], ...]
 
+    def of_blocks(self, first: int, end: int) -> Cells:
+        """Return the cells of blocks ``first`` to before ``end`` alone."""
+        k = (self.block >= first) & (self.block < end)
+        return Cells(
+            self.offset_px, self.block[k] - first, self.sector[k], self.profile[k], self.centre_px[k],
+            self.width_px[k], self.rest[k], self.whole[k], self.azimuth_rad[k], self.px_per_mm[k],
+            self.radius_mm[k], self.height[k], self.frames[first:end],
+        )  # fmt: skip
+
 
 def make_cells(profiles: LineProfiles, geometry: LineGeometry) -> Cells:
     """Average profiles over blocks of steady frames; frames with a step's second line are left out."""

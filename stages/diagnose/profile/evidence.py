@@ -16,9 +16,10 @@ from pipeline.stage import Context
 from stages.diagnose.profile.brightness import clip_finding, decentre_finding, dust_finding, stray_finding
 from stages.diagnose.profile.cells import make_cells
 from stages.diagnose.profile.finding import Finding
-from stages.diagnose.profile.geometry import line_geometry
+from stages.diagnose.profile.geometry import LineGeometry, line_geometry
+from stages.diagnose.profile.halves import Test, with_halves
 from stages.diagnose.profile.lit import vignetting_finding
-from stages.diagnose.profile.measure import measure_profiles
+from stages.diagnose.profile.measure import LineProfiles, measure_profiles
 from stages.diagnose.profile.rivals import settle
 from stages.diagnose.profile.secondary import ghost_findings
 from stages.diagnose.profile.sensor import locking_finding, pattern_finding
@@ -103,26 +104,38 @@ def _examined(recording: Recording, rings: RingSamples, probe: Probe, context: C
             "diagnose", f"only {len(cells.frames)} stretches of frames show the line alone and steady",
             limit=f"at least {_LEAST_BLOCKS}", hint="record frames with the LEDs off",
         )  # fmt: skip
+    tests = _tests(rings, profiles, geometry, probe)
+    shown = [test(cells) for test in tests]
     findings: tuple[Finding, ...] = (
-        *ghost_findings(cells, geometry, probe),
-        *skew_findings(cells, geometry, probe),
-        *width_findings(cells, geometry, probe),
-        blur_finding(cells, geometry, probe),
+        *(f for each in shown for f in each),
         vignetting_finding(recording, probe),
-        dust_finding(rings, profiles, cells),
         stray_finding(profiles, geometry),
-        decentre_finding(geometry, cells),
-        clip_finding(profiles, cells, geometry),
-        locking_finding(rings, profiles, cells),
         pattern_finding(profiles, recording.source.image_size),
     )
-    findings = settle(findings, cells)
+    telling = [test for test, each in zip(tests, shown, strict=True) if any(f.found for f in each)]
+    findings = with_halves(settle(findings, cells), telling, cells)
     context.report("effects found in the line's profile", sum(f.found for f in findings), "effects")
     whole = np.where(cells.whole[:, None], cells.profile, np.nan).reshape(
         len(cells.frames), -1, len(cells.offset_px)
     )
     return ProfileEvidence(
         recording.name, profiles.frame, profiles.azimuth_rad, findings, cells.offset_px, _mean(whole)
+    )
+
+
+def _tests(
+    rings: RingSamples, profiles: LineProfiles, geometry: LineGeometry, probe: Probe
+) -> tuple[Test, ...]:
+    """Return the tests that any cells of the recording can be put to."""
+    return (
+        lambda cells: ghost_findings(cells, geometry, probe),
+        lambda cells: skew_findings(cells, geometry, probe),
+        lambda cells: width_findings(cells, geometry, probe),
+        lambda cells: (blur_finding(cells, geometry, probe),),
+        lambda cells: (dust_finding(rings, profiles, cells),),
+        lambda cells: (decentre_finding(geometry, cells),),
+        lambda cells: (clip_finding(profiles, cells, geometry),),
+        lambda cells: (locking_finding(rings, profiles, cells),),
     )
 
 

@@ -14,6 +14,7 @@ from stages.diagnose.profile.skewed import cell_skewness, exponential_gaussian, 
 Float = NDArray[np.float64]
 _REACH_WIDTHS, _STEP_WIDTHS = 7.0, 0.25
 _OVERLAP_WIDTHS = 5.0
+_SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
 
 
 def settle(findings: tuple[Finding, ...], cells: Cells) -> tuple[Finding, ...]:
@@ -32,7 +33,19 @@ def settle(findings: tuple[Finding, ...], cells: Cells) -> tuple[Finding, ...]:
             lost[name] = "tube_ghost" if better else skewed.effect
     if by_name["subsurface"].found and "subsurface" not in lost:
         lost |= {name: "subsurface" for name in ("gamma", "albedo_bias")}
-    return tuple(_yielded(f, lost[f.effect]) if f.effect in lost else f for f in findings)
+    kept = (_yielded(f, lost[f.effect]) if f.effect in lost else f for f in findings)
+    return tuple(_unrivalled(f, by_name) for f in kept)
+
+
+def _unrivalled(finding: Finding, by_name: dict[str, Finding]) -> Finding:
+    """Return a spot without the pixels' own gains as rival where these were measured and found even, or back.
+
+    Gains of single pixels would show in their own test long before they made a dip in all frames.
+    """
+    rival = by_name.get(_SPOT_OR_PIXELS.get(finding.effect, ""))
+    if rival is None or rival.found or not rival.sizes:
+        return finding
+    return replace(finding, alike=tuple(n for n in finding.alike if n != rival.effect))
 
 
 def _yielded(finding: Finding, other: str) -> Finding:
