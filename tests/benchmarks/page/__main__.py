@@ -1,6 +1,6 @@
 """Boresight against what people would use instead: one page and one file of figures, made in one go.
 
-usage: python -m tests.benchmarks.page -o DIR [--recording DIR] [--colmap-limit SECONDS]
+usage: python -m tests.benchmarks.page -o DIR [--recording DIR] [--parts PART ...] [--colmap-limit S]
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 import os
 import platform
 import tempfile
+from collections.abc import Callable
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,6 +25,8 @@ from tests.benchmarks.page.inputs import prepare
 from tests.benchmarks.page.section import Section
 from tests.shared_data import PROJECT_ROOT
 
+PARTS = ("rings", "motion", "mesh", "texture", "whole")
+
 
 def main() -> None:
     arguments = _arguments()
@@ -32,19 +35,22 @@ def main() -> None:
         work = Path(name)
         print("boresight runs, twice", flush=True)
         inputs = prepare(arguments.recording, work)
-        sections = []
-        for title, compare in (
-            ("rings", lambda: rings.section(inputs)),
-            ("motion", lambda: motion.section(inputs)),
-            ("meshing", lambda: meshing.section(inputs)),
-            ("texture", lambda: texture.section(inputs, work / "texture")),
-            ("whole run", lambda: whole.section(inputs, work / "colmap", arguments.colmap_limit)),
-        ):
-            print(title, flush=True)
-            sections.append(compare())
+        compared = {
+            "rings": lambda: rings.section(inputs),
+            "motion": lambda: motion.section(inputs),
+            "mesh": lambda: meshing.section(inputs),
+            "texture": lambda: texture.section(inputs, work / "texture"),
+            "whole": lambda: whole.section(inputs, work / "colmap", arguments.colmap_limit),
+        }
+        sections = [_made(part, compared[part]) for part in arguments.parts]
     made = _machine() | {"recording": arguments.recording.name}
     write(sections, made, arguments.output)
     print(arguments.output / "page.html")
+
+
+def _made(part: str, compare: Callable[[], Section]) -> Section:
+    print(part, flush=True)
+    return compare()
 
 
 def write(sections: list[Section], made: dict[str, str], folder: Path) -> None:
@@ -91,6 +97,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--recording", type=Path, default=default, metavar="DIR", help="a recording with truth"
     )
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS, help="all unless named")
     parser.add_argument("--colmap-limit", type=float, default=900.0, metavar="SECONDS")
     return parser.parse_args()
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-_OVERLAP, _THREADS = 8, 2
+_OVERLAP, _THREADS, _LEAST_ANGLE_DEG = 8, 2, 8.0
 
 
 def installed() -> bool:
@@ -39,6 +39,8 @@ def reconstruct(pictures: Path, parameters: str, result: Path) -> None:
         device=pycolmap.Device.cpu,
     )  # fmt: skip
     options = pycolmap.IncrementalPipelineOptions(num_threads=_THREADS)
+    # Left alone it refuses to begin: a probe in a pipe moves along its line of sight.
+    options.mapper.init_max_forward_motion, options.mapper.init_min_tri_angle = 1.0, _LEAST_ANGLE_DEG
     # The probe file's camera is the best there is: refining it on a tube only bends the tube.
     options.ba_refine_focal_length = options.ba_refine_principal_point = options.ba_refine_extra_params = (
         False

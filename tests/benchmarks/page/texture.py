@@ -21,7 +21,7 @@ from tests.benchmarks.page.inputs import Inputs
 from tests.benchmarks.page.section import TIMES, Method, Quantity, Section, clocked
 from tests.shared_data import PROJECT_ROOT
 
-_EVERY, _SIDES, _TILT_DEG, _FIELD_DEG, _VIEW_PX = 6, 8, 62.0, 50.0, 512
+_EVERY, _SIDES, _TILT_DEG, _FIELD_DEG, _VIEW_PX = 12, 8, 62.0, 50.0, 512
 _TEXTURE_PX = 4096
 _SETUP = (
     "All get boresight's poses, wall and LED frames. open3d (t.geometry, project_images_to_albedo) takes "

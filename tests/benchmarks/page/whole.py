@@ -19,7 +19,8 @@ from tests.shared_data import PROJECT_ROOT
 _EVERY, _NAME = 5, "COLMAP, sparse"
 _SETUP = (
     f"COLMAP (pycolmap) gets each {_EVERY}th LED frame, the probe's camera as OPENCV_FISHEYE, held fixed, "
-    "sequential matching and incremental mapping, two threads, no GPU, and a time limit. It has no laser and "
+    "sequential matching and incremental mapping, two threads, no GPU, and a time limit. By its defaults it "
+    "refuses to begin with pictures taken along the line of sight: that is allowed it. It has no laser and "
     "no encoder; its scale is set by the encoder's total, and its diameter is that of the cylinder fitted to "
     "its points. It stops at sparse points: a dense wall and its texture would come on top.",
     "Boresight's time is that of the whole run as started from the command line, to the model, findings and "
