@@ -14,7 +14,7 @@ from rich.table import Table
 from pipeline.commands.prove_cases import Drawing, Worked, draw_case, require_seal, worked
 from pipeline.commands.prove_report import rows_of, write_report
 from pipeline.disk import disk_errors_named
-from pipeline.errors import InputError
+from pipeline.errors import BoresightError, InputError
 from stages.diagnose.drill.cases import find_cases
 
 _PRIOR = Path(__file__).resolve().parents[2] / "configs" / "priors" / "pairs.yaml"
@@ -66,7 +66,12 @@ def _drawn_and_worked(
     """Draw, render and diagnose one case after the other, several at a time."""
 
     def work(index: int) -> Worked:
-        return _told(worked(draw_case(drawing, index), output, drawing.truth, leave_out), console)
+        try:
+            case = draw_case(drawing, index)
+        except BoresightError as error:
+            # An effect too small for its scene to show is refused: the others go on.
+            return _told(Worked((), None, (str(error),), None), console)
+        return _told(worked(case, output, drawing.truth, leave_out), console)
 
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(work, range(cases)))

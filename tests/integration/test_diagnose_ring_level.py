@@ -2,13 +2,18 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.simulator.effects.switch import parse_switches
 from pipeline.simulator.scene import read_scene
+from stages.diagnose.effects.generic import GENERIC, STEADY
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
 from stages.diagnose.gauge.examine import Examined, examine
+from stages.diagnose.gauge.fit import fit
+from stages.diagnose.gauge.formula import says_the_same
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.result import Verdict
 from tests.benchmarks.ring_level import ring_level_run
 
@@ -39,6 +44,15 @@ def test_a_tilt_is_named_with_its_size():
     size = effect.parameters["tilt_deg"]
     assert size.value == pytest.approx(0.3, abs=4 * size.sd)
     assert size.sd < 0.03
+    # A formula that grows as a tilt does says that very tilt, and no other effect.
+    run, verdicts = found.searched.run, found.verdicts
+    assert verdicts is not None
+    (pattern,) = [term for term in GENERIC if term.name == "generic_line_1_2"]
+    formula_fit = fit(run, found.searched.nothing.state, [Term(pattern, STEADY, np.zeros(2))])
+    tilt, *others = [j.fit for j in verdicts.judged if j.named]
+    assert says_the_same(run, formula_fit, tilt)
+    assert others
+    assert not any(says_the_same(run, formula_fit, other) for other in others)
 
 
 def test_a_tilt_that_the_library_lacks_is_not_misnamed_but_described():

@@ -1,9 +1,13 @@
 """Classes of effects that one kind of recording cannot split, and what to record next."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import pytest
 
 from pipeline.physics.catalogue import CLASSES, EFFECTS
 from stages.diagnose.classes import alike, class_of, classes_of, record_next
+from stages.diagnose.gauge.examine import _untested
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -33,3 +37,11 @@ def test_what_to_record_next_names_each_recording_once():
         record_next(["outside_index"])
         == "To confirm outside_index, record: a log of pressure and temperature."
     )
+
+
+def test_what_looks_alike_and_has_no_model_is_not_excluded():
+    seen = cast(Any, SimpleNamespace(best=SimpleNamespace(named=True, names=("dome_axial",))))
+    assert _untested(seen, ("focal_scale", "laser_tilt")) == ("focal_scale",)
+    assert _untested(seen, ()) == ()
+    unnamed = cast(Any, SimpleNamespace(best=SimpleNamespace(named=False, names=("generic_rows",))))
+    assert _untested(unnamed, ("focal_scale",)) == ()
