@@ -15,6 +15,8 @@ from pipeline.errors import InputError
 _CONNECT_S = 15
 # A recording is given up after so many workers were lost over it: it may be what kills them.
 _LOST_WORKERS = 5
+# What becomes of work when nobody is there to hand it out.
+_GONE = ("cancelled", "lost")
 
 
 @contextmanager
@@ -49,11 +51,22 @@ def workers(count: int | None, scheduler: str) -> Iterator[Client]:
 
 
 def endings(client: Client, works: Sequence[Work]) -> Iterator[Ending]:
-    """Yield the ending of every recording as it comes; one whose workers were all lost has failed."""
+    """Yield the ending of every recording as it comes; one that lost too many workers failed.
+
+    Raises
+    ------
+    InputError
+        When the scheduler is lost.
+    """
     futures = {client.submit(run_one, work, key=f"run-{work.name}", pure=False): work for work in works}
     for future in as_completed(list(futures)):
         if future.status == "finished":
             yield future.result()
+        elif future.status in _GONE:
+            raise InputError(
+                client.scheduler.address if client.scheduler else "scheduler", "the scheduler was lost",
+                hint="start it again, or leave out --scheduler; the same command then continues",
+            )  # fmt: skip
         else:
             problem = f"{_LOST_WORKERS} workers were lost over it: {future.exception()}"
             yield Ending(futures[future].name, "failed", problem)

@@ -60,7 +60,7 @@ def run_one(work: Work) -> Ending:
         # A lost worker's process may hold the folder until the system has ended it.
         time.sleep(_WAIT_S)
         code, told = _run(work)
-    return _ending(work, code, told)
+    return ending_of(work, code, told)
 
 
 def _run(work: Work) -> tuple[int, str]:
@@ -78,7 +78,8 @@ def _end_with_parent() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _ending(work: Work, code: int, told: str) -> Ending:
+def ending_of(work: Work, code: int, told: str) -> Ending:
+    """Return how a run ended, from its exit status, what it said, and the record that it left."""
     record = _record(work.folder)
     if code and (record is None or not record.get("problem") or record["problem"] not in told):
         # The record is of an earlier call, or could not be brought up to date: the disk may be the cause.

@@ -3,6 +3,8 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 
@@ -12,10 +14,13 @@ from typer.testing import CliRunner
 from pipeline.batch.cluster import endings, workers
 from pipeline.batch.find import find_recordings
 from pipeline.batch.summary import write_summary
-from pipeline.batch.work import Ending, Work
+from pipeline.batch.work import Ending, Work, ending_of
 from pipeline.cli import app
 from pipeline.errors import InputError
 from tests.bad_recordings import cut_sample
+from tests.dask_cluster import DaskCluster, end
+from tests.run_content import run_content
+from tests.shared_data import PROJECT_ROOT
 
 FEW = ("--set", "rings.azimuths=360")
 
@@ -56,6 +61,85 @@ def test_a_lost_worker_loses_nothing(recordings, single, tmp_path):
     assert "key kind: is missing" in ended["broken"].problem
     for name in ("radius_map.npz", "trajectory.csv", "defects.json", "model.glb"):
         assert (tmp_path / "one" / name).read_bytes() == (single / name).read_bytes()
+
+
+def working(folder):
+    """Wait until a run below a batch's folder is at work in its first stage."""
+    until = time.monotonic() + 120
+    while not any("stage rings starts" in f.read_text() for f in folder.glob("*/.boresight/run.log")):
+        assert time.monotonic() < until, "no run came to its first stage"
+        time.sleep(0.05)
+
+
+def batch_of(recordings, folder, *words):
+    command = [sys.executable, "-m", "pipeline.cli", "batch", str(recordings), "-o", str(folder), *FEW]
+    return subprocess.Popen([*command, *words], cwd=PROJECT_ROOT, stderr=subprocess.PIPE, text=True)
+
+
+def test_workers_of_a_cluster_killed_while_they_work_lose_nothing(recordings, single, tmp_path):
+    with DaskCluster(tmp_path, 2) as cluster:
+        batch = batch_of(recordings, tmp_path / "out", "--scheduler", cluster.address)
+        working(tmp_path / "out")
+        for lost in cluster.workers[:]:
+            end(lost)
+        cluster.add_worker()
+        _, told = batch.communicate(timeout=300)
+    assert batch.returncode == 3, told
+    runs = json.loads((tmp_path / "out" / "batch.json").read_text())["runs"]
+    assert {r["name"]: r["state"] for r in runs} == {
+        "one": "completed",
+        "deep-two": "completed",
+        "broken": "refused",
+    }
+    assert run_content(tmp_path / "out" / "one") == run_content(single)
+
+
+def test_a_scheduler_lost_is_told_and_the_batch_goes_on_later(recordings, single, tmp_path):
+    with DaskCluster(tmp_path, 1) as cluster:
+        batch = batch_of(recordings / "one", tmp_path / "out", "--scheduler", cluster.address)
+        working(tmp_path / "out")
+        end(cluster.scheduler)
+        _, told = batch.communicate(timeout=120)
+    assert batch.returncode == 2, told
+    assert "the scheduler was lost" in told
+    assert "the same command" in told
+    again = batch_of(recordings / "one", tmp_path / "out", "--workers", "1")
+    _, told = again.communicate(timeout=300)
+    assert again.returncode == 0, told
+    assert run_content(tmp_path / "out" / "one") == run_content(single)
+
+
+@pytest.mark.parametrize(
+    ("code", "told", "record", "expected"),
+    [
+        (
+            2,
+            "boresight: a.csv: is cut off",
+            {"state": "completed"},
+            ("refused", "boresight: a.csv: is cut off"),
+        ),
+        (2, "no room", {"state": "running", "problem": ""}, ("refused", "no room")),
+        (-9, "", {"state": "running", "problem": ""}, ("failed", "it ended with status -9")),
+        (
+            2,
+            "a.csv: is cut off",
+            {"state": "unusable", "problem": "no ring"},
+            ("refused", "a.csv: is cut off"),
+        ),
+        (3, "boresight: no ring", {"state": "unusable", "problem": "no ring"}, ("unusable", "no ring")),
+        (0, "", {"state": "completed", "problem": ""}, ("completed", "")),
+    ],
+)
+def test_an_ending_is_that_of_this_call_not_of_an_earlier_one(tmp_path, code, told, record, expected):
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    ending = ending_of(Work("a", tmp_path, tmp_path, ()), code, told)
+    assert (ending.state, ending.problem) == expected
+
+
+def test_a_summary_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        write_summary([Ending("a", "completed", "")], tmp_path / "file")
 
 
 def test_the_summary_tells_every_ending_in_the_order_of_names(tmp_path):
