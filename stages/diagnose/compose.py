@@ -30,7 +30,8 @@ def composed(
     examined = gauge.geometry if gauge is not None else None
     every = claims_of(field, gauge)
     claims = [c for c in every if c.name not in without]
-    verdict = of_gauge.verdict_of(examined) if examined is not None else Verdict.NOT_IDENTIFIABLE
+    nameless = len(claims) < len(every)
+    verdict = verdict_of_rings(examined, bool(claims))
     effects = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(claims, effects)
     members: tuple[str, ...] = ()
@@ -42,12 +43,12 @@ def composed(
         every_name = [*doubted, *(c.name for c in claims), *(e.name for e in effects)]
         members = classes_of(every_name) if doubted else ()
     p_value = _global_p(field, gauge)
-    if len(claims) < len(every) and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE):
+    if nameless and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE):
         verdict = Verdict.UNEXPLAINED
     if verdict is Verdict.UNEXPLAINED:
         effects = ()
     named = (*effects, *(c.found for c in claims))
-    if verdict is Verdict.NAMED and (len(claims) < len(every) or not all(map(_confirmed, named))):
+    if verdict is Verdict.NAMED and (nameless or not all(map(_confirmed, named))):
         verdict, members = Verdict.CLASS, classes_of([e.name for e in named])
     asked = members if verdict is Verdict.CLASS else [e.name for e in named]
     return Diagnosis(
@@ -67,6 +68,19 @@ def composed(
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
         ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
     )
+
+
+def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
+    """Return what rings and fiducials of a gauge run come to beside what other channels claim, if anything.
+
+    Where something touches them for which nothing is still the likeliest pattern, it is the claim's doing:
+    play or a slip pulls at the poses too.
+    """
+    if examined is None:
+        return Verdict.NOT_IDENTIFIABLE
+    verdict = of_gauge.verdict_of(examined)
+    patternless = examined.best is not None and not examined.best.names
+    return Verdict.CONSISTENT if claimed and patternless and verdict is Verdict.UNEXPLAINED else verdict
 
 
 def _rivals(claim: Claim) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.claims import rocking_excluded
-from stages.diagnose.compose import composed
+from stages.diagnose.compose import composed, verdict_of_rings
 from stages.diagnose.result import Confirmation, Diagnosis, Verdict
 from stages.diagnose.seen import Seen
 from stages.diagnose.travel.events import StepFound
@@ -175,3 +175,19 @@ def test_a_swing_that_a_rocking_sheet_may_make_is_a_class(real_probe: Probe) -> 
     assert set(found.members) == {"probe_vibration", "laser_rocking"}
     lit = replace(SWING, lit_mm=0.3, share_sigma_mm=0.003)
     assert of_gauge(real_probe, lines=(lit,)).verdict is Verdict.NAMED
+
+
+@pytest.mark.parametrize(
+    ("names", "claimed", "verdict"),
+    [
+        ((), True, Verdict.CONSISTENT),
+        ((), False, Verdict.UNEXPLAINED),
+        (("a pattern",), True, Verdict.UNEXPLAINED),
+    ],
+)
+def test_what_touches_rings_without_a_pattern_is_the_doing_of_what_motion_shows(
+    names: tuple[str, ...], claimed: bool, verdict: Verdict
+) -> None:
+    best = SimpleNamespace(named=False, names=names)
+    rings = SimpleNamespace(best=best, verdicts=SimpleNamespace(adequacy=0.5), confirmed=(), unsplit=())
+    assert verdict_of_rings(cast(Any, rings), claimed) is verdict

@@ -72,6 +72,16 @@ def test_missing_pictures_at_steady_speed_are_not_called_a_slip() -> None:
     assert found[0].missing_s == pytest.approx(2 / 30, abs=0.01)
 
 
+def test_a_slip_of_the_size_of_missing_pictures_is_told_by_the_jump_of_the_reading() -> None:
+    sight, encoder = seen(np.random.default_rng(7), False), read(False)
+    noise = sight.distance_mm - way(sight.time_s, False)
+    even = replace(sight, distance_mm=18.0 * sight.time_s + noise)
+    reading = 18.0 * encoder.time_s + np.where(encoder.time_s > 4.002, -18.0 * 2 / 30, 0.0)
+    slipped = replace(encoder, distance_mm=QUANTUM_MM * np.round(reading / QUANTUM_MM))
+    (found,) = slips(even, slipped)
+    assert found.gain_mm == pytest.approx(-1.2, abs=0.1)
+
+
 def test_a_slip_leaves_delay_and_scale_alone() -> None:
     sight = seen(np.random.default_rng(6))
     plain, slipped = (with_events(sight, read(slips=s)) for s in ((), ((3.0, 5.0),)))

@@ -140,6 +140,9 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     k = moment(sight, encoder, event.place)
     time_s = (encoder.time_s[k] + encoder.time_s[k + 1]) / 2
     again = jump_of_reading(encoder, k, float(fit.values[at]), sigma)
+    if again is not None and again.confirmation.agrees:
+        # Nothing that befalls pictures makes the reading jump.
+        rivals = ()
     return StepFound(
         event.place, float(time_s), float(fit.values[at]), sigma,
         chance(z2, 2 * count, count), rivals, size[EventKind.LOST_TIME], () if again is None else (again,),

@@ -202,7 +202,9 @@ def turns_between(sight: Sight, steady: Encoder, delay_s: float) -> Turns:
 
 def moment(sight: Sight, encoder: Encoder, place: int) -> int:
     """Return the reading after which it jumped most between two pictures: readings come more often."""
-    before, after = sight.time_s[place - 1], sight.time_s[place]
+    # One reading more on either side: pictures and readings are stamped to about that.
+    stamp = float(np.median(np.diff(encoder.time_s)))
+    before, after = sight.time_s[place - 1] - stamp, sight.time_s[place] + stamp
     inside = np.flatnonzero((encoder.time_s[1:] >= before) & (encoder.time_s[:-1] <= after))
     if not len(inside):
         return int(np.clip(np.searchsorted(encoder.time_s, after) - 1, 0, len(encoder.time_s) - 2))
