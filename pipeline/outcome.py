@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
 Artefact = TypeVar("Artefact")
+# Name of a number that is no number but words to be shown before all others.
+WARNING = "warning"
 
 
 class State(StrEnum):
@@ -65,6 +68,11 @@ class RunOutcome:
     stages: tuple[StageOutcome, ...]
     metrics: tuple[Number, ...] = ()
     problem: str = ""
+
+
+def warnings_of(stages: Iterable[StageOutcome]) -> tuple[str, ...]:
+    """Return what stages warn of, each with the stage's name."""
+    return tuple(f"{s.name}: {n.value}" for s in stages for n in s.numbers if n.name == WARNING)
 
 
 @dataclass(frozen=True)
