@@ -190,12 +190,16 @@ def _print_inputs(console: Console, name: str, warnings: tuple[str, ...]) -> Non
 
 
 def _print_outcome(outcome: RunOutcome, folder: Path) -> None:
+    from pipeline.outcome import warnings_of
+
     for number in outcome.metrics:
         typer.echo(f"{number.name:<48} {number.value} {number.unit}".rstrip())
     for stage in outcome.stages:
         for number in stage.numbers:
             if "rejected" in number.name and number.value:
                 typer.echo(f"{stage.name + ': ' + number.name:<48} {number.value} {number.unit}".rstrip())
+    for warning in warnings_of(outcome.stages):
+        typer.echo(f"warning: {warning}", err=True)
     report = folder / "report.html"
     typer.echo(f"Report: {report.resolve()}" if report.is_file() else f"Run folder: {folder.resolve()}")
     if report.is_file():

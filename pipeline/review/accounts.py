@@ -7,6 +7,7 @@ from collections import Counter
 import numpy as np
 
 from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.outcome import WARNING
 from pipeline.review.page import Table
 from pipeline.review.summary import ReportedNumber, RunSummary
 
@@ -83,9 +84,14 @@ def _events(summary: RunSummary) -> Table | None:
 
 
 def _numbers(summary: RunSummary) -> Table | None:
-    told = [n for n in summary.numbers if not n.name.startswith("rejected")]
+    told = [n for n in summary.numbers if n.name != WARNING and not n.name.startswith("rejected")]
     rows = tuple((n.stage, n.name, _value(n)) for n in told)
     return Table("What the stages measured", ("stage", "quantity", "value"), rows) if rows else None
+
+
+def stage_warnings(summary: RunSummary) -> tuple[str, ...]:
+    """Return what stages warn of, each with the stage's name."""
+    return tuple(f"{n.stage}: {n.value}" for n in summary.numbers if n.name == WARNING)
 
 
 def _value(number: ReportedNumber) -> str:

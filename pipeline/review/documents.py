@@ -36,7 +36,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "name": record["recording"]["name"],
         "metrics": record["metrics"],
         "numbers": [{"stage": s["name"], "numbers": s["numbers"]} for s in record["stages"]],
-        "warnings": record["reader_warnings"],
+        "warnings": [*record["reader_warnings"], *record.get("warnings", ())],
         "program": record["program"],
         "inputs": record["input_sha256"],
         "has_recording": pipe is not None,

@@ -9,7 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pipeline.findings import Defect, Sections
 from pipeline.review import cards
-from pipeline.review.accounts import tables
+from pipeline.review.accounts import stage_warnings, tables
 from pipeline.review.page import Finding, Page
 from pipeline.review.pictures import Gallery, gallery
 from pipeline.review.plots import Curve, Plot, plot
@@ -52,7 +52,7 @@ def page_of(summary: RunSummary) -> Page:
         flats=pictures.flats(),
         plots=_plots(summary.sections, summary.recording.pipe.nominal_diameter_mm),
         tables=tables(summary),
-        warnings=summary.recording.warnings,
+        warnings=(*summary.recording.warnings, *stage_warnings(summary)),
     )
 
 

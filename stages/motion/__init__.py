@@ -22,6 +22,7 @@ from stages.motion.prediction import Predictor
 from stages.motion.sections import at_all_frames, ring_centres
 from stages.motion.sliding import RunEstimate, adjust_run
 from stages.motion.state import EncoderReadings
+from stages.motion.stated import report_instrument
 from stages.motion.strip import StripGrid
 from stages.motion.submaps import Estimate
 from stages.motion.tracking import Followed, TextureTracker, track_texture
@@ -73,6 +74,7 @@ def estimate_motion(
     trajectory = trajectory_of(estimate.joined, recording.frames, probe, unsure, encoder is not None)
     events = find_events(recording.frames, trajectory, followed, estimate.joined.slip, encoder is not None)
     _report(context, estimate, followed, trajectory)
+    report_instrument(probe, trajectory, context)
     return replace(trajectory, events=events)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import shutil
 import subprocess
@@ -194,6 +195,20 @@ def test_what_was_mended_is_told(
     assert noticed in told.err
     warnings = json.loads((tmp_path / "run" / "run.json").read_text())["reader_warnings"]
     assert any(noticed in w for w in warnings)
+
+
+def test_a_probe_that_does_not_fit_the_recording_is_told(
+    good: Path, tmp_path: Path, boresight: Callable[..., Told]
+) -> None:
+    """The principal point stated 3 px off, 50 times its σ: the adjustment finds it, and says that it did."""
+    recording = spoilt(good, tmp_path, replaced(PROBE, "796.8972", "799.9"))
+    told = boresight("run", recording, "-o", tmp_path / "run", *QUICK)
+    assert told.code == 0, told.err
+    (warning,) = json.loads((tmp_path / "run" / "run.json").read_text())["warnings"]
+    assert "the stated probe does not fit this recording" in warning
+    assert "run boresight diagnose" in warning.lower()
+    assert warning in told.err
+    assert warning in html.unescape((tmp_path / "run" / "report.html").read_text())
 
 
 def test_a_full_disk_keeps_what_was_computed(

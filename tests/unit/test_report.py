@@ -127,6 +127,18 @@ def test_mark_lies_in_the_middle_of_the_flat_view(summary):
     assert mark.top + mark.height / 2 == pytest.approx(50, abs=2)
 
 
+def test_what_stages_warn_of_is_told_first_and_as_text(summary, tmp_path):
+    warned = replace(
+        summary, numbers=(*summary.numbers, ReportedNumber("motion", "warning", f"36 σ {HOSTILE}"))
+    )
+    text = written(warned, tmp_path)
+    assert text.index("motion: 36 σ &lt;script&gt;") < text.index("Ring samples")
+    assert text.count("36 σ") == 1
+    assert "Noticed" not in written(
+        replace(summary, recording=replace(summary.recording, warnings=())), tmp_path
+    )
+
+
 def test_every_frame_and_sample_is_accounted_for(summary):
     told = {t.caption: t for t in tables(summary)}
     samples = {r[0]: int(r[1]) for r in told["Ring samples"].rows}

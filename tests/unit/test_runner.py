@@ -64,6 +64,19 @@ def test_run_json_tells_what_was_run(tmp_path: Path) -> None:
     assert told["reader_warnings"] == ["mended"]
 
 
+def warn_of_it(drawn: Drawn, *, parameters: Any, context: Context) -> SMOOTH.output():  # type: ignore[valid-type]
+    context.report("warning", "the probe was moved by 36 σ")
+    return SMOOTH.function(drawn, parameters=parameters, context=context)
+
+
+def test_what_a_stage_warns_of_stands_in_run_json_also_when_it_is_reused(tmp_path: Path) -> None:
+    job = toy_job(tmp_path / "run")
+    job = replace(job, stages=(DRAW, replace(SMOOTH, function=warn_of_it), job.stages[2]))
+    for _ in range(2):
+        run_job(job, Selection(), SilentDisplay())
+        assert record(tmp_path / "run")["warnings"] == ["smooth: the probe was moved by 36 σ"]
+
+
 def test_numbers_of_reused_stages_are_told_again(tmp_path: Path) -> None:
     first = run_toys(tmp_path / "run")
     again = run_toys(tmp_path / "run")

@@ -1,0 +1,77 @@
+"""A probe that the adjustment had to move by many σ is told of; one that it merely refined is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts import PipeAxis, Trajectory
+from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from pipeline.stage import quiet_context
+from stages.motion.stated import report_instrument
+
+COUNT = 20
+
+
+def probe(covariance: np.ndarray) -> Probe:
+    camera = KannalaBrandt((1600, 1200), (360.0, 360.0), (799.5, 599.5))
+    return Probe(camera, LaserSheet(22.0), covariance)
+
+
+def told(stated: Probe, change: np.ndarray | None) -> dict[str, object]:
+    axis = PipeAxis(np.array([-9.0, 99.0]), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)))
+    poses, found = np.tile(np.eye(4), (3, 1, 1)), None if change is None else stated.parameters + change
+    trajectory = Trajectory(
+        np.arange(3), np.arange(3) / 30, poses, np.zeros((3, 6, 6)), axis, 50.0, 1.0, 0.001, 0.0005, (), found
+    )
+    numbers: dict[str, object] = {}
+    context = replace(quiet_context(), report=lambda name, value, unit="": numbers.update({name: value}))
+    report_instrument(stated, trajectory, context)
+    return numbers
+
+
+def loose(**sigma: float) -> np.ndarray:
+    names = probe(np.zeros((COUNT, COUNT))).parameter_names
+    return np.diag([sigma.get(name, 0.0) ** 2 for name in names])
+
+
+def at(name: str, value: float) -> np.ndarray:
+    names = probe(np.zeros((COUNT, COUNT))).parameter_names
+    return np.array([value if n == name else 0.0 for n in names])
+
+
+def test_moved_by_36_sigma_is_a_warning_with_the_figure() -> None:
+    numbers = told(probe(loose(baseline_mm=0.008, fx=0.05)), at("baseline_mm", -0.288))
+    assert numbers["instrument moved by the adjustment, at most"] == pytest.approx(36)
+    text = str(numbers["warning"])
+    assert "the stated probe does not fit this recording" in text
+    assert "36 times" in text
+    assert "baseline_mm by -0.288" in text
+    assert "boresight diagnose" in text
+
+
+@pytest.mark.parametrize(("times", "warned"), [(0.0, False), (2.0, False), (4.9, False), (5.1, True)])
+def test_refined_within_its_uncertainty_is_not(times: float, warned: bool) -> None:
+    numbers = told(probe(loose(baseline_mm=0.008, fx=0.05)), at("fx", 0.05 * times))
+    assert ("warning" in numbers) is warned
+
+
+def test_a_move_against_a_known_correlation_counts_as_what_it_is() -> None:
+    """Two σ each are nothing when the two go together, and far when they are known to go together."""
+    covariance = loose(fx=0.05, fy=0.05)
+    both = at("fx", 0.1) - at("fy", 0.1)
+    assert "warning" not in told(probe(covariance), both)
+    covariance[0, 1] = covariance[1, 0] = 0.98 * 0.05**2
+    assert "warning" in told(probe(covariance), both)
+    assert "warning" not in told(probe(covariance), at("fx", 0.1) + at("fy", 0.1))
+
+
+def test_nothing_is_said_of_a_probe_left_as_stated() -> None:
+    assert told(probe(loose(fx=0.05)), None) == {}
+    assert told(probe(np.zeros((COUNT, COUNT))), np.zeros(COUNT)) == {
+        "instrument moved by the adjustment, at most": 0.0
+    }
