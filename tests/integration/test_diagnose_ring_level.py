@@ -45,14 +45,13 @@ def test_a_tilt_is_named_with_its_size():
     assert size.value == pytest.approx(0.3, abs=4 * size.sd)
     assert size.sd < 0.03
     # A formula that grows as a tilt does says that very tilt, and no other effect.
-    run, verdicts = found.searched.run, found.verdicts
-    assert verdicts is not None
+    run = found.searched.run
     (pattern,) = [term for term in GENERIC if term.name == "generic_line_1_2"]
     formula_fit = fit(run, found.searched.nothing.state, [Term(pattern, STEADY, np.zeros(2))])
-    tilt, *others = [j.fit for j in verdicts.judged if j.named]
-    assert says_the_same(run, formula_fit, tilt)
-    assert others
-    assert not any(says_the_same(run, formula_fit, other) for other in others)
+    other = fit(run, found.searched.nothing.state, [Term(LIBRARY["principal_point"], (), np.zeros(2))])
+    assert found.best is not None
+    assert says_the_same(run, formula_fit, found.best.fit)
+    assert not says_the_same(run, formula_fit, other)
 
 
 def test_a_tilt_that_the_library_lacks_is_not_misnamed_but_described():

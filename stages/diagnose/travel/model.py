@@ -30,6 +30,8 @@ _AROUND = 10
 # less than this share tell nothing of a delay.
 _SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
 _WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
+# χ² of two numbers that chance exceeds once in 10⁵.
+_FAR_BETTER = 23.0
 
 
 @dataclass(frozen=True)
@@ -101,15 +103,14 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     steady = _without_steps(sight, encoder, events)
     speed = np.gradient(sight.distance_mm, sight.time_s)
     searched = _nearest_start(sight, steady, events, speed)
-    # Play and delay can stand in for each other: nothing at all is a start too, and the better end counts.
+    # Play and delay can cancel each other: a pair of both must fit far better than what starts from nothing.
     from_search, from_nothing = (_refined(sight, steady, events, speed, s) for s in (searched, (0.0, 0.0)))
     if noise is None:
         noise = estimated_noise(*from_search, sight.path_mm, quantum_mm(encoder) / np.sqrt(12))
     covariance_mm = noise.covariance(sight.path_mm)
-    whitened, columns = min(
-        ((whitened_fit(y, columns, covariance_mm), columns) for y, columns in (from_nothing, from_search)),
-        key=lambda end: float(end[0].residual @ end[0].weighted),
-    )
+    ends = [(whitened_fit(y, x, covariance_mm), x) for y, x in (from_nothing, from_search)]
+    plain_misfit, searched_misfit = (float(w.residual @ w.weighted) for w, _ in ends)
+    whitened, columns = ends[int(searched_misfit < plain_misfit - _FAR_BETTER)]
     values = np.where(np.isfinite(np.diag(whitened.covariance)), whitened.estimate, 0.0)
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
     # Noise is measured from the pictures' usual steps: what is left in all may be more, never less.
