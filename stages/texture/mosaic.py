@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts import Byte
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Image
+from pipeline.scratch import Scratch
 from stages.texture.blend import TileStack
 from stages.texture.grid import FlatGrid
 from stages.texture.photometry import Light
@@ -20,8 +22,9 @@ from stages.texture.surface import SurfacePatch, WallSurface
 from stages.texture.views import LitViews, TileViews
 
 
-class Mosaic:
-    """Blended colours and sample counts of all pixels; holds samples only of the tiles in view.
+@dataclass(frozen=True)
+class Blended:
+    """Blended colours and sample counts of all pixels.
 
     Attributes
     ----------
@@ -31,6 +34,19 @@ class Mosaic:
         Samples behind each pixel; 0 where there was none.
     """
 
+    colour: NDArray[np.uint16]
+    count: Byte
+
+    @staticmethod
+    def empty(grid: FlatGrid, scratch: Scratch) -> Blended:
+        """Return room for the picture of a grid."""
+        shape = (grid.rows, grid.columns)
+        return Blended(scratch.zeros((*shape, 3), np.uint16), scratch.zeros(shape, np.uint8))
+
+
+class Mosaic:
+    """Samples the views of some tiles into a picture; holds samples only of the tiles in view."""
+
     def __init__(
         self,
         grid: FlatGrid,
@@ -38,19 +54,20 @@ class Mosaic:
         probe: Probe,
         views: LitViews,
         plan: Sequence[TileViews],
+        tiles: range,
         light: Light,
         laser_band_mm: float,
+        picture: Blended,
     ) -> None:
         self._grid, self._surface, self._probe = grid, surface, probe
         self._views, self._plan, self._light, self._band = views, plan, light, laser_band_mm
         self._tiles = grid.tiles()
         self._tiles_of: dict[int, list[int]] = defaultdict(list)
-        for tile, chosen in enumerate(plan):
-            for view in chosen.views:
+        for tile in tiles:
+            for view in plan[tile].views:
                 self._tiles_of[int(view)].append(tile)
         self._open: dict[int, tuple[SurfacePatch, TileStack]] = {}
-        self.colour: NDArray[np.uint16] = np.zeros((grid.rows, grid.columns, 3), np.uint16)
-        self.count: Byte = np.zeros((grid.rows, grid.columns), np.uint8)
+        self._picture = picture
 
     def add(self, view: int, image: Image | None, pool: Executor) -> None:
         """Sample one view, in order, into every tile that wants it; None when there is no such image."""
@@ -83,4 +100,4 @@ class Mosaic:
         colour, count = self._open.pop(tile)[1].blend()
         rows = slice(self._tiles[tile].first_row, self._tiles[tile].last_row)
         inside = rows.stop - rows.start
-        self.colour[rows], self.count[rows] = colour[:inside], count[:inside]
+        self._picture.colour[rows], self._picture.count[rows] = colour[:inside], count[:inside]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -84,13 +84,15 @@ class LightSampler:
             LightSamples(ratio, theta[use], azimuth[use], cell[use], np.full(ratio.shape, view))
         )
 
-    def samples(self) -> LightSamples:
-        """Return all samples taken so far."""
+    def take(self, views: Int) -> LightSamples:
+        """Return the samples taken since the last time, their views counted in a list (W,) of them."""
+        parts, self._parts = self._parts, []
         fields = ("log_ratio", "theta_rad", "azimuth_rad", "cell", "view")
-        if not self._parts:
+        if not parts:
             none, whole = np.zeros(0), np.zeros(0, np.int64)
             return LightSamples(none, none, none, whole, whole)
-        return LightSamples(*(np.concatenate([getattr(p, f) for p in self._parts]) for f in fields))
+        samples = LightSamples(*(np.concatenate([getattr(p, f) for p in parts]) for f in fields))
+        return replace(samples, view=np.searchsorted(views, samples.view))
 
     @property
     def reference(self) -> float:

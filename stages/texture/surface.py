@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +12,10 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from pipeline.artefacts import Float, PipeAxis, RadiusMap, Wall
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import frames_at
+from pipeline.scratch import Scratch
 
 _SEEN_ROW = 0.2
+_BLOCK_ROWS, _MORE_ROWS = 2000, 200
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,9 @@ class WallSurface:
         return np.asarray(map_coordinates(values, where, np.float64, order=1, mode="grid-wrap"))
 
 
-def wall_surface(wall: Wall, smoothing_mm: float, shading_mm: float) -> WallSurface:
+def wall_surface(
+    wall: Wall, smoothing_mm: float, shading_mm: float, scratch: Scratch | None = None
+) -> WallSurface:
     """Return the surface of a measured wall.
 
     Parameters
@@ -90,12 +95,15 @@ def wall_surface(wall: Wall, smoothing_mm: float, shading_mm: float) -> WallSurf
         1 σ of the smoothing of the radii, against their noise.
     shading_mm
         1 σ of the smoothing of the slopes, which are noisier.
+    scratch
+        Room for long walls.
 
     Raises
     ------
     UnusableError
         When fewer than two rows of the radius map hold radii.
     """
+    scratch = scratch or Scratch()
     seen = np.flatnonzero(np.isfinite(wall.radius_map.radius_mm).mean(1) >= _SEEN_ROW)
     if len(seen) < 2:
         raise UnusableError(
@@ -105,14 +113,27 @@ def wall_surface(wall: Wall, smoothing_mm: float, shading_mm: float) -> WallSurf
     rows = slice(seen[0], seen[-1] + 1)
     distance = wall.radius_map.distance_mm[rows]
     step = _steps(wall.radius_map)
-    radius = smoothed(wall.radius_map.radius_mm[rows], tuple(smoothing_mm / s for s in step))
-    shape = smoothed(radius, tuple(shading_mm / s for s in step))
-    along = np.gradient(shape, step[0], axis=0)
-    around = (np.roll(shape, -1, 1) - np.roll(shape, 1, 1)) / (2 * step[1])
-    return WallSurface(
-        wall.axis, distance, radius, along.astype(np.float32), around.astype(np.float32),
-        (float(distance[0]), float(distance[-1])),
-    )  # fmt: skip
+    measured = wall.radius_map.radius_mm[rows]
+    radius, along, around = (scratch.zeros(measured.shape, np.float32) for _ in range(3))
+    for part, wide, inner in _blocks(measured):
+        smooth = smoothed(measured[wide], tuple(smoothing_mm / s for s in step))
+        shape = smoothed(smooth, tuple(shading_mm / s for s in step))
+        radius[part], along[part] = smooth[inner], np.gradient(shape, step[0], axis=0)[inner]
+        around[part] = ((np.roll(shape, -1, 1) - np.roll(shape, 1, 1)) / (2 * step[1]))[inner]
+    return WallSurface(wall.axis, distance, radius, along, around, (float(distance[0]), float(distance[-1])))
+
+
+def _blocks(radius_mm: NDArray[np.float32]) -> Iterator[tuple[slice, slice, slice]]:
+    """Yield rows, the same with more on both sides that hold some radii, and the rows within these."""
+    rows = len(radius_mm)
+    for first in range(0, rows, _BLOCK_ROWS):
+        last, more = min(first + _BLOCK_ROWS, rows), _MORE_ROWS
+        while True:
+            wide = slice(max(first - more, 0), min(last + more, rows))
+            if np.isfinite(radius_mm[wide]).any():
+                break
+            more *= 2
+        yield slice(first, last), wide, slice(first - wide.start, last - wide.start)
 
 
 def smoothed(radius_mm: NDArray[np.float32], sigma_px: tuple[float, ...]) -> NDArray[np.float32]:

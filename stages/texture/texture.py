@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -12,12 +12,12 @@ from pipeline.artefacts import Int, Trajectory, Wall, WallTexture
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Image, Recording
 from pipeline.stage import Context, Parameters
+from stages.texture.chain import LightChain, cut_plan
 from stages.texture.grid import FlatGrid, flat_grid
-from stages.texture.mosaic import Mosaic
-from stages.texture.photometry import Light, solve_light
+from stages.texture.mosaic import Blended, Mosaic
 from stages.texture.sampling import LightSampler
 from stages.texture.surface import wall_surface
-from stages.texture.views import LitViews, TileViews, lit_views, plan_tiles
+from stages.texture.views import LitViews, lit_views, plan_tiles
 
 _WHITE = 250.0
 
@@ -41,6 +41,9 @@ class TextureParameters(Parameters):
     laser_band_mm: float = Field(
         1.0, ge=0.0, le=20.0, description="half width left out about the laser line when it is on, mm"
     )
+    views_at_once: int = Field(
+        1500, ge=20, le=100000, description="frames whose light is worked out together; more in a longer pipe"
+    )
     white_quantile: float = Field(
         0.9995, ge=0.5, le=1.0, description="quantile of the brightest colour that becomes 250 of 255"
     )
@@ -55,68 +58,78 @@ def photograph_wall(
     context: Context,
 ) -> WallTexture:
     """Return the wall's reflectance as a flat picture; where no lit frame shows it, alpha is 0."""
-    surface = wall_surface(wall, parameters.smoothing_mm, parameters.shading_mm)
+    surface = wall_surface(wall, parameters.smoothing_mm, parameters.shading_mm, context.scratch)
     grid = flat_grid(surface, probe, parameters.oversampling, parameters.tile_mm)
     views = lit_views(recording, trajectory)
     reach = parameters.reach_radii * surface.mean_radius_mm
     plan = plan_tiles(grid, surface, views, probe.laser, reach, parameters.most_views)
-    images = _Images(recording, views, plan, context)
+    stretches = cut_plan(plan, parameters.views_at_once)
+    images = _Images(recording, views, sum(len(s.wanted) for s in stretches), context)
 
     sampler = LightSampler(surface, probe, views, reach, parameters.laser_band_mm)
-    for view, image in images.read():
-        sampler.add(view, image)
-    light = solve_light(sampler.samples(), len(views.frame), probe, sampler.reference)
-    _report_light(light, images.wanted, context)
-
-    mosaic = Mosaic(grid, surface, probe, views, plan, light, parameters.laser_band_mm)
-    with ThreadPoolExecutor(context.workers) as pool:
-        for view, image in images.read():
-            mosaic.add(view, image, pool)
-    return _flat_picture(mosaic, grid, parameters.white_quantile, context)
+    picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe)
+    for stretch in stretches:
+        for view, image in images.read(stretch.wanted):
+            sampler.add(view, image)
+        light = lights.add(sampler.take(stretch.wanted), stretch.wanted, sampler.reference)
+        mosaic = Mosaic(
+            grid, surface, probe, views, plan, stretch.tiles, light, parameters.laser_band_mm, picture
+        )
+        with ThreadPoolExecutor(context.workers) as pool:
+            for view, image in images.read(stretch.wanted):
+                mosaic.add(view, image, pool)
+    _report_light(lights, context)
+    return _flat_picture(picture, grid, parameters.white_quantile, context)
 
 
 class _Images:
     """The frames that some tile wants, read twice: for the light and for the picture."""
 
-    def __init__(
-        self, recording: Recording, views: LitViews, plan: Sequence[TileViews], context: Context
-    ) -> None:
-        self._recording, self._views, self._context = recording, views, context
-        chosen = [tile.views for tile in plan]
-        self.wanted: Int = np.unique(np.concatenate(chosen)) if chosen else np.zeros(0, np.int64)
+    def __init__(self, recording: Recording, views: LitViews, wanted: int, context: Context) -> None:
+        self._recording, self._views, self._wanted, self._context = recording, views, wanted, context
         self._done = 0
 
-    def read(self) -> Iterator[tuple[int, Image | None]]:
+    def read(self, wanted: Int) -> Iterator[tuple[int, Image | None]]:
         """Yield (view, image) in order; None where a frame cannot be decoded."""
-        frames = self._views.frame[self.wanted]
-        for view, (_, image) in zip(self.wanted, self._recording.read(frames, "bgr"), strict=True):
+        frames = self._views.frame[wanted]
+        for view, (_, image) in zip(wanted, self._recording.read(frames, "bgr"), strict=True):
             yield int(view), image
             self._done += 1
-            self._context.progress(self._done, 2 * len(self.wanted))
+            self._context.progress(self._done, 2 * self._wanted)
 
 
-def _report_light(light: Light, wanted: Int, context: Context) -> None:
-    gain = light.gain[wanted]
+def _report_light(lights: LightChain, context: Context) -> None:
+    gain = lights.gain[lights.wanted]
     rejected = int(np.isnan(gain).sum())
     context.report("lit frames used for the texture", len(gain) - rejected, "frames")
     context.report("rejected: lit frames too dark, clipped or unreadable", rejected, "frames")
-    context.report("photometric residual", light.residual, "relative")
+    context.report("photometric residual", lights.residual, "relative")
     if rejected < len(gain):
         context.report("spread of exposure between frames", float(np.nanstd(np.log(gain))), "relative")
     else:
         context.logger.warning("no lit frame shows the wall: the model has no texture")
 
 
-def _flat_picture(mosaic: Mosaic, grid: FlatGrid, white_quantile: float, context: Context) -> WallTexture:
+def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, context: Context) -> WallTexture:
     """Scale by one common gain to 8 bits."""
-    seen = mosaic.count > 0
-    brightest = mosaic.colour.max(2)[seen]
-    white = float(np.quantile(brightest, white_quantile)) if brightest.size else 1.0
-    bgra = np.zeros((*seen.shape, 4), np.uint8)
-    for rows in range(0, grid.rows, grid.tile_rows):
-        part = slice(rows, rows + grid.tile_rows)
-        bgra[part, :, :3] = np.minimum(mosaic.colour[part] * np.float32(_WHITE / white) + 0.5, 255)
-    bgra[..., 3] = np.where(seen, 255, 0)
-    context.report("wall textured", float(seen.mean()), "fraction")
-    context.report("views behind a pixel, median", float(np.median(mosaic.count)), "views")
+    parts = [slice(a, a + grid.tile_rows) for a in range(0, grid.rows, grid.tile_rows)]
+    brightness, views = np.zeros(1 << 16, np.int64), np.zeros(1 << 8, np.int64)
+    for part in parts:
+        count = picture.count[part]
+        brightness += np.bincount(picture.colour[part].max(2)[count > 0], minlength=len(brightness))
+        views += np.bincount(count.ravel(), minlength=len(views))
+    white = quantile_of_counts(brightness, white_quantile) if brightness.any() else 1.0
+    bgra = context.scratch.zeros((grid.rows, grid.columns, 4), np.uint8)
+    for part in parts:
+        bgra[part, :, :3] = np.minimum(picture.colour[part] * np.float32(_WHITE / white) + 0.5, 255)
+        bgra[part, :, 3] = np.where(picture.count[part] > 0, 255, 0)
+    context.report("wall textured", float(1 - views[0] / views.sum()), "fraction")
+    context.report("views behind a pixel, median", quantile_of_counts(views, 0.5), "views")
     return WallTexture(bgra, grid.distance_from_mm, grid.mm_per_px, grid.azimuth_from_rad, grid.rad_per_px)
+
+
+def quantile_of_counts(counts: Int, quantile: float) -> float:
+    """Return the quantile of whole numbers that occur ``counts`` (N,) times, linear between two of them."""
+    place = quantile * (int(counts.sum()) - 1)
+    ends = np.searchsorted(np.cumsum(counts), [np.floor(place), np.ceil(place)], side="right")
+    return float(ends[0] + (place - np.floor(place)) * (ends[1] - ends[0]))

@@ -75,22 +75,43 @@ def plan_tiles(
     motion. Where views are rare the reach is widened until three of them show every row. Of several passes
     the one with the most views is taken, so that a tile need not be kept until the probe returns.
     """
-    half_tile = grid.tile_rows * grid.mm_per_px / 2
+    half_tile, lean_mm = grid.tile_rows * grid.mm_per_px / 2, views.lean * surface.mean_radius_mm
+    row = _InOrder(views.distance_mm)
     return [
-        _tile_views(
-            grid.centre_mm(tile) - views.distance_mm - laser.baseline_mm,
-            half_tile, views.lean * surface.mean_radius_mm, reach_mm, most,
-        )
+        _tile_views(row, grid.centre_mm(tile) - laser.baseline_mm, half_tile, lean_mm, reach_mm, most)
         for tile in grid.tiles()
-    ]  # fmt: skip
+    ]
 
 
-def _tile_views(offset_mm: Float, half_tile: float, lean_mm: Float, reach_mm: float, most: int) -> TileViews:
-    nearest = np.sort(np.abs(offset_mm))[:3]
-    reach = max(reach_mm, float(nearest[-1]) + half_tile) if len(nearest) else reach_mm
-    candidates = np.flatnonzero(np.abs(offset_mm) < reach + half_tile + lean_mm)
+class _InOrder:
+    """Views in the order of distance, so that those near a place are found without looking at all."""
+
+    def __init__(self, distance_mm: Float) -> None:
+        self._order = np.argsort(distance_mm, kind="stable")
+        self._sorted = distance_mm[self._order]
+        self.distance_mm = distance_mm
+
+    def third_nearest_mm(self, place_mm: float) -> float | None:
+        """Return how far the third nearest view is, or the farthest of fewer; None where there is none."""
+        at = int(np.searchsorted(self._sorted, place_mm))
+        near = np.sort(np.abs(self._sorted[max(at - 3, 0) : at + 3] - place_mm))[:3]
+        return float(near[-1]) if len(near) else None
+
+    def within(self, place_mm: float, reach_mm: float) -> Int:
+        """Return the views not farther than that, in the order of frames."""
+        ends = np.searchsorted(self._sorted, [place_mm - reach_mm, place_mm + reach_mm])
+        return np.sort(self._order[ends[0] : ends[1] + 1])
+
+
+def _tile_views(
+    row: _InOrder, place_mm: float, half_tile: float, lean_mm: Float, reach_mm: float, most: int
+) -> TileViews:
+    nearest = row.third_nearest_mm(place_mm)
+    reach = max(reach_mm, nearest + half_tile) if nearest is not None else reach_mm
+    near = row.within(place_mm, reach + half_tile + float(lean_mm.max(initial=0.0)))
+    candidates = near[np.abs(place_mm - row.distance_mm[near]) < reach + half_tile + lean_mm[near]]
     chosen = _longest_pass(candidates)
-    spread = chosen[np.argsort(offset_mm[chosen], kind="stable")]
+    spread = chosen[np.argsort(place_mm - row.distance_mm[chosen], kind="stable")]
     pick = np.unique(np.round(np.linspace(0, len(spread) - 1, min(most, len(spread)))).astype(int))
     return TileViews(np.sort(spread[pick]), reach)
 
