@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from matplotlib import colormaps
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -149,6 +148,9 @@ def _overlay(
 
 
 def _palette(colours: str) -> Byte:
+    # matplotlib is slow to import: a run is under way by then.
+    from matplotlib import colormaps
+
     rgb = colormaps[colours](np.linspace(0, 1, 255))[:, :3]
     bgr = np.rint(255 * rgb[:, ::-1]).astype(np.uint8)
     return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), bgr])

@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from matplotlib.path import Path as Outline
 from numpy.typing import NDArray
 
 from pipeline.artefacts import RadiusMap
@@ -97,6 +96,9 @@ def near(defects: Sequence[Defect], from_mm: float, to_mm: float) -> list[Defect
 
 def defect_at(defects: Sequence[Defect], distance_mm: Float, azimuth_rad: Float) -> NDArray[np.int64]:
     """Return (N,) which of the defects holds each place in its outline, their number where none does."""
+    # matplotlib is slow to import: a run is under way by then.
+    from matplotlib.path import Path as Outline
+
     out = np.full(len(distance_mm), len(defects))
     for number, defect in enumerate(defects):
         outline = Outline(defect.outline)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from pipeline.artefacts import Wall, WallTexture
 from pipeline.errors import UnusableError
@@ -77,7 +77,7 @@ def _refuse_unseen(seen: NDArray[np.bool_]) -> None:
 
 def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float:
     """Return the depth at which nine of ten defects of 3 mm × 3 mm pass both the threshold and the limit."""
-    chance = float(norm.ppf(0.9))
+    chance = float(ndtri(0.9))
     found = (detection.threshold + chance) * detection.small_sigma_mm
     return max(found, parameters.min_depth_mm + chance * detection.small_sigma_mm)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from pipeline.artefacts import PointCloud, WallTexture
 from pipeline.findings import Defect, DefectKind, clock_of_azimuth
@@ -37,7 +37,7 @@ def describe(number: int, region: Region, depth: Depth, scene: Scene) -> Defect:
     features = features_of(scene.relief, region, depth)
     likely = probabilities(features, region)
     kind, share = next(iter(likely.items()))
-    real = float(norm.cdf((abs(depth.depth_mm) - scene.min_depth_mm / 2) / depth.sigma_mm))
+    real = float(ndtr((abs(depth.depth_mm) - scene.min_depth_mm / 2) / depth.sigma_mm))
     clock_from, clock_to = _clock(scene.relief, region)
     first = float(scene.relief.distance_mm[region.row] - scene.relief.cell_mm[0] / 2)
     loss = kind.is_metal_loss and scene.wall_thickness_mm
