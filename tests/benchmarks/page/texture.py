@@ -21,14 +21,15 @@ from tests.benchmarks.page.inputs import Inputs
 from tests.benchmarks.page.section import TIMES, Method, Quantity, Section, clocked
 from tests.shared_data import PROJECT_ROOT
 
-_EVERY, _SIDES, _TILT_DEG, _FIELD_DEG, _VIEW_PX = 12, 8, 62.0, 50.0, 512
-_TEXTURE_PX = 4096
+_TILE_MM, _VIEWS, _TEXTURE_PX = 30.0, 6, 2048
+_NEAREST_DEG, _PASSED_MM, _FOCAL_PX = 72.0, 25.0, 200.0
 _SETUP = (
     "All get boresight's poses, wall and LED frames. open3d (t.geometry, project_images_to_albedo) takes "
-    f"pinhole pictures: each {_EVERY}th LED frame is cut into {_SIDES} undistorted views of {_FIELD_DEG:g}° "
-    f"that look {_TILT_DEG:g}° off the axis, {_VIEW_PX} px wide, half as fine again as the fisheye itself. "
-    f"Its mesh is the radius map, its texture {_TEXTURE_PX} px square over the unrolled wall, brought to "
-    "the size of boresight's picture.",
+    f"pinhole pictures: {_VIEWS} LED frames for each {_TILE_MM:g} mm of wall, undistorted out to "
+    f"{_NEAREST_DEG:g}° off the axis at about the fisheye's resolution there, taken while the probe came up "
+    f"to the wall over {_PASSED_MM:g} mm. The wall is worked on in such pieces because the function also "
+    "takes colours for what lies behind a camera. Its mesh is the radius map, its texture "
+    f"{_TEXTURE_PX} px square a piece, brought to the size of boresight's picture.",
     "Score: shared/score_run.py, which compares the flat picture with the true albedo after one gain per "
     "colour, and finds the shift of 10 mm patches. Boresight estimates the light, the projection just blends "
     "pictures; in the row 'light divided out' it is given boresight's model of the LEDs to divide by first. "
@@ -71,84 +72,85 @@ def section(inputs: Inputs, work: Path) -> Section:
     return Section("texture", "Texture", _SETUP, _QUANTITIES, tuple(methods), (chart,))
 
 
-def _views(inputs: Inputs, even: bool) -> list[_View]:
-    """Return the pinhole pictures; ``even``: divided by the light that a centred pipe's wall would get."""
-    frames = np.intersect1d(inputs.lit, inputs.trajectory.frame)[::_EVERY]
+def _views(inputs: Inputs, even: bool) -> dict[int, _View]:
+    """Return the lit frames as pinhole pictures; ``even``: divided by the light on a centred pipe's wall."""
+    frames = np.intersect1d(inputs.lit, inputs.trajectory.frame)
     T_cp = inverse(inputs.trajectory.T_pc[np.searchsorted(inputs.trajectory.frame, frames)])
-    focal = _VIEW_PX / 2 / np.tan(np.radians(_FIELD_DEG / 2))
-    intrinsic = np.array([[focal, 0, _VIEW_PX / 2], [0, focal, _VIEW_PX / 2], [0, 0, 1]])
-    sides = [_side(inputs, turn, intrinsic) for turn in 2 * np.pi * np.arange(_SIDES) / _SIDES]
-    views = []
-    for (_, bgr), T in zip(inputs.recording.read(frames, "bgr"), T_cp, strict=True):
-        for T_vc, uv, light in sides:
-            image = cv2.remap(bgr, uv, None, cv2.INTER_CUBIC)
-            if even:
-                image = np.clip(image / light[..., None], 0, 255).astype(np.uint8)
-            views.append(_View(np.ascontiguousarray(image[..., ::-1]), intrinsic, T_vc @ T))
-    return views
-
-
-def _side(inputs: Inputs, turn: float, intrinsic: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a view's rotation from the camera, the pixels it shows, and the light there, mean 1."""
-    tilt = np.radians(_TILT_DEG)
-    forward = np.array([np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)])
-    right = np.array([-np.sin(turn), np.cos(turn), 0.0])
-    T_vc = np.eye(4)
-    T_vc[:3, :3] = np.stack([right, np.cross(forward, right), forward])
-    pixel = np.stack(np.meshgrid(*[np.arange(_VIEW_PX) + 0.5] * 2), -1)
-    ray_v = np.concatenate(
-        [(pixel - intrinsic[:2, 2]) / intrinsic[0, 0], np.ones((_VIEW_PX, _VIEW_PX, 1))], -1
-    )
-    ray_c = ray_v @ T_vc[:3, :3]
+    size = 2 * int(np.ceil(_FOCAL_PX * np.tan(np.radians(_NEAREST_DEG))))
+    intrinsic = np.array([[_FOCAL_PX, 0, size / 2], [0, _FOCAL_PX, size / 2], [0, 0, 1]])
+    pixel = np.stack(np.meshgrid(*[np.arange(size) + 0.5] * 2), -1)
+    ray_c = np.concatenate([(pixel - size / 2) / _FOCAL_PX, np.ones((size, size, 1))], -1)
     uv = inputs.probe.camera.project(ray_c).uv.astype(np.float32)
-    return T_vc, np.nan_to_num(uv, nan=-1.0), _light(inputs, ray_c)
+    light = _light(inputs, ray_c)[..., None] if even else 1.0
+    return {
+        int(frame): _View(_pinhole(bgr, uv, light), intrinsic, T)
+        for (frame, bgr), T in zip(inputs.recording.read(frames, "bgr"), T_cp, strict=True)
+    }
+
+
+def _pinhole(bgr: np.ndarray, uv: np.ndarray, light: np.ndarray | float) -> np.ndarray:
+    rgb = cv2.remap(bgr, uv, None, cv2.INTER_CUBIC)[..., ::-1]
+    return np.ascontiguousarray(np.clip(rgb / light, 0, 255).astype(np.uint8))
 
 
 def _light(inputs: Inputs, ray_c: np.ndarray) -> np.ndarray:
-    rho = np.linalg.norm(ray_c[..., :2], axis=-1, keepdims=True)
+    rho = np.maximum(np.linalg.norm(ray_c[..., :2], axis=-1, keepdims=True), 1e-3)
     xyz_c = ray_c / rho * inputs.recording.pipe.nominal_diameter_mm / 2
     normal = -np.concatenate([ray_c[..., :2] / rho, 0 * rho], -1)
     light = irradiance(inputs.probe.lighting, xyz_c, normal)
-    return np.maximum(light / light.mean(), 0.05)
+    return np.maximum(light / light.max(), 0.02)
 
 
-def _projected(inputs: Inputs, own: WallTexture, views: list[_View]) -> np.ndarray:
-    """Return the flat picture (H, W, 4) that open3d makes, on the grid of boresight's."""
-    o3d = open3d()
-    tensor = o3d.core.Tensor
-    albedo = _mesh(inputs, own).project_images_to_albedo(
-        [o3d.t.geometry.Image(tensor(v.image)) for v in views],
-        [tensor(v.intrinsic) for v in views], [tensor(v.T_cp) for v in views],
+def _projected(inputs: Inputs, own: WallTexture, views: dict[int, _View]) -> np.ndarray:
+    """Return the flat picture (H, W, 4) that open3d makes, on the grid of boresight's, piece by piece."""
+    rows = max(1, round(_TILE_MM / own.mm_per_px))
+    pieces = [range(r, min(r + rows, len(own.bgra))) for r in range(0, len(own.bgra), rows)]
+    return np.concatenate([_piece(inputs, own, piece, views) for piece in pieces])
+
+
+def _piece(inputs: Inputs, own: WallTexture, rows: range, views: dict[int, _View]) -> np.ndarray:
+    o3d, size = open3d(), (own.bgra.shape[1], len(rows))
+    start = own.distance_from_mm + (rows.start - 0.5) * own.mm_per_px
+    chosen = _before(inputs, start, views)
+    if not chosen:
+        return np.zeros((*size[::-1], 4), np.uint8)
+    albedo = _mesh(inputs, own, start, len(rows) * own.mm_per_px).project_images_to_albedo(
+        [o3d.t.geometry.Image(o3d.core.Tensor(v.image)) for v in chosen],
+        [o3d.core.Tensor(v.intrinsic) for v in chosen], [o3d.core.Tensor(v.T_cp) for v in chosen],
         tex_size=_TEXTURE_PX, update_material=False,
     )  # fmt: skip
     rgb = np.asarray(albedo.as_tensor().numpy())[..., :3]
     rgb = rgb if rgb.dtype == np.uint8 else np.clip(255 * rgb, 0, 255).astype(np.uint8)
-    flat = cv2.resize(rgb[..., ::-1], own.bgra.shape[1::-1], interpolation=cv2.INTER_AREA)
+    flat = cv2.resize(rgb[..., ::-1], size, interpolation=cv2.INTER_AREA)
     return np.dstack([flat, np.where(flat.max(-1) > 0, 255, 0).astype(np.uint8)])
 
 
-def _mesh(inputs: Inputs, own: WallTexture):
-    """Return the radius map as a mesh whose texture is the unrolled wall as boresight's picture shows it."""
+def _before(inputs: Inputs, start_mm: float, views: dict[int, _View]) -> list[_View]:
+    """Return views from where the piece beginning at ``start_mm`` is seen whole, spread evenly."""
+    reach = inputs.recording.pipe.nominal_diameter_mm / 2 / np.tan(np.radians(_NEAREST_DEG - 2))
+    ahead = {frame: start_mm + (view.T_cp @ [0, 0, 0, 1])[2] for frame, view in views.items()}
+    seen = [frame for frame, mm in ahead.items() if reach <= mm <= reach + _PASSED_MM]
+    spread = np.unique(np.linspace(0, len(seen) - 1, min(_VIEWS, len(seen))).round().astype(int))
+    return [views[seen[k]] for k in spread]
+
+
+def _mesh(inputs: Inputs, own: WallTexture, start_mm: float, length_mm: float):
+    """Return a piece of the radius map as a mesh, its texture unrolled as in boresight's picture."""
     o3d, radius_map = open3d(), inputs.wall.radius_map
-    length = own.bgra.shape[0] * own.mm_per_px
-    s = np.arange(0, length + 1e-9, length / max(1, round(length / 2)))
-    psi = own.azimuth_from_rad - own.rad_per_px / 2 + np.linspace(0, 2 * np.pi, 181)
-    distance = own.distance_from_mm - own.mm_per_px / 2 + s
+    along, turn = np.linspace(0, 1, max(2, round(length_mm / 2))), np.linspace(0, 1, 181)
+    distance = start_mm + length_mm * along
+    psi = own.azimuth_from_rad - own.rad_per_px / 2 + 2 * np.pi * turn
     row = np.clip(np.searchsorted(radius_map.distance_mm, distance), 0, len(radius_map.distance_mm) - 1)
-    column = np.searchsorted(radius_map.azimuth_rad, (psi + np.pi) % (2 * np.pi) - np.pi) % len(
-        radius_map.azimuth_rad
-    )
-    radius = radius_map.radius_mm[row][:, column]
+    column = np.searchsorted(radius_map.azimuth_rad, (psi + np.pi) % (2 * np.pi) - np.pi)
+    radius = radius_map.radius_mm[row][:, column % len(radius_map.azimuth_rad)]
     radius = np.where(np.isfinite(radius), radius, np.nanmedian(radius))
     xyz = from_pipe(inputs.wall.axis, distance[:, None], psi, radius)
-    v, u = np.meshgrid(1 - s / length, np.linspace(0, 1, 181), indexing="ij")
-    number = np.arange(xyz[..., 0].size).reshape(xyz.shape[:2])
+    number = np.arange(radius.size).reshape(radius.shape)
     a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
     face = np.stack([np.stack([a, c, b], -1), np.stack([b, c, d], -1)], 2).reshape(-1, 3)
-    mesh = o3d.t.geometry.TriangleMesh(
-        o3d.core.Tensor(xyz.reshape(-1, 3).astype(np.float32)), o3d.core.Tensor(face)
-    )
-    uv = np.stack([u, v], -1).reshape(-1, 2)[face]
+    uv = np.stack(np.meshgrid(turn, 1 - along), -1).reshape(-1, 2)[face]
+    vertex = xyz.reshape(-1, 3).astype(np.float32)
+    mesh = o3d.t.geometry.TriangleMesh(o3d.core.Tensor(vertex), o3d.core.Tensor(face))
     mesh.triangle.texture_uvs = o3d.core.Tensor(uv.astype(np.float32))
     return mesh
 

@@ -89,7 +89,7 @@ def _found(inputs: Inputs, result: Path, given: np.ndarray) -> dict[str, float |
     diameter = 2 * scale * _cylinder_radius(points, centres)
     return {
         "registered_percent": 100 * len(frames) / len(given),
-        "diameter_error_percent": 100 * abs(diameter / 2 / _true_radius(inputs) - 1),
+        "diameter_error_percent": 100 * abs(float(diameter) / 2 / _true_radius(inputs) - 1),
         "points": float(len(points)),
     }
 
