@@ -19,6 +19,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 _MAP_KEYS = ("distance_mm", "azimuth_rad", "radius_mm")
 _POINT_FIELDS = ("x", "y", "z", "nx", "ny", "nz", "sigma_mm", "distance_mm", "azimuth_rad")
+LARGEST_UNPACKED_BYTES = 4 << 30
 SURFACE_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".pcd", ".xyz")
 
 
@@ -160,10 +161,19 @@ def _opened(file: Path) -> Iterator[np.lib.npyio.NpzFile]:
             content = np.load(stream, allow_pickle=False)
             if not isinstance(content, np.lib.npyio.NpzFile):
                 raise InputError(file, "is no archive", expected=expected)
+            _refuse_bomb(file, content)
             yield content
     except (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, MemoryError,
             NotImplementedError) as error:  # fmt: skip
         raise InputError(file, f"cannot be read: {error}", expected=expected) from error
+
+
+def _refuse_bomb(file: Path, content: np.lib.npyio.NpzFile) -> None:
+    """Refuse an archive that unpacks to more than memory should hold."""
+    unpacked = sum(entry.file_size for entry in content.zip.infolist()) if content.zip is not None else 0
+    if unpacked > LARGEST_UNPACKED_BYTES:
+        expected = f"at most {LARGEST_UNPACKED_BYTES} bytes"
+        raise InputError(file, f"unpacks to {unpacked} bytes", expected=expected)
 
 
 def _check_grid(file: Path, distance: Float, azimuth: Float, radius: Float) -> None:

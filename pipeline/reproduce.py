@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,6 +10,7 @@ from typing import Any
 
 from pipeline.errors import InputError
 from pipeline.export.exporter import Exporter, published_files
+from pipeline.json_file import read_json
 from pipeline.run_folder import RunFolder
 
 _RECORD = "run.json"
@@ -68,7 +68,7 @@ def read_run_record(run: Path) -> RunRecord:
     """
     file = run / _RECORD
     try:
-        tree: dict[str, Any] = json.loads(file.read_text("utf-8"))
+        tree: dict[str, Any] = read_json(file)
         record = RunRecord(
             Path(tree["recording"]["path"]), Path(tree["probe"]["path"]), dict(tree["input_sha256"]),
             dict(tree["configuration"]), dict(tree.get("libraries", {})),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.codec import CodecError, Json, canonical, decode, encode
 from pipeline.disk import FileRecord, disk_errors_named, remove, replace_json, sync_folder, write_synced
+from pipeline.json_file import read_json
 from pipeline.outcome import Number
 
 _FORMAT = 1
@@ -156,7 +156,7 @@ def _manifest(provenance: Provenance, tree: Json, files: Mapping[str, FileRecord
 
 
 def _read_manifest(folder: Path) -> dict[str, Any]:
-    manifest: dict[str, Any] = json.loads((folder / _MANIFEST).read_text(encoding="utf-8"))
+    manifest: dict[str, Any] = read_json(folder / _MANIFEST)
     if not isinstance(manifest, dict) or manifest.get("format") != _FORMAT:
         raise CodecError("a manifest of another format")
     stated = manifest.pop("sha256", "")

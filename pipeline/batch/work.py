@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import json
 import os
 import signal
 import subprocess
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pipeline
+from pipeline.json_file import read_json
 
 _PR_SET_PDEATHSIG = 1
 _REFUSED = 2
@@ -93,7 +93,7 @@ def ending_of(work: Work, code: int, told: str) -> Ending:
 
 def _record(folder: Path) -> dict[str, Any] | None:
     try:
-        record: dict[str, Any] = json.loads((folder / "run.json").read_text("utf-8"))
-    except (OSError, json.JSONDecodeError):
+        record: dict[str, Any] = read_json(folder / "run.json")
+    except (OSError, ValueError):
         return None
     return record

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from pipeline.disk import (
     sync_folder,
     sync_tree,
 )
+from pipeline.json_file import read_json
 from pipeline.run_folder import RunFolder
 from pipeline.source_code import source_digest
 
@@ -110,7 +110,7 @@ def _put_in_place(exporter: Exporter, temporary: Path, key: str, run: RunFolder)
 
 def _read_receipt(exporter: Exporter, run: RunFolder) -> tuple[str, dict[str, FileRecord]]:
     try:
-        tree: dict[str, Any] = json.loads(_receipt(exporter, run).read_text(encoding="utf-8"))
+        tree: dict[str, Any] = read_json(_receipt(exporter, run))
         return str(tree["key"]), {n: FileRecord(**r) for n, r in tree["files"].items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return "", {}

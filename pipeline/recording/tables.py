@@ -17,6 +17,8 @@ from pipeline.recording.checks import refuse_backward
 
 FRAME_COLUMNS = ("frame", "time_s", "illumination")
 ENCODER_COLUMNS = ("time_s", "distance_mm")
+# About ten million lines: four days at 30 frames/s.
+LARGEST_BYTES = 256 << 20
 _KINDS = tuple(k.value for k in Illumination)
 
 
@@ -65,6 +67,9 @@ def read_encoder(file: Path) -> Encoder:
 def _rows(file: Path, columns: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
     """Yield (line number, cells in the order of ``columns``)."""
     try:
+        size = file.stat().st_size
+        if size > LARGEST_BYTES:
+            raise InputError(file, f"is {size} bytes long", expected=f"at most {LARGEST_BYTES} bytes")
         text = file.read_text("utf-8-sig")
     except OSError as error:
         raise InputError(file, f"cannot be read ({error.strerror})", expected=",".join(columns)) from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict
 from typing import Any
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts import Trajectory
 from pipeline.findings import DefectKind
+from pipeline.json_file import parse_json, read_json
 from pipeline.model import Overlay, Overlays
 from pipeline.review.assessment import strength
 from pipeline.review.decisions.ledger import Entry
@@ -45,7 +45,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "distance_mm": [float(overlays.distance_mm[0]), float(overlays.distance_mm[-1])],
         "radius_mm": float(np.median(overlays.reference_radius_mm)),
         "overlays": [overlay_document(o) for o in overlays.pictures],
-        "defects": json.loads(files.defects_text()),
+        "defects": parse_json(files.defects_text()),
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),
         "diagnosis": _diagnosis(files),
@@ -185,7 +185,10 @@ def _diagnosis(files: RunFiles) -> dict[str, Any] | None:
     file = files.file("diagnosis.json")
     if not file.is_file():
         return None
-    told = json.loads(file.read_text("utf-8"))
+    try:
+        told = dict(read_json(file))
+    except (OSError, ValueError, TypeError) as error:
+        return {"verdict": "unreadable", "statement": f"diagnosis.json: {error}", "effects": []}
     effects = told.get("effects", [])
     words = [str(e.get("statement", e.get("name", ""))) for e in effects]
     statement = " ".join(words) or str(told.get("identifiable") or told.get("record_next") or "")

@@ -20,6 +20,7 @@ from pipeline.artefacts import PipeAxis, Trajectory
 from pipeline.disk import FileStamp, stamp_of
 from pipeline.errors import InputError
 from pipeline.geometry.axis import to_pipe
+from pipeline.json_file import parse_json
 from pipeline.review.run_files import RunFiles
 
 Json = dict[str, Any]
@@ -115,7 +116,7 @@ def _model(file: Path, _as_it_is: FileStamp, files: RunFiles) -> StretchedModel:
 
 def _document(file: Path, text: bytes) -> Json:
     try:
-        document: Json = json.loads(text)
+        document: Json = parse_json(text)
         if not document["meshes"][0]["primitives"]:
             raise InputError(file, "is a model without a wall")
     except (ValueError, KeyError, IndexError, TypeError) as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +17,7 @@ from pipeline.errors import InputError
 from pipeline.findings import DefectKind, Sections
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
+from pipeline.json_file import parse_json, read_json
 from pipeline.model import Overlays
 from pipeline.recording import open_recording
 from pipeline.recording.base import PipeFacts, Recording
@@ -134,11 +134,11 @@ class RunFiles:
     def _json(self, name: str) -> object:
         file = self.file(name)
         try:
-            return json.loads(file.read_text("utf-8"))
+            return read_json(file)
         except OSError as error:
             hint = "give the folder of a finished run"
             raise InputError(file, error.strerror or "cannot be read", hint=hint) from error
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        except ValueError as error:
             raise InputError(file, f"is not JSON: {error}") from error
 
 
@@ -170,9 +170,9 @@ def measured_findings(defects: str, file: Path) -> tuple[Finding, ...]:
         When it is not a list of defects.
     """
     try:
-        listed = json.loads(defects)
+        listed = parse_json(defects)
         return tuple(_finding(entry) for entry in listed)
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise InputError(file, f"is not a list of defects: {error!r}") from error
 
 
