@@ -1,0 +1,177 @@
+"""A run cut in windows: joined again it is what all frames at once give, within a fraction of σ."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.artefacts import PipeAxis
+from pipeline.geometry.axis import straight_axis
+from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
+from pipeline.scratch import Scratch
+from stages.motion.joining import Joined, join, seam
+from stages.motion.parameters import MotionParameters
+from stages.motion.sliding import RunEstimate, adjust_run
+from stages.motion.submaps import Settled, Submap, carried
+from stages.motion.tracks import TrackStore
+from stages.motion.windows import Window, cut_windows
+from tests.long_motion import LongMotion, long_motion
+
+Float = NDArray[np.float64]
+FRAMES, SHARED = 240, 3
+
+
+@pytest.fixture(scope="module")
+def drawn() -> LongMotion:
+    return long_motion(FRAMES, 0.6, 2.0)
+
+
+@pytest.fixture(scope="module")
+def at_once(drawn: LongMotion) -> RunEstimate:
+    return estimated(drawn, FRAMES, 20)
+
+
+@pytest.fixture(scope="module")
+def in_windows(drawn: LongMotion) -> RunEstimate:
+    return estimated(drawn, 110, 50)
+
+
+def estimated(drawn: LongMotion, window: int, overlap: int) -> RunEstimate:
+    parameters = MotionParameters.model_validate({"window_frames": window, "overlap_frames": overlap})
+    return adjust_run(drawn.run, parameters, lambda estimate: None, lambda done, total: None)
+
+
+def since_first(T_pc: Float) -> Float:
+    return inverse(T_pc[0]) @ T_pc
+
+
+def difference(T_pc: Float, other_T_pc: Float) -> Float:
+    """Return (N, 6) of translations and rotation vectors, both runs reckoned from their first pose."""
+    a, b = since_first(T_pc), since_first(other_T_pc)
+    turn = vector_from_rotation(np.swapaxes(b[:, :3, :3], 1, 2) @ a[:, :3, :3])
+    return np.concatenate([a[:, :3, 3] - b[:, :3, 3], turn], -1)
+
+
+def sigma_of(run: Joined) -> Float:
+    return np.sqrt(np.diagonal(run.covariance, axis1=1, axis2=2))
+
+
+def test_windows_give_what_all_frames_at_once_do(at_once: RunEstimate, in_windows: RunEstimate) -> None:
+    one, many = at_once.joined, in_windows.joined
+    apart = difference(many.T_pc, one.T_pc)[10:] / sigma_of(one)[10:]
+    assert np.abs(apart).max() < 0.35
+    assert in_windows.trials > at_once.trials, "the control: it was cut"
+    sigma = np.sqrt(np.diagonal(one.settled.covariance))
+    assert np.abs((many.settled.value - one.settled.value) / sigma).max() < 0.5
+    assert many.radius_mm == pytest.approx(one.radius_mm, abs=0.005)
+
+
+def test_stated_sigma_is_that_of_all_frames_at_once(at_once: RunEstimate, in_windows: RunEstimate) -> None:
+    one, many = sigma_of(at_once.joined)[10:], sigma_of(in_windows.joined)[10:]
+    assert np.all(many / one > 0.7)
+    assert np.all(many / one < 1.5)
+
+
+def test_errors_lie_within_sigma(drawn: LongMotion, in_windows: RunEstimate) -> None:
+    run = in_windows.joined
+    error = difference(run.T_pc, drawn.T_pc)[10:]
+    assert np.mean(np.abs(error / sigma_of(run)[10:]) < 3) > 0.97
+
+
+def test_windows_cover_all_frames_and_overlap() -> None:
+    for frames, length, overlap in ((100, 200, 20), (200, 200, 20), (201, 200, 20), (5000, 700, 150)):
+        windows = cut_windows(frames, length, overlap)
+        assert (windows[0].first, windows[-1].last) == (0, frames)
+        assert all(a.last - b.first >= overlap for a, b in pairwise(windows))
+        assert all(a.first < seam(a, b) < a.last for a, b in pairwise(windows))
+        assert len(windows) == 1 or {w.frames for w in windows} == {length}
+
+
+def submaps(T_pc: Float, axis: PipeAxis, windows: tuple[Window, ...]) -> list[Submap]:
+    """Return pieces of one course, each moved somewhere else, without any error."""
+    random = np.random.default_rng(3)
+    found = []
+    for k, window in enumerate(windows):
+        moved = from_parts(rotation_from_vector(0.2 * random.standard_normal(3)), random.standard_normal(3))
+        moved = np.eye(4) if k == 0 else moved
+        origin, R = transform(moved, axis.origin_p), moved[:3, :3] @ axis.R_pa
+        own = PipeAxis(axis.distance_mm + (k > 0) * random.standard_normal(), origin, R)
+        anchor = 0 if k == 0 else seam(windows[k - 1], window) - window.first
+        end = window.frames - 1 if k + 1 == len(windows) else seam(window, windows[k + 1]) - window.first
+        some = np.unique(np.linspace(anchor, end, 4).astype(int))
+        covariance = np.stack([1e-4 * (s - anchor) * np.eye(6) for s in some])
+        found.append(
+            Submap(
+                window,
+                moved @ T_pc[window.first : window.last],
+                np.full(window.frames, float(k)),
+                own,
+                50.0,
+                anchor,
+                some,
+                covariance,
+                np.zeros((len(some), 6, SHARED)),
+                0.01,
+                np.zeros(SHARED),
+            )
+        )
+    return found
+
+
+def test_pieces_of_one_course_become_that_course_again() -> None:
+    k = np.arange(100)
+    turn = np.stack([0.01 * np.sin(k / 9), 0.02 * np.cos(k / 7), 0.01 * k], -1)
+    T_pc = from_parts(rotation_from_vector(turn), np.stack([np.sin(k / 20), np.cos(k / 15), 0.7 * k], -1))
+    windows = cut_windows(100, 40, 20)
+    axis = straight_axis(-30.0, 150.0)
+    settled = Settled(np.zeros(SHARED), np.eye(SHARED))
+    got = join(submaps(T_pc, axis, windows), settled)
+    np.testing.assert_allclose(got.T_pc, T_pc, atol=1e-9)
+    np.testing.assert_allclose(got.slip, 0, atol=1e-12)
+    np.testing.assert_allclose(got.axis.origin_p[:, :2], 0, atol=1e-9)
+    broken = submaps(T_pc, axis, windows)
+    broken[1] = replace(
+        broken[1], T_pc=from_parts(broken[1].T_pc[:, :3, :3], 1.001 * broken[1].T_pc[:, :3, 3])
+    )
+    assert np.abs(join(broken, settled).T_pc - T_pc).max() > 1e-4, "the control"
+    variance = got.covariance[:, 0, 0]
+    assert np.all(np.diff(variance) > -1e-9), "errors only grow"
+
+
+def test_an_error_of_the_anchor_is_carried_as_a_motion_of_the_whole() -> None:
+    random = np.random.default_rng(1)
+    T_pc = from_parts(
+        rotation_from_vector(random.standard_normal((5, 3))), 30 * random.standard_normal((5, 3))
+    )
+    step = 1e-6 * random.standard_normal(6)
+
+    def moved(T: Float, by: Float) -> Float:
+        return from_parts(T[:3, :3] @ rotation_from_vector(by[3:]), T[:3, 3] + by[:3])
+
+    whole = moved(T_pc[0], step) @ inverse(T_pc[0])
+    for T, carry in zip(T_pc, carried(T_pc, T_pc[0]), strict=True):
+        np.testing.assert_allclose(moved(T, carry @ step), whole @ T, atol=1e-9)
+
+
+def test_tracks_come_back_from_the_disk_thinned_and_cut() -> None:
+    store = TrackStore.on(Scratch(), most=4)
+    for frame in range(20):
+        seen = np.array([0, 1] if frame < 12 else [1, 2])
+        store.note(
+            seen, frame, np.stack([seen + frame, seen], -1).astype(float), 0.1 + 0 * seen, np.zeros((2, 2))
+        )
+        if frame == 12:
+            store.settle(np.array([0]))
+    store.settle()
+    found = store.between(0, 20)
+    assert np.array_equal(np.bincount(found["landmark"]), [4, 4, 4])
+    assert np.all(np.diff(found["frame"][found["landmark"] == 1]) == 5), "spread evenly"
+    np.testing.assert_array_equal(found["uv"][:, 0], found["landmark"] + found["frame"])
+    assert not len(store.between(0, 3)), "seen less than three times in them"
+    part = store.between(0, 12)
+    assert set(part["landmark"]) == {0}
+    assert part["frame"].max() < 12
