@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
@@ -56,7 +57,7 @@ def composed(
         gauge=gauge.recording.name if gauge is not None else "",
         verdict=verdict,
         global_p=p_value,
-        location=_location(examined, every),
+        location=_location(examined, every, asked),
         effects=named,
         members=members,
         identifiable=_identifiable(verdict, named, examined),
@@ -121,10 +122,19 @@ def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Cla
     return out
 
 
-def _location(examined: Examined | None, claims: Sequence[Claim]) -> Location | None:
+def _location(examined: Examined | None, claims: Sequence[Claim], asked: Sequence[str]) -> Location | None:
+    """Return the place as far as it was measured, and for the rest what all causes in question share."""
     if examined is not None and examined.location is not None:
         return examined.location
-    return claims[0].location if claims else None
+    if not claims:
+        return None
+    measured, known = claims[0].location, [effect(name) for name in asked]
+    fixed_to, time = {str(e.fixed_to) for e in known}, {e.time for e in known}
+    return replace(
+        measured,
+        fixed_to=measured.fixed_to or (fixed_to.pop() if len(fixed_to) == 1 else None),
+        time=measured.time or (time.pop() if len(time) == 1 else None),
+    )
 
 
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:

@@ -85,3 +85,17 @@ def test_the_readings_quantum_and_ends() -> None:
     assert quantum_mm(encoder) == pytest.approx(0.05)
     beyond = readings_at(encoder, np.array([encoder.time_s[-1] + 0.1]))
     assert beyond[0] - encoder.distance_mm[-1] == pytest.approx(1.7, abs=0.4)
+
+
+def test_a_delay_that_no_encoder_has_is_no_find() -> None:
+    encoder = read(False)
+    fit = with_events(seen(np.random.default_rng(5), False), encoder)
+    values = fit.values.copy()
+
+    def p_value(delay_s: float) -> float:
+        values[DELAY] = delay_s
+        made = _estimates("gauge", replace(fit, values=values), STATED, quantum_mm(encoder))
+        return next(e.p_value for e in made if e.effect == "time_offset")
+
+    assert p_value(-0.9) < 1e-3
+    assert p_value(-1.7) == 1.0

@@ -183,7 +183,9 @@ def _estimates(
         quantity = effect(name).quantities[0]
         sigma, value = float(fit.sigma[k]), float(fit.values[k])
         total = float(np.hypot(sigma, allowed))
-        p = float(2 * norm.sf(abs(value) / total)) if np.isfinite(total) else 1.0
+        # What no encoder does is a motion too even to tell, not a find.
+        told = np.isfinite(total) and LIBRARY[name].possible((), np.array([value]))
+        p = float(2 * norm.sf(abs(value) / total)) if told else 1.0
         alike = tuple(
             (SMOOTH[j], float(correlation[k, j]))
             for j in stated
