@@ -143,14 +143,18 @@ def _counts(found: Fit) -> bool:
 def _exchanged(
     run: GaugeRun, found: Fit, tried: Sequence[Fit], library: Mapping[str, EffectModel], stated: Stated
 ) -> tuple[Fit, tuple[Fit, ...]]:
-    """Try another effect in each earlier term's place; the last one's rivals were tried when it came."""
+    """Try another effect in each earlier term's place; the last one's rivals were tried when it came.
+
+    An effect may come back with another frequency or time constant, now that what disturbed it is taken out.
+    """
     every = [found, *tried]
     for k in range(len(found.terms) - 1):
         others = found.terms[:k] + found.terms[k + 1 :]
         reduced = fit(run, found.state, others, _RIVAL_ITERATIONS)
-        taken = {found.terms[k].model.name}
+        term = found.terms[k]
+        taken = {term.model.name} if term.model.shape_step(term.shape) is None else set()
         scores = [s for s in scan(run, reduced, library, stated) if s.model.name not in taken]
-        every += [reduced, *refits(run, reduced, scores, 3)]
+        every += [reduced, *(refined(run, f) for f in refits(run, reduced, scores, 3))]
     return _sorted(every[0], every[1:])
 
 
