@@ -1,0 +1,367 @@
+"""What each stage takes, in time per metre and in memory, for a pipe of 1, 10 and 100 m.
+
+    python -m tests.benchmarks.bench_length RUN --metres 1,10,100          # RUN: a finished run
+    python -m tests.benchmarks.bench_length RUN --only motion --metres 1,10
+    python -m tests.benchmarks.bench_length RUN --recording FOLDER         # rings and texture, from video
+
+What the stages see: ``motion`` (its adjustment, not the following of texture in pictures) drawn tracks, rings
+and encoder readings of every ``--coarser``-th frame, one each 0.6 mm; ``triangulate`` and all
+after it the rings and the motion of RUN repeated end to end along a straight pipe, every ``--coarser``-th
+azimuth of them, on a map as much coarser; ``rings`` and ``texture``, with ``--recording``, a real video once
+and then repeated, decoded anew each time. Nothing is extrapolated: a length that was not run has no line.
+
+Each stage runs in a process of its own that may hold 4 GiB of its own memory (RLIMIT_DATA) and fails beyond.
+Told is the most that it and its helpers held (RssAnon: pages mapped from files are the system's to drop), and
+the processor time of all of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.artefacts import PipeAxis, RingPoints, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.export.cloud import write_cloud
+from pipeline.export.glb import write_model
+from pipeline.export.overlays import write_overlays
+from pipeline.export.radius_map import write_radius_map
+from pipeline.export.tileset import write_tileset
+from pipeline.export.unrolled import write_unrolled
+from pipeline.findings import Defects, Sections
+from pipeline.instrument.probe_file import read_probe
+from pipeline.model import Overlays, TexturedMesh
+from pipeline.recording import open_recording
+from pipeline.recording.base import FrameTable, Image, Planes, Recording
+from pipeline.review.run_files import RunFiles
+from pipeline.scratch import Scratch
+from pipeline.stage import Context, quiet_context
+from pipeline.store import Provenance, Store
+from stages.accumulate import AccumulateParameters, accumulate_wall
+from stages.defects import DefectParameters, find_defects
+from stages.mesh import MeshParameters, make_mesh
+from stages.motion.parameters import MotionParameters
+from stages.motion.sliding import adjust_run
+from stages.motion.submaps import Estimate
+from stages.overlays import OverlayParameters, draw_overlays
+from stages.rings import RingParameters, extract_rings
+from stages.sections import SectionParameters, measure_sections
+from stages.texture.texture import TextureParameters, photograph_wall
+from stages.triangulate import TriangulateParameters, triangulate_rings
+from tests.long_motion import long_motion
+from tests.synthetic_wall import bare_recording
+
+MEMORY_BYTES = 4 << 30
+KEY = "0" * 64
+STEP_MM, LANDMARKS_PER_MM = 0.6, 20.0
+CHAIN = (
+    "motion", "triangulate", "accumulate", "overlays", "mesh", "sections", "defects", "exports", "tileset",
+)  # fmt: skip
+FROM_VIDEO = ("rings", "texture")
+KINDS = {"rings": RingSamples, "trajectory": Trajectory, "triangulate": RingPoints, "accumulate": Wall,
+         "photo": WallTexture, "overlays": Overlays, "mesh": TexturedMesh, "sections": Sections,
+         "defects": Defects}  # fmt: skip
+
+
+def main() -> None:
+    """Measure and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("run", type=Path, help="a finished run of a straight pipe")
+    parser.add_argument("--metres", default="1,10,100")
+    parser.add_argument("--coarser", type=int, default=4, help="every n-th azimuth, a map as much coarser")
+    parser.add_argument("--only", default="", help="stages, separated by commas")
+    parser.add_argument("--recording", type=Path, help="the recording of RUN: measure rings and texture too")
+    parser.add_argument("--repeats", default="1,5", help="how often the recording is repeated")
+    parser.add_argument("--keep", type=Path, help="where results lie, to go on with")
+    parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.child:
+        _child(given, *given.child)
+        return
+    only = tuple(filter(None, given.only.split(",")))
+    with TemporaryDirectory() as folder:
+        kept = given.keep or Path(folder)
+        print(
+            "| stage | length m | CPU s | CPU s per m | most memory MiB |\n|---|---|---|---|---|", flush=True
+        )
+        for metres in map(float, given.metres.split(",")):
+            for stage in only or CHAIN:
+                if stage in CHAIN:
+                    _measure(given, kept / f"{metres:g}m", stage, metres)
+        for times in map(float, given.repeats.split(",") if given.recording else ()):
+            for stage in only or FROM_VIDEO:
+                if stage in FROM_VIDEO:
+                    _measure(given, kept / f"{times:g}x", stage, times)
+
+
+def _measure(given: argparse.Namespace, folder: Path, stage: str, size: float) -> None:
+    """Run one stage in a process of its own and print its line."""
+    command = [sys.executable, "-m", "tests.benchmarks.bench_length", *sys.argv[1:], "--keep", str(folder)]
+    done = subprocess.run(
+        [*command, "--child", stage, f"{size:g}"], stdout=subprocess.PIPE, text=True, check=False
+    )
+    if done.returncode:
+        print(f"| {stage} | {size:g} | failed | | |", flush=True)
+        return
+    found = json.loads(done.stdout.splitlines()[-1])
+    line = f"{found['cpu_s']:.1f} | {found['cpu_s'] / found['metres']:.2f} | {found['mib']:.0f}"
+    print(f"| {stage} | {found['metres']:.3g} | {line} |", flush=True)
+
+
+def _child(given: argparse.Namespace, stage: str, size: str) -> None:
+    store = Store(given.keep)
+    store.folder.mkdir(parents=True, exist_ok=True)
+    work, metres = _work(given, store, stage, float(size))
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY_BYTES, MEMORY_BYTES))
+    with Watch() as watch:
+        made = work()
+        if stage in KINDS and made is not None:
+            store.write(made, Provenance(stage, "1", KEY, 0.0, ()))
+    print(json.dumps({"cpu_s": watch.cpu_s, "mib": watch.most_mib, "metres": metres}))
+
+
+def _work(
+    given: argparse.Namespace, store: Store, stage: str, size: float
+) -> tuple[Callable[[], Any], float]:
+    """Return what is to be measured, all that it needs already at hand, and the length that it covers."""
+    context = replace(quiet_context(workers=1), scratch=Scratch(store.folder))
+    if stage in FROM_VIDEO:
+        return _from_video(given, stage, int(size), context)
+    if stage == "motion":
+        step_mm = STEP_MM * given.coarser
+        drawn = long_motion(round(1000 * size / step_mm), step_mm, LANDMARKS_PER_MM / given.coarser)
+        parameters = MotionParameters.model_validate({})
+        return lambda: adjust_run(drawn.run, parameters, _agree, context.progress), size
+    needed = _inputs(given, store, size)
+    made = Made(store)
+    work: dict[str, Callable[[], Any]] = {
+        "triangulate": lambda: triangulate_rings(
+            made(RingSamples), needed.probe, TriangulateParameters.model_validate({}), context
+        ),
+        "accumulate": lambda: accumulate_wall(
+            needed.probe, made(RingSamples), made(RingPoints), made(Trajectory),
+            AccumulateParameters.model_validate(
+                {"distance_step_mm": 0.5 * given.coarser, "azimuth_samples": 720 // given.coarser}
+            ), context,
+        ),
+        "overlays": lambda: draw_overlays(
+            needed.recording, made(Wall), OverlayParameters.model_validate({}), context
+        ),
+        "mesh": lambda: make_mesh(
+            made(Wall), made(WallTexture), made(Overlays),
+            MeshParameters.model_validate(
+                {"texel_mm": 0.1 * given.coarser, "tile_mm": 100.0 * given.coarser}
+            ), context,
+        ),
+        "sections": lambda: measure_sections(
+            needed.recording, made(Wall), SectionParameters.model_validate({}), context
+        ),
+        "defects": lambda: find_defects(
+            needed.recording, made(Wall), made(WallTexture), DefectParameters.model_validate({}), context
+        ),
+        "exports": lambda: _exports(made, store.folder / "files"),
+        "tileset": lambda: _tileset(needed.recording, made, store.folder / "files"),
+    }  # fmt: skip
+    return work[stage], size
+
+
+def _agree(estimate: Estimate) -> None:
+    """Find nothing wrong with a window."""
+
+
+class Made:
+    """Results of the stages before, read when they are needed."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+
+    def __call__(self, kind: type) -> Any:
+        name = next(n for n, k in KINDS.items() if k is kind)
+        found = self._store.look(name, KEY, kind)
+        if found is None:
+            raise FileNotFoundError(f"no {kind.__name__}: run the stages in their order, with --keep")
+        return found
+
+
+def _exports(made: Made, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    write_radius_map(made(Wall), folder)
+    write_cloud(made(Wall), made(WallTexture), folder)
+    write_unrolled(made(WallTexture), folder)
+    write_overlays(made(Overlays), folder)
+    write_model(made(TexturedMesh), folder)
+
+
+def _tileset(recording: Recording, made: Made, folder: Path) -> None:
+    folder.mkdir(exist_ok=True)
+    wall, photo = made(Wall), made(WallTexture)
+    write_tileset(recording, made(TexturedMesh), wall, photo, made(Overlays), made(Defects), folder)
+
+
+class _inputs:  # noqa: N801
+    """A run repeated to a length: probe, recording, and rings, motion and photo put into the store."""
+
+    def __init__(self, given: argparse.Namespace, store: Store, metres: float) -> None:
+        run = RunFiles(given.run.resolve())
+        self.probe = read_probe(Path(run.record()["probe"]["path"]))
+        self.recording = bare_recording(101.6)
+        if store.has("rings", KEY):
+            return
+        motion, rings = run.artefact(Trajectory), run.artefact(RingSamples)
+        length = float(np.ptp(motion.T_pc[:, 2, 3])) + STEP_MM
+        times, scratch = max(round(1000 * metres / length), 1), Scratch(store.folder)
+        made = (
+            ("rings", _rings(rings, times, given.coarser, scratch)),
+            ("trajectory", _motion(motion, times, length)),
+            ("photo", _photo(run.artefact(WallTexture), times, length, given.coarser, scratch)),
+        )
+        for name, artefact in made:
+            store.write(artefact, Provenance(name, "1", KEY, 0.0, ()))
+
+
+def _rings(rings: RingSamples, times: int, coarser: int, scratch: Scratch) -> RingSamples:
+    last = int(rings.frame[-1]) + 2
+    frame = (rings.frame + last * np.arange(times)[:, None]).ravel()
+    per_sample = {f.name: getattr(rings, f.name) for f in fields(rings)
+                  if np.ndim(getattr(rings, f.name)) == 2}  # fmt: skip
+    long = {n: _tiled(v[:, ::coarser], times, scratch) for n, v in per_sample.items()}
+    return replace(rings, frame=frame, azimuth_rad=rings.azimuth_rad[::coarser], **long)
+
+
+def _tiled(values: NDArray[Any], times: int, scratch: Scratch) -> NDArray[Any]:
+    out = scratch.zeros((times * len(values), *values.shape[1:]), values.dtype)
+    for k in range(times):
+        out[k * len(values) : (k + 1) * len(values)] = values
+    return out
+
+
+def _motion(motion: Trajectory, times: int, length_mm: float) -> Trajectory:
+    """Return the motion along a straight pipe; the source's bent axis would not meet itself."""
+    count, every = len(motion.frame), np.arange(times)
+    T_pc = np.tile(motion.T_pc, (times, 1, 1))
+    T_pc[:, 2, 3] += np.repeat(length_mm * every, count)
+    frame = (motion.frame + (int(motion.frame[-1]) + 1) * every[:, None]).ravel()
+    s = np.arange(-100.0, times * length_mm + 200.0, 2.0)
+    axis = PipeAxis(s, np.stack([0 * s, 0 * s, s], -1), np.tile(np.eye(3), (len(s), 1, 1)))
+    time_s = (motion.time_s + (motion.time_s[-1] + 1 / 30) * every[:, None]).ravel()
+    covariance = np.tile(motion.covariance, (times, 1, 1))
+    return replace(motion, frame=frame, time_s=time_s, T_pc=T_pc, covariance=covariance, axis=axis, events=())
+
+
+def _photo(photo: WallTexture, times: int, length_mm: float, coarser: int, scratch: Scratch) -> WallTexture:
+    rows = round(length_mm / photo.mm_per_px)
+    one = photo.bgra[np.minimum(np.arange(0, rows, coarser), len(photo.bgra) - 1), ::coarser]
+    return replace(
+        photo, bgra=_tiled(one, times, scratch), mm_per_px=length_mm / len(one),
+        rad_per_px=photo.rad_per_px * coarser,
+    )  # fmt: skip
+
+
+class RepeatedFrames:
+    """A video shown again and again, decoded anew each time."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording, self._count = recording, int(recording.frames.frame[-1]) + 1
+
+    @property
+    def image_size(self) -> tuple[int, int]:
+        return self._recording.source.image_size
+
+    def read(
+        self, frames: Sequence[int] | NDArray[np.int64], planes: Planes
+    ) -> Iterator[tuple[int, Image | None]]:
+        wanted = np.asarray(frames)
+        for k in np.unique(wanted // self._count):
+            first = int(k) * self._count
+            for frame, image in self._recording.read(wanted[wanted // self._count == k] - first, planes):
+                yield first + frame, image
+
+
+def _from_video(
+    given: argparse.Namespace, stage: str, times: int, context: Context
+) -> tuple[Callable[[], Any], float]:
+    """Return rings or texture of a recording repeated end to end."""
+    recording, run = open_recording(given.recording), RunFiles(given.run.resolve())
+    probe, motion = read_probe(recording.probe_file), run.artefact(Trajectory)
+    length = float(np.ptp(motion.T_pc[:, 2, 3])) + STEP_MM
+    long_motion_ = _motion(motion, times, length)
+    table = FrameTable(long_motion_.frame, long_motion_.time_s, np.tile(recording.frames.illumination, times))
+    long = replace(recording, frames=table, source=RepeatedFrames(recording))
+    metres = times * length / 1000
+    if stage == "rings":
+        return lambda: extract_rings(long, probe, RingParameters.model_validate({}), context), metres
+    wall = _wall(run.artefact(Wall), times, length)
+    parameters = TextureParameters.model_validate({})
+    return lambda: photograph_wall(long, probe, long_motion_, wall, parameters, context), metres
+
+
+def _wall(wall: Wall, times: int, length_mm: float) -> Wall:
+    """Return a wall of the mean radius at every place: what lies on it is the photo's business."""
+    radius_map = wall.radius_map
+    s = np.arange(radius_map.distance_mm[0], radius_map.distance_mm[0] + times * length_mm, 0.5)
+    even = {f.name: np.full((len(s), len(radius_map.azimuth_rad)), np.nanmedian(getattr(radius_map, f.name)),
+                            getattr(radius_map, f.name).dtype)
+            for f in fields(radius_map) if np.ndim(getattr(radius_map, f.name)) == 2}  # fmt: skip
+    axis = PipeAxis(s, np.stack([0 * s, 0 * s, s], -1), np.tile(np.eye(3), (len(s), 1, 1)))
+    return Wall(wall.cloud, replace(radius_map, distance_mm=s, **even), axis)
+
+
+class Watch:
+    """Processor time and most memory of its own that this process and those below it take."""
+
+    cpu_s = 0.0
+    most_mib = 0.0
+
+    def __enter__(self) -> Watch:
+        self._start, self._stop = _cpu_s(), threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+        self.cpu_s = _cpu_s() - self._start
+
+    def _look(self) -> None:
+        while not self._stop.wait(0.05):
+            self.most_mib = max(self.most_mib, sum(map(_anonymous_mib, _family(os.getpid()))))
+
+
+def _cpu_s() -> float:
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in used)
+
+
+def _family(pid: int) -> list[int]:
+    try:
+        tasks = list(Path(f"/proc/{pid}/task").iterdir())
+        below = [int(c) for t in tasks for c in (t / "children").read_text().split()]
+    except OSError:  # ended meanwhile
+        return [pid]
+    return [pid, *(p for child in below for p in _family(child))]
+
+
+def _anonymous_mib(pid: int) -> float:
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:  # ended meanwhile
+        return 0.0
+    held = [line.split()[1] for line in status.splitlines() if line.startswith("RssAnon:")]
+    return int(held[0]) / 1024 if held else 0.0
+
+
+if __name__ == "__main__":
+    main()
