@@ -10,9 +10,10 @@ from pipeline.recording.base import Encoder
 from stages.diagnose.travel.events import steps_found, with_events
 from stages.diagnose.travel.jump import jump_of_reading, reading_jump
 from stages.diagnose.travel.lines import find_lines
-from stages.diagnose.travel.model import DELAY, PLAY, SCALE, fitted, turns_between
+from stages.diagnose.travel.model import DELAY, PLAY, SCALE, fitted
 from stages.diagnose.travel.parts import second_predictions
 from stages.diagnose.travel.swings import swings_again
+from stages.diagnose.travel.turns import turns_between
 from tests.travel_cases import read, seen, way
 
 Float = NDArray[np.float64]

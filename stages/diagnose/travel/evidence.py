@@ -190,6 +190,7 @@ def _estimates(
             (SMOOTH[j], float(correlation[k, j]))
             for j in stated
             if j != k and usable[j] and usable[k] and abs(correlation[k, j]) > _INSEPARABLE
+            if not (fit.told_apart and {j, k} == {DELAY, PLAY})
         )
         if k == SCALE and source == "field":
             # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -9,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.recording.base import Encoder
-from stages.diagnose.effects.base import Travel
-from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.travel.noise import (
     DriftNoise,
     Whitened,
@@ -19,6 +18,7 @@ from stages.diagnose.travel.noise import (
     whitened_fit,
 )
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
+from stages.diagnose.travel.turns import lag_mm, turns_between
 
 Float = NDArray[np.float64]
 OFFSET, SCALE, DELAY, PLAY = range(4)
@@ -30,16 +30,8 @@ _AROUND = 10
 # less than this share tell nothing of a delay.
 _SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
 _WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
-# χ² of two numbers that chance exceeds once in 10⁵.
+# χ² of one number that chance exceeds once in 10⁵, with a margin for noise that is not quite normal.
 _FAR_BETTER = 23.0
-
-
-@dataclass(frozen=True)
-class Turns:
-    """Where the probe turned between two pictures: before picture ``place`` (K,), at ``distance_mm`` (K,)."""
-
-    place: NDArray[np.int64]
-    distance_mm: Float
 
 
 class EventKind(StrEnum):
@@ -77,6 +69,8 @@ class TravelFit:
         Around ``values``.
     columns : (N, 4 + E)
         What each value adds to reading − sight, per unit.
+    told_apart : bool
+        Whether delay or play is there, and the other does not explain it nearly as well.
     """
 
     sight: Sight
@@ -87,6 +81,7 @@ class TravelFit:
     difference_mm: Float
     whitened: Whitened
     columns: Float
+    told_apart: bool
 
     @property
     def sigma(self) -> Float:
@@ -103,28 +98,81 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     steady = _without_steps(sight, encoder, events)
     speed = np.gradient(sight.distance_mm, sight.time_s)
     searched = _nearest_start(sight, steady, events, speed)
-    # Play and delay can cancel each other: a pair of both must fit far better than what starts from nothing.
-    from_search, from_nothing = (_refined(sight, steady, events, speed, s) for s in (searched, (0.0, 0.0)))
+    ends = [_refined(sight, steady, events, speed, start, held) for held, start in _starts(*searched)]
     if noise is None:
-        noise = estimated_noise(*from_search, sight.path_mm, quantum_mm(encoder) / np.sqrt(12))
+        richest = ends[-1]
+        noise = estimated_noise(
+            richest.difference_mm, richest.columns, sight.path_mm, quantum_mm(encoder) / np.sqrt(12)
+        )
     covariance_mm = noise.covariance(sight.path_mm)
-    ends = [(whitened_fit(y, x, covariance_mm), x) for y, x in (from_nothing, from_search)]
-    plain_misfit, searched_misfit = (float(w.residual @ w.weighted) for w, _ in ends)
-    whitened, columns = ends[int(searched_misfit < plain_misfit - _FAR_BETTER)]
-    values = np.where(np.isfinite(np.diag(whitened.covariance)), whitened.estimate, 0.0)
+    end, told_apart = _simplest(ends, covariance_mm)
+    whitened = whitened_fit(end.difference_mm, end.columns, covariance_mm)
+    values = end.values(covariance_mm)
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
     # Noise is measured from the pictures' usual steps: what is left in all may be more, never less.
     left = float(whitened.residual @ whitened.weighted) / max(len(plain) - len(values), 1)
     covariance = max(left, 1.0) * whitened.covariance
     covariance[SCALE, SCALE] += sight.scale_sigma**2
     values[4:] += [_gain(encoder, sight, e) for e in events]
-    return TravelFit(sight, events, values, covariance, noise, plain - np.median(plain), whitened, columns)
+    return TravelFit(
+        sight, events, values, covariance, noise, plain - np.median(plain), whitened, end.columns, told_apart
+    )
+
+
+@dataclass(frozen=True)
+class _End:
+    """Where a fit came to: reading − sight (N,), columns (N, 4 + E) there, and which are held at 0."""
+
+    held: tuple[int, ...]
+    difference_mm: Float
+    columns: Float
+
+    def values(self, covariance_mm: Float) -> Float:
+        """Return (4 + E,) the values; 0 of what is held, and of what this motion does not tell."""
+        free = _free(self.columns, self.held)
+        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
+        out = np.zeros(self.columns.shape[1])
+        out[free] = np.where(np.isfinite(np.diag(fit.covariance)), fit.estimate, 0.0)
+        return out
+
+    def misfit(self, covariance_mm: Float) -> float:
+        """Return χ² of what is left."""
+        free = _free(self.columns, self.held)
+        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
+        return float(fit.residual @ fit.weighted)
+
+
+def _free(columns: Float, held: tuple[int, ...]) -> NDArray[np.int64]:
+    return np.setdiff1d(np.arange(columns.shape[1]), held)
+
+
+def _starts(delay_s: float, play_mm: float) -> list[tuple[tuple[int, ...], tuple[float, float]]]:
+    """Return what is held at 0 and from where the rest starts: neither, each alone, and last of all both."""
+    return [
+        ((DELAY, PLAY), (0.0, 0.0)),
+        ((PLAY,), (0.0, 0.0)), ((PLAY,), (delay_s, 0.0)),
+        ((DELAY,), (0.0, 0.0)), ((DELAY,), (0.0, play_mm)),
+        ((), (0.0, 0.0)), ((), (delay_s, play_mm)),
+    ]  # fmt: skip
+
+
+def _simplest(ends: Sequence[_End], covariance_mm: Float) -> tuple[_End, bool]:
+    """Return the end that nothing beats by far, and whether it tells delay from play.
+
+    The two can stand in for each other, or cancel: each must earn its place.
+    """
+    cost = [e.misfit(covariance_mm) + _FAR_BETTER * (2 - len(e.held)) for e in ends]
+    best = int(np.argmin(cost))
+    held = ends[best].held
+    rivals = [c for c, e in zip(cost, ends, strict=True) if len(e.held) == 1 and e.held != held]
+    return ends[best], len(held) == 0 or (len(held) == 1 and min(rivals) > cost[best] + _FAR_BETTER)
 
 
 def _refined(
-    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float, start: tuple[float, float]
-) -> tuple[Float, Float]:
-    """Return reading − sight (N,) and the columns (N, 4 + E) about the delay and play found from a start."""
+    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float,
+    start: tuple[float, float], held: tuple[int, ...],
+) -> _End:  # fmt: skip
+    """Return where a fit comes to from a delay and a play, some columns being held at 0."""
     delay_s, play_mm = start
     of_events = event_columns(sight, events, speed)
     for _ in range(_ROUNDS):
@@ -133,9 +181,10 @@ def _refined(
         columns = np.concatenate([smooth, of_events], 1)
         # What is in the reading already is put back, so that every round gives the values in full.
         difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s + off
-        found = robust_coefficients(difference, columns)
+        found, free = np.zeros(columns.shape[1]), _free(columns, held)
+        found[free] = robust_coefficients(difference, columns[:, free])
         delay_s, play_mm = _within(found[DELAY], _LONGEST_S), _within(found[PLAY], _WIDEST_MM)
-    return difference, columns
+    return _End(held, difference, columns)
 
 
 def _nearest_start(
@@ -175,30 +224,6 @@ def _astray(
 
 def _within(value: float, most: float) -> float:
     return float(np.clip(value, -most, most))
-
-
-def turns_between(sight: Sight, steady: Encoder, delay_s: float) -> Turns:
-    """Return where the probe turned between pictures: as far beyond the last one as the reading still went.
-
-    Until it turns, the reading follows the probe, whatever play there is after that.
-    """
-    way = sight.direction
-    before = np.flatnonzero(way[1:] != way[:-1])
-    place, distance = [], []
-    for turn in before:
-        # The direction is a mean over neighbours: the turn may be a picture later or earlier.
-        first, last = max(int(turn) - 1, 0), min(int(turn) + 2, len(way) - 1)
-        inside = (steady.time_s > sight.time_s[first] + delay_s) & (
-            steady.time_s < sight.time_s[last] + delay_s
-        )
-        if not inside.any():
-            continue
-        at = np.flatnonzero(inside)[np.argmax(way[turn] * steady.distance_mm[inside])]
-        k = int(np.clip(np.searchsorted(sight.time_s, steady.time_s[at] - delay_s), 1, len(way) - 1))
-        went = steady.distance_mm[at] - readings_at(steady, sight.time_s[k - 1 : k] + delay_s)[0]
-        place.append(k)
-        distance.append(sight.distance_mm[k - 1] + went)
-    return Turns(np.array(place, np.int64), np.array(distance, float))
 
 
 def moment(sight: Sight, encoder: Encoder, place: int) -> int:
@@ -255,16 +280,7 @@ def _smooth_columns(
     What the play does to a reading is the column times the size less the second.
     """
     turns = turns_between(sight, steady, delay_s)
-    low, here, high = (_lag(sight, turns, play_mm + step) for step in (-_PLAY_STEP_MM, 0.0, _PLAY_STEP_MM))
+    low, here, high = (lag_mm(sight, turns, play_mm + step) for step in (-_PLAY_STEP_MM, 0.0, _PLAY_STEP_MM))
     slope = (high - low) / (2 * _PLAY_STEP_MM)
     way = sight.distance_mm - sight.distance_mm[0]
     return np.stack([np.ones(len(speed)), way, -speed, slope], 1), slope * play_mm - here
-
-
-def _lag(sight: Sight, turns: Turns, play_mm: float) -> Float:
-    """Return (N,) by how much readings are ahead for play of that size."""
-    way = np.insert(sight.distance_mm, turns.place, turns.distance_mm)
-    same = np.zeros(len(way))
-    travel = Travel(same, way, same, way)
-    lag = LIBRARY["encoder_backlash"].reading_shift_mm(travel, (), np.array([play_mm]))
-    return np.asarray(np.delete(lag, turns.place + np.arange(len(turns.place))))
