@@ -73,6 +73,8 @@ def test_a_swing_is_named_at_its_own_frequency_and_found_without_a_name_too():
     unknown = seen(hidden, ("laser_tilt",), 63)
     assert verdict_of(unknown) is Verdict.UNEXPLAINED
     assert "sin(2πft" in formula(unknown)
+    assert unknown.location is not None
+    assert (unknown.location.fixed_to, unknown.location.time) == ("laser", "periodic")
 
 
 def test_a_drift_is_sized_with_its_time_constant():
@@ -88,3 +90,9 @@ def test_rings_beyond_the_last_fiducials_do_not_count():
     run = found.searched.run
     assert run.edges.frame.min() <= run.rings.frame.min()
     assert run.rings.frame.max() <= run.edges.frame.max() < len(run.time_s) - 1
+
+
+def test_an_unknown_wave_in_the_fraction_of_a_pixel_is_found_and_described():
+    found = seen(("pixel_locking=0.06",), FEW, 65)
+    assert verdict_of(found) is Verdict.UNEXPLAINED
+    assert "cos(2πρ" in formula(found)

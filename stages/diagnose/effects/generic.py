@@ -102,6 +102,26 @@ class RowTerm(Nameless):
         return "image: a (row/H − 1/2) × velocity"
 
 
+@dataclass(frozen=True)
+class FractionTerm(Nameless):
+    """A wave in the fraction of a pixel that the line lies at."""
+
+    name: str = "generic_fraction"
+    harmonic: int = 0
+    amplitudes: tuple[Amplitude, ...] = two_parts("px", 0.02)
+
+    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return a cos 2πρ + b sin 2πρ of the line's image radius ρ, nothing on texture."""
+        if not points.on_line:
+            return np.zeros(len(points.uv))
+        rho = np.linalg.norm(points.uv - points.probe.camera.centre_px, axis=1)
+        return cosine(2 * np.pi * rho, amplitude)
+
+    def formula(self, shape: Shape) -> str:
+        """Return the pattern as a formula."""
+        return "line: a cos(2πρ − φ₀), ρ its image radius in px"
+
+
 def smooth_columns(points: ImagePoints) -> Float:
     """Return (M, 72) columns of the generic line terms, constant and linear in time, for line points."""
     terms = [term for term in GENERIC if term.moves is Moves.LINE]
@@ -133,7 +153,7 @@ def _vocabulary() -> tuple[tuple[EffectModel, Shape], ...]:
     courses = {Moves.LINE: (STEADY, WITH_TIME, WITH_SPEED), Moves.OUTWARD: (STEADY, WITH_TIME)}
     moving = [(t, course) for t in GENERIC for course in courses.get(t.moves, (STEADY,))]
     wall = [(_term(Moves.WALL, m, 0), course) for m in (1, 2, 3, 4) for course in (STEADY, WITH_DISTANCE)]
-    return (*moving, *wall, (RowTerm(), STEADY))
+    return (*moving, *wall, (RowTerm(), STEADY), (FractionTerm(), STEADY))
 
 
 # What an empirical formula is put together from: patterns in (r, ψ, t, s, speed, row).

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.effects.generic import GenericTerm, Moves, RowTerm
+from stages.diagnose.effects.generic import FractionTerm, GenericTerm, Moves, RowTerm
+from stages.diagnose.effects.swings import SwingTerm
 from stages.diagnose.gauge.confirm import by_bore, partial_of
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged, Regime
@@ -41,6 +42,11 @@ def _pattern(term: Term) -> tuple[str, str, int | None]:
     model = term.model
     if isinstance(model, RowTerm):
         return "camera", "speed", None
+    if isinstance(model, FractionTerm):
+        return "camera", "static", None
+    if isinstance(model, SwingTerm):
+        # It moves the line against the fiducials: the camera has no part in it.
+        return "laser", "periodic", model.harmonic
     if isinstance(model, GenericTerm):
         time = _COURSES[int(term.shape[0])]
         return "time" if time == "drift" else _FIXED[model.moves], time, model.harmonic
