@@ -14,6 +14,7 @@ from pipeline.artefacts import Float, Int, RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Image, Recording
+from pipeline.scratch import Scratch
 from pipeline.stage import Context, Parameters
 from stages.rings.colour import discriminant_weights, excess_weights, mix
 from stages.rings.noise import clip_level_of, noise_response
@@ -24,6 +25,7 @@ from stages.rings.validity import mark_outliers, wander_px
 Images = Iterator[tuple[int, Image | None]]
 Found = tuple[int, RingTrace | None]
 _LEARNING_FRAMES = 4
+_AT_ONCE = 512
 
 
 class RingParameters(Parameters):
@@ -58,20 +60,22 @@ def extract_rings(
     both = recording.read(recording.frames.of(Illumination.BOTH), "bgr")
     sectors = cut_sectors(recording.source.image_size, probe.camera.centre_px, parameters.azimuths)
     found = chain(_laser_traces(lasers, recording, sectors), _lit_traces(both, probe, sectors))
-    traces: dict[int, RingTrace] = {}
+    samples, rings = _empty(frames, sectors, context.scratch), 0
     for done, (frame, trace) in enumerate(found, 1):
         if trace is not None and trace.coverage >= parameters.least_coverage:
-            traces[frame] = trace
+            _put(samples, int(np.searchsorted(frames, frame)), trace)
+            rings += 1
         context.progress(done, len(frames))
-    if not traces:
+    if not rings:
         raise UnusableError(
             "rings", "no laser ring was found in any frame", frames=frames.tolist(),
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
-    samples = _samples(frames, sectors, traces)
-    wander = wander_px(samples)
+    _mark_outliers(samples)
+    wander = wander_px(_some(samples))
     _report(context, samples, wander)
-    return replace(samples, sigma_px=np.hypot(samples.sigma_px, np.float32(wander)))
+    np.hypot(samples.sigma_px, np.float32(wander), out=samples.sigma_px)
+    return samples
 
 
 def _laser_traces(images: Images, recording: Recording, sectors: Sectors) -> Iterator[Found]:
@@ -123,21 +127,40 @@ def _first_trace(
     return None
 
 
-def _samples(frames: Int, sectors: Sectors, traces: dict[int, RingTrace]) -> RingSamples:
+def _empty(frames: Int, sectors: Sectors, scratch: Scratch) -> RingSamples:
+    """Return room for the rings of all frames, every one rejected as yet."""
     shape = (len(frames), len(sectors.azimuth_rad))
-    values = {
-        k: np.full(shape, np.nan, np.float32) for k in ("radius_px", "sigma_px", "width_px", "amplitude")
-    }
-    validity = np.full(shape, RingValidity.FRAME_REJECTED, np.uint8)
-    for row, frame in enumerate(frames):
-        trace = traces.get(int(frame))
-        if trace is None:
-            continue
-        validity[row] = trace.validity
-        for name, array in values.items():
-            array[row] = getattr(trace.fit, name)
-    validity = mark_outliers(values["radius_px"], values["sigma_px"], validity)
-    return RingSamples(frames, sectors.azimuth_rad, sectors.centre_px, **values, validity=validity)
+    radius, sigma, width, amplitude = (scratch.full(shape, np.nan, np.float32) for _ in range(4))
+    validity = scratch.full(shape, RingValidity.FRAME_REJECTED, np.uint8)
+    return RingSamples(
+        frames, sectors.azimuth_rad, sectors.centre_px, radius, sigma, width, amplitude, validity
+    )
+
+
+def _put(samples: RingSamples, row: int, trace: RingTrace) -> None:
+    samples.validity[row] = trace.validity
+    for name in ("radius_px", "sigma_px", "width_px", "amplitude"):
+        getattr(samples, name)[row] = getattr(trace.fit, name)
+
+
+def _mark_outliers(samples: RingSamples) -> None:
+    """Mark outliers some rings at a time, each seen with the one before and the one after."""
+    count, before = len(samples.frame), samples.validity[:0]
+    for first in range(0, count, _AT_ONCE):
+        rows = slice(first, min(first + _AT_ONCE, count))
+        wide = slice(max(first - 1, 0), min(rows.stop + 1, count))
+        validity = np.concatenate([before, samples.validity[wide.start + len(before) : wide.stop]])
+        marked = mark_outliers(samples.radius_px[wide], samples.sigma_px[wide], validity)
+        # As found in the image: what was marked in it must not tell the next rings otherwise.
+        before = samples.validity[rows][-1:].copy()
+        samples.validity[rows] = marked[first - wide.start : rows.stop - wide.start]
+
+
+def _some(samples: RingSamples) -> RingSamples:
+    """Return some hundred of the rings, which are told apart no better by more of them."""
+    some = slice(None, None, max(len(samples.frame) // _AT_ONCE, 1))
+    per_ring = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
+    return replace(samples, **{name: getattr(samples, name)[some] for name in per_ring})
 
 
 def _report(context: Context, samples: RingSamples, wander: float) -> None:
