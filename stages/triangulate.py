@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
+from scipy.ndimage import median_filter
 
 from pipeline.artefacts import Float, Float32, RingPoints, RingSamples, RingValidity
 from pipeline.instrument.laser import LaserSheet
@@ -15,10 +17,19 @@ from pipeline.stage import Context, Parameters, Stage
 _UPPER = np.triu_indices(3)
 _CHUNK_FRAMES = 16
 _REPORTED_RINGS = 500
+_NEIGHBOURS = 9
 
 
 class TriangulateParameters(Parameters):
-    """Triangulation is exact and has nothing to set."""
+    """Triangulation itself is exact; what can be set is which samples cannot be of the wall."""
+
+    largest_departure: float = Field(
+        0.2,
+        gt=0,
+        le=100,
+        description="a sample is not used that lies farther from the median distance of its nine neighbours "
+        "from the camera's axis than this part of it: an edge of texture taken for the line",
+    )
 
 
 def triangulate_rings(
@@ -36,22 +47,48 @@ def triangulate_rings(
     Returns
     -------
     RingPoints
-        mm in C; NaN where the sample is invalid or its ray misses the sheet.
+        mm in C; NaN where the sample is invalid, its ray misses the sheet, or it is off the ring.
     """
     shape = rings.validity.shape
     xyz, uncorrected, noise = (context.scratch.zeros((*shape, 3), np.float32) for _ in range(3))
     covariance = context.scratch.zeros((*shape, 6), np.float32)
-    placed, missed = 0, 0
+    placed, missed, off = 0, 0, 0
     for start in range(0, len(rings.frame), _CHUNK_FRAMES):
         frames = slice(start, start + _CHUNK_FRAMES)
         found = _triangulate_chunk(rings, frames, probe)
-        xyz[frames], uncorrected[frames], noise[frames], covariance[frames] = found
-        known = np.isfinite(xyz[frames, :, 0])
-        placed += int(known.sum())
-        missed += int((_valid(rings, frames) & ~known).sum())
+        hit = np.isfinite(found[0][..., 0])
+        missed += int((_valid(rings, frames) & ~hit).sum())
+        apart = off_the_ring(np.hypot(*np.moveaxis(found[0][..., :2], -1, 0)), parameters.largest_departure)
+        off += int(apart.sum())
+        for whole, part in zip((xyz, uncorrected, noise, covariance), found, strict=True):
+            part[apart] = np.nan
+            whole[frames] = part
+        placed += int((hit & ~apart).sum())
         context.progress(min(frames.stop, len(rings.frame)), len(rings.frame))
-    _report(context, placed, missed, noise)
+    _report(context, placed, missed, off, noise)
     return RingPoints(rings.frame, rings.azimuth_rad, xyz, uncorrected, noise, covariance)
+
+
+def off_the_ring(rho_mm: Float32, largest_departure: float) -> NDArray[np.bool_]:
+    """Return where samples lie off the ring that their neighbours form.
+
+    A dent, a step or a branch is as wide as most of its neighbours and stays; what is narrower than half of
+    them and as deep as a fifth of the pipe's radius is no wall: light does not come out of such a hole.
+
+    Parameters
+    ----------
+    rho_mm : (F, A)
+        Distance from the camera's axis; NaN where there is no sample.
+    largest_departure
+        From the median of the nine neighbours there are along the ring, as a part of it.
+    """
+    out = np.zeros(rho_mm.shape, bool)
+    for row, rho in zip(out, rho_mm, strict=True):
+        there = np.flatnonzero(np.isfinite(rho))
+        if there.size >= _NEIGHBOURS:
+            ring = median_filter(rho[there], _NEIGHBOURS, mode="wrap")
+            row[there] = np.abs(rho[there] - ring) > largest_departure * ring
+    return out
 
 
 def untilted_sheet(laser: LaserSheet) -> LaserSheet:
@@ -97,9 +134,10 @@ def _valid(rings: RingSamples, frames: slice) -> NDArray[np.bool_]:
     return np.asarray(rings.validity[frames] == RingValidity.VALID)
 
 
-def _report(context: Context, placed: int, missed: int, noise: Float32) -> None:
+def _report(context: Context, placed: int, missed: int, off: int, noise: Float32) -> None:
     context.report("points triangulated", placed, "points")
     context.report("ring samples that miss the laser sheet", missed, "samples")
+    context.report("rejected: far off the ring beside them", off, "samples")
     # The median of some hundred rings is that of all.
     some = noise[:: max(len(noise) // _REPORTED_RINGS, 1)]
     length = np.linalg.norm(some[np.isfinite(some[..., 0])], axis=-1)
@@ -109,7 +147,7 @@ def _report(context: Context, placed: int, missed: int, noise: Float32) -> None:
 
 TRIANGULATE = Stage(
     "triangulate",
-    "1",
+    "2",
     TriangulateParameters,
     triangulate_rings,
     "ring samples and instrument to wall points with covariance",

@@ -10,7 +10,7 @@ from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.stage import quiet_context
-from stages.triangulate import TRIANGULATE, TriangulateParameters, triangulate_rings
+from stages.triangulate import TRIANGULATE, TriangulateParameters, off_the_ring, triangulate_rings
 
 CAMERA = KannalaBrandt((1600, 1200), (366.1, 365.8), (796.9, 591.8), (-0.0118, 0.0008, -0.0008, 0.0))
 SHEET = LaserSheet(23.4, 0.008, -0.006, 0.002, 0.05, -0.03, (1e-4, -2e-4, 0.0, 1e-4, 0.0, 0.0))
@@ -29,8 +29,10 @@ def samples(radius, sigma=0.1):
 
 
 def rings(frames=20):
+    """Rings of every size, off the middle."""
     random = np.random.default_rng(0)
-    return samples(random.uniform(280, 430, (frames, AZIMUTH.size)))
+    size, off, phase = (random.uniform(*span, (frames, 1)) for span in ((280, 430), (0, 10), (-3, 3)))
+    return samples(size + off * np.cos(AZIMUTH - phase))
 
 
 def triangulated(ring, probe=PROBE):
@@ -102,3 +104,63 @@ def test_counts_are_reported():
 
 def test_the_stage_is_wired_by_type():
     assert list(TRIANGULATE.inputs()) == ["rings", "probe"]
+
+
+WIDE = np.linspace(-np.pi, np.pi, 1440, endpoint=False)
+
+
+def ring_of(*bumps, frames=3):
+    """A ring 25 mm in radius about a point 6 mm off the axis; ``bumps`` are (sector, width, departure)."""
+    rho = np.tile(6 * np.cos(WIDE) + np.sqrt(25**2 - (6 * np.sin(WIDE)) ** 2), (frames, 1))
+    for at, width, departure in bumps:
+        rho[:, np.arange(at, at + width) % 1440] *= 1 + departure
+    return rho
+
+
+@pytest.mark.parametrize(
+    ("bump", "rejected"),
+    [
+        ((593, 1, 2.4), 1),
+        ((593, 4, 0.25), 4),
+        ((1438, 4, 1.0), 4),
+        ((10, 1, -0.4), 1),
+        ((593, 1, 0.15), 0),
+        ((593, 5, 1.0), 0),
+        ((593, 200, 0.5), 0),
+        ((593, 720, -0.3), 0),
+    ],
+    ids=["edge", "narrow", "seam", "inward", "pit", "branch", "opening", "step"],
+)
+def test_only_what_is_narrow_and_far_off_is_rejected(bump, rejected):
+    """In every ring alike, as edges of texture are: the ring before bears nothing out."""
+    off = off_the_ring(ring_of(bump).astype(np.float32), 0.2)
+    assert off.sum(1).tolist() == [rejected] * 3
+    assert not off_the_ring(ring_of(bump).astype(np.float32), 100).any()
+
+
+def test_lone_samples_are_held_against_the_nearest_there_are():
+    rho = ring_of((593, 1, 2.4), (640, 1, 0.05)).astype(np.float32)
+    rho[:, 560:590] = rho[:, 600:636] = np.nan
+    rho[1] = np.nan
+    rho[1, :8] = 25
+    off = off_the_ring(rho, 0.2)
+    assert np.argwhere(off).tolist() == [[0, 593], [2, 593]]
+
+
+def test_a_sample_far_off_is_counted_and_nothing_of_it_is_left():
+    ring, told = rings(3), {}
+    good = triangulated(ring)
+    context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
+    spoilt = ring.radius_px.copy()
+    spoilt[1, 7] *= 1.25
+    points = triangulate_rings(
+        replace(ring, radius_px=spoilt), PROBE, TriangulateParameters.model_validate({}), context
+    )
+    assert told["rejected: far off the ring beside them"] == 1
+    assert told["points triangulated"] == ring.valid.sum() - 1
+    for name in ("xyz_c", "xyz_uncorrected_c", "noise_direction", "calibration_covariance"):
+        found, before = getattr(points, name), getattr(good, name)
+        assert np.isnan(found[1, 7]).all()
+        kept = np.isfinite(found)
+        assert kept.sum() == np.isfinite(before).sum() - before.shape[-1]
+        assert np.array_equal(found[kept], before[kept])
