@@ -134,6 +134,10 @@ class Tab:
             " boresight.flat.paint())"
         )
 
+    def status(self) -> str:
+        """Return what the unrolled wall says below itself."""
+        return str(self.page.locator("#view-flat .status").inner_text())
+
     def page_of(self, name: str) -> None:
         self.page.click(f'[data-page="{name}"]')
 

@@ -28,10 +28,11 @@ class Answer:
 
 @dataclass
 class ReviewServer:
-    """``boresight review RUN``; ``address`` carries the token."""
+    """``boresight review RUN``, with more ``words`` where given; ``address`` carries the token."""
 
     run: Path
     port: int = 0
+    words: tuple[str, ...] = ()
     address: str = field(init=False, default="")
     token: str = field(init=False, default="")
 
@@ -45,16 +46,18 @@ class ReviewServer:
     def start(self) -> None:
         command = [sys.executable, "-m", "pipeline.cli", "review", str(self.run), "--no-browser"]
         self.process = subprocess.Popen(
-            [*command, "--port", str(self.port)],
+            [*command, "--port", str(self.port), *self.words],
             cwd=PROJECT_ROOT,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
             env=os.environ | {"PYTHONUNBUFFERED": "1"},
         )
-        line = self.process.stdout.readline()
-        found = re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", line)
-        assert found, line + self.process.stderr.read()
+        told = ""
+        while (found := re.search(r"http://127\.0\.0\.1:(\d+)/\?token=(\S+)", told)) is None:
+            line = self.process.stdout.readline()
+            assert line, told + self.process.stderr.read()
+            told += line
         self.address, self.port, self.token = found[0], int(found[1]), found[2]
 
     def kill(self, how: signal.Signals = signal.SIGKILL) -> None:

@@ -1,0 +1,140 @@
+"""Decisions by mouse and by keyboard alone: accept, redraw, merge, split, undo; what a wall assumed tells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.review_browser import Tab
+
+
+def test_decisions_by_keyboard_alone(page: Tab) -> None:
+    rank = {"pit": 1, "corrosion": 1, "dent": 2}
+    rows = page.page.locator(".list .row strong").all_inner_texts()
+    assert [rank[r.split()[1]] for r in rows] == sorted(rank[r.split()[1]] for r in rows)
+    page.choose("1")
+    with page.one_change():
+        page.keys("a")
+    page.keys("n")
+    chosen = page.js("boresight.session.selected")
+    page.keys("r")
+    page.page.keyboard.type("reflection")
+    with page.one_change():
+        page.keys("Enter")
+    page.keys("c")
+    page.page.keyboard.type("seen in frame 12")
+    with page.one_change():
+        page.keys("Enter")
+    first, second = page.finding("1"), page.finding(chosen)
+    assert (first["status"], first["decided_by"]) == ("accepted", "Ada")
+    assert first["decided_at"].startswith("20")
+    assert (second["status"], second["reason"]) == ("rejected", "reflection")
+    assert [(r["who"], r["text"]) for r in second["remarks"]] == [("Ada", "seen in frame 12")]
+    page.focus_list()
+    for keys in ("Control+z", "Control+z", "Control+Shift+z"):
+        with page.one_change():
+            page.keys(keys)
+    assert page.finding(chosen)["status"] == "rejected"
+    assert page.finding(chosen)["remarks"] == []
+    with page.one_change():
+        page.keys("o")
+    assert page.finding(page.js("boresight.session.selected"))["status"] == "open"
+
+
+def test_without_a_name_nothing_is_decided(page: Tab) -> None:
+    page.page.fill("#who", "")
+    page.page.locator("#who").press("Tab")
+    page.focus_list()
+    before = page.revision
+    page.keys("a")
+    assert "Give your name" in page.page.locator(".notice").inner_text()
+    assert page.js("document.activeElement.id") == "who"
+    page.named("Ada")
+    assert page.revision == before
+
+
+def test_reclassified_and_redrawn_stands_beside_the_original(page: Tab) -> None:
+    page.choose("2")
+    measured = page.finding("2")
+    with page.one_change():
+        page.page.select_option('select[aria-label="kind"]', "deposit")
+    low, high = (f([p[0] for p in measured["outline"]]) for f in (min, max))
+    middle = sum(p[1] for p in measured["outline"]) / len(measured["outline"])
+    page.show_wall((low + high) / 2, middle, 0.3)
+    page.focus_list()
+    page.keys("e")
+    page.click_wall(
+        (low - 3, middle - 0.2), (high + 3, middle - 0.2), (high + 3, middle + 0.2), (low - 3, middle + 0.2)
+    )
+    with page.one_change():
+        page.page.click("text=Done")
+    now = page.finding("2")
+    assert (now["kind"], now["edited"], now["original"]) == ("deposit", True, 2)
+    assert now["size"]["length_mm"] == pytest.approx(high - low + 6, abs=1)
+    assert now["size"]["depth_mm"] == pytest.approx(measured["size"]["depth_mm"], abs=0.5)
+    shown = page.page.locator(".original").inner_text()
+    assert shown.startswith("As measured")
+    assert "Dent" in shown
+
+
+def test_an_outline_is_drawn_with_the_keyboard_alone(page: Tab) -> None:
+    page.js("boresight.session.moveTo([50, 0.5])")
+    page.keys("d")
+    for steps in (
+        ("Enter",),
+        ("Shift+ArrowRight", "Enter"),
+        ("Shift+ArrowDown", "Enter", "Enter", "Backspace"),
+    ):
+        page.keys(*steps)
+    assert len(page.js("boresight.session.drawn")) == 3
+    page.page.select_option('select[aria-label="kind of the missed defect"]', "gouge")
+    page.page.locator(".flat canvas").focus()
+    with page.one_change():
+        page.keys("Control+Enter")
+    made = page.finding(f"a{page.revision}")
+    assert (made["kind"], made["status"], len(made["outline"])) == ("gouge", "accepted", 3)
+    assert made["size"]["depth_sigma_mm"] > 0
+
+
+def test_merge_and_split(page: Tab) -> None:
+    page.choose("1")
+    page.keys("x")
+    page.choose("3")
+    page.keys("x")
+    with page.one_change():
+        page.keys("m")
+    merged = f"m{page.revision}"
+    assert merged in page.standing()
+    assert not {"1", "3"} & set(page.standing())
+    assert page.finding(merged)["made_of"] == ["1", "3"]
+    page.focus_list()
+    with page.one_change():
+        page.keys("Control+z")
+    assert {"1", "3"} <= set(page.standing())
+    page.choose("2")
+    page.keys("s")
+    s, a = np.mean(page.finding("2")["outline"], axis=0)
+    page.show_wall(float(s), float(a), 0.3)
+    page.click_wall((s - 8, a - 0.1), (s - 1, a - 0.1), (s - 4, a + 0.1))
+    page.keys(",")
+    page.click_wall((s + 1, a - 0.1), (s + 8, a - 0.1), (s + 4, a + 0.1))
+    with page.one_change():
+        page.page.click("text=Done")
+    assert {"2.1", "2.2"} <= set(page.standing())
+    assert "2" not in page.standing()
+
+
+def test_assumed_wall_gives_loss_and_strength(page: Tab) -> None:
+    page.page_of("Sign-off")
+    page.page.fill("#wall", "6")
+    page.page.fill("#yield", "360")
+    with page.one_change():
+        page.page.click("text=Use for wall loss")
+    found = page.finding("1")
+    assert found["wall_loss_percent"] == pytest.approx(100 * found["size"]["depth_mm"] / 6)
+    page.page_of("Inspect")
+    page.choose("1")
+    shown = page.page.locator(".detail table").inner_text()
+    assert "modified B31G" in shown
+    assert "%" in shown
+    page.until("document.querySelectorAll('.curves .chart').length === 2")

@@ -1,0 +1,74 @@
+"""Quality, signing and papers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.review_browser import Tab
+
+
+def test_the_quality_page_tells_how_good_the_run_is(page: Tab) -> None:
+    page.keys("2")
+    shown = page.page.locator(".page:visible")
+    shown.locator(".plots figure").first.wait_for()
+    captions = " ".join(shown.locator("figcaption").all_inner_texts())
+    for word in ("Wall seen", "1 σ of the radius", "Diameter", "Drift", "not used"):
+        assert word in captions
+    text = shown.inner_text()
+    for word in ("laser frames rejected whole", "probe file written", "Left-out physics", "SHA-256"):
+        assert word in text
+
+
+def test_any_later_change_shows_as_unsigned(page: Tab) -> None:
+    page.keys("3")
+    page.page.fill("#sign-name", "Ada Lovelace")
+    page.page.fill("#sign-standard", "POF 100")
+    page.page.fill("#sign-remarks", "dry pipe")
+    page.page.click('button:text-is("Sign")')
+    badge = "document.querySelector('.badge').textContent === '{}'"
+    page.until(badge.format("signed"))
+    assert "Signed by Ada Lovelace" in page.page.locator(".page:visible").inner_text()
+    page.page_of("Inspect")
+    page.choose("1")
+    with page.one_change():
+        page.keys("a")
+    page.until(badge.format("changed since signed"))
+    with page.one_change():
+        page.keys("Control+z")
+    page.until(badge.format("signed"))
+
+
+def test_a_file_of_the_run_changed_behind_its_back_shows_as_unsigned(page: Tab, run: Path) -> None:
+    page.keys("3")
+    page.page.fill("#sign-name", "Ada")
+    page.page.click('button:text-is("Sign")')
+    page.until("boresight.session.seal?.signed")
+    table = run / "sections.csv"
+    before = table.read_bytes()
+    table.write_bytes(before.replace(b"1", b"2", 1))
+    page.js("boresight.session.refresh()")
+    page.until("boresight.session.seal && !boresight.session.seal.signed")
+    table.write_bytes(before)
+    page.js("boresight.session.refresh()")
+    page.until("boresight.session.seal?.signed")
+
+
+def test_every_paper_can_be_taken_away(page: Tab) -> None:
+    page.keys("3")
+    links = page.page.locator(".papers a")
+    starts = {
+        "report.pdf": b"%PDF-",
+        "report.html": b"<!doctype html>",
+        "findings.csv": b"\xef\xbb\xbfid,",
+        "findings.json": b"{",
+        "pof.csv": b"\xef\xbb\xbffeature_id,",
+        "pictures.zip": b"PK",
+    }
+    assert links.count() == len(starts)
+    for k in range(links.count()):
+        address = links.nth(k).get_attribute("href")
+        answer = page.page.request.get(page.origin + address)
+        assert answer.body().startswith(starts[address.rsplit("/", 1)[1]])
+    with page.page.context.expect_page() as opened, page.page.expect_popup():
+        links.filter(has_text="Findings, CSV").click()
+    opened.value.close()

@@ -1,0 +1,151 @@
+"""Linked views: wall, model, frame and section move together; overlays, relief, cuts, flight."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.review_browser import Tab
+
+SPOT = (60.0, -1.2)
+_RADII = """(() => {
+  const { parts, pipe } = boresight.model, a = parts[0].mesh.geometry.getAttribute('position').array;
+  let low = 1e9, high = 0;
+  for (let k = 0; k < a.length; k += 3) {
+    const r = pipe.coordinates([a[k] * 1e3, a[k + 1] * 1e3, a[k + 2] * 1e3]).radius;
+    low = Math.min(low, r);
+    high = Math.max(high, r);
+  }
+  return [low, high]; })()"""
+
+
+def cursor(page: Tab) -> tuple[float, float]:
+    return tuple(page.js("boresight.session.cursor"))
+
+
+def turned(a: float, b: float) -> float:
+    return abs((a - b + np.pi) % (2 * np.pi) - np.pi)
+
+
+def told(page: Tab, place: str, old: str) -> str:
+    """Return what a view says once it no longer says ``old``."""
+    page.until(f"document.querySelector('{place} .told').textContent !== {json.dumps(old)}")
+    return page.page.locator(f"{place} .told").inner_text()
+
+
+def test_a_click_on_the_wall_moves_all_views(page: Tab) -> None:
+    page.show_wall(60, -1.5, 0.25)
+    frame, section = (page.page.locator(f"{v} .told").inner_text() for v in ("#view-frame", "#view-section"))
+    marker = page.js("boresight.model.marker.position.toArray()")
+    page.click_wall(SPOT)
+    distance, azimuth = cursor(page)
+    assert (distance, azimuth) == pytest.approx(SPOT, abs=0.4)
+    assert "Frame" in told(page, "#view-frame", frame)
+    assert "Radius at" in told(page, "#view-section", section)
+    assert page.js("boresight.model.marker.position.toArray()") != marker
+    assert page.status().startswith(f"Spot at {distance:.1f} mm, 12:")
+
+
+def test_a_click_on_the_model_moves_to_what_was_clicked(page: Tab) -> None:
+    page.js("boresight.session.moveTo([70, -2.4])")
+    x, y = page.js("""(() => {
+        const m = boresight.model, box = m.canvas.getBoundingClientRect();
+        m.camera.updateMatrixWorld(); const p = m.marker.position.clone().project(m.camera);
+        return [(p.x + 1) / 2 * box.width, (1 - p.y) / 2 * box.height]; })()""")
+    page.js("boresight.session.moveTo([30, 1.0])")
+    page.js("boresight.model.flown = 70 - boresight.session.run.radius_mm * 1.1, boresight.model.fly(0)")
+    page.page.locator(".model canvas").click(position={"x": x, "y": y})
+    distance, azimuth = cursor(page)
+    assert abs(distance - 70) < 1.5
+    assert turned(azimuth, -2.4) < 0.03
+
+
+def test_a_click_on_the_frame_moves_to_what_was_clicked(page: Tab) -> None:
+    page.js("boresight.session.moveTo([66, 0.4])")
+    page.until("document.querySelector('.zoomed circle.spot')")
+    told(page, "#view-frame", "")
+    page.page.uncheck("#close-up")
+    page.until("boresight.session.cursor[0] === 66 && document.querySelector('.zoomed img').complete")
+    page.page.wait_for_timeout(400)
+    box = page.page.locator(".zoomed circle.spot").bounding_box()
+    page.js("boresight.session.cursor = [20, -3]")  # moved without any view being told
+    page.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.until("boresight.session.cursor[0] !== 20")
+    distance, azimuth = cursor(page)
+    page.page.check("#close-up")
+    assert abs(distance - 66) < 2
+    assert turned(azimuth, 0.4) < 0.05
+
+
+def test_a_click_on_the_section_turns_only(page: Tab) -> None:
+    page.js("boresight.session.moveTo([50, -1.5])")
+    box = page.page.locator(".section svg[role=img]").bounding_box()
+    page.page.mouse.click(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
+    assert cursor(page)[0] == 50
+    assert turned(cursor(page)[1], 0) < 0.05
+
+
+def test_every_overlay_dresses_wall_and_model(page: Tab) -> None:
+    names = page.js("boresight.session.run.overlays.map((o) => o.name)")
+    assert len(names) >= 4
+    for name in [*names, "photo"]:
+        page.page.select_option('select[aria-label="what the wall shows"]', name)
+        page.until(f"boresight.flat.picture.shown === '{name}'")
+        variant = {"deviation_nominal": "deviation"}.get(name, name)
+        worn = page.js("boresight.model.parts.map((p) => p.mesh.material.name)")
+        assert worn
+        assert all(w.startswith(variant) for w in worn)
+        assert ("mm" in page.page.locator(".legend").inner_text()) == (name != "photo")
+
+
+def test_relief_is_exaggerated_about_the_round_pipe(page: Tab) -> None:
+    def radii() -> tuple[float, float]:
+        return tuple(page.js(_RADII))
+
+    radius = page.js("boresight.session.run.radius_mm")
+    plain = np.array(radii()) - radius
+    page.page.fill("#gain", "5")
+    assert np.array(radii()) - radius == pytest.approx(5 * plain, rel=0.02)
+    page.page.fill("#gain", "1")
+    assert np.array(radii()) - radius == pytest.approx(plain, abs=1e-3)
+
+
+def test_the_model_is_cut_open_from_outside_only(page: Tab) -> None:
+    planes = "boresight.model.parts.every((p) => p.mesh.material.clippingPlanes.length === {})"
+    page.page.click("text=Outside")
+    page.page.check("#cut")
+    page.until(planes.format(1))
+    page.page.click("text=Inside")
+    page.until(planes.format(0))
+    assert page.page.locator("#cut").is_disabled()
+    page.page.click("text=Outside")
+    page.page.uncheck("#cut")
+    page.until(planes.format(0))
+    page.page.click("text=Inside")
+
+
+def test_the_keyboard_flies_inside(page: Tab) -> None:
+    page.keys("g")
+    before = page.js("[boresight.model.flown, boresight.model.look.yaw, boresight.model.frameTimes.length]")
+    page.keys("w", "w", "Shift+W", "s", "d")
+    flown, yaw = page.js("[boresight.model.flown, boresight.model.look.yaw]")
+    assert flown - before[0] == pytest.approx(6 + 6 + 30 - 6)
+    assert yaw < before[1]
+    assert page.standing(), "D beside the model looks around; it adds no defect"
+    assert page.js("boresight.session.tool") == "none"
+
+
+def test_at_rest_the_model_is_sharp_and_not_drawn_on(page: Tab) -> None:
+    page.page.locator(".model canvas").focus()
+    for _ in range(12):
+        page.keys("w")
+    page.page.wait_for_timeout(900)
+    drawn = "boresight.model.renderer.info.render.frame"
+    before = page.js(drawn)
+    page.page.wait_for_timeout(900)
+    assert page.js(drawn) == before
+    assert page.js("boresight.model.renderer.getPixelRatio() / boresight.model.pixelRatio") == pytest.approx(
+        1
+    )
