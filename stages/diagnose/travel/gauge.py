@@ -29,7 +29,8 @@ def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> Tra
         The adjusted state, as of `stages.diagnose.gauge.prepare.prepare`.
     """
     fiducials = recording.pipe.fiducials
-    places = np.array([m.distance_mm for m in fiducials.markers]) if fiducials else np.zeros(1)
+    # Markers of one row were put there together and err alike: rows count, not markers.
+    places = np.unique([round(m.distance_mm, 1) for m in fiducials.markers]) if fiducials else np.zeros(1)
     spread = float(np.sqrt(np.sum((places - places.mean()) ** 2)))
     sight = sight_of_poses(recording, state.T_pc, run.posed, _PLACEMENT_SIGMA_MM / max(spread, 1.0))
     span = slice(int(run.posed[0]), int(run.posed[-1]) + 1)
