@@ -21,7 +21,7 @@ from tests.benchmarks.page.inputs import Inputs
 from tests.benchmarks.page.section import TIMES, Method, Quantity, Section, clocked
 from tests.shared_data import PROJECT_ROOT
 
-_TILE_MM, _VIEWS, _TEXTURE_PX = 30.0, 6, 2048
+_TILE_MM, _VIEWS, _TEXTURE_PX, _BANDS = 30.0, 6, 1024, 4
 _NEAREST_DEG, _PASSED_MM, _FOCAL_PX = 72.0, 25.0, 200.0
 _SETUP = (
     "All get boresight's poses, wall and LED frames. open3d (t.geometry, project_images_to_albedo) takes "
@@ -29,7 +29,7 @@ _SETUP = (
     f"{_NEAREST_DEG:g}° off the axis at about the fisheye's resolution there, taken while the probe came up "
     f"to the wall over {_PASSED_MM:g} mm. The wall is worked on in such pieces because the function also "
     "takes colours for what lies behind a camera. Its mesh is the radius map, its texture "
-    f"{_TEXTURE_PX} px square a piece, brought to the size of boresight's picture.",
+    f"{_TEXTURE_PX} px square a piece, in {_BANDS} bands, brought to the size of boresight's picture.",
     "Score: shared/score_run.py, which compares the flat picture with the true albedo after one gain per "
     "colour, and finds the shift of 10 mm patches. Boresight estimates the light, the projection just blends "
     "pictures; in the row 'light divided out' it is given boresight's model of the LEDs to divide by first. "
@@ -60,8 +60,7 @@ def section(inputs: Inputs, work: Path) -> Section:
     ]
     for name, even in (("open3d, projected pictures", False), ("open3d, light divided out", True)):
         with clocked() as spent:
-            views = _views(inputs, even)
-            albedo = _projected(inputs, own, views)
+            albedo = _projected(inputs, own, even)
         picture = WallTexture(
             albedo, own.distance_from_mm, own.mm_per_px, own.azimuth_from_rad, own.rad_per_px
         )
@@ -72,19 +71,18 @@ def section(inputs: Inputs, work: Path) -> Section:
     return Section("texture", "Texture", _SETUP, _QUANTITIES, tuple(methods), (chart,))
 
 
-def _views(inputs: Inputs, even: bool) -> dict[int, _View]:
-    """Return the lit frames as pinhole pictures; ``even``: divided by the light on a centred pipe's wall."""
-    frames = np.intersect1d(inputs.lit, inputs.trajectory.frame)
-    T_cp = inverse(inputs.trajectory.T_pc[np.searchsorted(inputs.trajectory.frame, frames)])
+def _views(inputs: Inputs, frames: np.ndarray, even: bool) -> dict[int, _View]:
+    """Return frames as pinhole pictures; ``even``: divided by the light on a centred pipe's wall."""
     size = 2 * int(np.ceil(_FOCAL_PX * np.tan(np.radians(_NEAREST_DEG))))
     intrinsic = np.array([[_FOCAL_PX, 0, size / 2], [0, _FOCAL_PX, size / 2], [0, 0, 1]])
     pixel = np.stack(np.meshgrid(*[np.arange(size) + 0.5] * 2), -1)
     ray_c = np.concatenate([(pixel - size / 2) / _FOCAL_PX, np.ones((size, size, 1))], -1)
     uv = inputs.probe.camera.project(ray_c).uv.astype(np.float32)
     light = _light(inputs, ray_c)[..., None] if even else 1.0
+    T_pc = inputs.trajectory.T_pc[np.searchsorted(inputs.trajectory.frame, frames)]
     return {
         int(frame): _View(_pinhole(bgr, uv, light), intrinsic, T)
-        for (frame, bgr), T in zip(inputs.recording.read(frames, "bgr"), T_cp, strict=True)
+        for (frame, bgr), T in zip(inputs.recording.read(frames, "bgr"), inverse(T_pc), strict=True)
     }
 
 
@@ -101,37 +99,43 @@ def _light(inputs: Inputs, ray_c: np.ndarray) -> np.ndarray:
     return np.maximum(light / light.max(), 0.02)
 
 
-def _projected(inputs: Inputs, own: WallTexture, views: dict[int, _View]) -> np.ndarray:
+def _projected(inputs: Inputs, own: WallTexture, even: bool) -> np.ndarray:
     """Return the flat picture (H, W, 4) that open3d makes, on the grid of boresight's, piece by piece."""
     rows = max(1, round(_TILE_MM / own.mm_per_px))
     pieces = [range(r, min(r + rows, len(own.bgra))) for r in range(0, len(own.bgra), rows)]
-    return np.concatenate([_piece(inputs, own, piece, views) for piece in pieces])
+    starts = [own.distance_from_mm + (p.start - 0.5) * own.mm_per_px for p in pieces]
+    chosen = [_before(inputs, start) for start in starts]
+    views = _views(inputs, np.unique(np.concatenate(chosen)), even)
+    flat = [
+        _piece(inputs, own, len(p), start, [views[int(k)] for k in frames])
+        for p, start, frames in zip(pieces, starts, chosen, strict=True)
+    ]
+    return np.concatenate(flat)
 
 
-def _piece(inputs: Inputs, own: WallTexture, rows: range, views: dict[int, _View]) -> np.ndarray:
-    o3d, size = open3d(), (own.bgra.shape[1], len(rows))
-    start = own.distance_from_mm + (rows.start - 0.5) * own.mm_per_px
-    chosen = _before(inputs, start, views)
-    if not chosen:
+def _piece(inputs: Inputs, own: WallTexture, rows: int, start_mm: float, views: list[_View]) -> np.ndarray:
+    o3d, size = open3d(), (own.bgra.shape[1], rows)
+    if not views:
         return np.zeros((*size[::-1], 4), np.uint8)
-    albedo = _mesh(inputs, own, start, len(rows) * own.mm_per_px).project_images_to_albedo(
-        [o3d.t.geometry.Image(o3d.core.Tensor(v.image)) for v in chosen],
-        [o3d.core.Tensor(v.intrinsic) for v in chosen], [o3d.core.Tensor(v.T_cp) for v in chosen],
+    albedo = _mesh(inputs, own, start_mm, rows * own.mm_per_px).project_images_to_albedo(
+        [o3d.t.geometry.Image(o3d.core.Tensor(v.image)) for v in views],
+        [o3d.core.Tensor(v.intrinsic) for v in views], [o3d.core.Tensor(v.T_cp) for v in views],
         tex_size=_TEXTURE_PX, update_material=False,
     )  # fmt: skip
     rgb = np.asarray(albedo.as_tensor().numpy())[..., :3]
     rgb = rgb if rgb.dtype == np.uint8 else np.clip(255 * rgb, 0, 255).astype(np.uint8)
-    flat = cv2.resize(rgb[..., ::-1], size, interpolation=cv2.INTER_AREA)
+    wide = np.concatenate(np.split(rgb[..., ::-1], _BANDS), axis=1)
+    flat = cv2.resize(wide, size, interpolation=cv2.INTER_AREA)
     return np.dstack([flat, np.where(flat.max(-1) > 0, 255, 0).astype(np.uint8)])
 
 
-def _before(inputs: Inputs, start_mm: float, views: dict[int, _View]) -> list[_View]:
-    """Return views from where the piece beginning at ``start_mm`` is seen whole, spread evenly."""
-    reach = inputs.recording.pipe.nominal_diameter_mm / 2 / np.tan(np.radians(_NEAREST_DEG - 2))
-    ahead = {frame: start_mm + (view.T_cp @ [0, 0, 0, 1])[2] for frame, view in views.items()}
-    seen = [frame for frame, mm in ahead.items() if reach <= mm <= reach + _PASSED_MM]
-    spread = np.unique(np.linspace(0, len(seen) - 1, min(_VIEWS, len(seen))).round().astype(int))
-    return [views[seen[k]] for k in spread]
+def _before(inputs: Inputs, start_mm: float) -> np.ndarray:
+    """Return frames taken from where the piece beginning at ``start_mm`` is seen whole, spread evenly."""
+    frames = np.intersect1d(inputs.lit, inputs.trajectory.frame)
+    z = inputs.trajectory.T_pc[np.searchsorted(inputs.trajectory.frame, frames), 2, 3]
+    least = inputs.recording.pipe.nominal_diameter_mm / 2 / np.tan(np.radians(_NEAREST_DEG - 2))
+    seen = frames[(start_mm - z >= least) & (start_mm - z <= least + _PASSED_MM)]
+    return seen[np.unique(np.linspace(0, len(seen) - 1, min(_VIEWS, len(seen))).round().astype(int))]
 
 
 def _mesh(inputs: Inputs, own: WallTexture, start_mm: float, length_mm: float):
@@ -148,7 +152,11 @@ def _mesh(inputs: Inputs, own: WallTexture, start_mm: float, length_mm: float):
     number = np.arange(radius.size).reshape(radius.shape)
     a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
     face = np.stack([np.stack([a, c, b], -1), np.stack([b, c, d], -1)], 2).reshape(-1, 3)
-    uv = np.stack(np.meshgrid(turn, 1 - along), -1).reshape(-1, 2)[face]
+    # The texture is square: quarters of the ring lie in bands below each other.
+    band = np.tile((np.arange(180) * _BANDS // 180)[None, :, None], (len(along) - 1, 1, 2)).ravel()[:, None]
+    u = _BANDS * np.broadcast_to(turn, radius.shape).ravel()[face] - band
+    v = 1 - (np.broadcast_to(along[:, None], radius.shape).ravel()[face] + band) / _BANDS
+    uv = np.stack([u, v], -1)
     vertex = xyz.reshape(-1, 3).astype(np.float32)
     mesh = o3d.t.geometry.TriangleMesh(o3d.core.Tensor(vertex), o3d.core.Tensor(face))
     mesh.triangle.texture_uvs = o3d.core.Tensor(uv.astype(np.float32))
