@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import weakref
 from collections.abc import Iterator, Sequence
@@ -11,6 +12,8 @@ from typing import IO, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
+
+from pipeline.disk import disk_errors_named
 
 _MAP_FROM_BYTES = 1 << 25
 
@@ -29,6 +32,11 @@ class Scratch:
 
     folder: Path | None = None
 
+    @property
+    def place(self) -> Path:
+        """The folder, whichever it is."""
+        return self.folder if self.folder is not None else Path(tempfile.gettempdir())
+
     def zeros(self, shape: Sequence[int], dtype: DTypeLike) -> NDArray[Any]:
         """Return an array of zeros: in memory where it is small, else mapped from a file."""
         kind = np.dtype(dtype)
@@ -36,7 +44,9 @@ class Scratch:
         if size < _MAP_FROM_BYTES:
             return np.zeros(shape, kind)
         with self._file() as stream:
-            stream.truncate(size)
+            # Room taken now: where the disk fills under a mapped file, the system ends the program.
+            with disk_errors_named(self.place):
+                os.posix_fallocate(stream.fileno(), 0, size)
             return _mapped(stream, kind, tuple(shape))
 
     def full(self, shape: Sequence[int], value: float, dtype: DTypeLike) -> NDArray[Any]:
@@ -48,12 +58,12 @@ class Scratch:
 
     def spool(self, dtype: DTypeLike, record: tuple[int, ...] = ()) -> Spool:
         """Return an empty list of records, each of a shape, that grows on the disk."""
-        return Spool(np.dtype(dtype), record, self._file())
+        return Spool(np.dtype(dtype), record, self._file(), self.place)
 
     def _file(self) -> IO[bytes]:
-        if self.folder is not None:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        return tempfile.TemporaryFile(dir=self.folder)
+        with disk_errors_named(self.place):
+            self.place.mkdir(exist_ok=True)
+            return tempfile.TemporaryFile(dir=self.place)
 
 
 @dataclass
@@ -72,6 +82,7 @@ class Spool:
     dtype: np.dtype[Any]
     record: tuple[int, ...]
     stream: IO[bytes] = field(repr=False)
+    place: Path = field(repr=False)
     count: int = 0
 
     def __post_init__(self) -> None:
@@ -79,11 +90,13 @@ class Spool:
 
     def append(self, records: NDArray[Any]) -> None:
         """Append records (N,)."""
-        self.stream.write(np.ascontiguousarray(records, self.dtype).data)
+        with disk_errors_named(self.place):
+            self.stream.write(np.ascontiguousarray(records, self.dtype).data)
         self.count += len(records)
 
     def part(self, first: int, last: int) -> NDArray[Any]:
         """Return a copy of records ``first`` to ``last`` (exclusive)."""
+        self._flush()
         here = self.stream.tell()
         size = self.dtype.itemsize * int(np.prod(self.record, dtype=np.int64))
         self.stream.seek(first * size)
@@ -98,8 +111,12 @@ class Spool:
 
     def array(self) -> NDArray[Any]:
         """Return all records, mapped from the file."""
-        self.stream.flush()
+        self._flush()
         return _mapped(self.stream, self.dtype, (self.count, *self.record))
+
+    def _flush(self) -> None:
+        with disk_errors_named(self.place):
+            self.stream.flush()
 
 
 def _mapped(stream: IO[bytes], kind: np.dtype[Any], shape: tuple[int, ...]) -> NDArray[Any]:
