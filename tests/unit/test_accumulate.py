@@ -14,7 +14,7 @@ from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
 from pipeline.stage import quiet_context
-from stages.accumulate import AccumulateParameters, accumulate_wall
+from stages.accumulate import AccumulateParameters, accumulate_wall, stretch, survey
 from stages.accumulate.grid import _regress
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
@@ -183,3 +183,19 @@ def test_regression_is_the_plain_one() -> None:
             assert total[i, a] == count[a, np.abs(d) <= 3 * width].sum()
             checked += 1
     assert checked > 80
+
+
+def test_a_wall_made_in_stretches_is_the_wall_made_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rings = drawn_rings(pitted)
+    whole = accumulated(rings)
+    monkeypatch.setattr(stretch, "_ROWS", 9)
+    monkeypatch.setattr(survey, "_AT_ONCE", 7)
+    cut = accumulated(rings)
+    # Width of the kernel and size of the noise are those of a stretch, and differ a little.
+    np.testing.assert_allclose(cut.radius_map.radius_mm, whole.radius_map.radius_mm, atol=0.006)
+    ratio = cut.radius_map.sigma_random_mm / whole.radius_map.sigma_random_mm
+    assert np.nanpercentile(np.abs(np.log(ratio)), 95) < 0.5
+    for name in ("xyz_p", "radius_mm", "distance_mm", "azimuth_rad", "frame"):
+        np.testing.assert_array_equal(getattr(cut.cloud, name), getattr(whole.cloud, name))
+    assert np.median(np.sum(cut.cloud.normal_p * whole.cloud.normal_p, 1)) > 0.9999
+    assert not np.array_equal(cut.radius_map.sigma_random_mm, whole.radius_map.sigma_random_mm), "the control"

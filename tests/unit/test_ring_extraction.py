@@ -6,13 +6,14 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.artefacts import RingValidity
+from pipeline.artefacts import RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.stage import quiet_context
-from stages.rings import RINGS, RingParameters, extract_rings
+from stages.rings import RINGS, RingParameters, extract, extract_rings
+from stages.rings.validity import mark_outliers
 from tests.ring_images import exposed, memory_recording, off_centre, ring_light
 
 SIZE, CENTRE = (640, 480), (318.7, 241.3)
@@ -123,3 +124,22 @@ def test_the_same_recording_gives_the_same_bytes():
 
 def test_the_stage_is_wired_by_type():
     assert list(RINGS.inputs()) == ["recording", "probe"]
+
+
+def test_outliers_are_marked_in_batches_as_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(2)
+    shape = (23, 60)
+    radius = (200 + random.normal(0, 0.1, shape)).astype(np.float32)
+    for k in range(1, 22, 2):
+        radius[k : k + 2, 3 * (k % 9)] += 8  # seen twice: kept
+        radius[k, 40] += 8  # seen once: an outlier
+    lost = random.random(shape) < 0.05
+    validity = np.where(lost, RingValidity.NO_LINE, RingValidity.VALID).astype(np.uint8)
+    full = np.full(shape, 0.1, np.float32)
+    wanted = mark_outliers(radius, full, validity)
+    monkeypatch.setattr(extract, "_AT_ONCE", 4)
+    azimuth, centre = np.linspace(-3, 3, 60), np.zeros(2)
+    samples = RingSamples(np.arange(23), azimuth, centre, radius, full, full, full, validity.copy())
+    extract._mark_outliers(samples)
+    np.testing.assert_array_equal(samples.validity, wanted)
+    assert np.sum(wanted == RingValidity.OUTLIER) > 3, "the control"
