@@ -194,7 +194,7 @@ def _report(context: Context, estimate: RunEstimate, followed: Followed, traject
 
 MOTION = Stage(
     "motion",
-    "2",
+    "3",
     MotionParameters,
     estimate_motion,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -144,7 +144,7 @@ def _work(
         drawn = long_motion(round(1000 * size / step_mm), step_mm, LANDMARKS_PER_MM / given.coarser)
         parameters = MotionParameters.model_validate({})
         return lambda: adjust_run(drawn.run, parameters, _agree, context.progress), size
-    needed = _inputs(given, store, size)
+    needed = Inputs(given, store, size)
     made = Made(store)
     work: dict[str, Callable[[], Any]] = {
         "triangulate": lambda: triangulate_rings(
@@ -210,7 +210,7 @@ def _tileset(recording: Recording, made: Made, folder: Path) -> None:
     write_tileset(recording, made(TexturedMesh), wall, photo, made(Overlays), made(Defects), folder)
 
 
-class _inputs:  # noqa: N801
+class Inputs:
     """A run repeated to a length: probe, recording, and rings, motion and photo put into the store."""
 
     def __init__(self, given: argparse.Namespace, store: Store, metres: float) -> None:
