@@ -26,7 +26,7 @@ _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
 _RIVAL_ITERATIONS = 5
 # Rivals further off than this gain of χ² are out of the question.
-_FAR, _REWEIGHED = 100.0, 4
+_FAR, _REWEIGHED, _WEIGHINGS = 100.0, 4, 3
 # A further effect smaller than this share of the first may be the first's imprecise prediction.
 _LEAST_SHARE = 0.01
 
@@ -76,17 +76,34 @@ def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated
         if better is None or len(better.terms) > _MOST_EFFECTS:
             break
         better = refined(run, better)
+        tried: Sequence[Fit] = step.tried
         if found.terms:
             earlier = (found, *rivals)
-            found, rivals = _exchanged(run, better, step.tried, library, stated)
-            rivals = (*rivals, *earlier)
-            continue
-        run = weighed(run, better.state, better.terms)
+            better, others = _exchanged(run, better, step.tried, library, stated)
+            tried = (*others, *earlier)
+        run, found, rivals = _weighed_anew(run, better, tried, alike(step.scores))
         nothing = fit(run, start.state, ())
-        near = [f for f in step.tried if f.cost < better.cost + _FAR * alike(step.scores)][:_REWEIGHED]
-        found, *rest = (refined(run, fit(run, f.state, f.terms, _RIVAL_ITERATIONS)) for f in near)
-        found, rivals = _sorted(found, rest)
     return Search(run, nothing, found, tuple(rivals), tuple(steps), alike(steps[-1].scores))
+
+
+def _weighed_anew(
+    run: GaugeRun, found: Fit, tried: Sequence[Fit], ratio: float
+) -> tuple[GaugeRun, Fit, tuple[Fit, ...]]:
+    """Return the run with weights by what the fit leaves, and the fit and its near rivals with these.
+
+    Weights from a fit without an effect hold its size back: where it acts, measurements count as outliers.
+    """
+    names = [t.model.name for t in found.terms]
+    near = [f for f in tried if f.cost < found.cost + _FAR * ratio]
+    others = [f for f in near if [t.model.name for t in f.terms] != names]
+    for _ in range(_WEIGHINGS):
+        run = weighed(run, found.state, found.terms)
+        found = refined(run, fit(run, found.state, found.terms, _RIVAL_ITERATIONS))
+    rest = (
+        refined(run, fit(run, f.state, f.terms, _RIVAL_ITERATIONS))
+        for f in sorted(others, key=lambda f: f.cost)[:_REWEIGHED]
+    )
+    return run, *_sorted(found, list(rest))
 
 
 def global_p(scores: Sequence[Scored]) -> float:
