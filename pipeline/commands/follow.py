@@ -38,20 +38,20 @@ def follow(place: Path, output: Path, probe: Path | None, quiet_s: float, consol
     sections: list[PreliminarySection] = []
     with claimed(output), stop_wish() as wish:
         for glimpse in glimpses(place, quiet_s, _POLL_S, wish):
-            if sections and _begun_anew(glimpse, sections[-1].frame):
+            if sections and begun_anew(glimpse, sections[-1].frame):
                 sections = []
-            sections += _new_sections(glimpse, probe, sections[-1].frame if sections else -1)
+            sections += new_sections(glimpse, probe, sections[-1].frame if sections else -1)
             write_live_page(place.name, sections, "complete" if glimpse.resting else "growing", output)
     if glimpse.recording is None:
         raise InputError(place, f"cannot be opened even at rest: {glimpse.problem}")
 
 
-def _begun_anew(glimpse: Glimpse, shown: int) -> bool:
+def begun_anew(glimpse: Glimpse, shown: int) -> bool:
     """Tell whether the recording no longer has a frame that was shown: the recorder started again."""
     return glimpse.recording is not None and glimpse.recording.frames.frame.max() < shown
 
 
-def _new_sections(glimpse: Glimpse, probe: Path | None, after: int) -> tuple[PreliminarySection, ...]:
+def new_sections(glimpse: Glimpse, probe: Path | None, after: int) -> tuple[PreliminarySection, ...]:
     """Return the sections behind a frame; what cannot be read before the recording rests is tried again."""
     try:
         return _sections(glimpse, probe, after)

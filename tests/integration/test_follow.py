@@ -9,13 +9,16 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipeline.errors import Cancelled
-from pipeline.follow.watch import glimpses
+from pipeline.commands.follow import begun_anew, new_sections
+from pipeline.errors import Cancelled, InputError
+from pipeline.follow.watch import Glimpse, glimpses
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from pipeline.stage import quiet_context
@@ -79,6 +82,60 @@ def test_the_preliminary_diameter_is_near_and_nothing_is_told_twice(whole: Path)
     assert [s.frame for s in late] == [s.frame for s in early[4:]]
     assert np.median([s.diameter_mm for s in early]) == pytest.approx(101.6, abs=0.5)
     assert all(0 < s.diameter_sigma_mm < 0.1 and s.seen > 0.5 for s in early)
+
+
+def copied(whole: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(whole, tmp_path / "followed")
+
+
+def half_written(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [("frames.mkv", Path.unlink), ("probe.yaml", half_written), ("probe.yaml", Path.unlink)],
+)
+def test_what_cannot_be_read_is_tried_again_until_the_recording_rests(
+    whole: Path, tmp_path: Path, name: str, spoil: Callable[[Path], None]
+) -> None:
+    """A drive that drops out, a file that the recorder is at: no end of following, but told at rest."""
+    folder = copied(whole, tmp_path)
+    glimpse = Glimpse(open_recording(folder), "", resting=False)
+    spoil(folder / name)
+    assert new_sections(glimpse, None, -1) == ()
+    with pytest.raises(InputError, match=name):
+        new_sections(replace(glimpse, resting=True), None, -1)
+
+
+def test_a_recorder_that_starts_again_is_shown_from_its_start(whole: Path, tmp_path: Path) -> None:
+    folder = copied(whole, tmp_path)
+    assert not begun_anew(Glimpse(open_recording(folder), "", resting=False), shown=20)
+    cut_sample(tmp_path / "anew", frames=8)
+    for file in (tmp_path / "anew").iterdir():
+        shutil.copy(file, folder / file.name)
+    assert begun_anew(Glimpse(open_recording(folder), "", resting=False), shown=20)
+    assert not begun_anew(Glimpse(None, "not there", resting=False), shown=20)
+
+
+def test_files_that_come_and_go_while_they_are_counted(tmp_path: Path) -> None:
+    stop = threading.Event()
+
+    def come_and_go() -> None:
+        while not stop.is_set():
+            for k in range(20):
+                (tmp_path / f"{k}.csv").write_text("x" * k)
+            for k in range(20):
+                (tmp_path / f"{k}.csv").unlink()
+
+    writer = threading.Thread(target=come_and_go)
+    writer.start()
+    try:
+        seen = glimpses(tmp_path, 60.0, 0.0, threading.Event())
+        assert all(next(seen).recording is None for _ in range(100))
+    finally:
+        stop.set()
+        writer.join()
 
 
 def test_what_is_not_there_yet_is_waited_for_and_told_at_rest(tmp_path: Path) -> None:
