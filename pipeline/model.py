@@ -54,8 +54,12 @@ class Overlay:
     @property
     def bgra(self) -> Byte:
         """(S, A, 4) flat picture; alpha 0 where nothing was measured."""
-        alpha = np.where(self.level > 0, 255, 0).astype(np.uint8)
-        return np.dstack([self.palette_bgr[self.level], alpha])
+        return self.colours_of(self.level)
+
+    def colours_of(self, level: Byte) -> Byte:
+        """Return levels (S, A) as colours (S, A, 4), alpha 0 where nothing was measured."""
+        alpha = np.where(level > 0, 255, 0).astype(np.uint8)
+        return np.dstack([self.palette_bgr[level], alpha])
 
 
 @dataclass(frozen=True)

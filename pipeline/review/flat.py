@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import WallTexture
+from pipeline.export.unrolled import display_colours
 from pipeline.findings import Defect
 from pipeline.model import Overlay, Overlays
 
@@ -18,14 +20,18 @@ Byte = NDArray[np.uint8]
 
 TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
 _PAPER = 235
-_GAMMA = 2.2
+_FINENESS = 0.25  # of a picture much shrunk, rows are left out that would show less than this far apart
 
 
 @dataclass(frozen=True)
 class FlatImage:
-    """A picture of the wall, rows along distance and columns along azimuth, and where its pixels lie."""
+    """A picture of the wall, rows along distance and columns along azimuth, and where its pixels lie.
 
-    bgra: Byte
+    ``stored`` becomes BGRA for the screen by ``shown``, a part at a time: it may be larger than memory.
+    """
+
+    stored: Byte
+    shown: Callable[[Byte], Byte]
     distance_from_mm: float
     mm_per_px: float
     azimuth_from_rad: float
@@ -56,19 +62,19 @@ class Window:
 
 def photo(texture: WallTexture) -> FlatImage:
     """Return the wall's photo, encoded for the screen."""
-    table = np.round(255 * (np.arange(256) / 255) ** (1 / _GAMMA)).astype(np.uint8)
-    bgra = np.dstack([table[texture.bgra[..., :3]], texture.bgra[..., 3]])
     return FlatImage(
-        bgra, texture.distance_from_mm, texture.mm_per_px, texture.azimuth_from_rad, texture.rad_per_px
-    )
+        texture.bgra, display_colours, texture.distance_from_mm, texture.mm_per_px, texture.azimuth_from_rad,
+        texture.rad_per_px,
+    )  # fmt: skip
 
 
 def overlay_image(overlays: Overlays, overlay: Overlay) -> FlatImage:
     """Return an overlay's error colours."""
     s, psi = overlays.distance_mm, overlays.azimuth_rad
     return FlatImage(
-        overlay.bgra, float(s[0]), float(s[1] - s[0]), float(psi[0]), float(psi[1] - psi[0]), nearest=True
-    )
+        overlay.level, overlay.colours_of, float(s[0]), float(s[1] - s[0]), float(psi[0]),
+        float(psi[1] - psi[0]), nearest=True,
+    )  # fmt: skip
 
 
 def windows(from_mm: float, to_mm: float, radius_mm: float, pixels: int) -> tuple[Window, ...]:
@@ -103,17 +109,24 @@ def seen_through(image: FlatImage, window: Window) -> Byte:
     row = (s - image.distance_from_mm) / image.mm_per_px
     turn = 2 * np.pi / image.rad_per_px
     column = np.mod((psi - image.azimuth_from_rad) / image.rad_per_px, turn)
-    wide = np.concatenate([image.bgra, image.bgra[:, :2]], 1)
-    x, y = np.meshgrid(column, row, indexing="ij")
-    bgra = _remapped(wide, x, y, image.nearest, window.width_px / max(1.0, float(np.ptp(row))))
+    shrink = window.width_px / max(1.0, float(np.ptp(row)))
+    every = max(int(_FINENESS / shrink), 1)
+    margin = 3 + int(np.ceil(2 / shrink))
+    first = max(0, int(np.floor(row.min())) - margin)
+    last = max(first + 1, int(np.ceil(row.max())) + margin)
+    part = image.shown(np.asarray(image.stored[first:last:every]))
+    wide = np.concatenate([part, part[:, :2]], 1)
+    x, y = np.meshgrid(column, (row - first) / every, indexing="ij")
+    bgra = _remapped(wide, x, y, image.nearest, (shrink, shrink * every))
     alpha = bgra[..., 3:].astype(float) / 255
     return np.asarray(np.round(alpha * bgra[..., :3] + (1 - alpha) * _PAPER), np.uint8)
 
 
-def _remapped(image: Byte, x: Float, y: Float, nearest: bool, shrink: float) -> Byte:
-    """Return ``image`` at (x, y); blurred first when it is shrunk, and in strips, for OpenCV's size limit."""
-    if shrink < 0.5 and not nearest:
-        image = cv2.GaussianBlur(image, (0, 0), 0.35 / shrink)  # type: ignore[assignment]
+def _remapped(image: Byte, x: Float, y: Float, nearest: bool, shrink: tuple[float, float]) -> Byte:
+    """Return ``image`` at (x, y), blurred first where it is shrunk (around, along)."""
+    if shrink[0] < 0.5 and not nearest:
+        sigma_x, sigma_y = (0.35 / s for s in shrink)
+        image = cv2.GaussianBlur(image, (0, 0), sigma_x, None, sigma_y)  # type: ignore[assignment]
     first, last = max(0, int(np.floor(y.min())) - 2), int(np.ceil(y.max())) + 3
     part = np.ascontiguousarray(image[first : max(first + 1, last)])
     mode = cv2.INTER_NEAREST if nearest else cv2.INTER_LINEAR
