@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pipeline.artefacts import RingSamples
@@ -84,6 +84,8 @@ def diagnose(
     if of_field is not None and corrected is not None:
         # The scale of the way seen is the instrument's: what is wrong with that is not the encoder's.
         of_field = _with_travel(of_field, travel_of_run(corrected, "field with the corrected probe"))
+    if of_field is not None and correction is not None and correction.unsaid:
+        of_field = _without_scale(of_field, correction.unsaid)
     found = with_field(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe, library)
     run = of_field.field.run if of_field is not None and of_field.field is not None else None
     seen = compared(run, corrected, of_gauge, correction)
@@ -95,6 +97,16 @@ def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
     new = travel.shortcomings if travel is not None else ()
     kept = tuple(s for s in seen.shortcomings if s not in old)
     return replace(seen, travel=travel, shortcomings=(*kept, *new))
+
+
+def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
+    """Return the field without the encoder's scale: its way is seen with an instrument in part wrong."""
+    if seen.travel is None:
+        return seen
+    kept = tuple(e for e in seen.travel.estimates if e.effect != "encoder_scale")
+    words = f"The field does not tell the encoder's scale: no probe file can say {' and '.join(unsaid)}."
+    travel = replace(seen.travel, estimates=kept)
+    return replace(seen, travel=travel, shortcomings=(*seen.shortcomings, words))
 
 
 def _correction(gauge: Seen | None, probe: Probe) -> Correction | None:

@@ -19,8 +19,9 @@ from stages.diagnose.inference import DEGREES, Stated, estimate
 from stages.diagnose.result import Confirmation
 
 Float = NDArray[np.float64]
-# Estimates from disjoint measurements agree when their difference is no rarer than this.
-_AGREE = 1e-3
+# Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is
+# compared some five times over, and noise is to contradict it once in a thousand.
+_AGREE = 2e-4
 # Predictions are good to this part of an effect's size.
 _LAW = 0.05
 # An estimate tells something only when it is known to this part of the effect.
