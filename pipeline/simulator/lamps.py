@@ -11,7 +11,7 @@ from pipeline.simulator.instrument import LedRing
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.light import REFERENCE_MM
 from pipeline.simulator.meet import meet, normal_at, radius_at
-from pipeline.simulator.rays import ray_at
+from pipeline.simulator.rays import part_ray_at
 from pipeline.simulator.surface import Surface
 from pipeline.simulator.texture import albedo_at, sheen_at
 from pipeline.simulator.view import View, Work, new_work, to_wall
@@ -89,9 +89,7 @@ def _pixel_light(
     times = view.pose.shape[1]
     total[:] = 0.0
     for n in range(samples * samples):
-        y = v + (n // samples + 0.5) / samples - 0.5
-        x = u + (n % samples + 0.5) / samples - 0.5
-        ray_at(view.rays, x, y, work.c_ray)
+        part_ray_at(view.rays, u, v, n, samples, work.c_ray)
         for k in range(times):
             _ray_light(view, lamps, v, k, samples, work, lit, total)
     for c in range(3):

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.meet import meet, normal_at
-from pipeline.simulator.rays import ray_at
+from pipeline.simulator.rays import part_ray_at, ray_at
 from pipeline.simulator.sheet import density_at, sheet_at
 from pipeline.simulator.texture import Texture, albedo_at, sheen_at
 from pipeline.simulator.view import TILE_PX, Line, View, Work, new_work, to_wall
@@ -48,9 +48,7 @@ def _add_rows(
                 continue
             total[:] = 0.0
             for n in range(samples * samples):
-                y = v + (n // samples + 0.5) / samples - 0.5
-                x = u + (n % samples + 0.5) / samples - 0.5
-                ray_at(view.rays, x, y, work.c_ray)
+                part_ray_at(view.rays, u, v, n, samples, work.c_ray)
                 for k in range(times):
                     _line_light(view, line, speckle, v, k, samples, work, total)
             for c in range(3):

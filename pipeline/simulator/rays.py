@@ -119,3 +119,11 @@ def ray_at(table: RayTable, u: float, v: float, out: Float) -> None:
     out[3] *= size
     out[4] *= size
     out[5] *= size
+
+
+@kernel
+def part_ray_at(table: RayTable, u: int, v: int, n: int, samples: int, out: Float) -> None:
+    """Write the ray through the middle of part ``n`` of a pixel cut into samples × samples: see `ray_at`."""
+    x = u + (n % samples + 0.5) / samples - 0.5
+    y = v + (n // samples + 0.5) / samples - 0.5
+    ray_at(table, x, y, out)
