@@ -68,7 +68,8 @@ def _shrunk_along(bgra: Byte, step: int) -> Byte:
         block = bgra[k * step : (k + 1) * step].astype(np.float32)
         seen = block[..., 3:] > 0
         colour = (block[..., :3] * seen).sum(0) / np.maximum(seen.sum(0), 1)
-        out[k] = np.dstack([np.rint(colour), np.where(2 * seen.sum(0) > len(block), 255, 0)])
+        alpha = np.where(2 * seen.sum(0) > len(block), 255, 0)
+        out[k] = np.concatenate([np.rint(colour), alpha], -1)
     return out
 
 

@@ -15,7 +15,7 @@ from pipeline.native import open3d
 from pipeline.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.decimate import decimate
-from stages.mesh.surface import grid_surface, row_pieces, weld
+from stages.mesh.surface import grid_surface, row_pieces, vertex_normals, weld, with_normals
 from stages.overlays import OverlayParameters, overlays_of
 from tests.unit.small_wall import PIT, RADIUS, bent_axis, drawn_radius, small_wall, smooth_photo, tee
 
@@ -249,3 +249,17 @@ def test_a_wall_of_nothing_is_refused() -> None:
             MeshParameters(),
             quiet_context(),
         )
+
+
+def test_normals_go_on_from_piece_to_piece() -> None:
+    wall = small_wall(noise_mm=0.05, hole=HOLE)
+    radius = wall.radius_map.radius_mm
+    pieces = [grid_surface(wall, p, np.zeros(radius.shape)[p]) for p in row_pieces(len(radius), 3)]
+    whole = weld(pieces)
+    wanted = {tuple(v): n for v, n in zip(whole.vertex_p, vertex_normals(whole), strict=True)}
+    found = list(with_normals(iter(pieces)))
+    assert sum(len(surface.face) for surface, _ in found) == len(whole.face)
+    for surface, normal in found:
+        np.testing.assert_allclose(normal, [wanted[tuple(v)] for v in surface.vertex_p], atol=1e-9)
+    alone = vertex_normals(found[0][0])
+    assert np.abs(alone - found[0][1]).max() > 1e-3, "the control: a piece alone knows no better"

@@ -1,0 +1,57 @@
+"""Flat pictures of a pipe far longer than the page is wide."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.artefacts import WallTexture
+from pipeline.export.unrolled import display_colours, write_unrolled
+from pipeline.review.flat import TOP_RAD, Window, photo, seen_through
+
+ROWS, COLUMNS = 40000, 48
+
+
+@pytest.fixture(scope="module")
+def long_photo() -> WallTexture:
+    """Return a photo that grows brighter along the pipe, with fine stripes that average out, and a gap."""
+    s = np.arange(ROWS)
+    bgra = np.full((ROWS, COLUMNS, 4), 255, np.uint8)
+    bgra[..., :3] = np.rint(60 + 120 * s / ROWS + 10 * (s % 2))[:, None, None]
+    bgra[20000:24000, :, 3] = 0
+    return WallTexture(bgra, 0.0, 0.5, -np.pi, 2 * np.pi / COLUMNS)
+
+
+def test_what_is_shown_is_the_mean_of_what_is_there(long_photo: WallTexture) -> None:
+    window = Window(0.0, 0.5 * ROWS, TOP_RAD, TOP_RAD + 2 * np.pi, 200, 60)
+    shown = seen_through(photo(long_photo), window).astype(float)
+    assert shown.shape == (60, 200, 3)
+    s = (np.arange(200) + 0.5) * ROWS / 200
+    level = np.rint(60 + 120 * s / ROWS + 5).astype(np.uint8)
+    wanted = display_colours(np.dstack([level] * 3 + [np.full_like(level, 255)]))[0, :, 0].astype(float)
+    away = (s < 19500) | (s > 24500)
+    assert np.abs(shown[:, away, 0] - wanted[away]).max() < 8
+    assert np.all(shown[:, (s > 20500) & (s < 23500)] == 235), "paper where there is no photo"
+
+
+def test_a_near_look_shows_every_row(long_photo: WallTexture) -> None:
+    window = Window(100.0, 120.0, TOP_RAD, TOP_RAD + 2 * np.pi, 160, 48)
+    shown = seen_through(photo(long_photo), window)
+    assert np.ptp(shown[24, :, 0].astype(int)) > 5, "the stripes"
+
+
+def test_sheets_hold_every_row_and_say_where_they_lie(long_photo, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("pipeline.export.unrolled._MOST_ROWS", 16000)
+    write_unrolled(long_photo, tmp_path)
+    place = json.loads((tmp_path / "unrolled.json").read_text())
+    assert len(place["sheets"]) == 3
+    parts = [cv2.imread(str(tmp_path / s["file"]), cv2.IMREAD_UNCHANGED) for s in place["sheets"]]
+    assert np.array_equal(np.concatenate(parts), display_colours(long_photo.bgra))
+    assert [s["distance_from_mm"] for s in place["sheets"]] == [0.0, 8000.0, 16000.0]
+    shrunk = cv2.imread(str(tmp_path / "unrolled.png"), cv2.IMREAD_UNCHANGED)
+    assert len(shrunk) <= 16000
+    assert place["mm_per_px"] * len(shrunk) == pytest.approx(0.5 * ROWS, rel=1e-3)
+    assert place["distance_from_mm"] == pytest.approx(0.5)
