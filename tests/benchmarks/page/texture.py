@@ -172,7 +172,7 @@ def _score(inputs: Inputs, picture: WallTexture, folder: Path) -> dict[str, floa
     wall = tool.wall_error(str(inputs.run), *truth[1:4]) | {"radius": truth[5]["radius"]}
     told = tool.texture_score(str(folder), place, wall)
     return {
-        "psnr_db": told["psnr_db"],
+        "psnr_db": float(told["psnr_db"]),
         "registration_p95_mm": told["registration_p95_mm"],
         "textured_percent": 100 * told["textured"],
     }
