@@ -33,7 +33,7 @@ def write_model(mesh: TexturedMesh, folder: Path) -> None:
     OSError
         When a texture cannot be encoded or the file cannot be written.
     """
-    builder = GlbBuilder()
+    builder = GlbBuilder(folder)
     primitives = [tile_primitive(builder, tile, number) for number, tile in enumerate(mesh.tiles)]
     complete(builder, primitives)
     builder.write(folder / "model.glb")

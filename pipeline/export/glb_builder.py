@@ -21,12 +21,12 @@ _AT_ONCE = 1 << 24
 
 
 class GlbBuilder:
-    """A glTF 2.0 document under construction; its buffer lies in an unnamed file."""
+    """A glTF 2.0 document under construction; its buffer lies in an unnamed file in ``folder``."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path) -> None:
         self.document = gltf.GLTF2()
         self.document.asset = gltf.Asset(version="2.0", generator="boresight")
-        self._binary = Scratch().spool(np.uint8)
+        self._binary = Scratch(folder).spool(np.uint8)
 
     def view(self, content: bytes, target: int | None = None) -> int:
         """Append bytes, aligned, and return the number of their view."""

@@ -153,7 +153,7 @@ class _Writer:
         file = self.folder / path
         file.parent.mkdir(exist_ok=True)
         defects = metadata.near(self.defects, *tile.distance_mm)
-        builder = GlbBuilder()
+        builder = GlbBuilder(self.folder)
         centre = np.rint(tile.vertex_p.mean(axis=0, dtype=np.float64))
         primitive = tile_primitive(builder, tile, 0, centre)
         s, psi, _ = to_pipe(self.axis, tile.vertex_p.astype(float))
