@@ -50,10 +50,14 @@ def killed_batches(folder: Path, kills: int) -> int:
 
 def killed_reviews(folder: Path, kills: int) -> int:
     """Kill the server before, while or after it answers; return how many acknowledged actions were lost."""
-    chance, answered = random.Random(SEED), 0
+    chance = random.Random(SEED)
     with ReviewServer(folder / "whole-run") as server:
+        answered = sum(_added(server, k) for k in range(3))
         for _ in range(kills):
-            stop = _kill_soon(server, 0.02 * chance.random())
+            # A busy machine answers late: about every second kill is to come before the answer.
+            began = time.perf_counter()
+            answered += _added(server, answered)
+            stop = _kill_soon(server, 2 * (time.perf_counter() - began) * chance.random())
             answer = _added(server, answered)
             stop()
             server.start()
