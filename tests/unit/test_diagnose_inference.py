@@ -213,6 +213,7 @@ def examined(
         (examined(named=False), Verdict.UNEXPLAINED),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
         (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),
+        (examined(confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.CLASS),
         (examined(confirmed=((),)), Verdict.CLASS),
         (examined(chance=0.9), Verdict.CLASS),
         (examined(unsplit=("principal_point",)), Verdict.CLASS),

@@ -91,11 +91,14 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.CONSISTENT
     if not best.named or verdicts.adequacy < ADEQUATE:
         return Verdict.UNEXPLAINED
-    if any(not c.agrees for each in examined.confirmed for c in each):
+    contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
+    if contradicted and all(contradicted):
         return Verdict.UNEXPLAINED
     sure = all(verdicts.chance_of(n) > CONFIDENT for n in best.names)
     confirmed = all(each for each in examined.confirmed)
-    return Verdict.NAMED if sure and confirmed and not examined.unsplit else Verdict.CLASS
+    # One of several that is contradicted is not what it is taken for; the others stand.
+    doubted = any(contradicted) or bool(examined.unsplit)
+    return Verdict.NAMED if sure and confirmed and not doubted else Verdict.CLASS
 
 
 def same_class(names: tuple[str, ...]) -> bool:
