@@ -187,9 +187,10 @@ class Made:
     def __init__(self, store: Store) -> None:
         self._store = store
 
-    def __call__(self, kind: type) -> Any:
+    def __call__(self, kind: type, lacking: Any = None) -> Any:
         name = next(n for n, k in KINDS.items() if k is kind)
         found = self._store.look(name, KEY, kind)
+        found = lacking if found is None else found
         if found is None:
             raise FileNotFoundError(f"no {kind.__name__}: run the stages in their order, with --keep")
         return found
@@ -206,8 +207,8 @@ def _exports(made: Made, folder: Path) -> None:
 
 def _tileset(recording: Recording, made: Made, folder: Path) -> None:
     folder.mkdir(exist_ok=True)
-    wall, photo = made(Wall), made(WallTexture)
-    write_tileset(recording, made(TexturedMesh), wall, photo, made(Overlays), made(Defects), folder)
+    wall, photo, defects = made(Wall), made(WallTexture), made(Defects, Defects((), 0.0, 0.0))
+    write_tileset(recording, made(TexturedMesh), wall, photo, made(Overlays), defects, folder)
 
 
 class Inputs:
