@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import asdict
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -21,6 +22,7 @@ from markupsafe import Markup
 import pipeline.pages
 from pipeline.export.run_record import library_versions
 from tests.benchmarks.page import meshing, motion, rings, texture, whole
+from tests.benchmarks.page.colmap import installed
 from tests.benchmarks.page.inputs import prepare
 from tests.benchmarks.page.section import Section
 from tests.shared_data import PROJECT_ROOT
@@ -31,6 +33,7 @@ PARTS = ("rings", "motion", "mesh", "texture", "whole")
 def main() -> None:
     arguments = _arguments()
     arguments.output.mkdir(parents=True, exist_ok=True)
+    made = _machine() | {"recording": arguments.recording.name}
     with tempfile.TemporaryDirectory() as name:
         work = Path(name)
         print("boresight runs, twice", flush=True)
@@ -43,7 +46,6 @@ def main() -> None:
             "whole": lambda: whole.section(inputs, work / "colmap", arguments.colmap_limit),
         }
         sections = [_made(part, compared[part]) for part in arguments.parts]
-    made = _machine() | {"recording": arguments.recording.name}
     write(sections, made, arguments.output)
     print(arguments.output / "page.html")
 
@@ -80,11 +82,12 @@ def _machine() -> dict[str, str]:
     info = Path("/proc/cpuinfo")
     lines = info.read_text("ascii").splitlines() if info.exists() else []
     model = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "unknown")
-    versions = ", ".join(f"{name} {version}" for name, version in library_versions().items())
+    others = {"pycolmap": version("pycolmap")} if installed() else {}
+    versions = ", ".join(f"{name} {version}" for name, version in (library_versions() | others).items())
     return {
         "when": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "processor": f"{model}, {len(os.sched_getaffinity(0))} cores used",
-        "load before": f"{os.getloadavg()[2]:.1f} processes wanting a core over the last 15 minutes",
+        "load before": f"{os.getloadavg()[1]:.1f} processes wanting a core over 5 minutes",
         "system": platform.platform(),
         "libraries": versions,
     }

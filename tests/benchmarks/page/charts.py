@@ -27,13 +27,13 @@ def chart(draw: Callable[[Axes], None], title: str, x: str, y: str, legend: bool
     return text.getvalue()[text.getvalue().index("<svg") :]
 
 
-def bars(values: dict[str, float], title: str, unit: str) -> str:
-    """Return horizontal bars, boresight's first and in the first colour."""
+def bars(values: dict[str, float], title: str, unit: str, own: int = 1) -> str:
+    """Return horizontal bars; the first ``own`` are boresight's and have its colour."""
 
     def draw(axes: Axes) -> None:
-        names = list(values)[::-1]
-        colours = [COLOURS[0] if name == next(iter(values)) else COLOURS[1] for name in names]
-        drawn = axes.barh(names, [values[name] for name in names], color=colours)
+        colours = [COLOURS[0] if k < own else COLOURS[1] for k in range(len(values))]
+        drawn = axes.barh(list(values), list(values.values()), color=colours)
+        axes.invert_yaxis()
         axes.bar_label(drawn, fmt="%.3g", padding=3)
         axes.margins(x=0.12)
 

@@ -42,7 +42,7 @@ def section(inputs: Inputs, work: Path, limit_s: float) -> Section:
     own = Method("boresight, whole run", _own(inputs, duration))
     other = _colmap(inputs, work, limit_s, duration) if installed() else Method(_NAME, {}, "not installed")
     stages = {name: seconds for name, seconds in inputs.stage_seconds.items() if seconds > 0}
-    charts = (bars(stages, f"Boresight's stages ({duration:.0f} s of recording)", "s"),)
+    charts = (bars(stages, f"Boresight's stages ({duration:.0f} s of recording)", "s", len(stages)),)
     return Section("whole", "Whole run", _SETUP, _QUANTITIES, (own, other), charts)
 
 
