@@ -54,7 +54,7 @@ def test_a_file_of_a_sequence_of_images_is_named(tmp_path: Path) -> None:
     folder = write_folder(tmp_path / "r", "frames/%06d.png")
     recording = open_recording(folder)
     (folder / "frames" / "000007.png").unlink()
-    with pytest.raises(InputError, match="000007.png: cannot be read any more"):
+    with pytest.raises(InputError, match=r"000007\.png: cannot be read any more"):
         refuse_changed(recording)
 
 
