@@ -42,7 +42,10 @@ class TextureParameters(Parameters):
         1.0, ge=0.0, le=20.0, description="half width left out about the laser line when it is on, mm"
     )
     views_at_once: int = Field(
-        1500, ge=20, le=100000, description="frames whose light is worked out together; more in a longer pipe"
+        1500,
+        ge=20,
+        le=100000,
+        description="frames whose light is worked out together; a longer pipe is cut in stretches of so many",
     )
     white_quantile: float = Field(
         0.9995, ge=0.5, le=1.0, description="quantile of the brightest colour that becomes 250 of 255"
