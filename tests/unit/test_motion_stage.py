@@ -17,8 +17,9 @@ STEP = 0.8
 PARAMETERS = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
 
 
-def estimated(run: DrawnRun) -> Trajectory:
-    return estimate_motion(run.recording, run.probe, run.rings, run.points, PARAMETERS, quiet_context())
+def estimated(run: DrawnRun, **parameters: int) -> Trajectory:
+    chosen = PARAMETERS.model_copy(update=parameters)
+    return estimate_motion(run.recording, run.probe, run.rings, run.points, chosen, quiet_context())
 
 
 def errors(got: Trajectory, run: DrawnRun) -> tuple[Float, Float, Float]:
@@ -68,11 +69,12 @@ def test_same_recording_same_bytes(steady: DrawnRun) -> None:
     assert first.covariance.tobytes() == second.covariance.tobytes()
 
 
-def test_stop_and_reversal_are_followed_without_encoder() -> None:
+@pytest.mark.parametrize("window", [800, 44])
+def test_stop_and_reversal_are_followed_without_encoder(window: int) -> None:
     step = np.concatenate([np.full(14, STEP), np.zeros(28), np.full(14, -STEP), np.full(8, STEP)])
     step = np.convolve(np.pad(step, 4, mode="edge"), np.hanning(11)[1:-1] / 5, mode="valid")  # no jerks
     run = drawn_run(np.concatenate([[0], np.cumsum(step)]), np.zeros(len(step) + 1), encoder=False)
-    got = estimated(run)
+    got = estimated(run, window_frames=window, overlap_frames=20)
     z, _, sigma = errors(got, run)
     assert np.abs(z).max() < 0.1, (np.round(z, 2), np.round(sigma[:, 0], 3))
     assert {"stop", "reversal"} <= {e.kind for e in got.events}
