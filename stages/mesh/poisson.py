@@ -16,6 +16,7 @@ from stages.mesh.surface import Face, Float, Surface
 _NEIGHBOURS = 20
 _OUTLIER_SIGMA = 3.0
 _LARGEST_DEPTH = 10
+_AT_ONCE = 1 << 20
 
 
 def folded_cells(cloud: PointCloud, cell_mm: float, fold: float) -> int:
@@ -26,14 +27,19 @@ def folded_cells(cloud: PointCloud, cell_mm: float, fold: float) -> int:
     """
     if len(cloud.radius_mm) == 0:
         return 0
-    radius = float(np.median(cloud.radius_mm))
+    count = len(cloud.radius_mm)
+    radius = float(np.median(cloud.radius_mm[:: max(count // _AT_ONCE, 1)]))
     columns = max(8, round(2 * np.pi * radius / cell_mm))
-    row = np.floor((cloud.distance_mm - cloud.distance_mm.min()) / cell_mm).astype(np.int64)
-    column = np.floor((cloud.azimuth_rad + np.pi) / (2 * np.pi) * columns).astype(np.int64) % columns
-    _, cell = np.unique(row * columns + column, return_inverse=True)
-    low, high = np.full(cell.max() + 1, np.inf), np.full(cell.max() + 1, -np.inf)
-    np.minimum.at(low, cell, cloud.radius_mm)
-    np.maximum.at(high, cell, cloud.radius_mm)
+    start, end = float(cloud.distance_mm.min()), float(cloud.distance_mm.max())
+    cells = (int((end - start) / cell_mm) + 1) * columns
+    low, high = np.full(cells, np.inf, np.float32), np.full(cells, -np.inf, np.float32)
+    for first in range(0, count, _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        row = np.floor((cloud.distance_mm[part] - start) / cell_mm).astype(np.int64)
+        turn = (cloud.azimuth_rad[part] + np.pi) / (2 * np.pi)
+        cell = row * columns + np.floor(turn * columns).astype(np.int64) % columns
+        np.minimum.at(low, cell, cloud.radius_mm[part])
+        np.maximum.at(high, cell, cloud.radius_mm[part])
     return int(np.count_nonzero(high - low > fold * radius))
 
 
