@@ -198,7 +198,7 @@ AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
 
 
 def examined(
-    named: bool = True, chance: float = 0.99, left: float = 0.5, unsplit: tuple[str, ...] = (),
+    named: bool = True, chance: float = 0.9999, left: float = 0.5, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),),
 ) -> Any:  # fmt: skip
     best = SimpleNamespace(named=named, names=("laser_tilt",))
@@ -215,7 +215,7 @@ def examined(
         (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),
         (examined(confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.CLASS),
         (examined(confirmed=((),)), Verdict.CLASS),
-        (examined(chance=0.9), Verdict.CLASS),
+        (examined(chance=0.99), Verdict.CLASS),
         (examined(unsplit=("principal_point",)), Verdict.CLASS),
     ],
 )
