@@ -92,7 +92,9 @@ def _sealed_and_worked(
 def _told(done: Worked, console: Console) -> Worked:
     """Tell on the console of a case that gave no answer."""
     for failure in done.failures:
-        console.print(f"no answer: {failure}", style="red", highlight=False)
+        console.print(
+            f"{'no answer' if done.trials else 'not rendered'}: {failure}", style="red", highlight=False
+        )
     return done
 
 

@@ -32,7 +32,8 @@ def report_document(done: Sequence[Worked]) -> dict[str, Any]:
         "format": 2,
         "figures": [vars(row) | {"text": row.text} for row in rows_of(done)],
         "seconds": {"median": median(seconds), "most": max(seconds), "of": len(seconds)} if seconds else None,
-        "unanswered": [failure for case in done for failure in case.failures],
+        "unanswered": [failure for case in done if case.trials for failure in case.failures],
+        "not_rendered": [failure for case in done if not case.trials for failure in case.failures],
         "confusion": [
             {"concealed": truth, "said": said, "count": count}
             for (truth, said), count in sorted(confusion(trials).items())

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from pipeline.cli import app
 from pipeline.commands.prove_cases import require_seal
-from pipeline.errors import InputError
+from pipeline.errors import BoresightError, InputError
 from pipeline.simulator.seal import seal_truth
 from stages.diagnose.drill.cases import Case, DiagnosisFailedError, diagnose_apart, find_cases
 
@@ -121,3 +121,16 @@ def test_a_case_without_an_answer_is_counted_and_told(drill):
     figures = {r["name"]: r for r in proof["figures"]}
     assert len(proof["unanswered"]) == 1
     assert (figures["detected_any"]["value"], figures["detected_any"]["of"]) == (0.0, 1)
+
+
+def test_a_pair_that_cannot_be_rendered_is_told_and_counts_nowhere(tmp_path, monkeypatch):
+    def refused(drawing, index):
+        raise BoresightError(f"pair {index} could not be rendered: nothing would show")
+
+    monkeypatch.setattr("pipeline.commands.prove.draw_case", refused)
+    done = CliRunner().invoke(app, ["prove", "-o", str(tmp_path / "out"), "--cases", "2"])
+    assert done.exit_code == 0, done.output
+    proof = json.loads((tmp_path / "out" / "proof.json").read_text())
+    assert [text[:6] for text in proof["not_rendered"]] == ["pair 0", "pair 1"]
+    assert proof["unanswered"] == proof["trials"] == []
+    assert "nothing would show" in (tmp_path / "out" / "proof.html").read_text()
