@@ -91,10 +91,9 @@ def _sealed_and_worked(
 
 def _told(done: Worked, console: Console) -> Worked:
     """Tell on the console of a case that gave no answer."""
+    words = "no answer" if done.trials else "not rendered"
     for failure in done.failures:
-        console.print(
-            f"{'no answer' if done.trials else 'not rendered'}: {failure}", style="red", highlight=False
-        )
+        console.print(f"{words}: {failure}", style="red", highlight=False)
     return done
 
 
