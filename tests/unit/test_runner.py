@@ -177,10 +177,11 @@ def stop_in_the_middle(*, parameters: DrawParameters, context: Context) -> Drawn
 def test_ctrl_c_stops_at_the_next_progress(tmp_path: Path) -> None:
     job = toy_job(tmp_path / "run")
     job = replace(job, stages=(replace(DRAW, function=stop_in_the_middle), *job.stages[1:]))
+    before = signal.getsignal(signal.SIGINT)
     with pytest.raises(Cancelled, match="the same command continues"):
         run_job(job, Selection(), SilentDisplay())
     assert record(tmp_path / "run")["state"] == State.CANCELLED
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def answer_something_else(drawn: Drawn, *, parameters: Any, context: Context) -> SMOOTH.output():  # type: ignore[valid-type]
