@@ -7,6 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
 from stages.diagnose.effects.nameless import Nameless, growth, two_parts
@@ -18,6 +19,7 @@ _REFERENCE_S, _REFERENCE_MM_S, _REFERENCE_MM = 10.0, 20.0, 50.0
 # Shapes of a term: which coordinate its size is proportional to.
 STEADY, WITH_TIME, WITH_SPEED, WITH_DISTANCE = (0.0,), (1.0,), (2.0,), (3.0,)
 _COURSES = ("", " t/10", " v/20", " s/50")
+_IN_TIME = ("static", "drift", "speed", "static")
 
 
 class Moves(StrEnum):
@@ -27,6 +29,14 @@ class Moves(StrEnum):
     OUTWARD = "outward"
     AROUND = "around"
     WALL = "wall"
+
+
+_FIXED_TO = {
+    Moves.LINE: FixedTo.LASER,
+    Moves.OUTWARD: FixedTo.CAMERA,
+    Moves.AROUND: FixedTo.CAMERA,
+    Moves.WALL: FixedTo.PIPE,
+}
 
 
 @dataclass(frozen=True)
@@ -70,6 +80,11 @@ class GenericTerm(Nameless):
             return f"δr = a (r/50)^{self.exponent}{wave}{course}"
         return f"image {self.moves}: a θ^{self.exponent}{wave}{course}"
 
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return what it moves, or time where it grows with that."""
+        time = _IN_TIME[int(shape[0])]
+        return FixedTo.TIME if time == "drift" else _FIXED_TO[self.moves], time, self.harmonic
+
     def _pattern(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         parts = np.array([*amplitude, 0.0])[:2]
         return self._course(points, shape) * cosine(points.azimuth_rad, parts, self.harmonic)
@@ -97,6 +112,10 @@ class RowTerm(Nameless):
         row = (points.uv[:, 1] + 0.5) / points.probe.camera.image_size[1] - 0.5
         return np.asarray(amplitude[0] * row[:, None] * points.velocity_px)
 
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return the camera and its speed."""
+        return FixedTo.CAMERA, "speed", None
+
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
         return "image: a (row/H − 1/2) × velocity"
@@ -116,6 +135,10 @@ class FractionTerm(Nameless):
             return np.zeros(len(points.uv))
         rho = np.linalg.norm(points.uv - points.probe.camera.centre_px, axis=1)
         return cosine(2 * np.pi * rho, amplitude)
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return the camera's pixels."""
+        return FixedTo.CAMERA, "static", None
 
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
 
 _REFERENCE_MM = 50.0
@@ -24,6 +25,10 @@ class Nameless(EffectModel):
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula in a, r, ψ, t."""
         raise NotImplementedError
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return what the pattern turns and travels with, its behaviour in time, and its harmonic."""
+        return FixedTo.TIME, "static", self.harmonic
 
     def equation(self, shape: Shape, amplitude: Float) -> str:
         """Return the formula with the numbers to put into it."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Amplitude, Float, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
 from stages.diagnose.effects.nameless import Nameless, growth
@@ -41,6 +42,10 @@ class SwingTerm(Nameless):
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the amplitude and the frequency."""
         return {"amplitude": float(np.linalg.norm(amplitude)), "frequency_hz": shape[0]}
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return the laser: the line moves against the fiducials, and the camera has no part in that."""
+        return FixedTo.LASER, "periodic", self.harmonic
 
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.diagnose.classes import alike as of_one_class
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.examine import ADEQUATE, Examined
 from stages.diagnose.gauge.sizes import quantities
@@ -101,8 +100,3 @@ def verdict_of(examined: Examined) -> Verdict:
     # One of several that is contradicted is not what it is taken for; the others stand.
     doubted = any(contradicted) or bool(examined.unsplit)
     return Verdict.NAMED if sure and confirmed and not doubted else Verdict.CLASS
-
-
-def same_class(names: tuple[str, ...]) -> bool:
-    """Return whether all names are alike."""
-    return all(of_one_class(names[0], other) for other in names[1:])

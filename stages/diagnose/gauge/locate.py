@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.effects.generic import FractionTerm, GenericTerm, Moves, RowTerm
-from stages.diagnose.effects.swings import SwingTerm
+from stages.diagnose.effects.generic import GenericTerm, Moves
+from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.confirm import by_bore, partial_of
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged, Regime
@@ -18,8 +18,6 @@ from stages.diagnose.inference import Stated
 from stages.diagnose.result import Location
 
 Float = NDArray[np.float64]
-_COURSES = ("static", "drift", "speed", "static")
-_FIXED = {Moves.LINE: "laser", Moves.OUTWARD: "camera", Moves.AROUND: "camera", Moves.WALL: "pipe"}
 
 
 def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated: Stated) -> Location | None:
@@ -40,18 +38,9 @@ def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated
 def _pattern(term: Term) -> tuple[str, str, int | None]:
     """Return what the term is fixed to, its behaviour in time and its harmonic."""
     model = term.model
-    if isinstance(model, RowTerm):
-        return "camera", "speed", None
-    if isinstance(model, FractionTerm):
-        return "camera", "static", None
-    if isinstance(model, SwingTerm):
-        # It moves the line against the fiducials: the camera has no part in it.
-        return "laser", "periodic", model.harmonic
-    if isinstance(model, GenericTerm):
-        time = _COURSES[int(term.shape[0])]
-        return "time" if time == "drift" else _FIXED[model.moves], time, model.harmonic
-    if model.name not in EFFECTS:
-        return "time", "static", getattr(model, "harmonic", None)
+    if isinstance(model, Nameless):
+        fixed_to, time, harmonic = model.goes_with(term.shape)
+        return str(fixed_to), time, harmonic
     known = EFFECTS[model.name]
     order = int(term.shape[0]) if model.name == "sheet_waviness" else known.harmonic
     return str(known.fixed_to), known.time, order
