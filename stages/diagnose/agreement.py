@@ -13,7 +13,7 @@ from stages.diagnose.result import Confirmation
 
 Float = NDArray[np.float64]
 # They agree when their difference is no rarer than this.
-_AGREE = 1e-3
+AGREE = 1e-3
 # Predictions are good to this part of an effect's size.
 _LAW = 0.05
 # A measurement tells something only when it is known to this part of the effect.
@@ -59,14 +59,32 @@ def agreement(first: Part, second: Part, own: tuple[Float, Float], gap: Float) -
     telling = all(np.all(np.isfinite(c)) and np.trace(c) <= TELLING**2 * square for c in own)
     if not telling or not np.all(np.isfinite(gap)):
         return None
-    count = len(first.value)
-    spread = gap + _LAW**2 * square * np.eye(count)
-    apart = second.value - first.value
-    statistic = float(apart @ np.linalg.solve(spread, apart))
-    rare = float(stats.f.sf(statistic / count, count, DEGREES))
-    agrees = rare > _AGREE and float(first.value @ second.value) > 0
+    count, size = len(first.value), float(np.sqrt(square))
+    agrees = same(first.value, second.value, gap, size)
     unrelated = own[1] + square / count * np.eye(count)
-    like = stats.multivariate_normal(np.zeros(count), spread).logpdf(apart)
+    like = stats.multivariate_normal(np.zeros(count), _spread(gap, size)).logpdf(second.value - first.value)
     unlike = stats.multivariate_normal(np.zeros(count), unrelated).logpdf(second.value)
-    told = Confirmation(f"{first.where}: {first.words}", f"{second.where}: {second.words}", bool(agrees))
+    told = Confirmation(f"{first.where}: {first.words}", f"{second.where}: {second.words}", agrees)
     return Agreement(told, float(np.exp(np.clip(like - unlike, -50, 50))))
+
+
+def same(first: Float, second: Float, gap: Float, size: float, rarest: float = AGREE) -> bool:
+    """Return whether two estimates (Q,) agree: in sign, and as closely as noise and laws let expect.
+
+    Parameters
+    ----------
+    gap : (Q, Q)
+        Covariance of their difference.
+    size
+        Of the effect, in their unit: predictions are good to a part of it.
+    rarest
+        Chance below which a difference is none of noise's (F distribution).
+    """
+    apart, count = second - first, len(first)
+    statistic = float(apart @ np.linalg.solve(_spread(gap, size), apart))
+    rare = float(stats.f.sf(statistic / count, count, DEGREES))
+    return rare > rarest and float(first @ second) > 0
+
+
+def _spread(gap: Float, size: float) -> Float:
+    return np.asarray(gap + (_LAW * size) ** 2 * np.eye(len(gap)))

@@ -119,7 +119,7 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence) -> Claim:
 
 
 def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
-    size = {"slip_mm": Value(step.gain_mm, step.sigma_mm), "time_s": Value(step.time_s, 0.05)}
+    size = {"slip_mm": Value(step.gain_mm, step.sigma_mm), "time_s": Value(step.time_s, step.time_sigma_s)}
     words = f"The encoder's wheel slips at {step.time_s:.2f} s and its reading gains {step.gain_mm:+.2f} mm."
     where = (step.place - 1, step.place)
     location = _stretch(travel, where, FixedTo.TIME, "event")

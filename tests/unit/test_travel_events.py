@@ -45,6 +45,8 @@ def test_a_slip_is_found_with_size_and_time(reverses: bool, gain_mm: float) -> N
         assert found.gain_mm == pytest.approx(gain_mm, abs=4 * found.sigma_mm + QUANTUM_MM / 2)
         assert found.sigma_mm < 0.1
         assert found.time_s == pytest.approx(2.303, abs=0.07 if abs(gain_mm) < 1 else 0.011)
+        assert found.time_s == pytest.approx(2.303, abs=4 * found.time_sigma_s)
+        assert found.time_sigma_s < 0.02
 
 
 def test_two_slips_of_opposite_sign_are_two() -> None:

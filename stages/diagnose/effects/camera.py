@@ -165,6 +165,8 @@ class PixelLocking(Scalar):
 
     name = "pixel_locking"
     amplitudes = one(name, 0.02)
+    # The bins of a gauge's rings average over a part of the wave: drawn ones come out at half their size.
+    law_sigma = 0.6
     words = "The line is found off by {amplitude_px:+.3f} px × sin 2πρ, with its image radius ρ in px."
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:

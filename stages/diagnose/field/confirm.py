@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.predict import columns
 from stages.diagnose.evidence import Evidence
@@ -16,13 +16,10 @@ from stages.diagnose.field.points import ring_points
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.inference import DEGREES, Score, Stated, places_of, score
+from stages.diagnose.inference import Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
 Float = NDArray[np.float64]
-_AGREE = 1e-3
-# Predictions are good to this part of an effect's size.
-_LAW = 0.05
 # The field tells something only when it knows the effect to this part of its size.
 _TELLING = 0.33
 
@@ -68,14 +65,10 @@ def confirm_in_field(
     if own is None or np.sqrt(np.trace(own.covariance)) > _TELLING * size:
         return None
     gap = own.amplitude - amplitude
-    spread = own.covariance + covariance + (_LAW * size) ** 2 * np.eye(len(gap))
-    statistic = float(gap @ np.linalg.solve(spread, gap))
-    same_sign = float(own.amplitude @ amplitude) > 0
-    agrees = bool(stats.f.sf(statistic / len(gap), len(gap), DEGREES) > _AGREE) and same_sign
     confirmation = Confirmation(
         f"in the field, from the gauge: {_words(model, shape, amplitude, covariance)}",
         f"field alone: {_words(model, shape, own.amplitude, own.covariance)}",
-        agrees,
+        same(amplitude, own.amplitude, own.covariance + covariance, size),
     )
     pattern = columns(model, ring_points(found.run), shape)
     pattern = pattern[np.isfinite(pattern).all(1)]

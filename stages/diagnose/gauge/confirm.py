@@ -8,24 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from stages.diagnose.agreement import TELLING, same
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.inference import DEGREES, Stated, estimate
+from stages.diagnose.inference import Stated, estimate
 from stages.diagnose.result import Confirmation
 
 Float = NDArray[np.float64]
 # Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is
 # compared some five times over, and noise is to contradict it once in a thousand.
 _AGREE = 2e-4
-# Predictions are good to this part of an effect's size.
-_LAW = 0.05
-# An estimate tells something only when it is known to this part of the effect.
-_TELLING = 0.25
 _LEAST_FRAMES = 8
 
 
@@ -102,17 +98,13 @@ def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
 def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | None:
     """Return whether two estimates agree in sign and size; None when either tells too little."""
     size = float(np.linalg.norm(term.amplitude))
-    if max(np.sqrt(np.trace(p.covariance)) for p in (first, second)) > _TELLING * size:
+    if max(np.sqrt(np.trace(p.covariance)) for p in (first, second)) > TELLING * size:
         return None
-    law = (_LAW * size) ** 2 * np.eye(len(term.amplitude))
-    gap = first.amplitude - second.amplitude
-    statistic = float(gap @ np.linalg.solve(first.covariance + second.covariance + law, gap))
-    agrees = bool(stats.f.sf(statistic / len(gap), len(gap), DEGREES) > _AGREE)
-    same_sign = float(first.amplitude @ second.amplitude) > 0
+    gap = first.covariance + second.covariance
     return Confirmation(
         f"{first.where}: {_words(term, first)}",
         f"{second.where}: {_words(term, second)}",
-        agrees and same_sign,
+        same(first.amplitude, second.amplitude, gap, size, _AGREE),
     )
 
 

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 
 from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement
-from stages.diagnose.travel.jump import jump_of_reading
+from stages.diagnose.travel.jump import SLIPS_WITHIN_S, jump_of_reading
 from stages.diagnose.travel.model import (
     Event,
     EventKind,
@@ -42,7 +42,9 @@ class StepFound:
     ----------
     place : int
         Index in the `Sight` of the first picture after it.
-    time_s, gain_mm, sigma_mm : float
+    time_s, time_sigma_s : float
+        When, and 1 σ.
+    gain_mm, sigma_mm : float
     p_value : float
         Over all moments at which it might have come.
     rivals : tuple of EventKind
@@ -55,6 +57,7 @@ class StepFound:
 
     place: int
     time_s: float
+    time_sigma_s: float
     gain_mm: float
     sigma_mm: float
     p_value: float
@@ -140,11 +143,13 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     k = moment(sight, encoder, event.place)
     time_s = (encoder.time_s[k] + encoder.time_s[k + 1]) / 2
     again = jump_of_reading(encoder, k, float(fit.values[at]), sigma)
+    # Somewhere between two pictures; where the reading itself jumps, as long as a slip lasts.
+    within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
     if again is not None and again.confirmation.agrees:
         # Nothing that befalls pictures makes the reading jump.
-        rivals = ()
+        rivals, within_s = (), SLIPS_WITHIN_S
     return StepFound(
-        event.place, float(time_s), float(fit.values[at]), sigma,
+        event.place, float(time_s), within_s / np.sqrt(12), float(fit.values[at]), sigma,
         chance(z2, 2 * count, count), rivals, size[EventKind.LOST_TIME], () if again is None else (again,),
     )  # fmt: skip
 

@@ -10,7 +10,8 @@ from stages.diagnose.agreement import Agreement, Part, agreement
 
 Float = NDArray[np.float64]
 # A wheel slips within so long; its speed is that of so many steps around.
-_SLIPS_WITHIN_S, _AROUND = 0.03, 8
+SLIPS_WITHIN_S = 0.03
+_AROUND = 8
 _TAIL = 2.275
 
 
@@ -46,7 +47,7 @@ def reading_jump(encoder: Encoder, at: int) -> tuple[float, float]:
     """
     step = np.diff(encoder.distance_mm)
     rate = float(np.median(np.diff(encoder.time_s)))
-    width = 2 * max(int(np.ceil(_SLIPS_WITHIN_S / rate / 2)), 1) - 1
+    width = 2 * max(int(np.ceil(SLIPS_WITHIN_S / rate / 2)), 1) - 1
     side = width // 2
     reach = side + _AROUND
     if not reach <= at < len(step) - reach:
