@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
@@ -30,45 +30,56 @@ def composed(
     """
     examined = gauge.geometry if gauge is not None else None
     every = claims_of(field, gauge)
-    claims = [c for c in every if c.name not in without]
-    nameless = len(claims) < len(every)
-    verdict = verdict_of_rings(examined, bool(claims))
-    effects = of_gauge.effects_found(examined) if examined is not None else ()
-    claims = _beyond(claims, effects)
-    members: tuple[str, ...] = ()
-    if verdict is Verdict.CLASS and examined is not None:
-        members = classes_of(of_gauge.members(examined))
-    doubted = tuple(n for c in claims for n in _rivals(c))
-    if claims and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE, Verdict.NAMED):
-        verdict = Verdict.CLASS if doubted else Verdict.NAMED
-        every_name = [*doubted, *(c.name for c in claims), *(e.name for e in effects)]
-        members = classes_of(every_name) if doubted else ()
-    p_value = _global_p(field, gauge)
-    if nameless and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE):
-        verdict = Verdict.UNEXPLAINED
-    if verdict is Verdict.UNEXPLAINED:
-        effects = ()
-    named = (*effects, *(c.found for c in claims))
-    if verdict is Verdict.NAMED and (nameless or not all(map(_confirmed, named))):
-        verdict, members = Verdict.CLASS, classes_of([e.name for e in named])
-    asked = members if verdict is Verdict.CLASS else [e.name for e in named]
+    said = _said(examined, every, without)
+    asked = said.members if said.verdict is Verdict.CLASS else [e.name for e in said.effects]
     return Diagnosis(
         recording=field.recording.name if field is not None else "",
         gauge=gauge.recording.name if gauge is not None else "",
-        verdict=verdict,
-        global_p=p_value,
+        verdict=said.verdict,
+        global_p=_global_p(field, gauge),
         location=_location(examined, every, asked),
-        effects=named,
-        members=members,
-        identifiable=_identifiable(verdict, named, examined),
+        effects=said.effects,
+        members=said.members,
+        identifiable=_identifiable(said, examined),
         fit=examined.quality if examined is not None else None,
-        record_next=_next(verdict, asked),
+        record_next=_next(said.verdict, asked),
         feasibility=examined.feasibility if examined is not None else (),
         inseparable=examined.inseparable if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
         ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
     )
+
+
+@dataclass(frozen=True)
+class _Said:
+    """The verdict, the effects it rests on, and the members of its class."""
+
+    verdict: Verdict
+    effects: tuple[EffectFound, ...]
+    members: tuple[str, ...]
+
+
+def _said(examined: Examined | None, every: Sequence[Claim], without: Collection[str]) -> _Said:
+    """Return what rings and fiducials, and then the claims beyond them, come to."""
+    known = [c for c in every if c.name not in without]
+    nameless = len(known) < len(every)
+    verdict = verdict_of_rings(examined, bool(known))
+    of_rings = of_gauge.effects_found(examined) if examined is not None else ()
+    claims = _beyond(known, of_rings)
+    named = (*of_rings, *(c.found for c in claims))
+    if verdict is Verdict.CLASS and examined is not None:
+        return _Said(verdict, named, classes_of(of_gauge.members(examined)))
+    if nameless and not claims and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE):
+        verdict = Verdict.UNEXPLAINED
+    if verdict is Verdict.UNEXPLAINED:
+        return _Said(verdict, tuple(c.found for c in claims), ())
+    if not named:
+        return _Said(verdict, (), ())
+    names, doubted = [e.name for e in named], tuple(n for c in claims for n in _rivals(c))
+    if doubted or nameless or not all(map(_confirmed, named)):
+        return _Said(Verdict.CLASS, named, classes_of([*doubted, *names]))
+    return _Said(Verdict.NAMED, named, ())
 
 
 def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
@@ -102,11 +113,13 @@ def _next(verdict: Verdict, asked: Sequence[str]) -> str:
     return record_next(asked) if verdict is Verdict.CLASS and asked else ""
 
 
-def _identifiable(verdict: Verdict, named: Sequence[EffectFound], examined: Examined | None) -> str:
+def _identifiable(said: _Said, examined: Examined | None) -> str:
     """Return what is determined all the same: the size each cause would have, or an empirical formula."""
-    if verdict is Verdict.CLASS:
-        return "; or ".join(e.statement for e in named)
-    return of_gauge.formula(examined) if verdict is Verdict.UNEXPLAINED and examined is not None else ""
+    if said.verdict is Verdict.CLASS:
+        return "; or ".join(e.statement for e in said.effects)
+    if said.verdict is Verdict.UNEXPLAINED and examined is not None:
+        return of_gauge.formula(examined)
+    return ""
 
 
 def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Claim]:
