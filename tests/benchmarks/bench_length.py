@@ -24,16 +24,15 @@ import resource
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, RingPoints, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts import RingPoints, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.export.cloud import write_cloud
 from pipeline.export.glb import write_model
 from pipeline.export.overlays import write_overlays
@@ -44,7 +43,7 @@ from pipeline.findings import Defects, Sections
 from pipeline.instrument.probe_file import read_probe
 from pipeline.model import Overlays, TexturedMesh
 from pipeline.recording import open_recording
-from pipeline.recording.base import FrameTable, Image, Planes, Recording
+from pipeline.recording.base import FrameTable, Recording
 from pipeline.review.run_files import RunFiles
 from pipeline.scratch import Scratch
 from pipeline.stage import Context, quiet_context
@@ -60,6 +59,13 @@ from stages.rings import RingParameters, extract_rings
 from stages.sections import SectionParameters, measure_sections
 from stages.texture.texture import TextureParameters, photograph_wall
 from stages.triangulate import TriangulateParameters, triangulate_rings
+from tests.benchmarks.long_inputs import (
+    RepeatedFrames,
+    even_wall,
+    repeated_motion,
+    repeated_photo,
+    repeated_rings,
+)
 from tests.long_motion import long_motion
 from tests.synthetic_wall import bare_recording
 
@@ -224,70 +230,12 @@ class Inputs:
         length = float(np.ptp(motion.T_pc[:, 2, 3])) + STEP_MM
         times, scratch = max(round(1000 * metres / length), 1), Scratch(store.folder)
         made = (
-            ("rings", _rings(rings, times, given.coarser, scratch)),
-            ("trajectory", _motion(motion, times, length)),
-            ("photo", _photo(run.artefact(WallTexture), times, length, given.coarser, scratch)),
+            ("rings", repeated_rings(rings, times, given.coarser, scratch)),
+            ("trajectory", repeated_motion(motion, times, length)),
+            ("photo", repeated_photo(run.artefact(WallTexture), times, length, given.coarser, scratch)),
         )
         for name, artefact in made:
             store.write(artefact, Provenance(name, "1", KEY, 0.0, ()))
-
-
-def _rings(rings: RingSamples, times: int, coarser: int, scratch: Scratch) -> RingSamples:
-    last = int(rings.frame[-1]) + 2
-    frame = (rings.frame + last * np.arange(times)[:, None]).ravel()
-    per_sample = {f.name: getattr(rings, f.name) for f in fields(rings)
-                  if np.ndim(getattr(rings, f.name)) == 2}  # fmt: skip
-    long = {n: _tiled(v[:, ::coarser], times, scratch) for n, v in per_sample.items()}
-    return replace(rings, frame=frame, azimuth_rad=rings.azimuth_rad[::coarser], **long)
-
-
-def _tiled(values: NDArray[Any], times: int, scratch: Scratch) -> NDArray[Any]:
-    out = scratch.zeros((times * len(values), *values.shape[1:]), values.dtype)
-    for k in range(times):
-        out[k * len(values) : (k + 1) * len(values)] = values
-    return out
-
-
-def _motion(motion: Trajectory, times: int, length_mm: float) -> Trajectory:
-    """Return the motion along a straight pipe; the source's bent axis would not meet itself."""
-    count, every = len(motion.frame), np.arange(times)
-    T_pc = np.tile(motion.T_pc, (times, 1, 1))
-    T_pc[:, 2, 3] += np.repeat(length_mm * every, count)
-    frame = (motion.frame + (int(motion.frame[-1]) + 1) * every[:, None]).ravel()
-    s = np.arange(-100.0, times * length_mm + 200.0, 2.0)
-    axis = PipeAxis(s, np.stack([0 * s, 0 * s, s], -1), np.tile(np.eye(3), (len(s), 1, 1)))
-    time_s = (motion.time_s + (motion.time_s[-1] + 1 / 30) * every[:, None]).ravel()
-    covariance = np.tile(motion.covariance, (times, 1, 1))
-    return replace(motion, frame=frame, time_s=time_s, T_pc=T_pc, covariance=covariance, axis=axis, events=())
-
-
-def _photo(photo: WallTexture, times: int, length_mm: float, coarser: int, scratch: Scratch) -> WallTexture:
-    rows = round(length_mm / photo.mm_per_px)
-    one = photo.bgra[np.minimum(np.arange(0, rows, coarser), len(photo.bgra) - 1), ::coarser]
-    return replace(
-        photo, bgra=_tiled(one, times, scratch), mm_per_px=length_mm / len(one),
-        rad_per_px=photo.rad_per_px * coarser,
-    )  # fmt: skip
-
-
-class RepeatedFrames:
-    """A video shown again and again, decoded anew each time."""
-
-    def __init__(self, recording: Recording) -> None:
-        self._recording, self._count = recording, int(recording.frames.frame[-1]) + 1
-
-    @property
-    def image_size(self) -> tuple[int, int]:
-        return self._recording.source.image_size
-
-    def read(
-        self, frames: Sequence[int] | NDArray[np.int64], planes: Planes
-    ) -> Iterator[tuple[int, Image | None]]:
-        wanted = np.asarray(frames)
-        for k in np.unique(wanted // self._count):
-            first = int(k) * self._count
-            for frame, image in self._recording.read(wanted[wanted // self._count == k] - first, planes):
-                yield first + frame, image
 
 
 def _from_video(
@@ -297,26 +245,15 @@ def _from_video(
     recording, run = open_recording(given.recording), RunFiles(given.run.resolve())
     probe, motion = read_probe(recording.probe_file), run.artefact(Trajectory)
     length = float(np.ptp(motion.T_pc[:, 2, 3])) + STEP_MM
-    long_motion_ = _motion(motion, times, length)
+    long_motion_ = repeated_motion(motion, times, length)
     table = FrameTable(long_motion_.frame, long_motion_.time_s, np.tile(recording.frames.illumination, times))
     long = replace(recording, frames=table, source=RepeatedFrames(recording))
     metres = times * length / 1000
     if stage == "rings":
         return lambda: extract_rings(long, probe, RingParameters.model_validate({}), context), metres
-    wall = _wall(run.artefact(Wall), times, length)
+    wall = even_wall(run.artefact(Wall), times, length)
     parameters = TextureParameters.model_validate({})
     return lambda: photograph_wall(long, probe, long_motion_, wall, parameters, context), metres
-
-
-def _wall(wall: Wall, times: int, length_mm: float) -> Wall:
-    """Return a wall of the mean radius at every place: what lies on it is the photo's business."""
-    radius_map = wall.radius_map
-    s = np.arange(radius_map.distance_mm[0], radius_map.distance_mm[0] + times * length_mm, 0.5)
-    even = {f.name: np.full((len(s), len(radius_map.azimuth_rad)), np.nanmedian(getattr(radius_map, f.name)),
-                            getattr(radius_map, f.name).dtype)
-            for f in fields(radius_map) if np.ndim(getattr(radius_map, f.name)) == 2}  # fmt: skip
-    axis = PipeAxis(s, np.stack([0 * s, 0 * s, s], -1), np.tile(np.eye(3), (len(s), 1, 1)))
-    return Wall(wall.cloud, replace(radius_map, distance_mm=s, **even), axis)
 
 
 class Watch:
