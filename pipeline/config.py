@@ -19,6 +19,8 @@ from pipeline.errors import InputError
 from pipeline.stage import Parameters, Stage
 from pipeline.yaml_file import read_yaml
 
+# The section that says where a batch is worked on: of no stage, read by `pipeline.batch.kinds`.
+CLUSTER = "cluster"
 _COMMAND_LINE = "--set"
 _WIDTH = 110
 _EXPONENT = re.compile(r"[-+]?\d+(\.\d*)?[eE][-+]?\d+")
@@ -62,7 +64,7 @@ def resolve(
     stages
         Whose parameters are asked for.
     file
-        YAML: a mapping of stage names to mappings of parameter names to values.
+        YAML: a mapping of stage names to mappings of parameter names to values, and perhaps `CLUSTER`.
     assignments
         ``stage.parameter=value`` each, the value in YAML.
 
@@ -93,6 +95,8 @@ def resolved_text(configuration: Configuration) -> str:
 
 def _settings_of_file(file: Path) -> Iterator[_Setting]:
     for stage, content in read_yaml(file).values.items():
+        if stage == CLUSTER:
+            continue
         if not isinstance(content, Mapping):
             raise InputError(
                 file,

@@ -1,4 +1,4 @@
-"""``boresight batch``: run many recordings, on local workers or a Dask scheduler."""
+"""``boresight batch``: run many recordings, on local workers or a cluster."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from rich.console import Console
 
 from pipeline.batch.cluster import endings, workers
 from pipeline.batch.find import find_recordings
+from pipeline.batch.kinds import Cluster, LocalWorkers, RunningScheduler, read_cluster
 from pipeline.batch.summary import write_summary
 from pipeline.batch.work import Ending, Work
 from pipeline.config import resolve
@@ -33,7 +34,9 @@ def batch(
     probe: Annotated[
         Path | None, typer.Option(metavar="FILE", help="probe to use in place of the recordings' own")
     ] = None,
-    config: Annotated[Path | None, typer.Option(metavar="FILE", help="parameters (YAML)")] = None,
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="parameters, and perhaps the cluster (YAML)")
+    ] = None,
     assignments: Annotated[
         list[str] | None, typer.Option("--set", metavar="STAGE.NAME=VALUE", help="one parameter")
     ] = None,
@@ -43,6 +46,7 @@ def batch(
     Writes OUT/NAME for each, batch.json and batch.html. What is complete already is not computed again.
     """
     resolve(PIPELINE, config, assignments or ())
+    cluster = _cluster(count, scheduler, config)
     options = _options(probe, config, assignments or [])
     found = find_recordings(folder)
     console = Console(stderr=True)
@@ -50,7 +54,7 @@ def batch(
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
     works = [Work(n, p.resolve(), (output / n).resolve(), options) for n, p in found.items()]
-    with workers(count, scheduler) as client:
+    with workers(cluster) as client:
         for ending in endings(client, works):
             done.append(ending)
             console.print(f"{len(done)}/{len(works)}  {ending.name}: {ending.state}", highlight=False)
@@ -60,6 +64,16 @@ def batch(
     typer.echo(f"Summary: {(output / 'batch.html').resolve()}")
     if any(e.state != "completed" for e in done):
         raise typer.Exit(_EXIT_SOME_FAILED)
+
+
+def _cluster(count: int | None, scheduler: str, config: Path | None) -> Cluster:
+    if count and scheduler:
+        raise InputError(
+            "--workers", "and --scheduler exclude each other", hint="a scheduler has the workers it has"
+        )
+    if scheduler:
+        return RunningScheduler(address=scheduler)
+    return LocalWorkers(count=count) if count else read_cluster(config)
 
 
 def _options(probe: Path | None, config: Path | None, assignments: list[str]) -> tuple[str, ...]:

@@ -13,11 +13,13 @@ from typer.testing import CliRunner
 
 from pipeline.batch.cluster import endings, workers
 from pipeline.batch.find import find_recordings
+from pipeline.batch.kinds import LocalWorkers, RunningScheduler
 from pipeline.batch.summary import write_summary
 from pipeline.batch.work import Ending, Work, ending_of
 from pipeline.cli import app
 from pipeline.errors import InputError
 from tests.bad_recordings import cut_sample
+from tests.batch_queue import kill_job, local_queue, queued
 from tests.dask_cluster import DaskCluster, end
 from tests.run_content import run_content
 from tests.shared_data import PROJECT_ROOT
@@ -47,7 +49,7 @@ def single(recordings, tmp_path_factory):
 def test_a_lost_worker_loses_nothing(recordings, single, tmp_path):
     found = find_recordings(recordings)
     works = [Work(n, p, tmp_path / n, FEW) for n, p in found.items()]
-    with workers(2, "") as client:
+    with workers(LocalWorkers(count=2)) as client:
         pids = list(client.run(os.getpid).values())
         kill = threading.Thread(target=lambda: (time.sleep(4), os.kill(pids[0], signal.SIGKILL)))
         kill.start()
@@ -91,6 +93,22 @@ def test_workers_of_a_cluster_killed_while_they_work_lose_nothing(recordings, si
         "deep-two": "completed",
         "broken": "refused",
     }
+    assert run_content(tmp_path / "out" / "one") == run_content(single)
+
+
+def test_jobs_of_a_queue_killed_while_they_work_are_queued_again(recordings, single, tmp_path, monkeypatch):
+    queue = local_queue(tmp_path)
+    monkeypatch.setenv("PATH", f"{queue}:{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", str(PROJECT_ROOT))
+    (tmp_path / "c.yaml").write_text("cluster: {kind: slurm, jobs: 2, memory_gib: 4, host: 127.0.0.1}\n")
+    batch = batch_of(recordings / "one", tmp_path / "out", "--config", str(tmp_path / "c.yaml"))
+    working(tmp_path / "out")
+    lost = queued(queue)
+    for job in lost:
+        kill_job(job)
+    _, told = batch.communicate(timeout=300)
+    assert batch.returncode == 0, told
+    assert len(queued(queue)) > len(lost)
     assert run_content(tmp_path / "out" / "one") == run_content(single)
 
 
@@ -156,8 +174,16 @@ def test_the_summary_tells_every_ending_in_the_order_of_names(tmp_path):
     assert 'href="&lt;i' not in page
 
 
+def test_workers_and_a_scheduler_exclude_each_other(recordings, tmp_path):
+    batch = batch_of(recordings, tmp_path, "--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
+    _, told = batch.communicate(timeout=60)
+    assert batch.returncode == 2
+    assert "--workers: and --scheduler exclude each other" in told
+
+
 def test_a_scheduler_that_does_not_answer_is_named():
-    with pytest.raises(InputError, match="no scheduler answers"), workers(None, "tcp://127.0.0.1:9"):
+    nobody = RunningScheduler(address="tcp://127.0.0.1:9")
+    with pytest.raises(InputError, match="no scheduler answers"), workers(nobody):
         pass
 
 
