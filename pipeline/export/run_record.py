@@ -20,7 +20,7 @@ from pipeline.recording.input_file import content_key
 _FORMAT = 1
 # What computes; another version of these may change a result's last digits.
 _LIBRARIES = (
-    "av", "matplotlib", "numba", "numpy", "open3d", "opencv-contrib-python-headless", "pillow", "pymeshlab",
+    "av", "matplotlib", "numba", "numpy", "open3d", "opencv-contrib-python-headless", "pillow", "pyfqmr",
     "scipy", "xatlas", "zarr",
 )  # fmt: skip
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
@@ -131,60 +129,44 @@ def _tile_length(wall: Wall, parameters: MeshParameters) -> float:
 def _grid_pieces(
     wall: Wall, tile_mm: float, parameters: MeshParameters, context: Context
 ) -> Iterator[Decimated]:
-    """Yield the radius map's surface in decimated pieces, a few of them made at a time."""
+    """Yield the radius map's surface in decimated pieces."""
     radius_map = wall.radius_map
     length = float(np.ptp(radius_map.distance_mm))
     rows = row_pieces(len(radius_map.distance_mm), tile_count(length, tile_mm))
-
-    def piece(part: slice) -> Decimated:
+    for done, part in enumerate(rows, 1):
         noise = np.nan_to_num(radius_map.sigma_random_mm[part].astype(float))
         allowance = parameters.error_mm + parameters.noise_factor * noise
-        return _thin_out(grid_surface(wall, part, allowance), parameters)
-
-    with ThreadPoolExecutor(context.workers) as pool:
-        for start in range(0, len(rows), context.workers):
-            yield from pool.map(piece, rows[start : start + context.workers])
-            context.progress(min(start + context.workers, len(rows)), len(rows))
+        yield _thin_out(grid_surface(wall, part, allowance), parameters)
+        context.progress(done, len(rows))
 
 
 def _poisson_pieces(wall: Wall, parameters: MeshParameters, context: Context) -> Iterator[Decimated]:
     """Yield the cloud's Poisson surface, decimated: one piece."""
+    surface = _reconstructed(wall, parameters)
+    context.progress(1, 2)
+    yield _thin_out(surface, parameters)
+    context.progress(2, 2)
+
+
+def _reconstructed(wall: Wall, parameters: MeshParameters) -> Surface:
+    """Return the cloud's Poisson surface, made in a process of its own: it may crash or find no end."""
     cloud = wall.cloud
     allowance = parameters.error_mm + parameters.noise_factor * float(np.median(cloud.sigma_mm))
     xyz, normal = cloud.xyz_p.astype(float), cloud.normal_p.astype(float)
-    with _native_failures("screened Poisson"):
-        surface = call_isolated(
-            parameters.time_limit_s,
-            poisson_surface,
-            xyz,
-            normal,
-            parameters.poisson_cell_mm,
-            parameters.poisson_reach_mm,
-            allowance,
-        )
-    context.progress(1, 2)
-    piece = _thin_out(surface, parameters)
-    context.progress(2, 2)
-    yield piece
+    limits = parameters.poisson_cell_mm, parameters.poisson_reach_mm, allowance
+    try:
+        return call_isolated(parameters.time_limit_s, poisson_surface, xyz, normal, *limits)
+    except (TimeLimitError, CrashError) as error:
+        hint = "set mesh.time_limit_s higher, or mesh.surface=grid, or mesh.poisson_cell_mm larger"
+        raise UnusableError("mesh", f"screened Poisson: {error}", hint=hint) from error
 
 
 def _thin_out(surface: Surface, parameters: MeshParameters) -> Decimated:
-    """Return the surface decimated in a process of its own, as pymeshlab bears no threads."""
+    """Return the surface decimated to the density wished, if its error allows."""
     a, b, c = np.moveaxis(surface.vertex_p[surface.face], 1, 0)
     area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     target = max(1, round(parameters.triangles_per_mm2 * area))
-    with _native_failures("decimation"):
-        return call_isolated(parameters.time_limit_s, decimate, surface, target)
-
-
-@contextmanager
-def _native_failures(what: str) -> Iterator[None]:
-    """Turn a library's crash or endless run into an error for people."""
-    try:
-        yield
-    except (TimeLimitError, CrashError) as error:
-        hint = "set mesh.time_limit_s higher, or mesh.surface=grid, or mesh.poisson_cell_mm larger"
-        raise UnusableError("mesh", f"{what}: {error}", hint=hint) from error
+    return decimate(surface, target)
 
 
 def _assemble(tiles: PackedTiles, kind: str, tally: Tally, parameters: MeshParameters) -> TexturedMesh:
@@ -200,4 +182,4 @@ def _report(mesh: TexturedMesh, context: Context) -> None:
     context.report("mesh: RMS decimation error", mesh.decimation_rms_mm, "mm")
 
 
-MESH = Stage("mesh", "2", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")
+MESH = Stage("mesh", "3", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")
