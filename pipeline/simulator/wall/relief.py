@@ -15,6 +15,8 @@ from pipeline.simulator.wall.seeds import Seeds
 Float = NDArray[np.float64]
 _FORM_LONGEST_MM = 80.0
 _BRANCH_CHAMFER_MM = 0.6
+# OpenCV interpolates pictures of less than 32767 rows.
+_MOST_ROWS = 32_000
 
 
 def add_relief(radius_mm: Float, grid: Grid, pipe: Pipe, seeds: Seeds) -> Float:
@@ -48,8 +50,17 @@ def coarse_field(grid: Grid, random: np.random.Generator, longest_mm: float) -> 
     columns = np.mod((grid.azimuth_rad + np.pi) / (2 * np.pi) * own.shape[1] - 0.5, own.shape[1])
     rows = (grid.distance_mm - own.distance_mm[0]) / own.step_mm
     wide = np.concatenate([values, values[:, :2]], 1)
-    x, y = np.meshgrid(columns.astype(np.float32), rows.astype(np.float32))
-    return np.asarray(cv2.remap(wide, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    many = int(_MOST_ROWS * min(own.step_mm / grid.step_mm, 1.0))
+    parts = [rows[n : n + many] for n in range(0, len(rows), many)]
+    return np.concatenate([_between(wide, part, columns) for part in parts])
+
+
+def _between(values: Float32, rows: Float, columns: Float) -> Float32:
+    """Return a field at fractional rows and columns, from the part of it that these rows need."""
+    first, last = int(rows[0]), int(rows[-1]) + 2
+    x, y = np.meshgrid(columns.astype(np.float32), (rows - first).astype(np.float32))
+    part = values[first:last]
+    return np.asarray(cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
 def weld_relief(grid: Grid, weld: Weld, random: np.random.Generator) -> Float:
