@@ -19,11 +19,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import resource
 import subprocess
 import sys
-import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -66,6 +64,7 @@ from tests.benchmarks.long_inputs import (
     repeated_photo,
     repeated_rings,
 )
+from tests.benchmarks.watch import Watch
 from tests.long_motion import long_motion
 from tests.synthetic_wall import bare_recording
 
@@ -135,7 +134,7 @@ def _child(given: argparse.Namespace, stage: str, size: str) -> None:
         made = work()
         if stage in KINDS and made is not None:
             store.write(made, Provenance(stage, "1", KEY, 0.0, ()))
-    print(json.dumps({"cpu_s": watch.cpu_s, "mib": watch.most_mib, "metres": metres}))
+    print(json.dumps({"cpu_s": watch.all_cpu_s, "mib": watch.most_mib, "metres": metres}))
 
 
 def _work(
@@ -254,51 +253,6 @@ def _from_video(
     wall = even_wall(run.artefact(Wall), times, length)
     parameters = TextureParameters.model_validate({})
     return lambda: photograph_wall(long, probe, long_motion_, wall, parameters, context), metres
-
-
-class Watch:
-    """Processor time and most memory of its own that this process and those below it take."""
-
-    cpu_s = 0.0
-    most_mib = 0.0
-
-    def __enter__(self) -> Watch:
-        self._start, self._stop = _cpu_s(), threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._thread.join()
-        self.cpu_s = _cpu_s() - self._start
-
-    def _look(self) -> None:
-        while not self._stop.wait(0.05):
-            self.most_mib = max(self.most_mib, sum(map(_anonymous_mib, _family(os.getpid()))))
-
-
-def _cpu_s() -> float:
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(u.ru_utime + u.ru_stime for u in used)
-
-
-def _family(pid: int) -> list[int]:
-    try:
-        tasks = list(Path(f"/proc/{pid}/task").iterdir())
-        below = [int(c) for t in tasks for c in (t / "children").read_text().split()]
-    except OSError:  # ended meanwhile
-        return [pid]
-    return [pid, *(p for child in below for p in _family(child))]
-
-
-def _anonymous_mib(pid: int) -> float:
-    try:
-        status = Path(f"/proc/{pid}/status").read_text()
-    except OSError:  # ended meanwhile
-        return 0.0
-    held = [line.split()[1] for line in status.splitlines() if line.startswith("RssAnon:")]
-    return int(held[0]) / 1024 if held else 0.0
 
 
 if __name__ == "__main__":

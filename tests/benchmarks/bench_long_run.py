@@ -1,0 +1,165 @@
+"""A real recording of 1, 10 and 100 m through `boresight run`: time per metre and memory of every stage.
+
+    python -m tests.benchmarks.bench_long_run OUT --metres 1,10,100
+
+Writes into OUT, per length, the scene (configs/scenes/pulled-4-inch.yaml made longer), the recording with its
+truth beside it (`boresight simulate`) and the run (`boresight run --config configs/long.yaml`); what is there
+already of scene and recording is kept. 100 m are 20 000 frames: about half an hour of rendering on one core
+and 7 GiB of memory, none of which counts. Nothing is extrapolated: a length that was not run has no line.
+
+The run is one process with its helpers, and told is the most that they held of their own at one moment
+(RssAnon: pages mapped from files are the system's to drop), and the processor time of all of them. Files for
+people are written beside the stages that follow: what they cost counts there, the last of it as ``files``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.artefacts import Trajectory, Wall
+from pipeline.geometry.axis import to_pipe
+from pipeline.review.run_files import RunFiles
+from pipeline.simulator.scene import read_scene, write_scene
+from tests.benchmarks.long_scene import lengthened
+from tests.benchmarks.watch import Watch
+
+ROOT = Path(__file__).resolve().parents[2]
+TEMPLATE, CONFIG = ROOT / "configs/scenes/pulled-4-inch.yaml", ROOT / "configs/long.yaml"
+_ENDED = re.compile(r" INFO stage \w+ (?:completed|reused)")
+_STARTS = re.compile(r" INFO stage (\w+) starts")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the files of one length lie."""
+
+    folder: Path
+
+    @property
+    def scene(self) -> Path:
+        """The scene file."""
+        return self.folder / "scene.yaml"
+
+    @property
+    def recording(self) -> Path:
+        """The recording's folder."""
+        return self.folder / "recording"
+
+    @property
+    def truth(self) -> Path:
+        """The folder of its truth."""
+        return self.folder / "recording-truth"
+
+    @property
+    def run(self) -> Path:
+        """The run folder."""
+        return self.folder / "run"
+
+
+def main() -> None:
+    """Render, run, and print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path, help="where everything is written")
+    parser.add_argument("--metres", default="1,10,100")
+    parser.add_argument("--config", type=Path, default=CONFIG)
+    given = parser.parse_args()
+    lengths = [int(n) for n in given.metres.split(",")]
+    found: dict[int, Watch] = {}
+    for metres in lengths:
+        place = Place(given.out.resolve() / f"{metres}m")
+        require_recording(place, metres)
+        found[metres] = watched_run(place, given.config)
+        print(f"{metres} m against the truth: {against_truth(place)}", flush=True)
+    print(table(found))
+
+
+def require_recording(place: Place, metres: int) -> None:
+    """Render the recording of a length unless it is there."""
+    place.folder.mkdir(parents=True, exist_ok=True)
+    if not place.recording.is_dir():
+        write_scene(lengthened(read_scene(TEMPLATE), metres), place.scene)
+        boresight("simulate", str(place.scene), "-o", str(place.recording)).wait()
+
+
+def watched_run(place: Place, config: Path) -> Watch:
+    """Process a recording from nothing; return what each stage took."""
+    log = place.run / ".boresight" / "run.log"
+    log.unlink(missing_ok=True)
+    command = ("run", str(place.recording), "-o", str(place.run), "--config", str(config), "--no-resume")
+    process = boresight(*command)
+    with Watch(process.pid, Progress(log)) as watch:
+        if process.wait():
+            raise SystemExit(f"the run of {place.recording} failed: see {log}")
+    return watch
+
+
+def boresight(*arguments: str) -> subprocess.Popen[bytes]:
+    """Start the program as its user does."""
+    command = [sys.executable, "-m", "pipeline.cli", *arguments]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+class Progress:
+    """Tells from a run's log, read on as it grows, at which stage it is."""
+
+    def __init__(self, log: Path) -> None:
+        self._log, self._read, self._stage = log, 0, "start"
+
+    def __call__(self) -> str:
+        if self._log.exists():
+            with self._log.open("rb") as file:
+                file.seek(self._read)
+                for line in file:
+                    self._take(line.decode())
+                self._read = file.tell()
+        return self._stage
+
+    def _take(self, line: str) -> None:
+        starts = _STARTS.search(line)
+        if starts:
+            self._stage = starts[1]
+        elif _ENDED.search(line):
+            self._stage = "files"
+
+
+def against_truth(place: Place) -> str:
+    """Return the errors of distance and roll at the end, and of the mean radius, in words."""
+    truth = json.loads((place.truth / "truth.json").read_text())
+    with np.load(place.truth / "truth_wall.npz") as wall:
+        true_radius_mm = float(np.mean(wall["radius_mm"], dtype=float))
+    files = RunFiles(place.run)
+    motion, radius_map = files.artefact(Trajectory), files.artefact(Wall).radius_map
+    T_pc = np.array(truth["camera_pose_in_pipe"])[motion.frame]
+    distance_mm = to_pipe(motion.axis, motion.T_pc[:, :3, 3])[0]
+    off_mm = distance_mm - distance_mm[0] - (T_pc[:, 2, 3] - T_pc[0, 2, 3])
+    seen = np.isfinite(radius_map.radius_mm)
+    bias_mm = float(np.mean(radius_map.radius_mm[seen], dtype=float)) - true_radius_mm
+    return (
+        f"distance {off_mm[-1]:+.2f} mm at the end of {np.ptp(T_pc[:, 2, 3]):.0f} mm "
+        f"(1 sigma {np.sqrt(motion.covariance[-1, 2, 2]):.2f}), mean radius {bias_mm:+.4f} mm, "
+        f"seen {100 * np.mean(seen[seen.any(1)]):.1f} %"
+    )
+
+
+def table(found: dict[int, Watch]) -> str:
+    """Return processor seconds per metre and most MiB of every stage, one column a length."""
+    stages = list(dict.fromkeys(s for watch in found.values() for s in watch.cpu_s))
+    lines = ["| stage, processor s per m (most MiB) | " + " | ".join(f"{n} m" for n in found) + " |"]
+    lines.append("|---" * (len(found) + 1) + "|")
+    for stage in stages:
+        cells = [f"{w.cpu_s.get(stage, 0) / n:.2f} ({w.mib.get(stage, 0):.0f})" for n, w in found.items()]
+        lines.append(f"| {stage} | " + " | ".join(cells) + " |")
+    cells = [f"{w.all_cpu_s / n:.2f} ({w.most_mib:.0f})" for n, w in found.items()]
+    return "\n".join([*lines, "| **all** | " + " | ".join(cells) + " |"])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""Processor time and memory of a process and all below it, looked at while they work."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+_TICK_S = 1 / os.sysconf("SC_CLK_TCK")
+_EVERY_S = 0.05
+_UTIME, _AFTER_CSTIME = 11, 15
+
+
+class Watch:
+    """Processor time and most memory of their own, that a process and those below it take, by phase.
+
+    Memory is RssAnon: pages mapped from files are the system's to drop.
+
+    Parameters
+    ----------
+    pid : int
+        The first of the family; absent: this process.
+    phase : callable
+        Names what the family is at; what it takes counts there.
+
+    Attributes
+    ----------
+    cpu_s, mib : dict of str to float
+        Processor time, and the most memory held at one moment, by phase.
+    """
+
+    def __init__(self, pid: int | None = None, phase: Callable[[], str] = str) -> None:
+        self._pid, self._phase = pid or os.getpid(), phase
+        self.cpu_s: dict[str, float] = {}
+        self.mib: dict[str, float] = {}
+
+    @property
+    def most_mib(self) -> float:
+        """Most memory at any moment."""
+        return max(self.mib.values(), default=0.0)
+
+    @property
+    def all_cpu_s(self) -> float:
+        """Processor time of all phases."""
+        return sum(self.cpu_s.values())
+
+    def __enter__(self) -> Watch:
+        self._used, self._stop = _used_s(family(self._pid)), threading.Event()
+        self._thread = threading.Thread(target=self._look_on, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+        self._look()
+
+    def _look_on(self) -> None:
+        while not self._stop.wait(_EVERY_S):
+            self._look()
+
+    def _look(self) -> None:
+        pids, phase = family(self._pid), self._phase()
+        self.mib[phase] = max(self.mib.get(phase, 0.0), sum(map(_anonymous_mib, pids)))
+        used = _used_s(pids)
+        # a helper that has ended is counted by its parent once that has waited for it
+        self.cpu_s[phase] = self.cpu_s.get(phase, 0.0) + max(used - self._used, 0.0)
+        self._used = max(used, self._used)
+
+
+def family(pid: int) -> list[int]:
+    """Return a process and all below it."""
+    try:
+        tasks = list(Path(f"/proc/{pid}/task").iterdir())
+        below = [int(c) for t in tasks for c in (t / "children").read_text().split()]
+    except OSError:  # ended meanwhile
+        return [pid]
+    return [pid, *(p for child in below for p in family(child))]
+
+
+def _used_s(pids: list[int]) -> float:
+    return sum(map(_one_used_s, pids))
+
+
+def _one_used_s(pid: int) -> float:
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:  # ended meanwhile
+        return 0.0
+    return _TICK_S * sum(map(int, stat.rpartition(")")[2].split()[_UTIME:_AFTER_CSTIME]))
+
+
+def _anonymous_mib(pid: int) -> float:
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:  # ended meanwhile
+        return 0.0
+    held = [line.split()[1] for line in status.splitlines() if line.startswith("RssAnon:")]
+    return int(held[0]) / 1024 if held else 0.0
