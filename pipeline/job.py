@@ -15,7 +15,7 @@ from pipeline.errors import InputError
 from pipeline.export.exporter import Exporter
 from pipeline.export.run_record import write_run_record
 from pipeline.instrument.probe import Probe
-from pipeline.instrument.probe_file import read_probe
+from pipeline.instrument.probe_file import ProbeSource, read_with_source
 from pipeline.interrupt import stop_wish
 from pipeline.outcome import RunOutcome
 from pipeline.plan import Plan, Source, make_plan
@@ -33,7 +33,7 @@ class Job:
 
     recording: Recording
     probe: Probe
-    probe_file: Path
+    probe_source: ProbeSource
     stages: tuple[Stage, ...]
     exporters: tuple[Exporter, ...]
     configuration: Configuration
@@ -73,9 +73,9 @@ def open_job(
     if file is None:
         noticed = "; ".join(("names no probe that is there", *opened.warnings))
         raise InputError(recording, noticed, expected="a probe file", hint="give one with --probe FILE")
-    believed = read_probe(file)
+    believed, source = read_with_source(file)
     check_probe_fits(opened, believed)
-    return Job(opened, believed, file, tuple(stages), tuple(exporters), configuration, folder)
+    return Job(opened, believed, source, tuple(stages), tuple(exporters), configuration, folder)
 
 
 def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
@@ -89,4 +89,4 @@ def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
 
 
 def _record(job: Job, plan: Plan, outcome: RunOutcome) -> None:
-    write_run_record(job.recording, job.probe_file, job.configuration, plan, outcome, job.folder)
+    write_run_record(job.recording, job.probe_source, job.configuration, plan, outcome, job.folder)

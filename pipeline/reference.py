@@ -71,7 +71,7 @@ def read_wall_map(path: Path) -> WallMap:
     InputError
         If there is none, there are several, or it is malformed.
     """
-    file = path if path.is_file() else _only_map(path)
+    file = map_file(path)
     with _opened(file) as content:
         arrays = {
             k: np.asarray(content[k], float) for k in content.files if k in _MAP_KEYS or k.startswith("sigma")
@@ -133,6 +133,11 @@ def read_surface(file: Path, unit_mm: float) -> Surface:
             file, f"holds {len(vertices)} usable points", expected="a mesh or a cloud of the pipe's wall"
         )
     return Surface(vertices * unit_mm, triangles)
+
+
+def map_file(path: Path) -> Path:
+    """Return the file of a radius map: itself, or the only one in a folder; see `read_wall_map`."""
+    return path if path.is_file() else _only_map(path)
 
 
 def _only_map(folder: Path) -> Path:

@@ -15,6 +15,7 @@ from pipeline.export.exporter import Exporter
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import ProbeSource
 from pipeline.job import Job, run_job
 from pipeline.outcome import RunOutcome
 from pipeline.recording.base import FrameTable, Image, Int, PipeFacts, Planes, Recording
@@ -49,7 +50,15 @@ def toy_probe() -> Probe:
 
 def toy_job(folder: Path, *assignments: str) -> Job:
     configuration = resolve(TOYS, None, assignments)
-    return Job(toy_recording(), toy_probe(), Path("probe.yaml"), TOYS, TOY_EXPORTERS, configuration, folder)
+    return Job(
+        toy_recording(),
+        toy_probe(),
+        ProbeSource(Path("probe.yaml"), "", None),
+        TOYS,
+        TOY_EXPORTERS,
+        configuration,
+        folder,
+    )
 
 
 def run_toys(folder: Path, *assignments: str, selection: Selection | None = None) -> RunOutcome:

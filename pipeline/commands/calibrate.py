@@ -13,10 +13,12 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
+from pipeline.codec import digest
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
+from pipeline.provenance import MadeBy
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits
@@ -52,13 +54,15 @@ def calibrate(
         rings = extract_rings(recording, stated, RingParameters.model_validate({}), quiet_context())
     with console.status("measuring fiducials, adjusting"):
         result = calibrate_gauge(recording, rings, stated, parameters, quiet_context())
+    inputs = {"gauge": recording.content_key, "probe": digest(stated)}
+    made_by = MadeBy("calibrate", inputs, parameters.model_dump(mode="json"))
     # matplotlib takes a second to load, for which a refusal need not wait
     from pipeline.commands.calibrate_report import write_report
 
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
-        write_probe(result.probe, output / "probe.yaml")
-        write_report(result, output)
+        write_probe(result.probe, output / "probe.yaml", made_by)
+        write_report(result, made_by, output)
     _show(result, output, console)
 
 

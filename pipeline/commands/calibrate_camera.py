@@ -22,6 +22,7 @@ from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError, UnusableError
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport
 from pipeline.instrument.camera.formats import WRITTEN, read_camera, write_camera
+from pipeline.provenance import MadeBy, files_sha256
 from pipeline.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import LEAST_CORNERS, detect
@@ -101,7 +102,11 @@ def calibrate_camera(
     parameters = BoardCalibrationParameters(board_shape=board_shape.value, folds=folds)
     models = MODEL_NAMES if model is ModelChoice.BEST else [m for m in MODEL_NAMES if m == model.value]
     console = Console(stderr=True)
-    views, image_size, rejected = find_boards(list_images(images), target, console)
+    files = list_images(images)
+    made_by = MadeBy(
+        "calibrate-camera", {"pictures": files_sha256(files)}, parameters.model_dump(mode="json")
+    )
+    views, image_size, rejected = find_boards(files, target, console)
     with console.status("fitting"):
         report = calibrate_boards(views, image_size, models, reference, parameters, quiet_context())
     report = report.with_rejected(rejected)
@@ -111,7 +116,7 @@ def calibrate_camera(
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
         write_camera(report.calibration.camera, output / "camera.yaml", "boresight")
-        write_report(report, "" if compare is None else compare.name, output)
+        write_report(report, "" if compare is None else compare.name, made_by, output)
         if file_format is not None:
             write_camera(report.calibration.camera, output / f"camera-{file_format}.txt", file_format)
     _show(report, output, console)

@@ -19,13 +19,14 @@ from pipeline.commands.calibrate_camera_figures import (
 from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
 from pipeline.pages import page_template
+from pipeline.provenance import MadeBy
 
 Float = NDArray[np.float64]
 
 
-def write_report(report: CalibrationReport, compared_file: str, folder: Path) -> None:
+def write_report(report: CalibrationReport, compared_file: str, made_by: MadeBy, folder: Path) -> None:
     """Write calibration.json and calibration.html; ``compared_file`` is empty unless one was given."""
-    document = report_document(report, compared_file)
+    document = report_document(report, compared_file) | {"made_by": made_by.document()}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / "calibration.json").write_text(text + "\n", "utf-8")
     (folder / "calibration.html").write_text(report_page(report, document), "utf-8")

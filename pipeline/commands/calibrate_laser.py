@@ -24,6 +24,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.laser_plane import LaserPlane
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
+from pipeline.provenance import MadeBy, files_sha256
 from pipeline.stage import quiet_context
 from stages.calibrate.laser.calibrate import LaserCalibration, LaserPicture, calibrate_laser_plane
 from stages.calibrate.laser.parameters import LaserPlaneParameters
@@ -71,11 +72,14 @@ def calibrate_laser(
         result = calibrate_laser_plane(_pictures(files, views), model, parameters, quiet_context())
     result = replace(result, rejected=(*without_board, *result.rejected))
     refined = None if stated is None else with_plane(stated, model, result.plane, wavelength_nm)
+    inputs = {"pictures": files_sha256(files), "camera": files_sha256((camera,))}
+    made_by = MadeBy("calibrate-laser", inputs, parameters.model_dump(mode="json"))
+    document = description(result) | {"made_by": made_by.document()}
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
-        (output / "laser.json").write_text(json.dumps(description(result), indent=1) + "\n", "utf-8")
+        (output / "laser.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
         if refined is not None:
-            write_probe(refined, output / "probe.yaml")
+            write_probe(refined, output / "probe.yaml", made_by)
     _show(result, output, console)
 
 

@@ -19,6 +19,7 @@ from pipeline.commands.calibrate_figures import (
 )
 from pipeline.instrument.probe import Probe
 from pipeline.pages import page_template
+from pipeline.provenance import MadeBy
 from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
 
 Float = NDArray[np.float64]
@@ -26,9 +27,9 @@ _UNDETERMINED = 0.7
 _SHOWN = 6
 
 
-def write_report(result: GaugeCalibration, folder: Path) -> None:
+def write_report(result: GaugeCalibration, made_by: MadeBy, folder: Path) -> None:
     """Write calibration.json and calibration.html."""
-    document = report_document(result)
+    document = report_document(result) | {"made_by": made_by.document()}
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / "calibration.json").write_text(text + "\n", "utf-8")
     (folder / "calibration.html").write_text(report_page(result, document), "utf-8")

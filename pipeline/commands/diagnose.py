@@ -12,6 +12,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from pipeline.codec import digest
 from pipeline.commands.diagnose_apply import apply_correction, consequence
 from pipeline.commands.diagnose_files import write_files
 from pipeline.commands.diagnose_image import image_of
@@ -22,6 +23,7 @@ from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
+from pipeline.provenance import MadeBy
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits
@@ -77,12 +79,13 @@ def diagnose(
     found = examination.found
     if foreign:
         found = replace(found, shortcomings=(foreign, *found.shortcomings))
+    made_by = _made_by(recordings, stated, tuple(without or ()))
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
-        write_files(examination, stated, output)
+        write_files(examination, stated, made_by, output)
         shown = Shown(simulated, None, image_of(examination))
         write_page(found, shown, output)
-        _write(found, output)
+        _write(found, made_by, output)
     _show(found, output, console)
     if apply and recordings[0] is not None and recordings[1] is not None:
         configuration = resolve(PIPELINE, None, ())
@@ -123,9 +126,15 @@ def _of_another_probe(gauge: Recording | None, stated: Probe) -> str:
     )
 
 
-def _write(found: Diagnosis, output: Path) -> None:
+def _made_by(recordings: Sequence[Recording | None], stated: Probe, without: Sequence[str]) -> MadeBy:
+    given = zip(("field", "gauge"), recordings, strict=True)
+    inputs = {name: r.content_key for name, r in given if r is not None} | {"probe": digest(stated)}
+    return MadeBy("diagnose", inputs, {"without": list(without)})
+
+
+def _write(found: Diagnosis, made_by: MadeBy, output: Path) -> None:
     """Write the answer last: where it is, all of it is."""
-    text = json.dumps(to_json(found), indent=1, ensure_ascii=False)
+    text = json.dumps(to_json(found) | {"made_by": made_by.document()}, indent=1, ensure_ascii=False)
     unfinished = output / "diagnosis.json.part"
     unfinished.write_text(text + "\n", "utf-8")
     unfinished.replace(output / "diagnosis.json")

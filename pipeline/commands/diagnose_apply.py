@@ -15,7 +15,7 @@ from pipeline.codec import digest
 from pipeline.config import Configuration
 from pipeline.display import ProgressDisplay
 from pipeline.export.catalogue import EXPORTERS
-from pipeline.instrument.probe_file import read_probe
+from pipeline.instrument.probe_file import read_with_source
 from pipeline.job import Job, run_job
 from pipeline.recording.base import Recording
 from pipeline.runner import Selection
@@ -86,7 +86,8 @@ def apply_correction(
 
 
 def _job(recording: Recording, probe_file: Path, configuration: Configuration, folder: Path) -> Job:
-    return Job(recording, read_probe(probe_file), probe_file, PIPELINE, EXPORTERS, configuration, folder)
+    probe, source = read_with_source(probe_file)
+    return Job(recording, probe, source, PIPELINE, EXPORTERS, configuration, folder)
 
 
 def _true_field(examination: Examination, field: Recording) -> Recording:

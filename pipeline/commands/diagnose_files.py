@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import write_probe
+from pipeline.provenance import MadeBy
 from stages.diagnose.diagnose import Examination
 
 
-def write_files(examination: Examination, stated: Probe, folder: Path) -> None:
+def write_files(examination: Examination, stated: Probe, made_by: MadeBy, folder: Path) -> None:
     """Write probe.yaml and arrays.npz; without a gauge run the probe stays as stated.
 
     Raises
@@ -22,7 +23,7 @@ def write_files(examination: Examination, stated: Probe, folder: Path) -> None:
         When they cannot be written.
     """
     correction = examination.correction
-    write_probe(correction.probe if correction is not None else stated, folder / "probe.yaml")
+    write_probe(correction.probe if correction is not None else stated, folder / "probe.yaml", made_by)
     arrays = _arrays(examination)
     if arrays:
         # Named as a stream: savez would else append .npz to a name of its own.

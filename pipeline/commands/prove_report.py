@@ -10,6 +10,7 @@ from typing import Any
 
 from pipeline.commands.prove_cases import Worked
 from pipeline.pages import page_template
+from pipeline.provenance import MadeBy
 from stages.diagnose.drill.figures import Figure, figures
 from stages.diagnose.drill.score import Trial, calibration, confusion
 
@@ -30,6 +31,7 @@ def report_document(done: Sequence[Worked]) -> dict[str, Any]:
     seconds = [case.seconds for case in done if case.seconds is not None]
     return {
         "format": 2,
+        "made_by": MadeBy("prove", {}).document(),
         "figures": [vars(row) | {"text": row.text} for row in rows_of(done)],
         "seconds": {"median": median(seconds), "most": max(seconds), "of": len(seconds)} if seconds else None,
         "unanswered": [failure for case in done if case.trials for failure in case.failures],

@@ -15,8 +15,8 @@ from pipeline.config import resolve
 from pipeline.display import ProgressDisplay
 from pipeline.errors import BoresightError
 from pipeline.export.catalogue import EXPORTERS
-from pipeline.export.run_record import library_versions
 from pipeline.job import Job, open_job, run_job
+from pipeline.provenance import library_versions
 from pipeline.reproduce import (
     Agreement,
     Compared,

@@ -13,9 +13,11 @@ import typer
 
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
+from pipeline.provenance import MadeBy, files_sha256
 from pipeline.reference import (
     SURFACE_SUFFIXES,
     WallMap,
+    map_file,
     read_surface,
     read_wall_map,
     read_wall_points,
@@ -72,6 +74,7 @@ def verify(
     elif reference is not None:
         found = _against_map(wall, reference, max_shift_mm, max_roll_deg)
     document = certificate_document(run.resolve().name, wall, found)
+    document["made_by"] = _made_by(run, reference).document()
     if output is not None or not as_json:
         # matplotlib takes a second to load
         from pipeline.commands.verify_report import write_certificate
@@ -83,6 +86,11 @@ def verify(
         typer.echo(json.dumps(document, ensure_ascii=False))
     else:
         _show(document, folder)
+
+
+def _made_by(run: Path, reference: Path | None) -> MadeBy:
+    files = {"wall": run} | ({} if reference is None else {"reference": reference})
+    return MadeBy("verify", {name: files_sha256((map_file(file),)) for name, file in files.items()})
 
 
 def certificate_document(run: str, wall: WallMap, found: Verification) -> dict[str, Any]:

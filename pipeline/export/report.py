@@ -8,11 +8,11 @@ from pathlib import Path
 
 from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.codec import digest
-from pipeline.export.run_record import program_version
 from pipeline.findings import Defects, Sections
 from pipeline.instrument.probe import Probe
 from pipeline.model import Overlays
 from pipeline.outcome import Results, StageOutcome
+from pipeline.provenance import program_version
 from pipeline.recording.base import Recording
 from pipeline.review.report import write_report
 from pipeline.review.summary import ReportedNumber, RunSummary, StageRecord

@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import math
-import platform
 import resource
 from collections.abc import Iterable
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from pipeline.codec import Json
 from pipeline.config import Configuration
 from pipeline.disk import disk_errors_named, replace_json
+from pipeline.instrument.probe_file import ProbeSource
 from pipeline.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.plan import Plan
+from pipeline.provenance import library_versions, program_version
 from pipeline.recording.base import Recording
 from pipeline.recording.input_file import content_key
 
 _FORMAT = 1
-# What computes; another version of these may change a result's last digits.
-_LIBRARIES = (
-    "av", "matplotlib", "numba", "numpy", "open3d", "opencv-contrib-python-headless", "pillow", "pyfqmr",
-    "scipy", "xatlas", "zarr",
-)  # fmt: skip
-
-
-def program_version() -> str:
-    """Return the version of boresight, ``unknown`` when it is not installed."""
-    try:
-        return version("boresight")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def write_run_record(
     recording: Recording,
-    probe_file: Path,
+    probe: ProbeSource,
     configuration: Configuration,
     plan: Plan,
     outcome: RunOutcome,
@@ -60,7 +47,11 @@ def write_run_record(
             "path": str(recording.path.resolve()),
             "files_sha256": content_key(recording.files),
         },
-        "probe": {"path": str(probe_file.resolve())},
+        "probe": {
+            "path": str(probe.path.resolve()),
+            "calibrated_from": probe.calibrated_from,
+            "made_by": probe.made_by,
+        },
         "input_sha256": dict(plan.input_hashes()),
         "configuration": {c.stage: c.parameters.model_dump(mode="json") for c in configuration.stages},
         "stages": [_stage(s) for s in outcome.stages],
@@ -71,11 +62,6 @@ def write_run_record(
     }
     with disk_errors_named(folder):
         replace_json(folder / "run.json", tree)
-
-
-def library_versions() -> dict[str, str]:
-    """Return the versions of Python and of the libraries that compute."""
-    return {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES}
 
 
 def _peak_mib() -> float:

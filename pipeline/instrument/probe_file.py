@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from pipeline.codec import Json
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Lighting, Probe, Shutter
@@ -18,17 +20,28 @@ from pipeline.instrument.stated_uncertainty import (
     covariance_from_stated,
     stated_from_covariance,
 )
+from pipeline.provenance import MadeBy
 from pipeline.yaml_file import Section, read_yaml
 
 Float = NDArray[np.float64]
 _KEYS = (
     "camera", "laser", "shutter", "lighting", "standard_uncertainty", "covariance", "calibrated_from",
+    "made_by",
 )  # fmt: skip
 _LASER_KEYS = (
     "baseline_mm", "opening_angle_deg", "tilt_deg", "tilt_direction_deg", "line_sigma_mm", "wavelength_nm",
     "decentre_mm", "decentre_direction_deg", "waviness_rad",
 )  # fmt: skip
 _WAVES = len(LaserSheet(1.0).waviness)
+
+
+@dataclass(frozen=True)
+class ProbeSource:
+    """Where a probe comes from: its file, the gauge it was calibrated from, and what made the file."""
+
+    path: Path
+    calibrated_from: str
+    made_by: Json
 
 
 def read_probe(file: Path) -> Probe:
@@ -63,7 +76,16 @@ def probe_from(document: Section) -> Probe:
     )  # fmt: skip
 
 
-def write_probe(probe: Probe, path: Path) -> None:
+def read_with_source(file: Path) -> tuple[Probe, ProbeSource]:
+    """Read a probe file with what it says of its own making; see `read_probe`."""
+    document = read_yaml(file)
+    probe = probe_from(document)
+    made_by = document.section("made_by").values if document.has("made_by") else None
+    # What YAML knows and JSON does not, such as dates, becomes text.
+    return probe, ProbeSource(file, probe.calibrated_from, json.loads(json.dumps(made_by, default=str)))
+
+
+def write_probe(probe: Probe, path: Path, made_by: MadeBy | None = None) -> None:
     """Write a probe file; `read_probe` returns the same probe, its covariance bit for bit."""
     document: dict[str, object] = {
         "camera": camera_to_mapping(probe.camera),
@@ -75,6 +97,8 @@ def write_probe(probe: Probe, path: Path) -> None:
     }
     if probe.calibrated_from:
         document["calibrated_from"] = probe.calibrated_from
+    if made_by is not None:
+        document["made_by"] = made_by.document()
     path.write_text(yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=1000), "utf-8")
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from pipeline.commands.calibrate import calibrate, gauge_parameters
 from pipeline.errors import InputError
-from pipeline.instrument.probe_file import read_probe
+from pipeline.instrument.probe_file import read_probe, read_with_source
+from pipeline.recording import open_recording
 from tests.shared_data import shared
 
 
@@ -52,6 +53,10 @@ def test_document_and_page_say_what_moved(calibration: Path) -> None:
     assert abs(moved["cx"]) < 4
     assert document["radius_error"][0]["before_largest_mm"] > 0.9
     assert document["radius_error"][0]["sigma_mm"] < 0.01
+    gauge = open_recording(shared("recordings", "open-2-gauge")).content_key
+    assert document["made_by"]["input_sha256"]["gauge"] == gauge
+    _, source = read_with_source(calibration / "probe.yaml")
+    assert source.made_by == document["made_by"]
     assert document["outvoted"] == {"fiducials": [], "rings": []}
     page = (calibration / "calibration.html").read_text("utf-8")
     assert "open-2-gauge" in page

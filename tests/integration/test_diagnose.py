@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from pipeline.cli import app
-from pipeline.instrument.probe_file import read_probe
+from pipeline.instrument.probe_file import read_probe, read_with_source
 from pipeline.recording import open_recording
 from pipeline.simulator.scene import scene_from
 from pipeline.stage import quiet_context
@@ -56,6 +56,8 @@ def diagnosed(pair, tmp_path_factory):
 def test_the_tilt_is_named_sized_and_borne_out(diagnosed):
     answer = json.loads((diagnosed / "diagnosis.json").read_text())
     assert answer["verdict"] == "named"
+    assert set(answer["made_by"]["input_sha256"]) == {"field", "gauge", "probe"}
+    assert read_with_source(diagnosed / "probe.yaml")[1].made_by == answer["made_by"]
     (tilt,) = answer["effects"]
     assert tilt["name"] == "laser_tilt"
     size = tilt["parameters"]["tilt_deg"]

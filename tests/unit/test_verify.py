@@ -13,6 +13,7 @@ from pipeline.errors import InputError, UnusableError
 from pipeline.export.cloud import write_cloud
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
 from pipeline.native import open3d
+from pipeline.provenance import files_sha256
 from pipeline.reference import WallMap, read_surface, read_wall_map, read_wall_points
 from stages.verify.accuracy import accuracy, bore_differences, wall_coverage
 from stages.verify.maps import align_maps, map_differences
@@ -209,6 +210,7 @@ def test_certificate_is_one_page_and_data_that_agree(tmp_path):
     assert result.exit_code == 0, result.output
     page = (tmp_path / "out" / "certificate.html").read_text("utf-8")
     document = json.loads((tmp_path / "out" / "certificate.json").read_text("utf-8"))
+    assert document["made_by"]["input_sha256"] == {"wall": files_sha256([run / "radius_map.npz"])}
     assert 'src="http' not in page
     assert f"{document['accuracy']['rms_mm']:.3f} mm RMS against bore of 101.6 mm" in page
 

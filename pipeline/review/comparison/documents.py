@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.findings import clock_of_azimuth
+from pipeline.provenance import MadeBy
 from pipeline.review.comparison.changes import FAMILY_ERROR, Change, Fate
 from pipeline.review.comparison.comparison import Comparison
 from pipeline.review.comparison.registration import Registration
@@ -54,7 +55,9 @@ def growth_json(comparison: Comparison) -> str:
     """Return the table of changes, and the registration they rest on, as JSON."""
     document = comparison_document(comparison)
     told = {k: document[k] for k in ("earlier", "years", "family_error", "registration", "diameter")}
-    return json.dumps(told | {"changes": growth_rows(comparison)}, indent=1, ensure_ascii=False)
+    runs = {"run": comparison.now.files.version, "earlier": comparison.earlier.files.version}
+    told |= {"made_by": MadeBy("review --compare", runs).document(), "changes": growth_rows(comparison)}
+    return json.dumps(told, indent=1, ensure_ascii=False)
 
 
 def growth_rows(comparison: Comparison) -> list[dict[str, Any]]:

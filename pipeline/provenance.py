@@ -1,0 +1,71 @@
+"""What a result was made by, and from which inputs: written into every result beside a run's own record."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from pipeline.codec import Json
+from pipeline.recording.input_file import content_key, input_file
+
+# What computes; another version of these may change a result's last digits.
+_LIBRARIES = (
+    "av", "matplotlib", "numba", "numpy", "open3d", "opencv-contrib-python-headless", "pillow", "pyfqmr",
+    "pymeshlab", "scipy", "xatlas", "zarr",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MadeBy:
+    """A command with what it was given.
+
+    Attributes
+    ----------
+    command : str
+        Of boresight.
+    inputs : mapping of str to str
+        SHA-256 by what the input is; recordings and probes as in ``input_sha256`` of run.json.
+    settings : mapping of str to JSON
+        Parameters of the command.
+    """
+
+    command: str
+    inputs: Mapping[str, str]
+    settings: Mapping[str, Json] = field(default_factory=dict)
+
+    def document(self) -> dict[str, Json]:
+        """Return all as plain data, with the versions of the program and its libraries."""
+        return {
+            "program": {"name": "boresight", "version": program_version()},
+            "command": self.command,
+            "input_sha256": dict(self.inputs),
+            "settings": dict(self.settings),
+            "libraries": dict(library_versions()),
+        }
+
+
+def program_version() -> str:
+    """Return the version of boresight, ``unknown`` when it is not installed."""
+    try:
+        return version("boresight")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that compute."""
+    return {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES}
+
+
+def files_sha256(files: Iterable[Path]) -> str:
+    """Return the SHA-256 over those of some files, in order.
+
+    Raises
+    ------
+    InputError
+        When one cannot be read.
+    """
+    return content_key(input_file(f) for f in files)
