@@ -66,7 +66,7 @@ def _decimated(original: Surface, found: Surface, distance: Float) -> Decimated:
 def _collapse(surface: Surface, goal: int) -> Surface:
     """Return the surface with about ``goal`` faces; vertices at its borders stay where they are.
 
-    M. Garland, P. Heckbert, "Surface simplification using quadric error metrics", 1997, by pyfqmr, which keeps
+    M. Garland, P. Heckbert, "Surface simplification using quadric error metrics", 1997, by pyfqmr. It keeps
     its mesh in variables of the process: one call at a time.
     """
     simplifier = pyfqmr.Simplify()

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from pipeline.artefacts import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
-from pipeline.recording.base import Illumination, Recording
+from pipeline.recording.background import in_background
+from pipeline.recording.base import Illumination, Image, Recording
 from pipeline.stage import Context, Stage
 from stages.motion.encoder import contradicted, encoder_at_frames
 from stages.motion.events import find_events
@@ -23,7 +24,7 @@ from stages.motion.sections import at_all_frames, ring_centres
 from stages.motion.sliding import RunEstimate, adjust_run
 from stages.motion.state import EncoderReadings
 from stages.motion.stated import report_instrument
-from stages.motion.strip import StripGrid
+from stages.motion.strip import StripGrid, softened
 from stages.motion.submaps import Estimate
 from stages.motion.tracking import Followed, TextureTracker, track_texture
 from stages.motion.tracks import Course, Tracks
@@ -35,6 +36,7 @@ Float = NDArray[np.float64]
 _LARGEST_CHANGE = 0.1
 _BLUE, _RED = 0, 2
 _YELLOW_NM = 575.0
+_AHEAD = 4
 
 
 def estimate_motion(
@@ -129,20 +131,20 @@ def _followed(
     half = 12 * probe.laser.line_sigma_mm if both else 0.0
     blocked = (probe.laser.baseline_mm - half, probe.laser.baseline_mm + half)
     tracker = TextureTracker(probe, grid, parameters, blocked, context.scratch)
-    images = zip(_index_of(recording, lit), _wall_images(recording, lit, both, probe), strict=False)
-    return track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
+    # Softened on another thread while the picture before is followed.
+    images = in_background(_wall_images(recording, lit, both, probe), _AHEAD)
+    placed = ((int(np.searchsorted(recording.frames.frame, frame)), image) for frame, image in images)
+    return track_texture(placed, predictor, tracker, lambda done: context.progress(done, len(lit)))
 
 
 def _wall_images(
     recording: Recording, lit: NDArray[np.int64], both: bool, probe: Probe
-) -> Iterator[NDArray[np.uint8] | None]:
-    """Yield the lit frames' grey pictures; with the laser on, the colour that its light reaches least."""
-    if not both:
-        yield from (image for _, image in recording.read(lit, "grey"))
-        return
+) -> Iterator[tuple[int, Image | None]]:
+    """Yield the lit frames' softened grey pictures; with the laser on, the colour its light reaches least."""
     channel = _RED if probe.laser.wavelength_nm < _YELLOW_NM else _BLUE
-    for _, image in recording.read(lit, "bgr"):
-        yield None if image is None else np.ascontiguousarray(image[..., channel])
+    for frame, image in recording.read(lit, "bgr" if both else "grey"):
+        grey = image if image is None or not both else np.ascontiguousarray(image[..., channel])
+        yield frame, None if grey is None else softened(grey)
 
 
 def _require_distance(tracks: Course, encoder: EncoderReadings | None) -> None:
@@ -194,7 +196,7 @@ def _report(context: Context, estimate: RunEstimate, followed: Followed, traject
 
 MOTION = Stage(
     "motion",
-    "3",
+    "4",
     MotionParameters,
     estimate_motion,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -7,17 +7,19 @@ offset are taken out by matching zero-mean patches and scaling by the least-squa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+import cv2
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.rings.kernels import FAST
+
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 _STEPS = 30
-_THREADS = 2
+_ENOUGH = 0.003  # a step, strip px, after which the next would not matter
 
 
 @dataclass(frozen=True)
@@ -78,103 +80,95 @@ def match(
 ) -> Matches:
     """Find patches near predicted strip positions (N,); they move by at most half a patch."""
     inverse = np.linalg.inv(patches.information + 1e-9 * np.eye(2))
-
-    def matched(part: slice) -> tuple[Float, Float, Float]:
-        templates = (a[part] for a in (patches.value, patches.by_row, patches.by_column, inverse))
-        found: tuple[Float, Float, Float] = _match(
-            contrast, usable, *templates, row[part], column[part], _STEPS
-        )
-        return found
-
-    cuts = np.linspace(0, len(row), _THREADS + 1).astype(int)
-    with ThreadPoolExecutor(_THREADS) as pool:
-        parts = list(pool.map(matched, map(slice, cuts[:-1], cuts[1:])))
-    offset, correlation, residual = (np.concatenate(p) for p in zip(*parts, strict=True))
+    offset, correlation, residual = _match(
+        *_wrapped(contrast, usable, patches.value.shape[1]), contrast.shape[1],
+        patches.value, patches.by_row, patches.by_column, inverse, row, column, _STEPS,
+    )  # fmt: skip
     sigma = residual * np.sqrt(np.trace(inverse, axis1=1, axis2=2) / 2)
     return Matches(offset, correlation, sigma)
 
 
-@numba.njit(cache=True, nogil=True)
-def _look(contrast, usable, r, c, out):  # type: ignore[no-untyped-def]
-    """Sample a patch centred on (r, c) into ``out``; False where it leaves the usable strip."""
-    n = out.shape[0]
-    half = n // 2
-    height, width = contrast.shape
-    i0, j0 = int(np.floor(r)) - half, int(np.floor(c)) - half
-    if i0 < 0 or i0 + n >= height:
-        return False
-    a, b = np.float32(r - np.floor(r)), np.float32(c - np.floor(c))
-    total = np.float32(0)
-    for i in range(n):
-        for j in range(n):
-            x0, x1 = (j0 + j) % width, (j0 + j + 1) % width
-            y = i0 + i
-            if not (usable[y, x0] and usable[y + 1, x1]):
-                return False
-            top = contrast[y, x0] * (1 - b) + contrast[y, x1] * b
-            low = contrast[y + 1, x0] * (1 - b) + contrast[y + 1, x1] * b
-            out[i, j] = top * (1 - a) + low * a
-            total += out[i, j]
-    total /= n * n
-    for i in range(n):
-        for j in range(n):
-            out[i, j] -= total
-    return True
+def _wrapped(contrast: Float32, usable: NDArray[np.bool_], side: int) -> tuple[Float32, NDArray[np.int32]]:
+    """Return the strip with its first columns again behind the last, and its unusable samples summed up.
+
+    The sums (H + 1, W + side + 2) are over all samples above and to the left.
+    """
+    wide = np.concatenate([contrast, contrast[:, : side + 1]], 1)
+    spoilt = (~np.concatenate([usable, usable[:, : side + 1]], 1)).astype(np.uint8)
+    return wide, np.asarray(cv2.integral(spoilt), np.int32)
 
 
 @numba.njit(cache=True, nogil=True)
-def _match(contrast, usable, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]
+def _whole(spoilt, i, j, n):  # type: ignore[no-untyped-def]
+    """Whether the square of side n from (i, j) on holds no unusable sample."""
+    return spoilt[i + n, j + n] - spoilt[i, j + n] - spoilt[i + n, j] + spoilt[i, j] == 0
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def _sums(contrast, i0, j0, a, b, template, by_row, by_column):  # type: ignore[no-untyped-def]
+    """Return Σ s, Σ s², Σ t s, Σ s ∂t/∂row and Σ s ∂t/∂column of the patch s at (i0 + a, j0 + b)."""
+    n = template.shape[0]
+    one = np.float32(1)
+    w00, w01, w10, w11 = (one - a) * (one - b), (one - a) * b, a * (one - b), a * b
+    s1 = s2 = ts = rs = cs = np.float32(0)
+    for i in range(n):
+        top, low = contrast[i0 + i, j0 : j0 + n + 1], contrast[i0 + i + 1, j0 : j0 + n + 1]
+        for j in range(n):
+            s = w00 * top[j] + w01 * top[j + 1] + w10 * low[j] + w11 * low[j + 1]
+            s1 += s
+            s2 += s * s
+            ts += template[i, j] * s
+            rs += by_row[i, j] * s
+            cs += by_column[i, j] * s
+    return s1, s2, ts, rs, cs
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _settled(contrast, spoilt, width, template, by_row, by_column, own, inverse, row, column, steps):  # type: ignore[no-untyped-def]
+    """Return the offset of one patch with Σ t s and Σ s² about the mean there; 0 where it is lost.
+
+    ``own``: Σ ∂t/∂row, Σ ∂t/∂column, Σ t ∂t/∂row, Σ t ∂t/∂column. With them one pass over the patch gives the
+    Gauss-Newton step, and the patch looked at need not be kept.
+    """
+    n = template.shape[0]
+    r, c, tr, tc = own
+    dr, dc, step, ts, ss = 0.0, 0.0, 1.0, 0.0, 0.0
+    for _ in range(steps + 1):
+        i, j = int(np.floor(row + dr)), int(np.floor(column + dc))
+        a, b = np.float32(row + dr - i), np.float32(column + dc - j)
+        i, j = i - n // 2, (j - n // 2) % width
+        if i < 0 or i + n >= contrast.shape[0]:
+            return dr, dc, 0.0, 0.0
+        if not (_whole(spoilt, i, j, n) and _whole(spoilt, i + 1, j + 1, n)):
+            return dr, dc, 0.0, 0.0
+        s1, s2, ts, rs, cs = _sums(contrast, i, j, a, b, template, by_row, by_column)
+        mean = s1 / (n * n)
+        ss = s2 - s1 * mean
+        if step < _ENOUGH:
+            break
+        gain = ts / ss if ss > 0 else 1.0
+        g0, g1 = tr - gain * (rs - mean * r), tc - gain * (cs - mean * c)
+        s0, s1 = inverse[0, 0] * g0 + inverse[0, 1] * g1, inverse[1, 0] * g0 + inverse[1, 1] * g1
+        dr, dc, step = dr + s0, dc + s1, abs(s0) + abs(s1)
+        if max(abs(dr), abs(dc)) > n / 2:
+            return dr, dc, 0.0, 0.0
+    return dr, dc, ts, ss
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _match(contrast, spoilt, width, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]
+    """Return offset (N, 2), correlation (N,) and residual 1 σ (N,) in a strip of ``_wrapped``."""
     count, n = value.shape[0], value.shape[1]
     offset = np.full((count, 2), np.nan)
     correlation = np.zeros(count)
     residual = np.full(count, np.nan)
-    seen = np.empty((n, n), np.float32)
-    limit = n / 2
     for k in range(count):
-        dr, dc, step = 0.0, 0.0, 1.0
-        tt, ts, ss = 0.0, 0.0, 0.0
-        for _ in range(steps + 1):
-            if not _look(contrast, usable, row[k] + dr, column[k] + dc, seen):
-                tt = 0.0
-                break
-            tt, ts, ss = _products(value[k], seen)
-            if step < 0.003:
-                break
-            s0, s1 = _step(value[k], by_row[k], by_column[k], inverse[k], seen, ts / ss if ss > 0 else 1.0)
-            dr += s0
-            dc += s1
-            step = abs(s0) + abs(s1)
-            if max(abs(dr), abs(dc)) > limit:
-                tt = 0.0
-                break
-        if tt <= 0 or ss <= 0:
-            continue
-        offset[k, 0], offset[k, 1] = dr, dc
-        correlation[k] = ts / np.sqrt(tt * ss)
-        residual[k] = np.sqrt(max(tt - ts * ts / ss, 0.0) / (n * n - 4))
+        t, r, c = value[k], by_row[k], by_column[k]
+        own = np.sum(r), np.sum(c), np.sum(t * r), np.sum(t * c)
+        dr, dc, ts, ss = _settled(contrast, spoilt, width, t, r, c, own, inverse[k], row[k], column[k], steps)
+        tt = np.sum(t * t)
+        if tt > 0 and ss > 0:
+            offset[k, 0], offset[k, 1] = dr, dc
+            correlation[k] = ts / np.sqrt(tt * ss)
+            residual[k] = np.sqrt(max(tt - ts * ts / ss, 0.0) / (n * n - 4))
     return offset, correlation, residual
-
-
-@numba.njit(cache=True, nogil=True)
-def _products(template, seen):  # type: ignore[no-untyped-def]
-    """Return Σ t², Σ t s and Σ s²."""
-    tt, ts, ss = 0.0, 0.0, 0.0
-    for i in range(seen.shape[0]):
-        for j in range(seen.shape[1]):
-            t, s = template[i, j], seen[i, j]
-            tt += t * t
-            ts += t * s
-            ss += s * s
-    return tt, ts, ss
-
-
-@numba.njit(cache=True, nogil=True)
-def _step(template, by_row, by_column, inverse, seen, gain):  # type: ignore[no-untyped-def]
-    """Return the Gauss-Newton step along rows and columns."""
-    g0, g1 = 0.0, 0.0
-    for i in range(seen.shape[0]):
-        for j in range(seen.shape[1]):
-            e = template[i, j] - gain * seen[i, j]
-            g0 += by_row[i, j] * e
-            g1 += by_column[i, j] * e
-    return inverse[0, 0] * g0 + inverse[0, 1] * g1, inverse[1, 0] * g0 + inverse[1, 1] * g1

@@ -110,7 +110,7 @@ class TextureTracker:
         self._last: Strip | None = None
 
     def follow(self, frame: int, image: Image, T_pc: Float) -> Float:
-        """Track one frame from its predicted pose and return the better one (4, 4)."""
+        """Track one frame's softened picture from its predicted pose and return the better pose (4, 4)."""
         strip = unroll(image, self._probe, T_pc, self._grid, self._blocked)
         found = self._search(strip, frame)
         if found.alike < _FEWEST_ALIKE and self._last is not None:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion import MotionParameters
-from stages.motion.matching import _match, cut, match
-from stages.motion.strip import Strip, StripGrid, _sample, _without_light, unroll
+from stages.motion.matching import _match, _wrapped, cut, match
+from stages.motion.strip import Strip, StripGrid, _sample, _without_light, softened, unroll
 from stages.motion.tracking import TextureTracker
 from tests.unit.drawn_pipe import RADIUS, draw, led_light, reflectance, small_probe, wall_hits
 
@@ -66,9 +66,9 @@ def test_match_is_the_plain_one() -> None:
     patches = cut(image, row, column, HALF)
     inverse = np.linalg.inv(patches.information)
     near = row + random.uniform(-1.5, 1.5, 20), column + random.uniform(-1.5, 1.5, 20)
-    usable = np.ones(image.shape, bool)
+    wide = _wrapped(image, np.ones(image.shape, bool), patches.value.shape[1])
     offset, correlation, _ = _match(
-        image, usable, patches.value, patches.by_row, patches.by_column, inverse, *near, 30
+        *wide, image.shape[1], patches.value, patches.by_row, patches.by_column, inverse, *near, 30
     )
     for k in range(20):
         parts = patches.value[k], patches.by_row[k], patches.by_column[k], inverse[k]
@@ -180,7 +180,7 @@ def test_a_plain_wall_seen_from_off_the_axis_is_even_but_for_wrong_lamps() -> No
 
 def test_patches_are_looked_for_only_where_they_may_err_and_still_be_seen_whole() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(draw(probe, pose())[..., 1], probe, pose(), wall, (20.0, 24.0))
+    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, (20.0, 24.0))
     tracker = TextureTracker(
         probe, wall, MotionParameters.model_validate({"patch_half_px": HALF}), (20.0, 24.0)
     )
@@ -194,7 +194,7 @@ def test_patches_are_looked_for_only_where_they_may_err_and_still_be_seen_whole(
 
 def test_the_strip_knows_the_pixels_it_looked_at() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(draw(probe, pose())[..., 1], probe, pose(), wall, (0.0, 0.0))
+    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, (0.0, 0.0))
     row, column = strip.first_row + np.array([5.0, 30.3, 50.9]), np.array([2.0, 100.7, 479.5])
     T = pose()
     xyz_c = (wall.wall(row, column) - T[:3, 3]) @ T[:3, :3]
@@ -203,7 +203,7 @@ def test_the_strip_knows_the_pixels_it_looked_at() -> None:
 
 def test_the_wall_under_the_laser_line_is_not_usable() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(draw(probe, pose())[..., 1], probe, pose(), wall, (20.0, 24.0))
+    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, (20.0, 24.0))
     ahead = (strip.first_row + np.arange(strip.usable.shape[0])) * wall.step_mm - 7.0
     hidden = (ahead > 20.0) & (ahead < 24.0)
     assert hidden.any()
