@@ -3,28 +3,37 @@
 1. Take the pipe's own slowly varying shape out (`relief`), and the motion of single rings; once more when it
    is known where the defects are.
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
-3. Hysteresis to instances with outlines; all-round beads are welds (`segment`).
+3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
 4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
 5. Kind from named features as a probability; codes; words (`classify`, `codes`, `describe`).
+
+A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from pipeline.artefacts import Wall, WallTexture
 from pipeline.errors import UnusableError
-from pipeline.findings import Defects
+from pipeline.findings import Defect, Defects
 from pipeline.recording.base import Recording
 from pipeline.stage import Context, Stage
-from stages.defects.depth import Depth, measure_depth, measured_surface
+from stages.defects.clean import clean_wall
+from stages.defects.depth import measure_depth
 from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, detect
+from stages.defects.grow import footprint, grown
 from stages.defects.parameters import DefectParameters
-from stages.defects.relief import smooth_shape_removed
-from stages.defects.segment import Region, footprint, segment
+from stages.defects.points import CloudAlong, cloud_along
+from stages.defects.relief import WallRelief, smooth_shape_removed
+from stages.defects.segment import Region, regions_of
+from stages.defects.stretch import stretches
+from stages.defects.surface import surface_about
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
@@ -41,31 +50,45 @@ def find_defects(
     UnusableError
         When too little of the wall was measured to know its own shape.
     """
-    _refuse_unseen(np.isfinite(wall.radius_map.radius_mm))
-    relief = smooth_shape_removed(
-        wall.radius_map, parameters, np.zeros(wall.radius_map.radius_mm.shape, bool)
-    )
-    detection = detect(relief, parameters.false_alarms)
-    known = footprint(relief, segment(relief, detection, parameters))
+    _refuse_unseen(wall)
+    relief = smooth_shape_removed(wall.radius_map, parameters)
+    seeds = detect(relief, parameters.false_alarms, context.scratch, context.progress)
+    known = footprint(relief, grown(relief, seeds, parameters, context.scratch), context.scratch)
     relief = smooth_shape_removed(wall.radius_map, parameters, known)
-    regions = segment(relief, detection, parameters)
-    surface = measured_surface(relief, wall.cloud, regions)
-    measured: list[tuple[Region, Depth]] = []
-    for k, region in enumerate(regions):
-        measured.append((region, measure_depth(relief, region, surface, parameters.draws, context.random)))
-        context.progress(k + 1, len(regions))
-    kept = [(r, d) for r, d in measured if abs(d.depth_mm) >= parameters.min_depth_mm]
-    kept.sort(key=lambda pair: (pair[0].row, pair[0].column))
-    scene = Scene(relief, wall.cloud, texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
-    items = tuple(describe(n + 1, region, depth, scene) for n, (region, depth) in enumerate(kept))
+    cells = grown(relief, seeds, parameters, context.scratch)
+    regions = regions_of(relief, cells, parameters.join_mm, context.scratch)
+    scene = Scene(texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
+    found = _measured(relief, cloud_along(wall.cloud), regions, scene, parameters, context)
+    items = tuple(replace(defect, id=n) for n, defect in enumerate(found, 1))
     context.report("defects", len(items), "")
-    context.report("rejected: shallower than the smallest depth", len(measured) - len(kept), "detections")
-    return Defects(items, parameters.false_alarms, _smallest_depth(detection, parameters))
+    context.report("rejected: shallower than the smallest depth", len(regions) - len(items), "detections")
+    return Defects(items, parameters.false_alarms, _smallest_depth(seeds, parameters))
 
 
-def _refuse_unseen(seen: NDArray[np.bool_]) -> None:
-    """Refuse a wall (S, A) of which too little was ``seen`` to know the shape that defects depart from."""
-    cells, circles = int(seen.sum()), int((seen.mean(1) >= _HALF).sum())
+def _measured(
+    relief: WallRelief,
+    cloud: CloudAlong,
+    regions: tuple[Region, ...],
+    scene: Scene,
+    parameters: DefectParameters,
+    context: Context,
+) -> Iterator[Defect]:
+    """Yield the defects among the regions: those as deep as is worth reporting."""
+    clean = clean_wall(relief, cloud, regions)
+    for done, region in enumerate(regions, 1):
+        surface, here = surface_about(relief, cloud, region)
+        depth = measure_depth(here, surface, clean, parameters.draws, context.random)
+        context.progress(len(regions) + done, 2 * len(regions))
+        if region.sign * depth.depth_mm >= parameters.min_depth_mm:
+            yield describe(here, depth, surface, scene)
+
+
+def _refuse_unseen(wall: Wall) -> None:
+    """Refuse a wall of which too little was seen to know the shape that defects depart from."""
+    radius, cells, circles = wall.radius_map.radius_mm, 0, 0
+    for part in stretches(len(radius)):
+        seen = np.isfinite(radius[part.own])
+        cells, circles = cells + int(seen.sum()), circles + int((seen.mean(1) >= _HALF).sum())
     if cells < _MIN_CELLS or circles < _MIN_CIRCLES:
         raise UnusableError(
             "defects",
@@ -83,5 +106,5 @@ def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float
 
 
 DEFECTS = Stage(
-    "defects", "2", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
+    "defects", "3", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
 )

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from pipeline.findings import DefectKind
 from stages.defects.depth import Depth
+from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief
-from stages.defects.segment import Region, millimetre_mean
+from stages.defects.segment import Region
 
 Float = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def _roughness(relief: Relief, region: Region, depth: Depth) -> float:
     basis = np.stack([x**m * y**n for m in range(5) for n in range(5 - m)], -1)
     values = surface[i, j]
     rest = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
-    noise = float(np.nanmedian(relief.noise_mm)) / 2
+    noise = relief.typical.noise_mm / 2
     excess = max(0.0, float(np.mean(rest**2)) - noise**2)
     return float(np.sqrt(excess)) / max(abs(depth.depth_mm), 1e-6)
 

@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from pipeline.artefacts import PointCloud
 from stages.defects.bell import fit_bell
-from stages.defects.fine import DeviationPoints, deviation_points, fine_surface
+from stages.defects.clean import CleanWall
+from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief
-from stages.defects.segment import Region, millimetre_mean
+from stages.defects.segment import Region
+from stages.defects.surface import Surface
 
 Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
-_TRIES = 40
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0
 _BELL_MISFIT = 0.12
@@ -33,76 +32,8 @@ class Depth:
     bias_mm: float
 
 
-@dataclass(frozen=True)
-class Surface:
-    """The wall's 1 mm mean, and its noise as the clean wall shows it.
-
-    Attributes
-    ----------
-    local_mm, all_mm : (S, A)
-        1 mm means from the points; as in `Relief`.
-    coarse_mm : (S, A)
-        1 mm mean of the map's ``all_mm``, which smoothing has flattened.
-    clean : (S, A) bool
-        Away from all defects.
-    scale : float
-        Share of noise in the scatter of the clean wall; the rest is its natural roughness.
-    points : DeviationPoints
-    """
-
-    local_mm: Float
-    all_mm: Float
-    coarse_mm: Float
-    clean: Mask
-    scale: float
-    points: DeviationPoints
-
-    def draw(self, shape: tuple[int, int], random: np.random.Generator) -> Float:
-        """Return a patch (H, W) of the clean wall, cleanest of some tries; its sign is drawn too."""
-        rows, columns = self.local_mm.shape
-        best, share = np.zeros(shape), -1.0
-        for _ in range(_TRIES):
-            i = np.arange(shape[0]) + int(random.integers(0, max(1, rows - shape[0] + 1)))
-            j = np.arange(shape[1]) + int(random.integers(0, columns))
-            at = np.ix_(_reflected(i, rows), j % columns)
-            clean = self.clean[at]
-            if clean.mean() > share:
-                best, share = np.where(clean, self.local_mm[at], 0.0), float(clean.mean())
-            if share > 0.98:
-                break
-        return np.asarray(best * self.scale * (1 if random.random() < 0.5 else -1))
-
-
-def _reflected(i: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    period = max(1, 2 * count - 2)
-    return np.asarray(np.minimum(i % period, period - i % period), np.int64)
-
-
-def measured_surface(relief: Relief, cloud: PointCloud, regions: tuple[Region, ...]) -> Surface:
-    """Return the surface on which depths are read."""
-    points = deviation_points(relief, cloud)
-    everything = fine_surface(relief, points)
-    local = everything + relief.local_mm - relief.all_mm
-    clean = np.isfinite(local)
-    margin = [round(3.0 / c) for c in relief.cell_mm]
-    for region in regions:
-        height, width = region.mask.shape
-        rows = slice(max(0, region.row - margin[0]), region.row + height + margin[0])
-        first, last = region.column - margin[1], region.column + width + margin[1]
-        clean[rows, np.arange(first, last) % clean.shape[1]] = False
-    coarse = millimetre_mean(relief.all_mm, relief.cell_mm)
-    return Surface(local, everything, coarse, clean, _noise_share(relief, local[clean]), points)
-
-
-def _noise_share(relief: Relief, clean_mm: Float) -> float:
-    """Return noise over scatter of the clean wall: what exceeds the roughness that the map shows."""
-    roughness = float(np.nanmedian(relief.sigma_mm)) ** 2 - float(np.nanmedian(relief.noise_mm)) ** 2
-    scatter = (1.4826 * float(np.median(np.abs(clean_mm)))) ** 2 if clean_mm.size else 0.0
-    return float(np.sqrt(np.clip(1 - roughness / scatter, 0.1, 1.0))) if scatter > 0 else 1.0
-
-
 def measure_depth(
-    relief: Relief, region: Region, surface: Surface, draws: int, random: np.random.Generator
+    region: Region, surface: Surface, clean: CleanWall, draws: int, random: np.random.Generator
 ) -> Depth:
     """Measure the depth of one region.
 
@@ -110,14 +41,16 @@ def measure_depth(
     by adding noise as the clean wall shows it to the smoothed surface (parametric bootstrap: Efron &
     Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10).
     """
+    relief = surface.relief
     height = region.sign * region.cut(surface.all_mm if region.all_round else surface.local_mm)
     inside = region.mask & np.isfinite(height)
     height = np.where(inside, height, 0.0)
     peak = np.unravel_index(int(np.argmax(height)), height.shape)
     smooth = gaussian_filter(height, [1.0 / c for c in relief.cell_mm])
     top = float(smooth[inside].max())
-    near = inside & (smooth > 0.5 * top)
-    drawn = np.array([(smooth + surface.draw(height.shape, random))[near].max() for _ in range(draws)])
+    # where points show nothing of what the map shows, the top of a defect may lie below zero
+    near = inside & (smooth >= top - 0.5 * abs(top))
+    drawn = np.array([(smooth + clean.draw(height.shape, random))[near].max() for _ in range(draws)])
     bias = float(drawn.mean()) - top
     depth = float(height[peak]) - bias
     sharpened = float((region.cut(surface.all_mm) - region.cut(surface.coarse_mm))[peak])
@@ -156,5 +89,5 @@ def _shape_sigma(relief: Relief, depth_mm: float) -> float:
     """
     around = 2 * np.pi * relief.radius_mm
     independent = max(1.0, around / 8.0)
-    ring = float(np.nanmedian(relief.sigma_mm)) * np.sqrt(5 / independent)
+    ring = relief.typical.sigma_mm * np.sqrt(5 / independent)
     return float(np.hypot(ring, 0.015 * depth_mm))

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from pipeline.artefacts import PointCloud, WallTexture
+from pipeline.artefacts import WallTexture
 from pipeline.findings import Defect, DefectKind, clock_of_azimuth
 from pipeline.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
 from stages.defects.classify import Features, features_of, probabilities
 from stages.defects.depth import Depth
+from stages.defects.points import WallPoints
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
+from stages.defects.surface import Surface
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -23,26 +25,25 @@ Int = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Scene:
-    """What a defect is described against."""
+    """What every defect is described against."""
 
-    relief: Relief
-    cloud: PointCloud
     texture: WallTexture
     wall_thickness_mm: float | None
     min_depth_mm: float
 
 
-def describe(number: int, region: Region, depth: Depth, scene: Scene) -> Defect:
-    """Return the defect of a region whose depth was measured."""
-    features = features_of(scene.relief, region, depth)
+def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
+    """Return the defect of a region whose depth was measured; it has no number yet."""
+    relief = surface.relief
+    features = features_of(relief, region, depth)
     likely = probabilities(features, region)
     kind, share = next(iter(likely.items()))
     real = float(ndtr((abs(depth.depth_mm) - scene.min_depth_mm / 2) / depth.sigma_mm))
-    clock_from, clock_to = _clock(scene.relief, region)
-    first = float(scene.relief.distance_mm[region.row] - scene.relief.cell_mm[0] / 2)
+    clock_from, clock_to = _clock(relief, region)
+    first = float(relief.distance_mm[region.row] - relief.cell_mm[0] / 2)
     loss = kind.is_metal_loss and scene.wall_thickness_mm
     return Defect(
-        id=number,
+        id=0,
         kind=str(kind),
         distance_from_mm=first,
         distance_to_mm=first + features.length_mm,
@@ -54,8 +55,8 @@ def describe(number: int, region: Region, depth: Depth, scene: Scene) -> Defect:
         depth_sigma_mm=depth.sigma_mm,
         wall_loss_percent=100 * depth.depth_mm / loss if loss else float("nan"),
         confidence=share * real,
-        frames=_frames(scene.cloud, scene.relief, region),
-        outline=_outline(scene.relief, region),
+        frames=_frames(surface.near, relief, region),
+        outline=_outline(relief, region),
         pof_class=(
             pof_class(features.length_mm, features.width_mm, scene.wall_thickness_mm)
             if kind.is_metal_loss
@@ -63,7 +64,7 @@ def describe(number: int, region: Region, depth: Depth, scene: Scene) -> Defect:
         ),
         pacp_suggestion=pacp_suggestion(kind, features.direction_rad),
         en13508_suggestion=en13508_suggestion(kind),
-        statement=_statement(features, likely, depth, _darkness(scene, region)),
+        statement=_statement(features, likely, depth, _darkness(scene.texture, relief, region)),
     )
 
 
@@ -81,20 +82,20 @@ def _clock(relief: Relief, region: Region) -> tuple[float, float]:
     return float(hours[0]), float(hours[1])
 
 
-def _cells_of(cloud: PointCloud, relief: Relief) -> tuple[Int, Int]:
-    """Return row (M,) and column (M,) in the map of the cloud's points."""
+def _cells_of(points: WallPoints, relief: Relief) -> tuple[Int, Int]:
+    """Return row (M,) and column (M,) in the map of points."""
     step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
-    row = np.rint((cloud.distance_mm - relief.distance_mm[0]) / relief.cell_mm[0]).astype(np.int64)
-    column = np.rint((cloud.azimuth_rad - relief.azimuth_rad[0]) / step).astype(np.int64)
+    row = np.rint((points.distance_mm - relief.distance_mm[0]) / relief.cell_mm[0]).astype(np.int64)
+    column = np.rint((points.azimuth_rad - relief.azimuth_rad[0]) / step).astype(np.int64)
     return row, column % len(relief.azimuth_rad)
 
 
-def _frames(cloud: PointCloud, relief: Relief, region: Region) -> Int:
-    row, column = _cells_of(cloud, relief)
+def _frames(points: WallPoints, relief: Relief, region: Region) -> Int:
+    row, column = _cells_of(points, relief)
     row, column = row - region.row, (column - region.column) % len(relief.azimuth_rad)
     near = (row >= 0) & (row < region.mask.shape[0]) & (column < region.mask.shape[1])
     inside = region.mask[row[near], column[near]]
-    return np.asarray(np.unique(cloud.frame[near][inside]), np.int64)
+    return np.asarray(np.unique(points.frame[near][inside]), np.int64)
 
 
 def _outline(relief: Relief, region: Region) -> Float:
@@ -115,9 +116,8 @@ def _outline(relief: Relief, region: Region) -> Float:
     return np.stack([top + (polygon[:, 1] - 0.5) * scale[0], first + (polygon[:, 0] - 0.5) * scale[1]], -1)
 
 
-def _darkness(scene: Scene, region: Region) -> float:
+def _darkness(texture: WallTexture, relief: Relief, region: Region) -> float:
     """Return by which fraction the photo is darker inside than in a frame around; NaN where unknown."""
-    texture, relief = scene.texture, scene.relief
     margin = max(4, min(region.mask.shape) // 2)
     rows = np.arange(region.row - margin, region.row + region.mask.shape[0] + margin)
     columns = np.arange(region.column - margin, region.column + region.mask.shape[1] + margin)

@@ -10,7 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from stages.defects.relief import Relief
+from pipeline.scratch import Scratch
+from pipeline.stage import Progress
+from stages.defects.relief import Relief, WallRelief
+from stages.defects.stretch import stretches, widened
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -18,6 +21,7 @@ Mask = NDArray[np.bool_]
 _ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
+_SMALL = 1  # the template for a bump of 3 mm × 3 mm
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,41 @@ class Template:
         c, d = np.cos(self.direction_rad), np.sin(self.direction_rad)
         along, across = c * s + d * q, -d * s + c * q
         return np.asarray(np.exp(-0.5 * ((along / self.long_mm) ** 2 + (across / self.short_mm) ** 2)))
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Relief over its variance (S, A), one over its variance, and where the wall was measured."""
+
+    signal: Float
+    weight: Float
+    seen: Mask
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A template as it is used on a wall.
+
+    Attributes
+    ----------
+    kernel : (odd, odd)
+    scale : float
+        1 σ of its response to this wall's noise and roughness; to white noise it would be 1.
+    least_power : float
+        Where less of the wall than this was seen, nothing is found.
+    height_sigma_mm : float
+        Typical 1 σ of the height that it measures.
+    """
+
+    kernel: Float
+    scale: float
+    least_power: float
+    height_sigma_mm: float
+
+    def standardised(self, wall: Weighed) -> Float:
+        """Return the response (S, A) in σ."""
+        response, power = _response(wall, self.kernel)
+        return np.where(power > self.least_power, response / self.scale, 0.0)
 
 
 @dataclass(frozen=True)
@@ -68,54 +107,76 @@ def templates() -> tuple[Template, ...]:
     )
 
 
-def detect(relief: Relief, false_alarms: float) -> Detection:
-    """Find cells that stand out of noise and roughness."""
+def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: Progress) -> Detection:
+    """Find cells that stand out of noise and roughness, some rows after the others."""
     bank = templates()
-    threshold = _threshold(relief, bank, false_alarms)
-    into = np.zeros(relief.local_mm.shape, bool)
-    inward = into.copy()
-    small = np.nan
-    for template in bank:
-        score, scale = _standardised(relief, template)
-        into |= score > threshold
-        inward |= score < -threshold
-        if template == Template(_ROUND_MM[1], _ROUND_MM[1]):
-            small = scale
-    return Detection(into, inward, threshold, small)
+    threshold = _threshold(_seen_mm2(relief), bank, false_alarms)
+    filters = _fitted(relief, [template.kernel(relief.cell_mm) for template in bank])
+    into, inward = (scratch.zeros(relief.shape, bool) for _ in range(2))
+    parts = stretches(relief.shape[0], max(len(f.kernel) for f in filters) // 2)
+    for done, part in enumerate(parts, 1):
+        near = _weighed(relief.rows(part.wide))
+        for used in filters:
+            score = used.standardised(near)[part.inner]
+            into[part.own] |= score > threshold
+            inward[part.own] |= score < -threshold
+        progress(done, 2 * len(parts))
+    return Detection(into, inward, threshold, filters[_SMALL].height_sigma_mm)
 
 
-def _threshold(relief: Relief, bank: tuple[Template, ...], false_alarms: float) -> float:
+def _seen_mm2(relief: WallRelief) -> float:
+    """Return how much of the wall was measured."""
+    cells = sum(int(relief.rows(s.own).seen.sum()) for s in stretches(relief.shape[0]))
+    return cells * relief.cell_mm[0] * relief.cell_mm[1]
+
+
+def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float) -> float:
     """Return the level that Gaussian fields exceed ``false_alarms`` times in all.
 
     Expected Euler characteristic of the excursion set of a smooth Gaussian field (Adler & Taylor, Random
     Fields and Geometry, 2007, § 11.7); a field filtered with a Gaussian of 1 σ b has gradient variance
     1 / (2 b²).
     """
-    area = float(relief.seen.sum()) * relief.cell_mm[0] * relief.cell_mm[1]
     density = sum(0.5 / (t.long_mm * t.short_mm) for t in bank)
 
     def excess(u: float) -> float:
-        expected: float = 2 * area * density * u * math.exp(-0.5 * u * u) / (2 * math.pi) ** 1.5
+        expected: float = 2 * area_mm2 * density * u * math.exp(-0.5 * u * u) / (2 * math.pi) ** 1.5
         return expected - false_alarms
 
     return float(brentq(excess, 1.0, 40.0)) if excess(1.0) > 0 else 1.0
 
 
-def _standardised(relief: Relief, template: Template) -> tuple[Float, float]:
-    """Return the filter's response (S, A) in σ, and the typical 1 σ of the height it measures, mm.
+def _weighed(relief: Relief) -> Weighed:
+    weight = np.where(relief.seen, 1 / relief.sigma_mm**2, 0.0)
+    return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen)
+
+
+def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
+    """Return the filters for this wall.
 
     The response to white noise is known; noise and roughness are correlated, so that the field's own robust
     scatter sets the unit.
     """
-    kernel = template.kernel(relief.cell_mm)
-    weight = np.where(relief.seen, 1 / relief.sigma_mm**2, 0.0)
-    signal = _filtered(weight * np.nan_to_num(relief.local_mm), kernel)
-    power = _filtered(weight, kernel**2)
-    enough = power > 0.4 * float(np.median(power[relief.seen])) if relief.seen.any() else power > 0
-    response = np.where(enough, signal / np.sqrt(np.maximum(power, 1e-30)), 0.0)
-    size = np.abs(response[enough])
-    scale = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
-    return response / scale, scale / float(np.sqrt(np.median(power[enough])))
+    overlap = max(map(len, kernels)) // 2
+    parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
+    walls = [_weighed(relief.rows(part.wide)) for part in parts]
+    seen = np.concatenate([w.seen[part.inner] for w, part in zip(walls, parts, strict=True)])
+    filters = []
+    for kernel in kernels:
+        found = [[f[part.inner] for f in _response(w, kernel)] for w, part in zip(walls, parts, strict=True)]
+        response, power = (np.concatenate(f) for f in zip(*found, strict=True))
+        least = 0.4 * float(np.median(power[seen]))
+        enough = power > least
+        size = np.abs(response[enough])
+        scale = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
+        filters.append(Filter(kernel, scale, least, scale / float(np.sqrt(np.median(power[enough])))))
+    return filters
+
+
+def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float]:
+    """Return the response (S, A) of unit variance in white noise, and how much was seen of each template."""
+    power = _filtered(wall.weight, kernel**2)
+    return _filtered(wall.signal, kernel) / np.sqrt(np.maximum(power, 1e-30)), power
 
 
 def _filtered(image: Float, kernel: Float) -> Float:

@@ -8,12 +8,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PointCloud
+from stages.defects.points import WallPoints
 from stages.defects.relief import Relief
-from stages.defects.segment import millimetre_mean
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 _AROUND_MM = 0.45  # 1 σ of the kernel around the pipe: within a ring, samples lie close
 _LEAST = 12
@@ -45,75 +45,66 @@ class DeviationPoints:
         return max(0.4, 0.55 * self.spacing_mm), _AROUND_MM
 
 
-def fine_surface(relief: Relief, points: DeviationPoints) -> Float:
+def fine_surface(relief: Relief, points: DeviationPoints, wanted: Mask, coarse_mm: Float) -> Float:
     """Return the 1 mm mean (S, A) of ``relief.all_mm`` by local quadratic regression on the points.
 
     A local quadratic has no bias from a peak's curvature (Fan & Gijbels, Local polynomial modelling and its
-    applications, 1996, § 3.2). Where too few points lie near, the map's own mean stands in.
+    applications, 1996, § 3.2). Where too few points lie near, and where it is not ``wanted`` (S, A), the
+    map's own mean ``coarse_mm`` (S, A) stands in.
     """
     out = np.full(relief.local_mm.shape, np.nan)
     place = (points.first, points.row, points.column, points.deviation_mm)
-    _regress(*place, *relief.cell_mm, *points.kernel_mm, _LEAST, out)
-    coarse = millimetre_mean(relief.all_mm, relief.cell_mm)
-    return np.where(np.isfinite(out) & relief.seen, out, coarse)
+    _regress(*place, *relief.cell_mm, *points.kernel_mm, _LEAST, np.argwhere(wanted & relief.seen), out)
+    return np.where(np.isfinite(out), out, coarse_mm)
 
 
-def deviation_points(relief: Relief, cloud: PointCloud) -> DeviationPoints:
-    """Return the cloud's points against the smooth shape."""
+def deviation_points(relief: Relief, points: WallPoints, spacing_mm: float) -> DeviationPoints:
+    """Return points on the rows of a relief against the smooth shape."""
     rows, columns = relief.local_mm.shape
     step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
-    i = (cloud.distance_mm.astype(float) - relief.distance_mm[0]) / relief.cell_mm[0]
-    j = np.mod((cloud.azimuth_rad.astype(float) - relief.azimuth_rad[0]) / step, columns)
-    i, j, radius = (x[(i > -0.5) & (i < rows - 0.5)] for x in (i, j, cloud.radius_mm.astype(float)))
+    i = (points.distance_mm.astype(float) - relief.distance_mm[0]) / relief.cell_mm[0]
+    j = np.mod((points.azimuth_rad.astype(float) - relief.azimuth_rad[0]) / step, columns)
+    i, j, radius = (x[(i > -0.5) & (i < rows - 0.5)] for x in (i, j, points.radius_mm.astype(float)))
     cell = np.rint(i).astype(np.int64) * columns + np.rint(j).astype(np.int64) % columns
     order = np.argsort(cell, kind="stable")
     first = np.searchsorted(cell[order], np.arange(rows * columns + 1))
     deviation = radius - relief.shape_at(i, j)
-    return DeviationPoints(first, i[order], j[order], deviation[order], _ring_spacing(cloud))
-
-
-def _ring_spacing(cloud: PointCloud) -> float:
-    """Return the median distance between neighbouring rings, mm."""
-    _, index = np.unique(cloud.frame, return_inverse=True)
-    count = np.bincount(index)
-    middle = np.sort(np.bincount(index, cloud.distance_mm) / np.maximum(count, 1))
-    return float(np.median(np.diff(middle))) if len(middle) > 1 else 0.0
+    return DeviationPoints(first, i[order], j[order], deviation[order], spacing_mm)
 
 
 @numba.njit(cache=True)
-def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wanted, out):  # type: ignore[no-untyped-def]  # pragma: no cover
     rows, columns = out.shape
     reach_s = int(np.ceil(2.5 * along / cell_s))
     reach_a = min(int(np.ceil(2.5 * around / cell_a)), columns // 2 - 1)
     normal, right, basis = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
-    for row in range(rows):
-        for column in range(columns):
-            normal[:] = 0.0
-            right[:] = 0.0
-            count = 0
-            before = after = False
-            for r in range(max(0, row - reach_s), min(rows, row + reach_s + 1)):
-                for c in range(column - reach_a, column + reach_a + 1):
-                    cell = r * columns + c % columns
-                    for k in range(first[cell], first[cell + 1]):
-                        s = (i[k] - row) * cell_s
-                        q = j[k] - column
-                        q = (q - columns * np.rint(q / columns)) * cell_a
-                        w = np.exp(-0.5 * ((s / along) ** 2 + (q / around) ** 2))
-                        basis[0], basis[1], basis[2] = 1.0, s, q
-                        basis[3], basis[4], basis[5] = s * s, s * q, q * q
-                        for a in range(6):
-                            right[a] += w * basis[a] * deviation[k]
-                            for b in range(6):
-                                normal[a, b] += w * basis[a] * basis[b]
-                        count += 1
-                        before = before or s <= 0.0
-                        after = after or s >= 0.0
-            if count < least or not (before and after):
-                continue
-            weight = normal[0, 0]
-            for a in range(6):
-                normal[a, a] += 1e-4 * weight
-            found = np.linalg.solve(normal, right)
-            # mean of x² over a millimetre about its middle is 1 / 12
-            out[row, column] = found[0] + (found[3] + found[5]) / 12.0
+    for row, column in wanted:
+        normal[:] = 0.0
+        right[:] = 0.0
+        count = 0
+        before = after = False
+        for r in range(max(0, row - reach_s), min(rows, row + reach_s + 1)):
+            for c in range(column - reach_a, column + reach_a + 1):
+                cell = r * columns + c % columns
+                for k in range(first[cell], first[cell + 1]):
+                    s = (i[k] - row) * cell_s
+                    q = j[k] - column
+                    q = (q - columns * np.rint(q / columns)) * cell_a
+                    w = np.exp(-0.5 * ((s / along) ** 2 + (q / around) ** 2))
+                    basis[0], basis[1], basis[2] = 1.0, s, q
+                    basis[3], basis[4], basis[5] = s * s, s * q, q * q
+                    for a in range(6):
+                        right[a] += w * basis[a] * deviation[k]
+                        for b in range(6):
+                            normal[a, b] += w * basis[a] * basis[b]
+                    count += 1
+                    before = before or s <= 0.0
+                    after = after or s >= 0.0
+        if count < least or not (before and after):
+            continue
+        weight = normal[0, 0]
+        for a in range(6):
+            normal[a, a] += 1e-4 * weight
+        found = np.linalg.solve(normal, right)
+        # mean of x² over a millimetre about its middle is 1 / 12
+        out[row, column] = found[0] + (found[3] + found[5]) / 12.0

@@ -2,47 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_lsq_spline
-from scipy.ndimage import find_objects, gaussian_filter1d, label, median_filter
 
 from pipeline.artefacts import RadiusMap
+from stages.defects.harmonics import MAD, basis_of, ring_harmonics, row_median, slow_along
 from stages.defects.parameters import DefectParameters
+from stages.defects.stretch import sample, stretches
+from stages.defects.welds import weld_rows
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_HARMONICS = 2
-_MAD = 1.4826
-_TUKEY = 4.685
-_SECTORS = 240
+
+@dataclass(frozen=True)
+class Typical:
+    """Medians over a wall: 1 σ of a cell of its relief, mm, and the part of it that is noise."""
+
+    sigma_mm: float
+    noise_mm: float
 
 
 @dataclass(frozen=True)
 class Relief:
-    """Deviation of the wall from its own smooth shape, mm, positive into the wall.
+    """Deviation of some rows of a wall from its own smooth shape, mm, positive into the wall.
 
     Attributes
     ----------
     distance_mm : (S,)
     azimuth_rad : (A,)
     radius_mm : float
-        Mean radius.
+        Mean radius of the whole wall.
     local_mm : (S, A)
         Without whatever goes all round: for defects of a part of the circumference.
     all_mm : (S, A)
         With welds left in.
     sigma_mm : (S, A)
         1 σ of ``local_mm`` from noise and the wall's natural roughness; NaN where nothing was seen.
-    noise_mm : (S, A)
-        Its part from noise alone.
     welds : tuple of slice
-        Rows of all-round beads.
+        Rows of all-round beads of the whole wall, counted from the first row here.
     harmonics_mm : (S, 5)
         Of the smooth shape that ``all_mm`` refers to: mean, cos ψ, sin ψ, cos 2ψ, sin 2ψ.
+    typical : Typical
     """
 
     distance_mm: Float
@@ -51,14 +55,14 @@ class Relief:
     local_mm: Float
     all_mm: Float
     sigma_mm: Float
-    noise_mm: Float
     welds: tuple[slice, ...]
     harmonics_mm: Float
+    typical: Typical
 
     def shape_at(self, row: Float, column: Float) -> Float:
         """Return the smooth shape's radius (N,) at fractional rows and columns (N,)."""
         step = float(self.azimuth_rad[1] - self.azimuth_rad[0])
-        basis = _basis(self.azimuth_rad[0] + step * column)
+        basis = basis_of(self.azimuth_rad[0] + step * column)
         at = np.arange(len(self.harmonics_mm))
         coefficients = np.stack([np.interp(row, at, c) for c in self.harmonics_mm.T], -1)
         return np.asarray((coefficients * basis).sum(-1))
@@ -75,7 +79,66 @@ class Relief:
         return np.isfinite(self.sigma_mm)
 
 
-def smooth_shape_removed(radius_map: RadiusMap, parameters: DefectParameters, known: Mask) -> Relief:
+@dataclass(frozen=True)
+class WallRelief:
+    """The relief of a whole wall, of which rows are worked out when they are asked for.
+
+    Attributes
+    ----------
+    radius_map : RadiusMap
+    radius_mm : float
+        Mean radius.
+    local_shape_mm, whole_shape_mm : (S, 5)
+        Harmonics that are taken out for `Relief.local_mm` and for `Relief.all_mm`.
+    welds : tuple of slice
+    roughness_mm2 : float
+        Variance of the wall's natural roughness.
+    typical : Typical
+    sampled : tuple of slice
+        The rows of which medians over the wall are taken.
+    """
+
+    radius_map: RadiusMap
+    radius_mm: float
+    local_shape_mm: Float
+    whole_shape_mm: Float
+    welds: tuple[slice, ...]
+    roughness_mm2: float
+    typical: Typical
+    sampled: tuple[slice, ...]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the map."""
+        return len(self.radius_map.distance_mm), len(self.radius_map.azimuth_rad)
+
+    @property
+    def cell_mm(self) -> tuple[float, float]:
+        """Size of a cell along and around."""
+        s, psi = self.radius_map.distance_mm, self.radius_map.azimuth_rad
+        return float(s[1] - s[0]), float(psi[1] - psi[0]) * self.radius_mm
+
+    def rows_in(self, length_mm: float) -> int:
+        """Return how many rows reach over a length."""
+        return int(np.ceil(length_mm / self.cell_mm[0]))
+
+    def rows(self, rows: slice) -> Relief:
+        """Return the relief of some rows."""
+        measured = self.radius_map.radius_mm[rows].astype(float)
+        basis = basis_of(self.radius_map.azimuth_rad)
+        local = measured - self.local_shape_mm[rows] @ basis.T
+        noise = _noise(self.radius_map, rows, local)
+        welds = tuple(slice(w.start - rows.start, w.stop - rows.start) for w in self.welds)
+        return Relief(
+            self.radius_map.distance_mm[rows], self.radius_map.azimuth_rad, self.radius_mm,
+            local, measured - self.whole_shape_mm[rows] @ basis.T,
+            _sigma(local, noise, self.roughness_mm2), welds, self.whole_shape_mm[rows], self.typical,
+        )  # fmt: skip
+
+
+def smooth_shape_removed(
+    radius_map: RadiusMap, parameters: DefectParameters, known: Mask | None = None
+) -> WallRelief:
     """Return the relief of a wall; ``known`` (S, A) marks defects that are known and kept out of all fits.
 
     The slow shape is mean radius and harmonics 1 and 2 (off-centre, oval), each a spline along the pipe
@@ -83,146 +146,70 @@ def smooth_shape_removed(radius_map: RadiusMap, parameters: DefectParameters, kn
     beyond the slow shape is error of motion unless it stands out: then it is a weld. Even there, the first
     harmonic is motion: a ring cannot tell it from the probe's own shift.
     """
-    measured = radius_map.radius_mm.astype(float)
-    radius = np.where(known, np.nan, measured)
-    basis = _basis(radius_map.azimuth_rad)
+    basis = basis_of(radius_map.azimuth_rad)
     step = float(radius_map.distance_mm[1] - radius_map.distance_mm[0])
-    coefficients = _ring_harmonics(radius, basis)
-    slow = _slow_along(radius_map.distance_mm, coefficients, parameters.smooth_mm)
-    deviation = radius - slow @ basis.T
-    rings = _ring_harmonics(deviation, basis)
-    welds = _weld_rows(deviation, rings[:, 0], step, parameters)
+
+    def radius(rows: slice) -> Float:
+        measured = radius_map.radius_mm[rows].astype(float)
+        return measured if known is None else np.where(known[rows], np.nan, measured)
+
+    slow = slow_along(radius_map.distance_mm, _by_ring(radius, radius_map), parameters.smooth_mm)
+
+    def deviation(rows: slice) -> Float:
+        return np.asarray(radius(rows) - slow[rows] @ basis.T)
+
+    rings = _by_ring(deviation, radius_map)
+    welds = weld_rows(deviation, rings[:, 0], step, parameters)
     motion = _interpolated_across(rings, welds, round(2.0 / step))
-    beads = _rows(welds, len(rings))[:, None] & np.isfinite(rings)
+    beads = _in_bands(welds, len(rings))[:, None] & np.isfinite(rings)
     shifted = motion.copy()
     shifted[:, 1:3] = np.where(beads, rings, motion)[:, 1:3]
-    everything = measured - (slow + shifted) @ basis.T
-    local = measured - (slow + np.where(beads, rings, motion)) @ basis.T
-    sigma, noise = _spread(local, radius_map)
-    mean = float(np.nanmedian(measured))
-    return Relief(
-        radius_map.distance_mm,
-        radius_map.azimuth_rad,
-        mean,
-        local,
-        everything,
-        sigma,
-        noise,
-        welds,
-        slow + shifted,
-    )  # fmt: skip
+    local = slow + np.where(beads, rings, motion)
+    return _with_spread(radius_map, local, slow + shifted, welds, sample(np.isfinite(rings[:, 0])))
 
 
-def _basis(azimuth_rad: Float) -> Float:
-    """Return (A, 5): 1, cos ψ, sin ψ, cos 2ψ, sin 2ψ."""
-    waves = [f(m * azimuth_rad) for m in range(1, _HARMONICS + 1) for f in (np.cos, np.sin)]
-    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
+def _by_ring(rows_of: Callable[[slice], Float], radius_map: RadiusMap) -> Float:
+    """Return the harmonics (S, 5) of every row that ``rows_of`` gives."""
+    basis = basis_of(radius_map.azimuth_rad)
+    parts = [ring_harmonics(rows_of(s.own), basis) for s in stretches(len(radius_map.distance_mm))]
+    return np.concatenate(parts)
 
 
-def _ring_harmonics(radius: Float, basis: Float) -> Float:
-    """Return (S, 5) harmonics of every row by a redescending fit; NaN for rows seen to less than a half."""
-    radius, basis = _sectors(radius), _sectors(basis.T).T
-    seen = np.isfinite(radius)
-    usable = seen.mean(1) >= 0.5
-    out = np.full((len(radius), basis.shape[1]), np.nan)
-    values, weight = np.where(seen, radius, 0.0)[usable], seen[usable]
-    found = np.zeros((len(values), basis.shape[1]))
-    found[:, 0] = _row_median(radius[usable])
-    products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
-    for _ in range(12):
-        residual = np.where(weight, values - found @ basis.T, np.nan)
-        scale = _MAD * _row_median(np.abs(residual))
-        u = np.nan_to_num(residual / (_TUKEY * np.maximum(scale, 1e-6))[:, None], nan=2.0)
-        w = np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
-        normal = (w @ products).reshape(-1, basis.shape[1], basis.shape[1])
-        normal += 1e-6 * np.eye(basis.shape[1])
-        found = np.linalg.solve(normal, ((w * values) @ basis)[..., None])[..., 0]
-    out[usable] = found
-    return out
+def _with_spread(
+    radius_map: RadiusMap, local: Float, whole: Float, welds: tuple[slice, ...], sampled: tuple[slice, ...]
+) -> WallRelief:
+    """Return the relief with its spread: roughness is what a wall scatters beyond its stated noise."""
+    basis = basis_of(radius_map.azimuth_rad)
+    measured = [radius_map.radius_mm[rows].astype(float) for rows in sampled]
+    rest = [m - local[rows] @ basis.T for m, rows in zip(measured, sampled, strict=True)]
+    noise = [_noise(radius_map, rows, r) for rows, r in zip(sampled, rest, strict=True)]
+    noise_mm = _median(noise)
+    roughness = max(0.0, (MAD * _median([np.abs(r) for r in rest])) ** 2 - noise_mm**2)
+    sigma_mm = _median([_sigma(r, n, roughness) for r, n in zip(rest, noise, strict=True)])
+    typical = Typical(sigma_mm, noise_mm)
+    return WallRelief(radius_map, _median(measured), local, whole, welds, roughness, typical, sampled)
 
 
-def _sectors(rows: Float) -> Float:
-    """Return the means (S, A / k) of k neighbouring columns; NaN where half of them or more was not seen."""
-    width = next(k for k in range(max(1, rows.shape[1] // _SECTORS), 0, -1) if rows.shape[1] % k == 0)
-    blocks = rows.reshape(len(rows), -1, width)
-    count = np.isfinite(blocks).sum(2)
-    total = np.nan_to_num(blocks).sum(2)
-    return np.asarray(np.where(2 * count > width, total / np.maximum(count, 1), np.nan))
+def _median(parts: list[Float]) -> float:
+    return float(np.nanmedian(np.concatenate(parts)))
 
 
-def _row_median(rows: Float) -> Float:
-    """Return the median (S,) of every row's seen values; faster than NumPy's where values are missing."""
-    ordered = np.sort(rows, 1)
-    count = np.isfinite(ordered).sum(1)
-    low, high = np.maximum(count - 1, 0) // 2, count // 2
-    pair = np.take_along_axis(ordered, np.stack([low, np.minimum(high, rows.shape[1] - 1)], -1), 1)
-    return np.asarray(pair.mean(1))
+def _noise(radius_map: RadiusMap, rows: slice, local: Float) -> Float:
+    noise = radius_map.sigma_random_mm[rows].astype(float)
+    return np.where(np.isfinite(local), noise, np.nan)
 
 
-def _slow_along(distance_mm: Float, coefficients: Float, smooth_mm: float) -> Float:
-    """Return (S, 5) coefficients as robust cubic splines with knots ``smooth_mm`` apart."""
-    good = np.isfinite(coefficients[:, 0])
-    if good.sum() < 8:
-        return np.tile(np.nanmedian(coefficients, 0), (len(coefficients), 1))
-    s = distance_mm[good]
-    pieces = max(1, int((s[-1] - s[0]) // smooth_mm))
-    inner = np.quantile(s, np.linspace(0, 1, pieces + 1)[1:-1])
-    knots = np.concatenate([[s[0]] * 4, inner, [s[-1]] * 4])
-    splines = [_robust_spline(s, c, knots, smooth_mm) for c in coefficients[good].T]
-    return np.stack([b(np.clip(distance_mm, s[0], s[-1])) for b in splines], -1)
+def _sigma(local: Float, noise: Float, roughness_mm2: float) -> Float:
+    """Return 1 σ of cells; rows that scatter more (flanks of a bead, a ring misplaced) are trusted less."""
+    sigma = np.sqrt(noise**2 + roughness_mm2)
+    measured = np.isfinite(local).any(1)
+    excess = np.ones((len(local), 1))
+    row = MAD * row_median(np.abs(local[measured]))
+    excess[measured, 0] = np.maximum(row / np.sqrt(np.nanmean(sigma[measured] ** 2, 1)), 1.0)
+    return np.asarray(sigma * excess)
 
 
-def _robust_spline(s: Float, value: Float, knots: Float, smooth_mm: float) -> BSpline:
-    window = min(len(s), max(3, round(smooth_mm / max(1e-9, float(np.median(np.diff(s)))))))
-    fitted = median_filter(value, window, mode="nearest")
-    for _ in range(12):
-        residual = value - fitted
-        scale = max(_MAD * float(np.median(np.abs(residual))), 1e-6)
-        u = residual / (_TUKEY * scale)
-        weight = np.where(np.abs(u) < 1, 1 - u * u, 0.0) + 1e-4
-        spline = make_lsq_spline(s, value, knots, k=3, w=weight)
-        fitted = spline(s)
-    return spline
-
-
-def _weld_rows(
-    deviation: Float, mean_mm: Float, step: float, parameters: DefectParameters
-) -> tuple[slice, ...]:
-    """Return the rows where the whole ring stands off, for no longer than a weld is."""
-    mean = gaussian_filter1d(np.nan_to_num(mean_mm), 0.5 / step)
-    limit = max(parameters.min_depth_mm / 2, 6 * _MAD * float(np.median(np.abs(mean))))
-    out: list[slice] = []
-    for sign in (-1.0, 1.0):
-        height = sign * mean
-        for rows in _runs(height > limit):
-            peak = rows.start + int(np.argmax(height[rows]))
-            grown = next(
-                r for r in _runs(height > max(limit / 2, 0.15 * height[peak])) if r.start <= peak < r.stop
-            )
-            length = (grown.stop - grown.start) * step
-            short = length <= parameters.max_weld_mm and grown not in out
-            if short and _all_round(sign * deviation[grown], height[peak]):
-                out.append(grown)
-    return tuple(sorted(out, key=lambda r: r.start))
-
-
-def _runs(mask: Mask) -> list[slice]:
-    labels, _ = label(mask)
-    return [rows for (rows,) in find_objects(labels)]
-
-
-def _all_round(height: Float, peak: float) -> bool:
-    """Tell whether a bead (rows, A) reaches a third of its peak in nine of ten sectors that were seen."""
-    seen = np.isfinite(height)
-    sectors = [
-        (np.where(s, h, 0.0).sum(1) / np.maximum(s.sum(1), 1)).max()
-        for h, s in zip(np.array_split(height, 24, axis=1), np.array_split(seen, 24, axis=1), strict=True)
-        if s.mean() > 0.5
-    ]
-    return len(sectors) >= 12 and float(np.mean(np.array(sectors) > peak / 3)) >= 0.9
-
-
-def _rows(bands: tuple[slice, ...], count: int) -> Mask:
+def _in_bands(bands: tuple[slice, ...], count: int) -> Mask:
     out = np.zeros(count, bool)
     for band in bands:
         out[band] = True
@@ -238,21 +225,3 @@ def _interpolated_across(rings: Float, bands: tuple[slice, ...], margin: int) ->
         return np.zeros_like(rings)
     at = np.flatnonzero(known)
     return np.stack([np.interp(np.arange(len(rings)), at, c[at]) for c in rings.T], -1)
-
-
-def _spread(local: Float, radius_map: RadiusMap) -> tuple[Float, Float]:
-    """Return 1 σ of a cell of the relief, and its noise part.
-
-    Natural roughness is what the wall scatters beyond its stated noise. Rows that scatter more than that
-    (flanks of a bead, a badly placed ring) are trusted less.
-    """
-    noise = radius_map.sigma_random_mm.astype(float)
-    noise = np.where(np.isfinite(local), noise, np.nan)
-    total = (_MAD * float(np.nanmedian(np.abs(local)))) ** 2
-    roughness = max(0.0, total - float(np.nanmedian(noise)) ** 2)
-    sigma = np.sqrt(noise**2 + roughness)
-    measured = np.isfinite(local).any(1)
-    excess = np.ones((len(local), 1))
-    row = _MAD * _row_median(np.abs(local[measured]))
-    excess[measured, 0] = np.maximum(row / np.sqrt(np.nanmean(sigma[measured] ** 2, 1)), 1.0)
-    return sigma * excess, noise

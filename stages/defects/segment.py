@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
+from scipy.ndimage import find_objects, label
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from stages.defects.detect import Detection
-from stages.defects.parameters import DefectParameters
-from stages.defects.relief import Relief
+from pipeline.scratch import Scratch
+from stages.defects.grow import Grown, joined
+from stages.defects.relief import WallRelief
+from stages.defects.stretch import stretches
 
 Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Labels = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 _EIGHT = np.ones((3, 3), int)
-_REACH_MM = 80.0
-_FOOT_MM = 10.0
+_LONGEST_ROWS = 2000
 
 
 @dataclass(frozen=True)
@@ -42,105 +46,53 @@ class Region:
     sign: float
     all_round: bool = False
 
+    def counted_from(self, row: int) -> Region:
+        """Return the region with its rows counted from another row of the map."""
+        return replace(self, row=self.row - row)
+
     def cut(self, image: Float) -> Float:
         """Return the window (H, W) of a map (S, A)."""
         columns = np.arange(self.column, self.column + self.mask.shape[1]) % image.shape[1]
         return image[self.row : self.row + self.mask.shape[0]][:, columns]
 
 
-def millimetre_mean(image: Float, cell_mm: tuple[float, float]) -> Float:
-    """Return the mean over 1 mm × 1 mm, periodic in azimuth; NaN where less than half of it was seen."""
-    size = tuple(max(1, round(1.0 / c)) for c in cell_mm)
-    pad = size[1]
-    wide = np.concatenate([image[:, -pad:], image, image[:, :pad]], 1)
-    seen = np.isfinite(wide).astype(float)
-    mean = cv2.blur(np.nan_to_num(wide), size[::-1], borderType=cv2.BORDER_REPLICATE)
-    share = cv2.blur(seen, size[::-1], borderType=cv2.BORDER_REPLICATE)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        out = np.where(share >= 0.5, mean / share, np.nan)
-    return np.asarray(out[:, pad:-pad])
+def regions_of(relief: WallRelief, cells: Grown, gap_mm: float, scratch: Scratch) -> tuple[Region, ...]:
+    """Return what belongs together, and the welds, in order of distance.
+
+    Cells of one sign with a gap of less than ``gap_mm`` are one defect. What is longer than 2000 rows, a
+    groove along the whole pipe say, is given in parts of that length.
+    """
+    regions = [_weld(relief, band) for band in relief.welds]
+    for sign, mask in ((1.0, cells.into), (-1.0, cells.inward)):
+        regions += _instances(mask, sign, relief.cell_mm, gap_mm, scratch)
+    return tuple(sorted(regions, key=lambda r: (r.row, r.column, r.sign)))
 
 
-def segment(relief: Relief, detection: Detection, parameters: DefectParameters) -> tuple[Region, ...]:
-    """Grow every detection to its outline, join what belongs together, and add the welds."""
-    smooth = millimetre_mean(relief.local_mm, relief.cell_mm)
-    regions: list[Region] = []
-    for sign, seeds in ((1.0, detection.into), (-1.0, detection.inward)):
-        grown = _grown(sign * smooth, seeds, relief, parameters)
-        regions += _instances(_joined(grown, relief, parameters.join_mm), grown, sign)
-    return (*regions, *(_weld(relief, band) for band in relief.welds))
+def _weld(relief: WallRelief, band: slice) -> Region:
+    rows = relief.rows(band).all_mm
+    return Region(band.start, 0, np.isfinite(rows), float(np.sign(np.nanmedian(rows))), True)
 
 
-def footprint(relief: Relief, regions: tuple[Region, ...]) -> Mask:
-    """Return the cells (S, A) of all local defects with a margin for their feet."""
-    mask = np.zeros_like(relief.seen)
-    for region in regions:
-        if not region.all_round:
-            i, j = np.nonzero(region.mask)
-            mask[region.row + i, (region.column + j) % mask.shape[1]] = True
-    return _joined(mask, relief, _FOOT_MM)
-
-
-def _grown(height: Float, seeds: Mask, relief: Relief, parameters: DefectParameters) -> Mask:
-    """Return all cells of all defects of one sign: hysteresis at a fraction of each one's own height."""
-    spread = 1.4826 * float(np.nanmedian(np.abs(height)))
-    out = np.zeros(seeds.shape, bool)
-    foot = max(2.5 * spread, 0.5 * parameters.min_depth_mm)
-    height = np.nan_to_num(height, nan=-1.0)
-    left = seeds & (height > max(foot, 0.75 * parameters.min_depth_mm))
-    rows_reach = round(_REACH_MM / relief.cell_mm[0])
-    while left.any():
-        peak = int(np.argmax(np.where(left, height, -np.inf)))
-        i, j = divmod(peak, height.shape[1])
-        turn = height.shape[1] // 2 - j
-        window = slice(max(0, i - rows_reach), i + rows_reach + 1)
-        near = np.roll(height[window], turn, 1)
-        level = max(parameters.outline_fraction * height[i, j], foot)
-        centre = (i - window.start, height.shape[1] // 2)
-        region = _component(near > level, centre)
-        skirt = _component(near > foot, centre) & (near <= level)
-        out[window] |= np.roll(region, -turn, 1)
-        left[window] &= ~np.roll(region | skirt, -turn, 1)
+def _instances(
+    mask: Mask, sign: float, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch
+) -> list[Region]:
+    patches = _patches(mask, cell_mm, gap_mm, scratch)
+    out: list[Region] = []
+    for number, extent in enumerate(patches.extent):
+        for first in range(extent.start, extent.stop, _LONGEST_ROWS):
+            rows = slice(first, min(first + _LONGEST_ROWS, extent.stop))
+            out += _region(mask[rows] & (patches.of(rows) == number), first, sign)
     return out
 
 
-def _component(mask: Mask, cell: tuple[int, int]) -> Mask:
-    labels, _ = label(mask, _EIGHT)
-    return np.asarray(labels == labels[cell])
-
-
-def _joined(mask: Mask, relief: Relief, gap_mm: float) -> Mask:
-    """Return the mask closed over gaps of ``gap_mm``, by which cells are told to be of one defect."""
-    reach = [max(0, round(gap_mm / 2 / c)) for c in relief.cell_mm]
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach[1] + 1, 2 * reach[0] + 1))
-    pad = reach[1] + 1
-    wide = np.concatenate([mask[:, -pad:], mask, mask[:, :pad]], 1).astype(np.uint8)
-    return np.asarray(cv2.dilate(wide, kernel)[:, pad:-pad] > 0)
-
-
-def _instances(joined: Mask, mask: Mask, sign: float) -> list[Region]:
-    labels = _periodic_labels(joined)
-    out = []
-    for number in np.unique(labels[mask]):
-        cells = mask & (labels == number)
-        first = _widest_gap_end(cells.any(0))
+def _region(cells: Mask, first_row: int, sign: float) -> Iterator[Region]:
+    """Yield the region of ``cells`` (rows, A), none where there is no cell."""
+    if cells.any():
+        first = _widest_gap_end(np.asarray(cells.any(0)))
         rolled = np.roll(cells, -first, 1)
         rows, columns = (np.flatnonzero(rolled.any(axis)) for axis in (1, 0))
         window = rolled[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        out.append(Region(int(rows[0]), first + int(columns[0]), window, sign))
-    return out
-
-
-def _periodic_labels(mask: Mask) -> NDArray[np.int64]:
-    """Label connected cells, across the seam too."""
-    labels, _ = label(mask, _EIGHT)
-    wide = np.concatenate([labels[:, -1:], labels[:, :1]], 1)
-    for shift in (-1, 0, 1):
-        ends = np.stack([wide[:, 0], np.roll(wide[:, 1], shift)], -1)
-        for a, b in np.unique(ends[(ends > 0).all(1)], axis=0):
-            a, b = labels[:, -1:][wide[:, 0] == a][0, 0], labels[:, :1][wide[:, 1] == b][0, 0]
-            labels[labels == max(a, b)] = min(a, b)
-    return np.asarray(labels, np.int64)
+        yield Region(first_row + int(rows[0]), first + int(columns[0]), window, sign)
 
 
 def _widest_gap_end(columns: Mask) -> int:
@@ -150,7 +102,70 @@ def _widest_gap_end(columns: Mask) -> int:
     return int(filled[(int(np.argmax(gaps)) + 1) % len(filled)]) if gaps.max() > 1 else 0
 
 
-def _weld(relief: Relief, band: slice) -> Region:
-    rows = relief.all_mm[band]
-    sign = float(np.sign(np.nanmedian(rows)))
-    return Region(band.start, 0, np.isfinite(rows), sign, True)
+@dataclass(frozen=True)
+class Patches:
+    """Connected cells of a long map, periodic in azimuth.
+
+    Attributes
+    ----------
+    label : (S, A) int32
+        0 where there is nothing, else a number that holds within one stretch.
+    patch : (L + 1,) int
+        The patch of every such number, −1 for 0.
+    extent : tuple of slice
+        Rows of every patch.
+    """
+
+    label: Labels
+    patch: Int
+    extent: tuple[slice, ...]
+
+    def of(self, rows: slice) -> Int:
+        """Return the patches (rows, A) of some rows, −1 where there is none."""
+        return self.patch[self.label[rows]]
+
+
+def _patches(mask: Mask, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch) -> Patches:
+    """Label what is connected stretch by stretch, and join what meets at the cuts and over the seam."""
+    labels = scratch.zeros(mask.shape, np.int32)
+    rows_of: list[slice] = []
+    meeting: list[Int] = [np.empty((0, 2), np.int64)]
+    for part in stretches(len(mask), int(np.ceil(gap_mm / cell_mm[0])) + 1):
+        here = np.zeros((part.own.stop - part.own.start, mask.shape[1]), np.int32)
+        label(joined(mask[part.wide], cell_mm, gap_mm)[part.inner], _EIGHT, output=here)
+        extents = [rows for rows, _ in find_objects(here)]
+        here[here > 0] += len(rows_of)
+        rows_of += [slice(part.own.start + r.start, part.own.start + r.stop) for r in extents]
+        labels[part.own] = here
+        meeting += _over_the_seam(here)
+        if part.own.start > 0:
+            meeting += _touching(labels[part.own.start - 1], here[0])
+    count = len(rows_of) + 1
+    pairs = np.concatenate(meeting)
+    graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    _, component = connected_components(graph, directed=False)
+    _, patch = np.unique(component[1:], return_inverse=True)
+    return Patches(labels, np.append(-1, patch), _extents(patch, rows_of))
+
+
+def _touching(above: Labels, below: Labels) -> list[Int]:
+    """Return pairs (n, 2) of labels of two periodic rows (A,), one under the other, that touch."""
+    pairs = [np.stack([above, np.roll(below, shift)], -1) for shift in (-1, 0, 1)]
+    return [np.unique(p[(p > 0).all(1)], axis=0) for p in pairs]
+
+
+def _over_the_seam(labels: Labels) -> list[Int]:
+    """Return pairs (n, 2) of labels (rows, A) that touch across the last and the first column."""
+    last, first = labels[:, -1], labels[:, 0]
+    ends = ((last, first), (last[1:], first[:-1]), (last[:-1], first[1:]))
+    pairs = [np.stack(pair, -1) for pair in ends]
+    return [np.unique(p[(p > 0).all(1)], axis=0) for p in pairs]
+
+
+def _extents(patch: Int, rows_of: list[slice]) -> tuple[slice, ...]:
+    """Return the rows of every patch from those of its parts."""
+    count = int(patch.max(initial=-1)) + 1
+    first, last = np.full(count, np.iinfo(np.int64).max), np.zeros(count, np.int64)
+    np.minimum.at(first, patch, np.array([r.start for r in rows_of], np.int64))
+    np.maximum.at(last, patch, np.array([r.stop for r in rows_of], np.int64))
+    return tuple(slice(int(a), int(b)) for a, b in zip(first, last, strict=True))

@@ -11,7 +11,7 @@ from pipeline.errors import UnusableError
 from pipeline.inspection_codes import pof_class
 from pipeline.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
-from stages.defects.segment import millimetre_mean
+from stages.defects.grow import millimetre_mean
 from tests.synthetic_wall import (
     DrawnDefect,
     bare_recording,

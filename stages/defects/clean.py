@@ -1,0 +1,92 @@
+"""The wall away from all defects: what noise alone looks like on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.defects.harmonics import MAD
+from stages.defects.points import CloudAlong
+from stages.defects.relief import Typical, WallRelief
+from stages.defects.segment import Region
+from stages.defects.surface import surface_of, with_margin
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_TRIES = 40
+_CLEAR_MM = 3.0
+
+
+@dataclass(frozen=True)
+class CleanWall:
+    """A sample of the wall's 1 mm mean.
+
+    Attributes
+    ----------
+    local_mm : (S, A)
+    clean : (S, A) bool
+        Away from all defects.
+    scale : float
+        Share of noise in the scatter of the clean wall; the rest is its natural roughness.
+    """
+
+    local_mm: Float
+    clean: Mask
+    scale: float
+
+    def draw(self, shape: tuple[int, int], random: np.random.Generator) -> Float:
+        """Return a patch (H, W) of the clean wall, cleanest of some tries; its sign is drawn too."""
+        rows, columns = self.local_mm.shape
+        best, share = np.zeros(shape), -1.0
+        for _ in range(_TRIES):
+            i = np.arange(shape[0]) + int(random.integers(0, max(1, rows - shape[0] + 1)))
+            j = np.arange(shape[1]) + int(random.integers(0, columns))
+            at = np.ix_(_reflected(i, rows), j % columns)
+            clean = self.clean[at]
+            if clean.mean() > share:
+                best, share = np.where(clean, self.local_mm[at], 0.0), float(clean.mean())
+            if share > 0.98:
+                break
+        return np.asarray(best * self.scale * (1 if random.random() < 0.5 else -1))
+
+
+def _reflected(i: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    period = max(1, 2 * count - 2)
+    return np.asarray(np.minimum(i % period, period - i % period), np.int64)
+
+
+def clean_wall(wall: WallRelief, cloud: CloudAlong, regions: Iterable[Region]) -> CleanWall:
+    """Return the wall's sampled rows, regions with a margin marked in them."""
+    known = tuple(regions)
+    parts = [_sampled(wall, cloud, rows, known) for rows in wall.sampled]
+    local, clean = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return CleanWall(local, clean, _noise_share(wall.typical, local[clean]))
+
+
+def _sampled(
+    wall: WallRelief, cloud: CloudAlong, rows: slice, regions: tuple[Region, ...]
+) -> tuple[Float, Mask]:
+    part = with_margin(wall, cloud, rows)
+    wanted = np.zeros((part.wide.stop - part.wide.start, wall.shape[1]), bool)
+    wanted[part.inner] = True
+    local = surface_of(wall, cloud, part.wide, wanted).local_mm[part.inner]
+    clean = np.isfinite(local)
+    margin = [round(_CLEAR_MM / c) for c in wall.cell_mm]
+    for region in regions:
+        height, width = region.mask.shape
+        first_row = region.row - margin[0] - rows.start
+        near = slice(max(0, first_row), max(0, first_row + height + 2 * margin[0]))
+        first, last = region.column - margin[1], region.column + width + margin[1]
+        clean[near, np.arange(first, last) % clean.shape[1]] = False
+    return local, clean
+
+
+def _noise_share(typical: Typical, clean_mm: Float) -> float:
+    """Return noise over scatter of the clean wall: what exceeds the roughness that the map shows."""
+    roughness = typical.sigma_mm**2 - typical.noise_mm**2
+    scatter = (MAD * float(np.median(np.abs(clean_mm)))) ** 2 if clean_mm.size else 0.0
+    return float(np.sqrt(np.clip(1 - roughness / scatter, 0.1, 1.0))) if scatter > 0 else 1.0

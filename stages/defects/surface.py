@@ -1,0 +1,73 @@
+"""Some rows of the wall with the points on them: what depths are read from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.defects.fine import DeviationPoints, deviation_points, fine_surface
+from stages.defects.grow import millimetre_mean
+from stages.defects.points import CloudAlong, WallPoints
+from stages.defects.relief import Relief, WallRelief
+from stages.defects.segment import Region
+from stages.defects.stretch import Stretch, widened
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_MARGIN_MM, _MARGIN_IN_RINGS = 10.0, 3.0
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The wall's 1 mm mean over some rows.
+
+    Attributes
+    ----------
+    relief : Relief
+        Of these rows.
+    local_mm, all_mm : (S, A)
+        1 mm means from the points; as in `Relief`.
+    coarse_mm : (S, A)
+        1 mm mean of the map's ``all_mm``, which smoothing has flattened.
+    near : WallPoints
+    points : DeviationPoints
+        The same points against the smooth shape.
+    """
+
+    relief: Relief
+    local_mm: Float
+    all_mm: Float
+    coarse_mm: Float
+    near: WallPoints
+    points: DeviationPoints
+
+
+def surface_about(wall: WallRelief, cloud: CloudAlong, region: Region) -> tuple[Surface, Region]:
+    """Return the surface about a region, and the region with its rows counted from the first one there."""
+    part = with_margin(wall, cloud, slice(region.row, region.row + region.mask.shape[0]))
+    here = region.counted_from(part.wide.start)
+    wanted = np.zeros((part.wide.stop - part.wide.start, wall.shape[1]), bool)
+    i, j = np.nonzero(region.mask)
+    wanted[here.row + i, (region.column + j) % wall.shape[1]] = True
+    return surface_of(wall, cloud, part.wide, wanted), here
+
+
+def with_margin(wall: WallRelief, cloud: CloudAlong, rows: slice) -> Stretch:
+    """Return rows with those about them that have a say in their surface."""
+    margin = wall.rows_in(max(_MARGIN_MM, _MARGIN_IN_RINGS * cloud.spacing_mm))
+    return widened(rows, wall.shape[0], margin)
+
+
+def surface_of(wall: WallRelief, cloud: CloudAlong, rows: slice, wanted: Mask) -> Surface:
+    """Return the surface of some rows; where it is not ``wanted`` (rows, A), the map's own mean stands in."""
+    relief = wall.rows(rows)
+    half = relief.cell_mm[0] / 2
+    near = cloud.between(relief.distance_mm[0] - half, relief.distance_mm[-1] + half)
+    points = deviation_points(relief, near, cloud.spacing_mm)
+    coarse = millimetre_mean(relief.all_mm, relief.cell_mm)
+    everything = fine_surface(relief, points, wanted, coarse)
+    local = everything + relief.local_mm - relief.all_mm
+    return Surface(relief, local, everything, coarse, near, points)
