@@ -9,7 +9,7 @@ from pipeline.simulator.wall.defects import imprint, reach_mm
 from pipeline.simulator.wall.description import Pipe, Surface, Tint, Weld
 from pipeline.simulator.wall.grid import Grid, window, wrapped
 from pipeline.simulator.wall.noise import Float32, above_share, field
-from pipeline.simulator.wall.relief import branch_cover, coarse_field, rust_field, weld_across
+from pipeline.simulator.wall.relief import branch_cover, coarse_field, rust_field, weld_across, weld_rows
 from pipeline.simulator.wall.seeds import Seeds
 
 Float = NDArray[np.float64]
@@ -86,11 +86,11 @@ def _stain_surface(albedo: Float32, grid: Grid, surface: Surface, seeds: Seeds) 
 
 def _stain_weld(albedo: Float32, grid: Grid, weld: Weld, random: np.random.Generator) -> None:
     half = weld.width_mm / 2
-    across, _ = weld_across(grid, weld, random)
-    rows = np.flatnonzero(np.abs(grid.distance_mm - weld.distance_mm) <= 2 * half + 3 * weld.heat_mm)
+    rows = weld_rows(grid, weld, 2 * half + 3 * weld.heat_mm)
     if rows.size == 0:
         return
-    part, off = albedo[rows], half * np.abs(across[rows])
+    across, _ = weld_across(grid, weld, random, rows)
+    part, off = albedo[rows], half * np.abs(across)
     heat = 0.7 * np.exp(-((np.maximum(off - half, 0) / max(weld.heat_mm, 0.1)) ** 2))
     texture = part[..., 1] / max(float(part[..., 1].mean()), 1e-6)
     _cover(part, heat, _HEAT, texture)

@@ -13,6 +13,7 @@ from pipeline.simulator.wall.noise import Float32, above_share, field
 from pipeline.simulator.wall.seeds import Seeds
 
 Float = NDArray[np.float64]
+Int = NDArray[np.int64]
 _FORM_LONGEST_MM = 80.0
 _BRANCH_CHAMFER_MM = 0.6
 # OpenCV interpolates pictures of less than 32767 rows.
@@ -23,7 +24,8 @@ def add_relief(radius_mm: Float, grid: Grid, pipe: Pipe, seeds: Seeds) -> Float:
     """Return the radius (S, A), mm, with everything that departs from the pipe as made."""
     radius = radius_mm + _surface_relief(grid, pipe, seeds)
     for k, weld in enumerate(pipe.welds):
-        radius += weld_relief(grid, weld, seeds.of("weld", k))
+        rows = weld_rows(grid, weld, weld.width_mm)
+        radius[rows] += weld_relief(grid, weld, seeds.of("weld", k), rows)
     for k, defect in enumerate(pipe.defects):
         part = window(grid, defect.distance_mm, np.radians(defect.azimuth_deg), *reach_mm(defect))
         marked = imprint(defect, seeds.of("defect", k), part.along_mm, part.around_mm)
@@ -63,9 +65,14 @@ def _between(values: Float32, rows: Float, columns: Float) -> Float32:
     return np.asarray(cv2.remap(part, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
-def weld_relief(grid: Grid, weld: Weld, random: np.random.Generator) -> Float:
-    """Return what a bead adds to the radius (S, A): inward, wavering, with ripples along it."""
-    across, height = weld_across(grid, weld, random)
+def weld_rows(grid: Grid, weld: Weld, reach_mm: float) -> Int:
+    """Return the rows of a grid within a reach of a weld's middle; no bead wavers by its own width."""
+    return np.flatnonzero(np.abs(grid.distance_mm - weld.distance_mm) <= reach_mm)
+
+
+def weld_relief(grid: Grid, weld: Weld, random: np.random.Generator, rows: Int) -> Float:
+    """Return what a bead adds to the radius (rows, A): inward, wavering, with ripples along it."""
+    across, height = weld_across(grid, weld, random, rows)
     profile = np.clip(1 - across**2, 0, None)
     pitch = max(weld.width_mm / 3, 4 * grid.arc_step_mm)
     count = max(round(2 * np.pi * grid.radius_mm / pitch), 1)
@@ -73,11 +80,11 @@ def weld_relief(grid: Grid, weld: Weld, random: np.random.Generator) -> Float:
     return np.asarray(-profile * (weld.height_mm * (1 + 0.12 * height[None]) + weld.ripple_mm * ripple))
 
 
-def weld_across(grid: Grid, weld: Weld, random: np.random.Generator) -> tuple[Float, Float]:
-    """Return (S, A) the offset from a bead's wavering middle in half widths, and (A,) its uneven height."""
+def weld_across(grid: Grid, weld: Weld, random: np.random.Generator, rows: Int) -> tuple[Float, Float]:
+    """Return offsets (rows, A) from a bead's wavering middle in half widths, and its uneven height (A,)."""
     waver, height = (_periodic(grid, random, order) for order in (9, 14))
     middle = weld.distance_mm + 0.08 * weld.width_mm * waver[None]
-    return (grid.distance_mm[:, None] - middle) / (weld.width_mm / 2), height
+    return (grid.distance_mm[rows, None] - middle) / (weld.width_mm / 2), height
 
 
 def branch_cover(branch: Branch, along_mm: Float, around_mm: Float) -> Float:
