@@ -19,6 +19,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from pipeline.artefacts import Wall, WallTexture
+from pipeline.cloud_along import cloud_along
 from pipeline.errors import UnusableError
 from pipeline.findings import Defect, Defects
 from pipeline.recording.base import Recording
@@ -29,11 +30,10 @@ from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
 from stages.defects.parameters import DefectParameters
-from stages.defects.points import CloudAlong, cloud_along
-from stages.defects.relief import WallRelief, smooth_shape_removed
+from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
 from stages.defects.stretch import stretches
-from stages.defects.surface import surface_about
+from stages.defects.surface import MeasuredWall
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
@@ -58,25 +58,26 @@ def find_defects(
     cells = grown(relief, seeds, parameters, context.scratch)
     regions = regions_of(relief, cells, parameters.join_mm, context.scratch)
     scene = Scene(texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
-    found = _measured(relief, cloud_along(wall.cloud), regions, scene, parameters, context)
+    cloud = cloud_along(wall.cloud)
+    measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
+    found = _described(measured, regions, scene, parameters, context)
     items = tuple(replace(defect, id=n) for n, defect in enumerate(found, 1))
     context.report("defects", len(items), "")
     context.report("rejected: shallower than the smallest depth", len(regions) - len(items), "detections")
     return Defects(items, parameters.false_alarms, _smallest_depth(seeds, parameters))
 
 
-def _measured(
-    relief: WallRelief,
-    cloud: CloudAlong,
+def _described(
+    wall: MeasuredWall,
     regions: tuple[Region, ...],
     scene: Scene,
     parameters: DefectParameters,
     context: Context,
 ) -> Iterator[Defect]:
     """Yield the defects among the regions: those as deep as is worth reporting."""
-    clean = clean_wall(relief, cloud, regions)
+    clean = clean_wall(wall, regions)
     for done, region in enumerate(regions, 1):
-        surface, here = surface_about(relief, cloud, region)
+        surface, here = wall.surface_about(region)
         depth = measure_depth(here, surface, clean, parameters.draws, context.random)
         context.progress(len(regions) + done, 2 * len(regions))
         if region.sign * depth.depth_mm >= parameters.min_depth_mm:

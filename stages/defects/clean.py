@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.defects.harmonics import MAD
-from stages.defects.points import CloudAlong
-from stages.defects.relief import Typical, WallRelief
+from stages.defects.relief import Typical
 from stages.defects.segment import Region
-from stages.defects.surface import surface_of, with_margin
+from stages.defects.surface import MeasuredWall
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -59,23 +57,20 @@ def _reflected(i: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return np.asarray(np.minimum(i % period, period - i % period), np.int64)
 
 
-def clean_wall(wall: WallRelief, cloud: CloudAlong, regions: Iterable[Region]) -> CleanWall:
+def clean_wall(wall: MeasuredWall, regions: tuple[Region, ...]) -> CleanWall:
     """Return the wall's sampled rows, regions with a margin marked in them."""
-    known = tuple(regions)
-    parts = [_sampled(wall, cloud, rows, known) for rows in wall.sampled]
+    parts = [_sampled(wall, rows, regions) for rows in wall.relief.sampled]
     local, clean = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return CleanWall(local, clean, _noise_share(wall.typical, local[clean]))
+    return CleanWall(local, clean, _noise_share(wall.relief.typical, local[clean]))
 
 
-def _sampled(
-    wall: WallRelief, cloud: CloudAlong, rows: slice, regions: tuple[Region, ...]
-) -> tuple[Float, Mask]:
-    part = with_margin(wall, cloud, rows)
-    wanted = np.zeros((part.wide.stop - part.wide.start, wall.shape[1]), bool)
+def _sampled(wall: MeasuredWall, rows: slice, regions: tuple[Region, ...]) -> tuple[Float, Mask]:
+    part = wall.with_margin(rows)
+    wanted = np.zeros((part.wide.stop - part.wide.start, wall.relief.shape[1]), bool)
     wanted[part.inner] = True
-    local = surface_of(wall, cloud, part.wide, wanted).local_mm[part.inner]
+    local = wall.surface(part.wide, wanted).local_mm[part.inner]
     clean = np.isfinite(local)
-    margin = [round(_CLEAR_MM / c) for c in wall.cell_mm]
+    margin = [round(_CLEAR_MM / c) for c in wall.relief.cell_mm]
     for region in regions:
         height, width = region.mask.shape
         first_row = region.row - margin[0] - rows.start

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts import PointCloud, WallTexture
 from pipeline.findings import Defect, DefectKind, clock_of_azimuth
 from pipeline.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
 from stages.defects.classify import Features, features_of, probabilities
 from stages.defects.depth import Depth
-from stages.defects.points import WallPoints
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
@@ -82,7 +81,7 @@ def _clock(relief: Relief, region: Region) -> tuple[float, float]:
     return float(hours[0]), float(hours[1])
 
 
-def _cells_of(points: WallPoints, relief: Relief) -> tuple[Int, Int]:
+def _cells_of(points: PointCloud, relief: Relief) -> tuple[Int, Int]:
     """Return row (M,) and column (M,) in the map of points."""
     step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
     row = np.rint((points.distance_mm - relief.distance_mm[0]) / relief.cell_mm[0]).astype(np.int64)
@@ -90,7 +89,7 @@ def _cells_of(points: WallPoints, relief: Relief) -> tuple[Int, Int]:
     return row, column % len(relief.azimuth_rad)
 
 
-def _frames(points: WallPoints, relief: Relief, region: Region) -> Int:
+def _frames(points: PointCloud, relief: Relief, region: Region) -> Int:
     row, column = _cells_of(points, relief)
     row, column = row - region.row, (column - region.column) % len(relief.azimuth_rad)
     near = (row >= 0) & (row < region.mask.shape[0]) & (column < region.mask.shape[1])

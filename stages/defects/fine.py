@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.defects.points import WallPoints
+from pipeline.artefacts import PointCloud
 from stages.defects.relief import Relief
 
 Float = NDArray[np.float64]
@@ -58,7 +58,7 @@ def fine_surface(relief: Relief, points: DeviationPoints, wanted: Mask, coarse_m
     return np.where(np.isfinite(out), out, coarse_mm)
 
 
-def deviation_points(relief: Relief, points: WallPoints, spacing_mm: float) -> DeviationPoints:
+def deviation_points(relief: Relief, points: PointCloud, spacing_mm: float) -> DeviationPoints:
     """Return points on the rows of a relief against the smooth shape."""
     rows, columns = relief.local_mm.shape
     step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from pipeline.cloud_along import cloud_along
 from stages.defects.fine import deviation_points, fine_surface
 from stages.defects.parameters import DefectParameters
-from stages.defects.points import cloud_along
 from stages.defects.relief import smooth_shape_removed
 from tests.synthetic_wall import wall_of
 
@@ -16,7 +16,7 @@ def relief_and_points(radius):
     wall = wall_of(DISTANCE, AZIMUTH, radius, 0.02)
     relief = smooth_shape_removed(wall.radius_map, DefectParameters()).rows(slice(0, len(DISTANCE)))
     cloud = cloud_along(wall.cloud)
-    return relief, deviation_points(relief, cloud.between(-1.0, 41.0), cloud.spacing_mm)
+    return relief, deviation_points(relief, cloud.between(-1.0, 41.0), cloud.ring_spacing_mm())
 
 
 def surface_of(relief, points):
