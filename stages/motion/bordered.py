@@ -160,7 +160,7 @@ class BorderedSystem:
 
     def __init__(self, frames: int, border: int, bandwidth: int) -> None:
         size = BLOCK * frames
-        self._band = np.zeros((BLOCK * (min(bandwidth, frames - 1) + 1), size))
+        self._band = np.zeros((frames, min(bandwidth, frames - 1) + 1, BLOCK, BLOCK))
         self._border = np.zeros((size, border))
         self._corner = np.zeros((border, border))
         self._right = np.zeros(size)
@@ -178,11 +178,16 @@ class BorderedSystem:
 
         The landmarks' own information is raised by a relative ``damping``.
         """
-        count = len(rows.start) - 1
+        count, weight = len(rows.start) - 1, rows.weight
+        instrument = rows.by_instrument.reshape(2 * len(weight), rows.by_instrument.shape[2])
+        weighted = instrument * np.repeat(weight, 2)[:, None]
+        own = slice(len(self._corner) - instrument.shape[1], None)
+        self._corner[own, own] += weighted.T @ instrument
+        self._right_border[own] -= weighted.T @ rows.residual.ravel()
         inverse, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
         add_landmarks(
             rows.start, rows.frame, rows.by_pose, rows.by_point, rows.by_instrument,
-            rows.residual, rows.weight, rows.surface_by_point, rows.surface_by_border,
+            rows.residual, weight, rows.surface_by_point, rows.surface_by_border,
             rows.surface_residual, rows.surface_weight, damping,
             self._band, self._border, self._corner, self._right, self._right_border, inverse, right,
         )  # fmt: skip
@@ -199,7 +204,8 @@ class BorderedSystem:
         band, corner = self._band, self._corner
         if damping:
             band, corner = band.copy(), corner + damping * np.diag(np.diag(corner))
-            band[0] *= 1 + damping
+            diagonal = np.arange(BLOCK)
+            band[:, 0, diagonal, diagonal] *= 1 + damping
         tridiagonal = BlockTridiagonal.of_band(band)
         solved = tridiagonal.solve(self._border)
         left = cho_factor(corner - self._border.T @ solved)

@@ -1,7 +1,8 @@
 """Compiled sums of `stages.motion.bordered`: equations into a banded, bordered matrix, landmarks eliminated.
 
-The band holds entry (i, j), i ≥ j, at ``band[i - j, j]``. Arguments are those of `Rows` or `LandmarkRows`,
-then band, border, corner and both right sides, which are added to.
+The band holds the rows of frame f and the columns of frame f - l in ``band[f, l]`` (block, block); with l = 0
+only the lower triangle counts. Arguments are those of `Rows` or `LandmarkRows`, then band, border, corner and
+both right sides, which are added to.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ import numba
 import numpy as np
 
 _HOLD = 1e-4  # 1/mm²: a landmark that nothing holds any more keeps its place
+_CONTRACTED = {"contract"}
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def add_rows(frame, by_frame, by_border, residual, weight, band, border, corner, right, right_border):  # type: ignore[no-untyped-def]
     """Add equations without landmarks to the band, the border, the corner and the right sides."""
     block = by_frame.shape[2]
@@ -25,23 +27,22 @@ def add_rows(frame, by_frame, by_border, residual, weight, band, border, corner,
                     continue
                 row = frame[m, p] * block + a
                 right[row] -= w * ja * residual[m]
-                _add_to_band(frame[m], by_frame[m], w * ja, row, band)
+                _add_to_band(frame[m], by_frame[m], w * ja, frame[m, p], a, band)
                 for b in range(border.shape[1]):
                     border[row, b] += w * ja * by_border[m, b]
         _add_to_corner(by_border[m], residual[m], w, corner, right_border)
 
 
-@numba.njit(cache=True)
-def _add_to_band(frame, by_frame, factor, row, band):  # type: ignore[no-untyped-def]
-    block = by_frame.shape[1]
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _add_to_band(frame, by_frame, factor, f, a, band):  # type: ignore[no-untyped-def]
+    """Add the products of one entry, row ``a`` of frame ``f``, with those on and below the diagonal."""
     for q in range(frame.shape[0]):
-        for b in range(block):
-            column = frame[q] * block + b
-            if column <= row and by_frame[q, b] != 0.0:
-                band[row - column, column] += factor * by_frame[q, b]
+        if frame[q] <= f:
+            for b in range(a + 1 if frame[q] == f else by_frame.shape[1]):
+                band[f, f - frame[q], a, b] += factor * by_frame[q, b]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _add_to_corner(by_border, residual, w, corner, right_border):  # type: ignore[no-untyped-def]
     for a in range(by_border.shape[0]):
         ja = by_border[a]
@@ -52,7 +53,7 @@ def _add_to_corner(by_border, residual, w, corner, right_border):  # type: ignor
             corner[a, b] += w * ja * by_border[b]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def add_landmarks(  # type: ignore[no-untyped-def]
     start, frame, by_pose, by_point, by_instrument, residual, weight,
     s_point, s_border, s_residual, s_weight, damping,
@@ -60,97 +61,139 @@ def add_landmarks(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Add texture and surface equations, and subtract what the landmarks take along when they leave.
 
-    ``damping`` raises the diagonal of each landmark's information.
+    ``damping`` raises the diagonal of each landmark's information. Products of the instrument's derivatives
+    with themselves are left to matrix algebra, which is quicker.
     """
     size = s_border.shape[1]
     first = size - by_instrument.shape[2]
     most = 0
     for k in range(len(start) - 1):
         most = max(most, start[k + 1] - start[k])
-    cross = np.empty((most, 6, 3))
+    cross, solved, side = np.empty((most, 3, 6)), np.empty((most, 6, 3)), np.empty((3, size))
     for k in range(len(start) - 1):
         ws = s_weight[k]
         h = ws * np.outer(s_point[k], s_point[k])
         g = -ws * s_residual[k] * s_point[k]
-        side = ws * np.outer(s_border[k], s_point[k])
-        right_border -= ws * s_residual[k] * s_border[k]
-        corner += ws * np.outer(s_border[k], s_border[k])
+        for c in range(3):
+            side[c] = ws * s_point[k, c] * s_border[k]
+        _add_to_corner(s_border[k], s_residual[k], ws, corner, right_border)
         for m in range(start[k], start[k + 1]):
             _add_observation(
-                weight[m], frame[m] * 7, by_pose[m], by_point[m], by_instrument[m], residual[m], first,
-                band, border, corner, right, right_border, h, g, side, cross[m - start[k]],
+                weight[m], frame[m], by_pose[m], by_point[m], by_instrument[m], residual[m], first,
+                band, border, right, h, g, side, cross[m - start[k]],
             )  # fmt: skip
         for a in range(3):
             h[a, a] *= 1.0 + damping
-        if np.linalg.det(h) < _HOLD**3:
-            h += _HOLD * np.eye(3)
-        hi = np.linalg.inv(h)
-        inverse[k], right_point[k] = hi, g
-        solved_side = side @ hi
-        right_border -= solved_side @ g
-        corner -= solved_side @ side.T
-        _eliminate(frame[start[k] : start[k + 1]], cross, hi, g, side, band, border, right)
+        right_point[k] = g
+        _invert(h, inverse[k])
+        _eliminate_from_corner(inverse[k], g, side, corner, right_border)
+        seen = frame[start[k] : start[k + 1]]
+        _eliminate_from_frames(seen, cross, solved, inverse[k], g, side, band, border, right)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _invert(h, out):  # type: ignore[no-untyped-def]
+    """Write the inverse of a landmark's information, raised where nothing holds the landmark."""
+    determinant = _cofactors(h, out)
+    if determinant < _HOLD**3:
+        for a in range(3):
+            h[a, a] += _HOLD
+        determinant = _cofactors(h, out)
+    out /= determinant
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _cofactors(h, out):  # type: ignore[no-untyped-def]
+    """Write the cofactors of a symmetric matrix (3, 3); return its determinant."""
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        out[a, a] = h[b, b] * h[c, c] - h[b, c] * h[b, c]
+        out[b, c] = out[c, b] = h[a, b] * h[a, c] - h[a, a] * h[b, c]
+    return h[0, 0] * out[0, 0] + h[0, 1] * out[0, 1] + h[0, 2] * out[0, 2]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
 def _add_observation(  # type: ignore[no-untyped-def]
-    w, f, jp, jx, jc, r, first, band, border, corner, right, right_border, h, g, side, cross
+    w, f, jp, jx, jc, r, first, band, border, right, h, g, side, cross
 ):
     """Add one texture observation; products of tiny matrices are written out, which is faster."""
     cross[:] = 0.0
+    row, block = f * band.shape[2], band[f, 0]
     for c in range(2):
         wr = w * r[c]
         for a in range(3):
             g[a] -= wr * jx[c, a]
             for b in range(3):
                 h[a, b] += w * jx[c, a] * jx[c, b]
+            for b in range(6):
+                cross[a, b] += w * jx[c, a] * jp[c, b]
+            for b in range(jc.shape[1]):
+                side[a, first + b] += w * jx[c, a] * jc[c, b]
         for a in range(6):
             wa = w * jp[c, a]
-            right[f + a] -= wr * jp[c, a]
-            for b in range(3):
-                cross[a, b] += wa * jx[c, b]
+            right[row + a] -= wr * jp[c, a]
             for b in range(a + 1):
-                band[a - b, f + b] += wa * jp[c, b]
+                block[a, b] += wa * jp[c, b]
             for b in range(jc.shape[1]):
-                border[f + a, first + b] += wa * jc[c, b]
-        _add_instrument(w, wr, c, jx, jc, first, corner, right_border, side)
+                border[row + a, first + b] += wa * jc[c, b]
 
 
-@numba.njit(cache=True)
-def _add_instrument(w, wr, c, jx, jc, first, corner, right_border, side):  # type: ignore[no-untyped-def]
-    for a in range(jc.shape[1]):
-        wa = w * jc[c, a]
-        right_border[first + a] -= wr * jc[c, a]
-        for b in range(3):
-            side[first + a, b] += wa * jx[c, b]
-        for b in range(jc.shape[1]):
-            corner[first + a, first + b] += wa * jc[c, b]
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+def _eliminate_from_corner(hi, g, side, corner, right_border):  # type: ignore[no-untyped-def]
+    """Subtract what one landmark takes from the border numbers; ``side`` is (3, B)."""
+    for a in range(side.shape[1]):
+        if side[0, a] == 0.0 and side[1, a] == 0.0 and side[2, a] == 0.0:
+            continue
+        s0 = side[0, a] * hi[0, 0] + side[1, a] * hi[1, 0] + side[2, a] * hi[2, 0]
+        s1 = side[0, a] * hi[0, 1] + side[1, a] * hi[1, 1] + side[2, a] * hi[2, 1]
+        s2 = side[0, a] * hi[0, 2] + side[1, a] * hi[1, 2] + side[2, a] * hi[2, 2]
+        right_border[a] -= s0 * g[0] + s1 * g[1] + s2 * g[2]
+        for b in range(side.shape[1]):
+            corner[a, b] -= s0 * side[0, b] + s1 * side[1, b] + s2 * side[2, b]
 
 
-@numba.njit(cache=True)
-def _eliminate(frame, cross, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
-    """Subtract what one landmark, seen in ``frame``, takes along when it leaves."""
-    solved = np.zeros((len(frame), 6, 3))
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+def _eliminate_from_frames(frame, cross, solved, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
+    """Subtract what one landmark, seen in ``frame``, takes from its frames; ``cross`` is (·, 3, 6)."""
     for i in range(len(frame)):
-        f = frame[i] * 7
+        row = frame[i] * band.shape[2]
         for a in range(6):
-            for b in range(3):
-                for c in range(3):
-                    solved[i, a, b] += cross[i, a, c] * hi[c, b]
-                right[f + a] -= solved[i, a, b] * g[b]
-            for b in range(side.shape[0]):
-                for c in range(3):
-                    border[f + a, b] -= solved[i, a, c] * side[b, c]
+            x0, x1, x2 = cross[i, 0, a], cross[i, 1, a], cross[i, 2, a]
+            s0 = x0 * hi[0, 0] + x1 * hi[1, 0] + x2 * hi[2, 0]
+            s1 = x0 * hi[0, 1] + x1 * hi[1, 1] + x2 * hi[2, 1]
+            s2 = x0 * hi[0, 2] + x1 * hi[1, 2] + x2 * hi[2, 2]
+            solved[i, a, 0], solved[i, a, 1], solved[i, a, 2] = s0, s1, s2
+            right[row + a] -= s0 * g[0] + s1 * g[1] + s2 * g[2]
+            for b in range(side.shape[1]):
+                border[row + a, b] -= s0 * side[0, b] + s1 * side[1, b] + s2 * side[2, b]
         for j in range(i + 1):
-            _subtract_pair(solved[i], cross[j], f, frame[j] * 7, band)
+            _subtract_pair(solved[i], cross[j], band[frame[i], frame[i] - frame[j]])
 
 
-@numba.njit(cache=True)
-def _subtract_pair(solved, cross, f, e, band):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+def _subtract_pair(solved, cross, block):  # type: ignore[no-untyped-def]
     for a in range(6):
         for b in range(6):
-            if f + a >= e + b:
-                total = 0.0
-                for c in range(3):
-                    total += solved[a, c] * cross[b, c]
-                band[f + a - e - b, e + b] -= total
+            block[a, b] -= (
+                solved[a, 0] * cross[0, b] + solved[a, 1] * cross[1, b] + solved[a, 2] * cross[2, b]
+            )
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+def by_point_and_pose(by_c, T_pc, xyz_c):  # type: ignore[no-untyped-def]
+    """Return derivatives by the point in P (M, 2, 3) and by the pose (M, 2, 6) from those by the point in C.
+
+    The pose moves by T = [R exp(w), t + d], (d, w), as in `stages.motion.state.moved`.
+    """
+    by_point, by_pose = np.empty((len(by_c), 2, 3)), np.empty((len(by_c), 2, 6))
+    for m in range(len(by_c)):
+        x, y, z = xyz_c[m]
+        for c in range(2):
+            j0, j1, j2 = by_c[m, c]
+            for a in range(3):
+                by_point[m, c, a] = j0 * T_pc[m, a, 0] + j1 * T_pc[m, a, 1] + j2 * T_pc[m, a, 2]
+                by_pose[m, c, a] = -by_point[m, c, a]
+            by_pose[m, c, 3] = j1 * z - j2 * y
+            by_pose[m, c, 4] = j2 * x - j0 * z
+            by_pose[m, c, 5] = j0 * y - j1 * x
+    return by_point, by_pose

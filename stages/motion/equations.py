@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.geometry.rigid import inverse, skew, transform
+from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
 from stages.motion import terms
 from stages.motion.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
+from stages.motion.elimination import by_point_and_pose
 from stages.motion.parameters import MotionParameters
 from stages.motion.robust import Cauchy, GemanMcClure
 from stages.motion.state import EncoderReadings, State
@@ -193,10 +194,10 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     bias = _match_bias(xyz_c, tracks.uv - camera.centre_px) * parameters.match_bias_px
     residual = camera.project(xyz_c).uv + bias @ state.instrument[-MATCH_BIASES:] - tracks.uv
     by_c, by_parameters = camera.project_jacobian(xyz_c)
-    by_camera = by_parameters @ measured.unsure[: by_parameters.shape[2]]
-    by_instrument = np.concatenate([by_camera, bias], -1)
-    by_point = by_c @ np.swapaxes(T[:, :3, :3], 1, 2)
-    by_pose = np.concatenate([-by_point, by_c @ skew(xyz_c)], -1)
+    unsure = measured.unsure[: by_parameters.shape[2]]
+    by_camera = by_parameters.reshape(2 * len(T), len(unsure)) @ unsure
+    by_instrument = np.concatenate([by_camera.reshape(len(T), 2, unsure.shape[1]), bias], -1)
+    by_point, by_pose = by_point_and_pose(by_c, T, xyz_c)
     astray = ~np.isfinite(residual).all(1)
     residual[astray] = _ASTRAY_PX
     for part in (by_point, by_pose, by_instrument):

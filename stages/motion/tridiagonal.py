@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
@@ -25,23 +26,25 @@ class BlockTridiagonal:
 
     @staticmethod
     def of_band(band: Float) -> BlockTridiagonal:
-        """Factorise the matrix whose entry (i, j), i ≥ j, is ``band[i - j, j]``.
+        """Factorise the matrix whose rows f and columns f - l, in blocks, are ``band[f, l]`` (N, R, b, b).
+
+        Of the blocks on the diagonal, l = 0, the lower triangle is looked at.
 
         Raises
         ------
         numpy.linalg.LinAlgError
             When it is not positive definite.
         """
-        width, size = band.shape
-        edges = [*range(0, max(size - width + 1, 1), width), size]
+        frames, lags = band.shape[:2]
+        width = max(lags - 1, 1)
+        edges = [*range(0, max(frames - width + 1, 1), width), frames]
         diagonal: list[Float] = []
         below: list[Float] = []
         for k, (a, b) in enumerate(pairwise(edges)):
             block = _dense(band, a, b, a, b)
-            block = block + np.tril(block, -1).T
             if below:
                 block -= below[-1] @ below[-1].T
-            diagonal.append(cholesky(block, lower=True, check_finite=False))
+            diagonal.append(cholesky(block, lower=True, overwrite_a=True, check_finite=False))
             if k + 2 < len(edges):
                 low = _dense(band, b, edges[k + 2], a, b)
                 below.append(solve_triangular(diagonal[-1], low.T, lower=True, check_finite=False).T)
@@ -60,9 +63,13 @@ class BlockTridiagonal:
         return np.concatenate(parts)
 
 
-def _dense(band: Float, r0: int, r1: int, c0: int, c1: int) -> Float:
-    """Return rows r0:r1, columns c0:c1 of the lower triangle; 0 outside the band."""
-    lag = np.arange(r0, r1)[:, None] - np.arange(c0, c1)
-    inside = (lag >= 0) & (lag < len(band))
-    column = np.broadcast_to(np.arange(c0, c1), lag.shape)
-    return np.where(inside, band[np.where(inside, lag, 0), column], 0.0)
+@numba.njit(cache=True, nogil=True)
+def _dense(band, r0, r1, c0, c1):  # type: ignore[no-untyped-def]
+    """Return rows r0:r1 and columns c0:c1, in frames, of the lower triangle; 0 outside the band."""
+    size = band.shape[2]
+    out = np.zeros(((r1 - r0) * size, (c1 - c0) * size))
+    for f in range(r0, r1):
+        for e in range(max(c0, f - band.shape[1] + 1), min(c1, f + 1)):
+            i, j = (f - r0) * size, (e - c0) * size
+            out[i : i + size, j : j + size] = band[f, f - e]
+    return out

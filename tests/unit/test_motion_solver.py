@@ -93,16 +93,17 @@ def test_steps_and_covariances_are_those_of_the_dense_normal_equations(seed: int
         np.testing.assert_allclose(block, covariance[at, at], rtol=1e-7, atol=1e-10)
 
 
-@pytest.mark.parametrize(("size", "width"), [(1, 1), (7, 7), (23, 5), (24, 6), (40, 3), (5, 12)])
-def test_block_tridiagonal_solves_banded_systems(size: int, width: int) -> None:
-    random = np.random.default_rng(size)
-    width = min(width, size)
+@pytest.mark.parametrize(("frames", "lags"), [(1, 1), (2, 2), (23, 5), (24, 6), (40, 3), (9, 1), (5, 5)])
+def test_block_tridiagonal_solves_banded_systems(frames: int, lags: int) -> None:
+    random = np.random.default_rng(frames)
+    size = 3 * frames
     a = random.standard_normal((size, size))
-    lag = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
-    full = np.where(lag < width, a + a.T, 0) + 4 * size * np.eye(size)
-    band = np.zeros((width, size))
-    for i in range(width):
-        band[i, : size - i] = np.diagonal(full, -i)
+    lag = np.abs(np.subtract.outer(np.arange(size) // 3, np.arange(size) // 3))
+    full = np.where(lag < lags, a + a.T, 0) + 4 * size * np.eye(size)
+    band = np.zeros((frames, lags, 3, 3))
+    for f in range(frames):
+        for back in range(min(lags, f + 1)):
+            band[f, back] = full[3 * f : 3 * f + 3, 3 * (f - back) : 3 * (f - back) + 3]
     right = random.standard_normal((size, 3))
     np.testing.assert_allclose(
         BlockTridiagonal.of_band(band).solve(right), np.linalg.solve(full, right), atol=1e-10
