@@ -29,7 +29,7 @@ from rosbags.typesys.store import Typestore
 # What the libraries raise on damaged files.
 BAG_ERRORS = (
     AnyReaderError, Reader1Error, Reader2Error, SerdeError, McapError, sqlite3.Error, struct.error,
-    OSError, EOFError, ValueError, KeyError, IndexError, AssertionError,
+    OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, IndexError, AssertionError,
 )  # fmt: skip
 
 

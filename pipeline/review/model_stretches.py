@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -44,6 +46,7 @@ class StretchedModel:
 
     Attributes
     ----------
+    file : Path
     document : dict
         Its JSON.
     binary : (B,) uint8
@@ -51,13 +54,21 @@ class StretchedModel:
     axis : PipeAxis
     """
 
+    file: Path
     document: Json
     binary: NDArray[np.uint8]
     axis: PipeAxis
 
     def stretches(self) -> tuple[Stretch, ...]:
-        """Return where each primitive lies along the pipe."""
-        return tuple(self._stretch(p) for p in self._primitives)
+        """Return where each primitive lies along the pipe.
+
+        Raises
+        ------
+        InputError
+            When the file is not as boresight writes it.
+        """
+        with _as_written(self.file):
+            return tuple(self._stretch(p) for p in self._primitives)
 
     def stretch(self, number: int) -> bytes:
         """Return one primitive with its materials and pictures as binary glTF.
@@ -65,11 +76,12 @@ class StretchedModel:
         Raises
         ------
         InputError
-            When there is no such stretch.
+            When there is no such stretch, or the file is not as boresight writes it.
         """
         if not 0 <= number < len(self._primitives):
             raise InputError("model", f"there is no stretch {number}")
-        return _packed(*_alone(self.document, self._primitives[number], self.binary))
+        with _as_written(self.file):
+            return _packed(*_alone(self.document, self._primitives[number], self.binary))
 
     @property
     def _primitives(self) -> list[Json]:
@@ -79,7 +91,8 @@ class StretchedModel:
     def _stretch(self, primitive: Json) -> Stretch:
         accessors = self.document["accessors"]
         place = accessors[primitive["attributes"]["POSITION"]]
-        corners = 1000 * np.array(list(product(*zip(place["min"], place["max"], strict=True))))
+        least, most = (np.array(place[edge], float).reshape(3) for edge in ("min", "max"))
+        corners = 1000 * np.array(list(product(*zip(least, most, strict=True))))
         distance, _, _ = to_pipe(self.axis, corners)
         return Stretch(
             float(distance.min()), float(distance.max()), accessors[primitive["indices"]]["count"] // 3
@@ -102,6 +115,17 @@ def model_of(files: RunFiles) -> StretchedModel:
 
 @lru_cache(maxsize=2)
 def _model(file: Path, _as_it_is: FileStamp, files: RunFiles) -> StretchedModel:
+    return read_model(file, files.artefact(Trajectory).axis)
+
+
+def read_model(file: Path, axis: PipeAxis) -> StretchedModel:
+    """Read the head of a model; of its buffer only what is asked for is read, later.
+
+    Raises
+    ------
+    InputError
+        When it is not one that boresight wrote.
+    """
     with file.open("rb") as stream:
         head = stream.read(20)
         if len(head) < 20:
@@ -109,19 +133,24 @@ def _model(file: Path, _as_it_is: FileStamp, files: RunFiles) -> StretchedModel:
         magic, version, _, length, kind = struct.unpack("<5I", head)
         if (magic, version, kind) != (_GLTF, 2, _JSON) or length > _LARGEST_DOCUMENT:
             raise InputError(file, "is no binary glTF 2.0")
-        document = _document(file, stream.read(length))
-    binary: NDArray[np.uint8] = np.memmap(file, np.uint8, "r", offset=20 + length + 8)
-    return StretchedModel(document, binary, files.artefact(Trajectory).axis)
-
-
-def _document(file: Path, text: bytes) -> Json:
-    try:
+        text = stream.read(length)
+    with _as_written(file):
         document: Json = parse_json(text)
         if not document["meshes"][0]["primitives"]:
             raise InputError(file, "is a model without a wall")
-    except (ValueError, KeyError, IndexError, TypeError) as error:
-        raise InputError(file, f"is not a model of boresight: {error!r}") from error
-    return document
+        binary: NDArray[np.uint8] = np.memmap(file, np.uint8, "r", offset=20 + length + 8)
+    return StretchedModel(file, document, binary, axis)
+
+
+@contextmanager
+def _as_written(file: Path) -> Iterator[None]:
+    """Turn what is missing, misplaced or of another kind in a document into an `InputError`."""
+    try:
+        yield
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError) as error:
+        raise InputError(
+            file, f"is not a model of boresight: {error!r}", hint="finish the run again: boresight run"
+        ) from error
 
 
 def _alone(document: Json, primitive: Json, binary: NDArray[np.uint8]) -> tuple[Json, bytes]:

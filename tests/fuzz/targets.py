@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from pipeline.batch.kinds import read_cluster
 from pipeline.config import resolve
 from pipeline.errors import InputError
 from pipeline.instrument.camera.formats import read_camera, write_camera
@@ -20,6 +22,7 @@ from pipeline.recording.video import open_video
 from pipeline.reference import read_wall_map, read_wall_points
 from pipeline.reproduce import read_run_record
 from pipeline.review.decisions.actions import action_of
+from pipeline.review.model_stretches import read_model
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.run_files import RunFiles, measured_findings
 from pipeline.simulator.prior import read_prior
@@ -27,10 +30,13 @@ from pipeline.simulator.scene import read_scene
 from pipeline.store import Store
 from stages.catalogue import PIPELINE
 from stages.diagnose.drill.answer import read_answer, read_concealed
-from tests.made_recording import write_folder, write_mcap, write_ros1
+from tests.made_recording import write_folder, write_mcap, write_ros1, write_ros2
 from tests.shared_data import PROJECT_ROOT
+from tests.truth_run import true_axis
 from tests.unit.camera_samples import SCARAMUZZA
 
+# What is opened of a folder that holds a bag.
+BAGS = {"ros1": "run.bag", "ros2": "run", "mcap": "run.mcap"}
 Take = Callable[[bytes], object]
 
 
@@ -67,7 +73,8 @@ def made() -> Path:
     folder = scratch() / "made"
     write_folder(folder / "folder")
     write_folder(folder / "h264", "frames.mp4", codec="libx264", pix_fmt="yuv420p")
-    for kind, write in (("ros1", write_ros1), ("mcap", write_mcap)):
+    write_folder(folder / "images", "frames/%06d.png")
+    for kind, write in (("ros1", write_ros1), ("ros2", write_ros2), ("mcap", write_mcap)):
         (folder / kind).mkdir(parents=True)
         write(folder / kind)
     return folder
@@ -94,11 +101,38 @@ def _beside(kind: str, name: str) -> Take:
         good = target.read_bytes()
         try:
             target.write_bytes(data)
-            return open_recording(target if name.endswith(("bag", "mcap")) else folder)
+            return open_recording(folder / BAGS.get(kind, ""))
         finally:
             target.write_bytes(good)
 
     return take
+
+
+def _model(data: bytes) -> object:
+    file = scratch() / "model.glb"
+    file.write_bytes(data)
+    model = read_model(file, true_axis(0.0, 0.0))
+    return model.stretches(), model.stretch(0)
+
+
+def _smallest_model() -> bytes:
+    """Return one triangle with one material, in the layout that boresight writes."""
+    text = MODEL.encode() + b" " * (-len(MODEL) % 4)
+    chunks = struct.pack("<2I", len(text), 0x4E4F534A) + text + struct.pack("<2I", 48, 0x004E4942) + bytes(48)
+    return struct.pack("<3I", 0x46546C67, 2, 12 + len(chunks)) + chunks
+
+
+def _pictures(data: bytes) -> object:
+    """Replace one picture of a sequence and read all: it may be unusable, the others are not."""
+    folder = made() / "images"
+    target = folder / "frames" / "000001.png"
+    good = target.read_bytes()
+    try:
+        target.write_bytes(data)
+        recording = open_recording(folder)
+        return list(recording.read(recording.frames.frame, "bgr"))
+    finally:
+        target.write_bytes(good)
 
 
 def _good(kind: str, name: str) -> Callable[[], bytes]:
@@ -173,6 +207,16 @@ ANSWER = (
     '"effects": [{"name": "laser_tilt", "probability": 0.99, '
     '"parameters": {"tilt_deg": {"value": 1, "sd": 2}}}]}'
 )
+MODEL = (
+    '{"asset":{"version":"2.0"},"extensions":{"KHR_materials_variants":{"variants":[{"name":"photo"}]}},'
+    '"extensionsUsed":["KHR_materials_variants"],"meshes":[{"primitives":[{"attributes":{"POSITION":0},'
+    '"indices":1,"extensions":{"KHR_materials_variants":{"mappings":[{"material":0,"variants":[0]}]}}}]}],'
+    '"accessors":[{"bufferView":0,"count":3,"min":[0,0,0],"max":[1,1,1]},{"bufferView":1,"count":3}],'
+    '"materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],"textures":[{"source":0}],'
+    '"images":[{"bufferView":2}],"bufferViews":[{"byteOffset":0,"byteLength":36},'
+    '{"byteOffset":36,"byteLength":6},{"byteOffset":42,"byteLength":4}]}'
+)
+CLUSTER = "cluster: {kind: slurm, jobs: 4, memory_gib: 6, walltime: 1-02:00:00}\n"
 CONFIG = "rings: {azimuths: 720}\nmotion:\n  cell_px: 24\n"
 FINDING = (
     '[{"id": 1, "kind": "pit", "outline": [[0, 0], [1, 0], [1, 1]], "distance_from_mm": 0, '
@@ -208,6 +252,8 @@ TARGETS = {
     "encoder.csv": Target(_file("encoder.csv", read_encoder), _good("folder", "encoder.csv"), 1),
     "probe.yaml": Target(_file("probe.yaml", read_probe), _good("folder", "probe.yaml"), 0.2),
     "recording.yaml": Target(_beside("folder", "recording.yaml"), _good("folder", "recording.yaml"), 0.1),
+    "cluster": Target(_file("k.yaml", read_cluster), _text(CLUSTER), 0.2),
+    "model.glb": Target(_model, _smallest_model, 1),
     "configuration": Target(_file("c.yaml", lambda f: resolve(PIPELINE, f)), _text(CONFIG), 0.3),
     "scene": Target(_file("scene.yaml", read_scene), _shipped("scenes/oval-3-inch.yaml"), 0.2),
     "prior": Target(_file("prior.yaml", read_prior), _shipped("priors/small.yaml"), 0.2),
@@ -225,5 +271,8 @@ TARGETS = {
     "video mkv": Target(_file("frames.mkv", open_video), _good("folder", "frames.mkv"), 0.02),
     "video mp4": Target(_file("frames.mp4", open_video), _good("h264", "frames.mp4"), 0.02),
     "ros1 bag": Target(_beside("ros1", "run.bag"), _good("ros1", "run.bag"), 0.01),
+    "ros2 bag": Target(_beside("ros2", "run/run.db3"), _good("ros2", "run/run.db3"), 0.01),
+    "ros2 metadata": Target(_beside("ros2", "run/metadata.yaml"), _good("ros2", "run/metadata.yaml"), 0.01),
+    "picture": Target(_pictures, _good("images", "frames/000001.png"), 0.05),
     "mcap": Target(_beside("mcap", "run.mcap"), _good("mcap", "run.mcap"), 0.01),
 }

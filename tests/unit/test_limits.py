@@ -23,12 +23,13 @@ from pipeline.reference import read_wall_map
 from pipeline.reproduce import read_run_record
 from pipeline.review import model_stretches, quality
 from pipeline.review.decisions.actions import action_of
-from pipeline.review.model_stretches import model_of
+from pipeline.review.model_stretches import read_model
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.run_files import RunFiles, measured_findings
 from pipeline.review.server import guard
 from tests.fuzz.targets import TARGETS
 from tests.shared_data import PROJECT_ROOT
+from tests.truth_run import true_axis
 
 MIB = 1 << 20
 STATED = {
@@ -96,7 +97,7 @@ def test_a_model_whose_head_is_too_large_is_refused(tmp_path: Path) -> None:
     head = np.array([0x46546C67, 2, 0, 257 * MIB, 0x4E4F534A], "<u4").tobytes()
     (tmp_path / "model.glb").write_bytes(head)
     with pytest.raises(InputError, match="no binary glTF"):
-        model_of(RunFiles(tmp_path))
+        read_model(tmp_path / "model.glb", true_axis(0.0, 0.0))
 
 
 DEEP = "[" * 100_000

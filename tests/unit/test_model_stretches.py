@@ -1,0 +1,62 @@
+"""A model that boresight did not write is refused by name, whatever is wrong within its document."""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.review.model_stretches import read_model
+from tests.fuzz.targets import TARGETS
+from tests.truth_run import true_axis
+
+GOOD = TARGETS["model.glb"].seed()
+HEAD = 20
+
+
+def document() -> dict[str, Any]:
+    length = struct.unpack("<I", GOOD[12:16])[0]
+    return json.loads(GOOD[HEAD : HEAD + length])  # type: ignore[no-any-return]
+
+
+def written(folder: Path, tree: dict[str, Any]) -> Path:
+    length = struct.unpack("<I", GOOD[12:16])[0]
+    text = json.dumps(tree).encode()
+    file = folder / "model.glb"
+    file.write_bytes(GOOD[:12] + struct.pack("<2I", len(text), 0x4E4F534A) + text + GOOD[HEAD + length :])
+    return file
+
+
+def test_a_good_one_gives_its_stretch(tmp_path: Path) -> None:
+    model = read_model(written(tmp_path, document()), true_axis(0.0, 0.0))
+    (stretch,) = model.stretches()
+    assert (stretch.from_mm, stretch.to_mm, stretch.triangles) == pytest.approx((0, 1000, 1))
+    assert model.stretch(0)[:4] == b"glTF"
+
+
+def all_of(file: Path) -> tuple[object, ...]:
+    model = read_model(file, true_axis(0.0, 0.0))
+    return model.stretches(), model.stretch(0)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda d: d["accessors"][0].pop("min"),
+        # Corners of a box of 40 dimensions would fill any memory.
+        lambda d: d["accessors"][0].update(min=[0] * 40, max=[1] * 40),
+        lambda d: d["accessors"].clear(),
+        lambda d: d["meshes"][0]["primitives"][0].update(attributes=[0]),
+        lambda d: d["meshes"][0]["primitives"][0].update(indices="x"),
+        lambda d: d.update(materials=None),
+        lambda d: d["bufferViews"][0].update(byteOffset={}),
+        lambda d: d["images"][0].update(bufferView=7),
+    ],
+)
+def test_what_does_not_fit_is_refused(tmp_path: Path, spoil: Any) -> None:
+    tree = document()
+    spoil(tree)
+    with pytest.raises(InputError, match=r"model\.glb: is not a model of boresight"):
+        all_of(written(tmp_path, tree))
