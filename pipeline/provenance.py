@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 from pipeline.codec import Json
-from pipeline.recording.input_file import content_key, input_file
 
 # What computes; another version of these may change a result's last digits.
 _LIBRARIES = (
@@ -58,14 +56,3 @@ def program_version() -> str:
 def library_versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries that compute."""
     return {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES}
-
-
-def files_sha256(files: Iterable[Path]) -> str:
-    """Return the SHA-256 over those of some files, in order.
-
-    Raises
-    ------
-    InputError
-        When one cannot be read.
-    """
-    return content_key(input_file(f) for f in files)

@@ -22,7 +22,8 @@ from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError, UnusableError
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport
 from pipeline.instrument.camera.formats import WRITTEN, read_camera, write_camera
-from pipeline.provenance import MadeBy, files_sha256
+from pipeline.provenance import MadeBy
+from pipeline.recording.input_file import files_sha256
 from pipeline.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import LEAST_CORNERS, detect

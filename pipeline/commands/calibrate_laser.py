@@ -24,7 +24,8 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.laser_plane import LaserPlane
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.provenance import MadeBy, files_sha256
+from pipeline.provenance import MadeBy
+from pipeline.recording.input_file import files_sha256
 from pipeline.stage import quiet_context
 from stages.calibrate.laser.calibrate import LaserCalibration, LaserPicture, calibrate_laser_plane
 from stages.calibrate.laser.parameters import LaserPlaneParameters

@@ -13,7 +13,8 @@ import typer
 
 from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
-from pipeline.provenance import MadeBy, files_sha256
+from pipeline.provenance import MadeBy
+from pipeline.recording.input_file import files_sha256
 from pipeline.reference import (
     SURFACE_SUFFIXES,
     WallMap,

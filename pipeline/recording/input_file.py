@@ -58,6 +58,17 @@ def content_key(files: Iterable[InputFile]) -> str:
     return hashlib.sha256(b"".join(f.sha256 for f in files)).hexdigest()
 
 
+def files_sha256(files: Iterable[Path]) -> str:
+    """Return the SHA-256 over those of some files, in order.
+
+    Raises
+    ------
+    InputError
+        When one cannot be read.
+    """
+    return content_key(input_file(f) for f in files)
+
+
 def _sha256(path: Path) -> bytes:
     with path.open("rb") as opened:
         return hashlib.file_digest(opened, "sha256").digest()
