@@ -4,24 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from pipeline.artefacts import Wall, WallTexture
+from pipeline.artefacts import PointCloud, Wall, WallTexture
+from pipeline.cloud_along import cloud_along
 from pipeline.errors import UnusableError
 from pipeline.isolated import CrashError, TimeLimitError, call_isolated
 from pipeline.model import Overlays, PackedTiles, TexturedMesh
 from pipeline.stage import Context, Parameters, Stage
 from stages.mesh.bake import bake_tile
 from stages.mesh.charts import cut_charts, pack, tile_count, tile_length, unroll
+from stages.mesh.clip import OpenMesh
 from stages.mesh.decimate import Decimated, decimate
 from stages.mesh.packing import TilePacker
-from stages.mesh.poisson import folded_cells, poisson_surface
+from stages.mesh.poisson import folded_cells, joined_pieces, piece_cuts, poisson_surface, seen_part
 from stages.mesh.surface import Surface, grid_surface, row_pieces, with_normals
 
-_SAMPLED_ROWS = 2000
+_SAMPLED_ROWS, _SAMPLED_POINTS = 2000, 1 << 20
 
 
 class MeshParameters(Parameters):
@@ -141,24 +144,34 @@ def _grid_pieces(
 
 
 def _poisson_pieces(wall: Wall, parameters: MeshParameters, context: Context) -> Iterator[Decimated]:
-    """Yield the cloud's Poisson surface, decimated: one piece."""
-    surface = _reconstructed(wall, parameters)
-    context.progress(1, 2)
-    yield _thin_out(surface, parameters)
-    context.progress(2, 2)
+    """Yield the cloud's Poisson surface in decimated pieces."""
+    along, noise = cloud_along(wall.cloud), _typical_sigma(wall.cloud)
+    first, last = float(along.nearest_mm.min()), float(along.farthest_mm.max())
+    cuts = piece_cuts(first, last, parameters.tile_mm, parameters.poisson_cell_mm)
+    allowance, open_borders = parameters.error_mm + parameters.noise_factor * noise, 0
+
+    reconstruct = partial(_reconstructed, parameters=parameters)
+    for done, (mesh, unjoined) in enumerate(joined_pieces(along, wall.axis, cuts, reconstruct), 1):
+        open_borders += unjoined
+        yield _thin_out(seen_part(mesh, parameters.poisson_reach_mm, allowance), parameters)
+        context.progress(done, len(cuts) - 1)
+    context.report("mesh: borders between pieces that do not meet", open_borders)
 
 
-def _reconstructed(wall: Wall, parameters: MeshParameters) -> Surface:
-    """Return the cloud's Poisson surface, made in a process of its own: it may crash or find no end."""
-    cloud = wall.cloud
-    allowance = parameters.error_mm + parameters.noise_factor * float(np.median(cloud.sigma_mm))
+def _reconstructed(cloud: PointCloud, parameters: MeshParameters) -> OpenMesh:
+    """Return a cloud's Poisson surface, made in a process of its own: it may crash or find no end."""
     xyz, normal = cloud.xyz_p.astype(float), cloud.normal_p.astype(float)
-    limits = parameters.poisson_cell_mm, parameters.poisson_reach_mm, allowance
+    limits = parameters.poisson_cell_mm, parameters.poisson_reach_mm
     try:
         return call_isolated(parameters.time_limit_s, poisson_surface, xyz, normal, *limits)
     except (TimeLimitError, CrashError) as error:
         hint = "set mesh.time_limit_s higher, or mesh.surface=grid, or mesh.poisson_cell_mm larger"
         raise UnusableError("mesh", f"screened Poisson: {error}", hint=hint) from error
+
+
+def _typical_sigma(cloud: PointCloud) -> float:
+    """Return the median 1 σ of a cloud, of a long one of some of its points."""
+    return float(np.median(cloud.sigma_mm[:: max(len(cloud.sigma_mm) // _SAMPLED_POINTS, 1)]))
 
 
 def _thin_out(surface: Surface, parameters: MeshParameters) -> Decimated:

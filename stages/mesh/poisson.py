@@ -5,18 +5,28 @@ M. Kazhdan, H. Hoppe, "Screened Poisson surface reconstruction", ACM TOG 2013, b
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.artefacts import PointCloud
+from pipeline.artefacts import PipeAxis, PointCloud
+from pipeline.cloud_along import CloudAlong
+from pipeline.geometry.axis import frames_at
 from pipeline.native import open3d
-from stages.mesh.surface import Face, Float, Surface
+from stages.mesh.clip import NO_CUT, NOTHING, OpenMesh, clip
+from stages.mesh.join import join
+from stages.mesh.surface import Float, Surface
 
 _NEIGHBOURS = 20
 _OUTLIER_SIGMA = 3.0
 _LARGEST_DEPTH = 10
+_BOX = 1.1  # the solver's box over the points'
 _AT_ONCE = 1 << 20
+_LEAST_POINTS = 100
+_APART_MM = 1.0  # farther apart than this, borders of two pieces are not of one wall
+OVERLAP_MM = 25.0
 
 
 def folded_cells(cloud: PointCloud, cell_mm: float, fold: float) -> int:
@@ -43,30 +53,66 @@ def folded_cells(cloud: PointCloud, cell_mm: float, fold: float) -> int:
     return int(np.count_nonzero(high - low > fold * radius))
 
 
-def poisson_surface(
-    xyz_p: Float, normal_p: Float, cell_mm: float, reach_mm: float, allowance_mm: float
-) -> Surface:
+def piece_cuts(first_mm: float, last_mm: float, tile_mm: float, cell_mm: float) -> Float:
+    """Return where along the pipe (n + 1,) a surface is cut: no piece outgrows the finest octree.
+
+    A deeper one would take more memory than a machine has; a longer piece would get larger cells.
+    """
+    finest = 2**_LARGEST_DEPTH * cell_mm / _BOX
+    longest = max(finest - 2 * OVERLAP_MM, tile_mm)
+    return np.linspace(first_mm, last_mm, max(1, int(np.ceil((last_mm - first_mm) / longest))) + 1)
+
+
+def joined_pieces(
+    along: CloudAlong, axis: PipeAxis, cuts_mm: Float, reconstruct: Callable[[PointCloud], OpenMesh]
+) -> Iterator[tuple[OpenMesh, int]]:
+    """Yield the surface from each of ``cuts_mm`` (n + 1,) to the next, neighbours joined without a gap.
+
+    Each comes with how many of the borders at its end could not be joined to the next one's. Two pieces are
+    held at a time.
+    """
+    before, border, last = NOTHING, NO_CUT, len(cuts_mm) - 2
+    for k, (start, end) in enumerate(pairwise(cuts_mm)):
+        cloud = along.between(start - OVERLAP_MM, end + OVERLAP_MM)
+        mesh = reconstruct(cloud) if len(cloud.frame) >= _LEAST_POINTS else NOTHING
+        if k > 0:
+            mesh, begin = clip(mesh, *_plane(axis, start, 1.0))
+            before, mesh, unjoined = join(before, border, mesh, begin, _APART_MM)
+            yield before, unjoined
+        if k < last:
+            mesh, border = clip(mesh, *_plane(axis, end, -1.0))
+        before = mesh
+    yield before, 0
+
+
+def _plane(axis: PipeAxis, distance_mm: float, way: float) -> tuple[Float, Float]:
+    """Return a point of the cross-section at a distance, and its normal along the pipe or against it."""
+    origin, rotation = frames_at(axis, np.array(distance_mm))
+    return origin, way * rotation[:, 2]
+
+
+def poisson_surface(xyz_p: Float, normal_p: Float, cell_mm: float, reach_mm: float) -> OpenMesh:
     """Return the screened Poisson surface of points (N, 3) with normals (N, 3) toward the inside.
 
-    Statistical outliers are left out first. Triangles further than ``reach_mm`` from every point are left
-    out last, so that what was not seen stays a hole.
+    Statistical outliers are left out first.
     """
     o3d = open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz_p))
     cloud.normals = o3d.utility.Vector3dVector(normal_p)
     cloud, _ = cloud.remove_statistical_outlier(_NEIGHBOURS, _OUTLIER_SIGMA)
     points = np.asarray(cloud.points)
-    depth = int(np.clip(np.ceil(np.log2(1.1 * np.ptp(points, axis=0).max() / cell_mm)), 5, _LARGEST_DEPTH))
+    depth = int(np.clip(np.ceil(np.log2(_BOX * np.ptp(points, axis=0).max() / cell_mm)), 5, _LARGEST_DEPTH))
     # One thread: with several the result depends on their timing.
     mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth, n_threads=1)
-    gap = cKDTree(points).query(np.asarray(mesh.vertices), distance_upper_bound=reach_mm)[0]
-    near = np.asarray(gap) <= reach_mm
-    return _part(np.asarray(mesh.vertices), np.asarray(mesh.triangles), near, allowance_mm)
+    vertex, far = np.asarray(mesh.vertices), 2 * reach_mm
+    gap = np.minimum(cKDTree(points).query(vertex, distance_upper_bound=far)[0], far)
+    return OpenMesh(vertex, gap, np.asarray(mesh.triangles, np.int64), np.zeros(len(vertex), bool))
 
 
-def _part(vertex: Float, face: Face, near: NDArray[np.bool_], allowance_mm: float) -> Surface:
-    """Return the faces whose corners are all near, vertices renumbered."""
-    used, compact = np.unique(face[near[face].all(1)], return_inverse=True)
-    count = len(used)
+def seen_part(mesh: OpenMesh, reach_mm: float, allowance_mm: float) -> Surface:
+    """Return the triangles within ``reach_mm`` of a measured point: what was not seen stays a hole."""
+    corners = mesh.face
+    whole = (np.roll(corners, 1, axis=1) != corners).all(1)
+    used, compact = np.unique(corners[whole & (mesh.gap_mm <= reach_mm)[corners].all(1)], return_inverse=True)
     corner = compact.reshape(-1, 3).astype(np.int32)
-    return Surface(vertex[used], corner, np.full(count, allowance_mm), np.zeros(count, bool))
+    return Surface(mesh.vertex_p[used], corner, np.full(len(used), allowance_mm), mesh.joined[used])

@@ -74,18 +74,20 @@ def smooth_photo(distance_from_mm: float = -2.0, length_mm: float = 60.0) -> Wal
     return WallTexture(bgra, distance_from_mm, 0.2, float(psi[0]), 2 * np.pi / columns)
 
 
-def tee(points: int = 24000) -> tuple[PointCloud, PipeAxis]:
-    """Cloud of a pipe of radius 25 mm with a branch of radius 12 mm toward +x at distance 25 mm."""
+def tee(points: int = 24000, length_mm: float = 50.0, noise_mm: float = 0.0) -> tuple[PointCloud, PipeAxis]:
+    """Cloud of a pipe of radius 25 mm with a branch of radius 12 mm toward +x in its middle."""
     random = np.random.default_rng(0)
-    psi, z = random.uniform(-np.pi, np.pi, points), random.uniform(0, 50, points)
+    psi, z = random.uniform(-np.pi, np.pi, points), random.uniform(0, length_mm, points)
+    middle = length_mm / 2
     run = np.stack([25 * np.cos(psi), 25 * np.sin(psi), z], -1)
-    mouth = (np.hypot(run[:, 1], z - 25) < 12) & (run[:, 0] > 0)
+    mouth = (np.hypot(run[:, 1], z - middle) < 12) & (run[:, 0] > 0)
     t, x = random.uniform(-np.pi, np.pi, points // 4), random.uniform(20, 42, points // 4)
-    branch = np.stack([x, 12 * np.sin(t), 25 + 12 * np.cos(t)], -1)
+    branch = np.stack([x, 12 * np.sin(t), middle + 12 * np.cos(t)], -1)
     beyond = np.hypot(branch[:, 0], branch[:, 1]) >= 25
     xyz = np.concatenate([run[~mouth], branch[beyond]])
     inward = [-run[~mouth] / 25 * [1, 1, 0], (np.stack([0 * t, -np.sin(t), -np.cos(t)], -1))[beyond]]
-    axis = straight_axis(-40.0, 120.0)
+    xyz = xyz + noise_mm * random.standard_normal(xyz.shape)
+    axis = straight_axis(-40.0, length_mm + 70.0)
     s, azimuth, r = to_pipe(axis, xyz)
     sigma, frame = np.full(len(s), 0.02), np.zeros(len(s), np.int64)
     columns = (xyz, np.concatenate(inward), sigma, r, s, azimuth)
