@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.artefacts import RingSamples, Trajectory, Wall
 from pipeline.findings import Defects
+from pipeline.geometry.axis import distance_along
 from pipeline.outcome import Number
 
 
@@ -37,8 +38,8 @@ def _of_rings(rings: RingSamples) -> Iterator[Number]:
 
 
 def _of_trajectory(trajectory: Trajectory) -> Iterator[Number]:
-    z = trajectory.T_pc[:, 2, 3]
-    yield Number("distance travelled", round(float(np.sum(np.abs(np.diff(z)))), 2), "mm")
+    distance_mm = distance_along(trajectory.axis, trajectory.T_pc)
+    yield Number("distance travelled", round(float(np.sum(np.abs(np.diff(distance_mm)))), 2), "mm")
     yield Number("relative 1 sigma of the distance scale", round(trajectory.scale_sigma, 6))
     yield Number("motion events", len(trajectory.events))
 

@@ -90,6 +90,11 @@ def to_pipe(axis: PipeAxis, xyz_p: Float) -> tuple[Float, Float, Float]:
     return s, np.arctan2(local[..., 1], local[..., 0]), np.hypot(local[..., 0], local[..., 1])
 
 
+def distance_along(axis: PipeAxis, T_pc: Float) -> Float:
+    """Return distances (...) of poses (..., 4, 4) along the axis; where a pipe bends these are not z in P."""
+    return to_pipe(axis, T_pc[..., :3, 3])[0]
+
+
 def _nearest(axis: PipeAxis, p: Float) -> Float:
     """Return the distance of the axis point nearest along the overall direction of the axis."""
     if len(axis.distance_mm) == 2:

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.artefacts import Trajectory, Wall
 from pipeline.findings import Defect
+from pipeline.geometry.axis import distance_along
 from pipeline.review.page import Card
 from pipeline.review.summary import RunSummary
 
@@ -85,7 +86,7 @@ def _measured(summary: RunSummary) -> Card:
 
 
 def _motion(trajectory: Trajectory) -> list[str]:
-    path = float(np.abs(np.diff(trajectory.T_pc[:, 2, 3])).sum())
+    path = float(np.abs(np.diff(distance_along(trajectory.axis, trajectory.T_pc))).sum())
     last = np.sqrt(np.maximum(np.diag(trajectory.covariance[-1]), 0))
     along = float(np.hypot(last[2], trajectory.scale_sigma * path))
     return [

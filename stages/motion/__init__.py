@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
+from pipeline.geometry.axis import distance_along
 from pipeline.instrument.probe import Probe
 from pipeline.recording.background import in_background
 from pipeline.recording.base import Illumination, Image, Recording
@@ -190,7 +191,9 @@ def _report(context: Context, estimate: RunEstimate, followed: Followed, traject
     context.report("median reprojection error", estimate.reprojection_px, "px")
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
-    context.report("distance travelled", float(np.ptp(trajectory.T_pc[:, 2, 3])), "mm")
+    context.report(
+        "distance travelled", float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc))), "mm"
+    )
     context.report("1 σ of distance at the end", float(np.sqrt(trajectory.covariance[-1, 2, 2])), "mm")
 
 

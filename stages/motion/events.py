@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import MotionEvent, Trajectory
+from pipeline.geometry.axis import distance_along
 from pipeline.recording.base import FrameTable
 from stages.motion.tracks import Course
 
@@ -22,7 +23,7 @@ def find_events(
     frames: FrameTable, trajectory: Trajectory, tracks: Course, slip: Float, has_encoder: bool
 ) -> tuple[MotionEvent, ...]:
     """Return the events in the order of their frames."""
-    z, t, f = trajectory.T_pc[:, 2, 3], frames.time_s, frames.frame
+    z, t, f = distance_along(trajectory.axis, trajectory.T_pc), frames.time_s, frames.frame
     if len(z) < 5:
         return ()
     speed = np.gradient(z, np.maximum.accumulate(t + 1e-9 * np.arange(len(t))))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts import PipeAxis
-from pipeline.geometry.axis import frames_at, from_pipe, to_pipe
+from pipeline.geometry.axis import distance_along, frames_at, from_pipe, to_pipe
 
 
 def arc_axis(curvature_per_mm: float) -> PipeAxis:
@@ -44,3 +44,12 @@ def test_frames_are_rotations_and_straight_beyond_the_ends() -> None:
     )
     np.testing.assert_allclose(np.linalg.det(frame), 1)
     assert np.linalg.norm(origin[0] - origin[1]) == pytest.approx(149.0, abs=0.01)
+
+
+def test_distance_of_poses_goes_round_a_bend() -> None:
+    axis = arc_axis(0.0105)  # half a turn and more: z in P comes back down
+    s = np.array([0.0, 100.0, 200.0, 290.0])
+    T_pc = np.tile(np.eye(4), (len(s), 1, 1))
+    T_pc[:, :3, 3] = from_pipe(axis, s, np.full(4, 0.7), np.full(4, 3.0))
+    np.testing.assert_allclose(distance_along(axis, T_pc), s, atol=1e-3)
+    assert T_pc[-1, 2, 3] < T_pc[1, 2, 3]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.artefacts import MotionEvent, Trajectory
-from pipeline.geometry.axis import straight_axis
+from pipeline.artefacts import MotionEvent, PipeAxis, Trajectory
+from pipeline.geometry.axis import axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events
 from stages.motion.tracks import Tracks
@@ -23,15 +23,15 @@ def events(
     slip: Float | None = None,
     lost: tuple[int, ...] = (),
     encoder: bool = True,
+    axis: PipeAxis | None = None,
 ) -> dict[str, MotionEvent]:
     n = len(z)
     t = np.arange(n) / RATE if time_s is None else time_s
     number = 10 + np.arange(n)
+    axis = straight_axis(-50, 200) if axis is None else axis
     T = np.tile(np.eye(4), (n, 1, 1))
-    T[:, 2, 3] = z
-    run = Trajectory(
-        number, t, T, np.zeros((n, 6, 6)), straight_axis(-50, 200), 50.0, 1.0, 0.0, 0.0, ()
-    )  # fmt: skip
+    T[:, :3, 3] = frames_at(axis, z)[0]
+    run = Trajectory(number, t, T, np.zeros((n, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
     none = np.zeros(0, np.int64)
     gone = np.zeros(n, bool)
     gone[list(lost)] = True
@@ -54,6 +54,12 @@ def with_steps(step: Float) -> Float:
 def test_steady_motion_has_no_events() -> None:
     creep = 0.002 * np.cumsum(np.random.default_rng(1).standard_normal(FRAMES))
     assert events(steady(), slip=creep) == {}
+
+
+def test_a_bend_past_a_right_angle_is_neither_stop_nor_reversal() -> None:
+    turn = np.linspace(0, 2.5, 200)
+    arc = 29.0 * np.stack([1 - np.cos(turn), 0 * turn, np.sin(turn)], -1)
+    assert events(steady(), axis=axis_through(arc, np.array([1.0, 0, 0]), 0.0)) == {}
 
 
 def test_stop_is_found() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.artefacts import RingSamples, Trajectory, WallTexture
 from pipeline.findings import DefectKind
+from pipeline.geometry.axis import distance_along
 from pipeline.model import Overlays
 from pipeline.review.comparison.changes import Change, changes
 from pipeline.review.comparison.growth import Resolution, Value
@@ -184,8 +185,8 @@ def _smoothing_mm(review: Review) -> float:
 def _ring_spacing_mm(review: Review) -> float:
     """Return the median distance between neighbouring rings; a triangle of that foot joins them."""
     trajectory, rings = review.files.artefact(Trajectory), review.files.artefact(RingSamples)
-    z = trajectory.T_pc[np.isin(trajectory.frame, rings.frame), 2, 3]
-    step = np.abs(np.diff(z))
+    of_rings = trajectory.T_pc[np.isin(trajectory.frame, rings.frame)]
+    step = np.abs(np.diff(distance_along(trajectory.axis, of_rings)))
     moving = step[step > 0]
     return float(np.median(moving)) if len(moving) else 0.0
 
