@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.bench_long_run OUT --metres 1,10,100
 
-Writes into OUT, per length, the scene (configs/scenes/pulled-4-inch.yaml made longer), the recording with its
+Writes into OUT, per length, the scene (pulled_4_inch.yaml made longer), the recording with its
 truth beside it (`boresight simulate`) and the run (`boresight run --config configs/long.yaml`); what is there
 already of scene and recording is kept. 100 m are 20 000 frames: about half an hour of rendering on one core
 and 7 GiB of memory, none of which counts. Nothing is extrapolated: a length that was not run has no line.
@@ -32,7 +32,7 @@ from tests.benchmarks.long_scene import lengthened
 from tests.benchmarks.watch import Watch
 
 ROOT = Path(__file__).resolve().parents[2]
-TEMPLATE, CONFIG = ROOT / "configs/scenes/pulled-4-inch.yaml", ROOT / "configs/long.yaml"
+TEMPLATE, CONFIG = Path(__file__).with_name("pulled_4_inch.yaml"), ROOT / "configs/long.yaml"
 _ENDED = re.compile(r" INFO stage \w+ (?:completed|reused)")
 _STARTS = re.compile(r" INFO stage (\w+) starts")
 

@@ -13,12 +13,15 @@ import pytest
 
 from pipeline.errors import InputError
 from pipeline.geometry.axis import from_pipe
+from pipeline.simulator.wall import relief
 from pipeline.simulator.wall.base import Wall
 from pipeline.simulator.wall.build import build_wall
 from pipeline.simulator.wall.description import Bend, Pipe
 from pipeline.simulator.wall.facts import facts_of
 from pipeline.simulator.wall.grid import grid_over
 from pipeline.simulator.wall.noise import above_share, field
+from pipeline.simulator.wall.relief import coarse_field
+from pipeline.simulator.wall.seeds import Seeds
 from pipeline.simulator.wall.shape import bore_radius
 
 HERE = Path()
@@ -261,3 +264,21 @@ def test_cells_of_relief_do_not_change_the_shape() -> None:
     index = np.rint((grid.distance_mm - fine.shape.distance_from_mm) / fine.shape.step_mm).astype(int)
     inside = index < fine.shape.rows
     assert fine.radius_mm[index[inside]].mean(1) == pytest.approx(coarse.radius_mm[inside].mean(1), abs=1e-4)
+
+
+def test_stains_of_a_pipe_longer_than_a_picture_may_be_are_those_of_its_parts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    grid, seeds = grid_over((-20.0, 180.0), 20.0, 0.1), Seeds(3)
+    whole = coarse_field(grid, seeds.of("rust"), 30.0)
+    monkeypatch.setattr(relief, "_MOST_ROWS", 170)
+    parts = coarse_field(grid, seeds.of("rust"), 30.0)
+    # OpenCV interpolates at 32nds of a cell
+    assert np.abs(parts - whole).max() < np.abs(np.diff(whole, axis=0)).max() / 10
+
+
+def test_stains_are_laid_out_over_more_rows_than_a_picture_may_have() -> None:
+    grid = grid_over((0.0, 40_000.0), 2.5, 1.0)
+    stains = coarse_field(grid, Seeds(3).of("rust"), 200.0)
+    assert stains.shape == grid.shape and len(stains) > 32_767
+    assert stains[-1000:].std() > 0.1
