@@ -5,7 +5,7 @@ from stages.texture.texture import TextureParameters, photograph_wall
 
 TEXTURE = Stage(
     "texture",
-    "2",
+    "3",
     TextureParameters,
     photograph_wall,
     "lit frames to the wall's reflectance as a flat picture, light divided out",
