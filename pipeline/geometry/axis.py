@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -9,6 +10,7 @@ from scipy.spatial import cKDTree
 from pipeline.artefacts import PipeAxis
 
 Float = NDArray[np.float64]
+_STEPS, _NEAR_MM = 6, 1e-7
 
 
 def straight_axis(distance_from_mm: float, distance_to_mm: float) -> PipeAxis:
@@ -54,15 +56,9 @@ def frames_at(axis: PipeAxis, distance_mm: Float) -> tuple[Float, Float]:
     Linear between the axis' points and straight beyond its ends.
     """
     s = np.asarray(distance_mm, float)
-    k = np.clip(np.searchsorted(axis.distance_mm, s) - 1, 0, len(axis.distance_mm) - 2)
-    span = axis.distance_mm[k + 1] - axis.distance_mm[k]
-    w = (s - axis.distance_mm[k]) / span
-    inside = np.clip(w, 0, 1)[..., None, None]
-    rotation = _orthonormal((1 - inside) * axis.R_pa[k] + inside * axis.R_pa[k + 1])
-    chord = axis.origin_p[k + 1] - axis.origin_p[k]
-    origin = axis.origin_p[k] + np.clip(w, 0, 1)[..., None] * chord
-    beyond = (w - np.clip(w, 0, 1)) * span
-    return origin + beyond[..., None] * rotation[..., :, 2], rotation
+    origin, rotation = np.empty((s.size, 3)), np.empty((s.size, 3, 3))
+    _frames(axis.distance_mm, axis.origin_p, axis.R_pa, s.ravel(), origin, rotation)
+    return origin.reshape(*s.shape, 3), rotation.reshape(*s.shape, 3, 3)
 
 
 def from_pipe(axis: PipeAxis, distance_mm: Float, azimuth_rad: Float, radius_mm: Float) -> Float:
@@ -80,14 +76,11 @@ def to_pipe(axis: PipeAxis, xyz_p: Float) -> tuple[Float, Float, Float]:
     point; this converges where the radius of curvature exceeds the point's distance from the axis.
     """
     p = np.asarray(xyz_p, float)
-    s = _nearest(axis, p)
-    for _ in range(6):
-        origin, rotation = frames_at(axis, s)
-        local = np.einsum("...ji,...j->...i", rotation, p - origin)
-        s = s + local[..., 2]
-        if not np.any(np.abs(local[..., 2]) > 1e-7):
-            break
-    return s, np.arctan2(local[..., 1], local[..., 0]), np.hypot(local[..., 0], local[..., 1])
+    s = np.array(_nearest(axis, p), float).ravel()
+    psi, radius = np.empty_like(s), np.empty_like(s)
+    _locate(axis.distance_mm, axis.origin_p, axis.R_pa, p.reshape(-1, 3), s, psi, radius)
+    shape = p.shape[:-1]
+    return s.reshape(shape), psi.reshape(shape), radius.reshape(shape)
 
 
 def distance_along(axis: PipeAxis, T_pc: Float) -> Float:
@@ -105,9 +98,56 @@ def _nearest(axis: PipeAxis, p: Float) -> Float:
     return np.asarray(axis.distance_mm[index].reshape(p.shape[:-1]))
 
 
-def _orthonormal(m: Float) -> Float:
-    """Return the frames with z kept and x made square to it."""
-    z = m[..., :, 2] / np.linalg.norm(m[..., :, 2], axis=-1, keepdims=True)
-    x = m[..., :, 0] - z * np.sum(z * m[..., :, 0], -1, keepdims=True)
-    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], -1)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _frames(distance, origin, rotation, s, out_origin, out_rotation):  # type: ignore[no-untyped-def]
+    """Write the axis' point and section frame at every distance ``s`` (N,)."""
+    for n in range(len(s)):
+        _frame(distance, origin, rotation, s[n], out_origin[n], out_rotation[n])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _frame(distance, origin, rotation, s, o, m):  # type: ignore[no-untyped-def]
+    """Write point ``o`` (3,) and frame ``m`` (3, 3): z is kept, x made square to it."""
+    k = min(max(np.searchsorted(distance, s) - 1, 0), len(distance) - 2)
+    span = distance[k + 1] - distance[k]
+    w = (s - distance[k]) / span
+    inside = min(max(w, 0.0), 1.0) if w == w else w
+    for i in range(3):
+        o[i] = origin[k, i] + inside * (origin[k + 1, i] - origin[k, i])
+        m[i, 0] = (1 - inside) * rotation[k, i, 0] + inside * rotation[k + 1, i, 0]
+        m[i, 2] = (1 - inside) * rotation[k, i, 2] + inside * rotation[k + 1, i, 2]
+    _normalise(m, 2)
+    along = m[0, 0] * m[0, 2] + m[1, 0] * m[1, 2] + m[2, 0] * m[2, 2]
+    for i in range(3):
+        m[i, 0] -= along * m[i, 2]
+    _normalise(m, 0)
+    m[0, 1] = m[1, 2] * m[2, 0] - m[2, 2] * m[1, 0]
+    m[1, 1] = m[2, 2] * m[0, 0] - m[0, 2] * m[2, 0]
+    m[2, 1] = m[0, 2] * m[1, 0] - m[1, 2] * m[0, 0]
+    for i in range(3):
+        o[i] += (w - inside) * span * m[i, 2]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _normalise(m, column):  # type: ignore[no-untyped-def]
+    length = np.sqrt(m[0, column] ** 2 + m[1, column] ** 2 + m[2, column] ** 2)
+    for i in range(3):
+        m[i, column] /= length
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _locate(distance, origin, rotation, p, s, psi, radius):  # type: ignore[no-untyped-def]
+    """Improve distances ``s`` (N,) of points (N, 3) in place; write their azimuths and radii."""
+    o, m = np.empty(3), np.empty((3, 3))
+    for n in range(len(s)):
+        x, y = 0.0, 0.0
+        for _ in range(_STEPS):
+            _frame(distance, origin, rotation, s[n], o, m)
+            dx, dy, dz = p[n, 0] - o[0], p[n, 1] - o[1], p[n, 2] - o[2]
+            x = m[0, 0] * dx + m[1, 0] * dy + m[2, 0] * dz
+            y = m[0, 1] * dx + m[1, 1] * dy + m[2, 1] * dz
+            ahead = m[0, 2] * dx + m[1, 2] * dy + m[2, 2] * dz
+            s[n] += ahead
+            if not abs(ahead) > _NEAR_MM:
+                break
+        psi[n], radius[n] = np.arctan2(y, x), np.hypot(x, y)
