@@ -1,6 +1,6 @@
 """Screened Poisson surface of a cloud, for walls that are not a function of distance and azimuth.
 
-M. Kazhdan, H. Hoppe, "Screened Poisson surface reconstruction", ACM TOG 2013, by open3d.
+M. Kazhdan, H. Hoppe, "Screened Poisson surface reconstruction", ACM TOG 2013, by pymeshlab.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
+import pymeshlab
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.artefacts import PipeAxis, PointCloud
@@ -23,6 +25,8 @@ _NEIGHBOURS = 20
 _OUTLIER_SIGMA = 3.0
 _LARGEST_DEPTH = 10
 _BOX = 1.1  # the solver's box over the points'
+# Points are measured to a small part of a cell: the surface is held to them more than by the usual 4.
+_POINT_WEIGHT = 10.0
 _AT_ONCE = 1 << 20
 _LEAST_POINTS = 100
 _APART_MM = 1.0  # farther apart than this, borders of two pieces are not of one wall
@@ -96,17 +100,26 @@ def poisson_surface(xyz_p: Float, normal_p: Float, cell_mm: float, reach_mm: flo
 
     Statistical outliers are left out first.
     """
+    kept = _without_outliers(xyz_p)
+    points = xyz_p[kept]
+    depth = int(np.clip(np.ceil(np.log2(_BOX * np.ptp(points, axis=0).max() / cell_mm)), 5, _LARGEST_DEPTH))
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(points, v_normals_matrix=normal_p[kept]))
+    # One thread: with several the result depends on their timing.
+    meshes.generate_surface_reconstruction_screened_poisson(
+        depth=depth, scale=_BOX, pointweight=_POINT_WEIGHT, threads=1
+    )
+    mesh = meshes.current_mesh()
+    vertex, far = mesh.vertex_matrix(), 2 * reach_mm
+    gap = np.minimum(cKDTree(points).query(vertex, distance_upper_bound=far)[0], far)
+    return OpenMesh(vertex, gap, mesh.face_matrix().astype(np.int64), np.zeros(len(vertex), bool))
+
+
+def _without_outliers(xyz_p: Float) -> NDArray[np.int64]:
     o3d = open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz_p))
-    cloud.normals = o3d.utility.Vector3dVector(normal_p)
-    cloud, _ = cloud.remove_statistical_outlier(_NEIGHBOURS, _OUTLIER_SIGMA)
-    points = np.asarray(cloud.points)
-    depth = int(np.clip(np.ceil(np.log2(_BOX * np.ptp(points, axis=0).max() / cell_mm)), 5, _LARGEST_DEPTH))
-    # One thread: with several the result depends on their timing.
-    mesh, _ = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth, n_threads=1)
-    vertex, far = np.asarray(mesh.vertices), 2 * reach_mm
-    gap = np.minimum(cKDTree(points).query(vertex, distance_upper_bound=far)[0], far)
-    return OpenMesh(vertex, gap, np.asarray(mesh.triangles, np.int64), np.zeros(len(vertex), bool))
+    _, kept = cloud.remove_statistical_outlier(_NEIGHBOURS, _OUTLIER_SIGMA)
+    return np.asarray(kept, np.int64)
 
 
 def seen_part(mesh: OpenMesh, reach_mm: float, allowance_mm: float) -> Surface:

@@ -110,8 +110,9 @@ def test_the_surface_is_that_of_one_piece():
         return np.quantile(far, [0.5, 0.99, 0.9999])
 
     whole, cut = misfit(pieces(0.0, LENGTH)[0]), misfit(pieces(0.0, 60.0, LENGTH)[0])
-    # noise of 0.05 mm is what points lie off either surface
-    assert np.all(np.abs(cut - whole) < [0.01, 0.05, 0.3])
+    # noise of 0.05 mm is what points lie off either surface; at the branch's edge a quarter of a cell, as
+    # the octrees of the pieces do not share theirs
+    assert np.all(np.abs(cut - whole) < [0.01, 0.05, CELL / 4])
 
 
 def test_triangles_at_a_joint_are_turned_as_all_others():
