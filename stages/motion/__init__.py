@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -13,31 +12,31 @@ from pipeline.artefacts import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along
 from pipeline.instrument.probe import Probe
-from pipeline.recording.background import in_background
-from pipeline.recording.base import Illumination, Image, Recording
+from pipeline.recording.base import Recording
 from pipeline.stage import Context, Stage
 from stages.motion.encoder import contradicted, encoder_at_frames
 from stages.motion.events import find_events
+from stages.motion.loops import close_loops
 from stages.motion.output import trajectory_of
 from stages.motion.parameters import MotionParameters
+from stages.motion.places import Passage, Signs, bands_in_rings, texture_at
 from stages.motion.prediction import Predictor
 from stages.motion.sections import at_all_frames, ring_centres
 from stages.motion.sliding import RunEstimate, adjust_run
 from stages.motion.state import EncoderReadings
 from stages.motion.stated import report_instrument
-from stages.motion.strip import StripGrid, softened
+from stages.motion.strip import StripGrid
 from stages.motion.submaps import Estimate
 from stages.motion.tracking import Followed, TextureTracker, track_texture
 from stages.motion.tracks import Course, Tracks
+from stages.motion.view import WallView
 from stages.motion.windows import MeasuredRun
 
 __all__ = ["MOTION", "MotionParameters", "estimate_motion"]
 
 Float = NDArray[np.float64]
 _LARGEST_CHANGE = 0.1
-_BLUE, _RED = 0, 2
-_YELLOW_NM = 575.0
-_AHEAD = 4
+_AT_ONCE = 1 << 16
 
 
 def estimate_motion(
@@ -52,7 +51,8 @@ def estimate_motion(
 
     Texture tracks are landmarks on the wall; rings lie on the wall; the encoder has a scale and slips; the
     motion is smooth; the axis bends as little as it may; the instrument is as stated within its uncertainty.
-    All of it is one least-squares problem with robust weights; a long run is a chain of them.
+    All of it is one least-squares problem with robust weights; a long run is a chain of them, whose loops are
+    closed where the probe passes a wall again.
 
     Raises
     ------
@@ -64,19 +64,26 @@ def estimate_motion(
     encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
     all_centres = at_all_frames(_index_of(recording, points.frame), centre_c, len(recording.frames.frame))
     predictor = Predictor(recording.frames.time_s, encoder, all_centres)
-    followed = _followed(recording, probe, grid, predictor, parameters, context)
+    view = WallView(recording, probe, grid)
+    followed = _followed(view, predictor, parameters, context)
     if encoder is not None and contradicted(encoder, followed, context):
         encoder, predictor = None, Predictor(recording.frames.time_s, None, all_centres)
-        followed = _followed(recording, probe, grid, predictor, parameters, context)
+        followed = _followed(view, predictor, parameters, context)
     _require_distance(followed, encoder)
     place = _index_of(recording, rings.frame)
     unsure = probe.principal_uncertainties()
     T_pc = predictor.between(followed.frames, followed.T_pc, len(recording.frames.frame))
     run = MeasuredRun(followed, rings, place, recording.frames.time_s, T_pc, encoder, probe, unsure)
     estimate = adjust_run(run, parameters, partial(_require_pipe, radius_mm), context.progress)
-    trajectory = trajectory_of(estimate.joined, recording.frames, probe, unsure, encoder is not None)
-    events = find_events(recording.frames, trajectory, followed, estimate.joined.slip, encoder is not None)
+    distance = distance_along(estimate.joined.axis, estimate.joined.T_pc)
+    passage = Passage.of(followed.frames, distance[followed.frames], grid.near_mm, grid.far_mm)
+    at_rings = distance[_index_of(recording, points.frame)] + probe.laser.baseline_mm
+    signs = partial(_signs, followed, points, at_rings)
+    joined, loops = close_loops(estimate.joined, passage, signs, view, parameters, context.scratch)
+    trajectory = trajectory_of(joined, recording.frames, probe, unsure, encoder is not None)
+    events = find_events(recording.frames, trajectory, followed, joined.slip, encoder is not None)
     _report(context, estimate, followed, trajectory)
+    loops.report(context)
     report_instrument(probe, trajectory, context)
     return replace(trajectory, events=events)
 
@@ -114,38 +121,23 @@ def _tracked(
     context: Context,
 ) -> Tracks:
     """Return the tracks of a whole recording at once."""
-    followed = _followed(recording, probe, grid, predictor, parameters, context)
+    followed = _followed(WallView(recording, probe, grid), predictor, parameters, context)
     return followed.between(0, len(recording.frames.frame))
 
 
 def _followed(
-    recording: Recording,
-    probe: Probe,
-    grid: StripGrid,
-    predictor: Predictor,
-    parameters: MotionParameters,
-    context: Context,
+    view: WallView, predictor: Predictor, parameters: MotionParameters, context: Context
 ) -> Followed:
-    lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
-    both = bool(np.any(recording.frames.illumination == Illumination.BOTH.value))
-    # The line is a few σ wide on the wall; its glow is a slope that the normalisation takes out.
-    half = 12 * probe.laser.line_sigma_mm if both else 0.0
-    blocked = (probe.laser.baseline_mm - half, probe.laser.baseline_mm + half)
-    tracker = TextureTracker(probe, grid, parameters, blocked, context.scratch)
-    # Softened on another thread while the picture before is followed.
-    images = in_background(_wall_images(recording, lit, both, probe), _AHEAD)
-    placed = ((int(np.searchsorted(recording.frames.frame, frame)), image) for frame, image in images)
-    return track_texture(placed, predictor, tracker, lambda done: context.progress(done, len(lit)))
+    tracker = TextureTracker(view.probe, view.grid, parameters, view.blocked_mm, context.scratch)
+    lit = view.lit
+    return track_texture(view.images(lit), predictor, tracker, lambda done: context.progress(done, len(lit)))
 
 
-def _wall_images(
-    recording: Recording, lit: NDArray[np.int64], both: bool, probe: Probe
-) -> Iterator[tuple[int, Image | None]]:
-    """Yield the lit frames' softened grey pictures; with the laser on, the colour its light reaches least."""
-    channel = _RED if probe.laser.wavelength_nm < _YELLOW_NM else _BLUE
-    for frame, image in recording.read(lit, "bgr" if both else "grey"):
-        grey = image if image is None or not both else np.ascontiguousarray(image[..., channel])
-        yield frame, None if grey is None else softened(grey)
+def _signs(followed: Followed, points: RingPoints, ring_distance_mm: Float, passage: Passage) -> Signs:
+    """Return what makes the wall of a passage easy to recognise; rings (F,) lie at these distances."""
+    observations = followed.store.spool.parts(_AT_ONCE)
+    bands_mm = bands_in_rings(ring_distance_mm, ring_centres(points)[1])
+    return Signs(texture_at(passage.frame, observations), bands_mm)
 
 
 def _require_distance(tracks: Course, encoder: EncoderReadings | None) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts import PipeAxis
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
+from stages.motion.chain import Chain, Link, interpolated
 from stages.motion.state import AXIS_STEP_MM
 from stages.motion.submaps import Settled, Submap, carried
 from stages.motion.terms import ORIGIN_SIGMA
@@ -28,6 +29,8 @@ class Joined:
 
     Attributes
     ----------
+    submaps : tuple of Submap
+        Its windows, each in a frame of its own.
     T_pc : (N, 4, 4)
     slip : (N,)
     axis : PipeAxis
@@ -38,6 +41,7 @@ class Joined:
         Encoder scale and instrument.
     """
 
+    submaps: tuple[Submap, ...]
     T_pc: Float
     slip: Float
     axis: PipeAxis
@@ -48,7 +52,7 @@ class Joined:
 
 
 @dataclass(frozen=True)
-class _Laid:
+class Laid:
     """A submap's poses and slip in the first window's frame, and how its own frame and distance lie."""
 
     submap: Submap
@@ -69,9 +73,7 @@ def join(submaps: Sequence[Submap], settled: Settled) -> Joined:
     Neighbouring windows see much the same in the frames they share, so these agree to a fraction of their σ:
     poses go over from one window to the other gradually, along the middle of the shared frames.
     """
-    laid = [_Laid(submaps[0], submaps[0].T_pc, submaps[0].slip, np.eye(4), 0.0)]
-    for submap in submaps[1:]:
-        laid.append(_laid_on(laid[-1], submap))
+    laid = lay(submaps)
     frames = submaps[-1].window.last
     T_pc, slip = np.zeros((frames, 4, 4)), np.zeros(frames)
     for part in laid:
@@ -81,12 +83,36 @@ def join(submaps: Sequence[Submap], settled: Settled) -> Joined:
     variance = float(np.mean([s.radius_variance for s in submaps])) / len(submaps)
     variance += float(response @ settled.covariance @ response)
     return Joined(
-        T_pc, slip, _one_axis(laid), _covariance(laid, settled), float(radius), float(np.sqrt(variance)),
-        settled,
+        tuple(submaps), T_pc, slip, one_axis(laid), _covariance(laid, settled), float(radius),
+        float(np.sqrt(variance)), settled,
     )  # fmt: skip
 
 
-def _laid_on(before: _Laid, submap: Submap) -> _Laid:
+def lay(submaps: Sequence[Submap]) -> list[Laid]:
+    """Return every window laid on the one before it."""
+    laid = [Laid(submaps[0], submaps[0].T_pc, submaps[0].slip, np.eye(4), 0.0)]
+    for submap in submaps[1:]:
+        laid.append(_laid_on(laid[-1], submap))
+    return laid
+
+
+def chain_of(laid: Sequence[Laid], settled: Settled) -> Chain:
+    """Return how errors run on through windows as they are laid."""
+    links: list[Link] = []
+    before = np.zeros((6, len(settled.value)))
+    for part in laid:
+        own, place = part.submap, part.submap.some
+        turn = np.eye(6)
+        turn[:3, :3] = part.T_ow[:3, :3]
+        carry = carried(part.T_pc[place], part.T_pc[own.anchor])
+        joint = np.einsum("ij,ajbk,lk->aibl", turn, own.joint, turn)
+        response = carry @ before + turn @ own.response
+        links.append(Link(own.window.first + place, carry, joint, response))
+        before = response[-1]
+    return Chain(tuple(links), np.diag(ORIGIN_SIGMA**2), settled.covariance)
+
+
+def _laid_on(before: Laid, submap: Submap) -> Laid:
     first, last = submap.window.first, before.submap.window.last
     middle = seam(before.submap.window, submap.window)
     weight = _hat(np.arange(first, last), middle, _SEAM_SHARE * (last - first) / 2)
@@ -98,10 +124,10 @@ def _laid_on(before: _Laid, submap: Submap) -> _Laid:
     slip = submap.slip + np.average(old_slip - submap.slip[: last - first], weights=weight)
     there = _distance_of(before, old[at])
     distance = there - float(to_pipe(submap.axis, new[at][:3, 3])[0])
-    return _Laid(submap, T_ow @ submap.T_pc, slip, T_ow, distance)
+    return Laid(submap, T_ow @ submap.T_pc, slip, T_ow, distance)
 
 
-def _distance_of(laid: _Laid, T_pc: Float) -> float:
+def _distance_of(laid: Laid, T_pc: Float) -> float:
     own = inverse(laid.T_ow) @ T_pc
     return laid.distance_mm + float(to_pipe(laid.submap.axis, own[:3, 3])[0])
 
@@ -118,7 +144,7 @@ def _mean_step(old: Float, new: Float, weight: Float) -> Float:
     return from_parts(rotation, np.average(shift, axis=0, weights=weight))
 
 
-def _write(part: _Laid, T_pc: Float, slip: Float) -> None:
+def _write(part: Laid, T_pc: Float, slip: Float) -> None:
     """Write a window's poses behind those of the windows before, over which it gains weight gradually."""
     window = part.submap.window
     mine = slice(window.first, window.last)
@@ -141,7 +167,7 @@ def _between(old: Float, new: Float, share: Float) -> Float:
     return np.where(whole[:, None, None], new, from_parts(rotation, origin))
 
 
-def _one_axis(laid: Sequence[_Laid]) -> PipeAxis:
+def one_axis(laid: Sequence[Laid]) -> PipeAxis:
     """Return the mean of all windows' axes, each weighing most in the middle of the wall it saw."""
     if len(laid) == 1:
         return laid[0].submap.axis
@@ -161,7 +187,7 @@ def _one_axis(laid: Sequence[_Laid]) -> PipeAxis:
     return axis_through(origin, laid[0].submap.axis.R_pa[0, :, 0], float(first))
 
 
-def _covariance(laid: Sequence[_Laid], settled: Settled) -> Float:
+def _covariance(laid: Sequence[Laid], settled: Settled) -> Float:
     """Return (N, 6, 6): errors go on from anchor to anchor, those of the shared numbers alike in all."""
     frames = laid[-1].submap.window.last
     at: list[Int] = []
@@ -178,12 +204,4 @@ def _covariance(laid: Sequence[_Laid], settled: Settled) -> Float:
         at.append(own.window.first + place)
         values.append(random + response @ settled.covariance @ np.swapaxes(response, 1, 2))
         start, start_response = random[-1], response[-1]
-    return _interpolated(np.arange(frames), np.concatenate(at), np.concatenate(values))
-
-
-def _interpolated(wanted: Int, at: Int, value: Float) -> Float:
-    """Return values (N, 6, 6), linear between those at places (K,) in ascending order."""
-    right = np.clip(np.searchsorted(at, wanted), min(1, len(at) - 1), len(at) - 1)
-    left = np.maximum(right - 1, 0)
-    weight = ((wanted - at[left]) / np.maximum(at[right] - at[left], 1))[:, None, None]
-    return np.asarray(value[left] * (1 - weight) + value[right] * weight)
+    return interpolated(np.arange(frames), np.concatenate(at), np.concatenate(values))

@@ -69,3 +69,15 @@ class MotionParameters(Parameters):
     overlap_frames: int = Field(
         200, ge=10, le=10000, description="frames that neighbouring windows share at least"
     )
+    loop_spacing_mm: float = Field(
+        100.0,
+        ge=10,
+        le=100000,
+        description="spacing, mm, of places at which a wall passed again is compared with what was seen",
+    )
+    most_loops: int = Field(
+        100,
+        ge=0,
+        le=1000,
+        description="most places in a run at which a wall passed again is compared; 0: none",
+    )

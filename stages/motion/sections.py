@@ -13,7 +13,7 @@ from stages.motion.terms import RingBins
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 _FEWEST = 0.3
-_CORRELATED_FRAMES = 4.0
+CORRELATED_FRAMES = 4.0
 _AT_ONCE = 256
 
 
@@ -83,7 +83,7 @@ def ring_bins(rings: RingSamples, probe: Probe, unsure: Float, bins: int, wall_s
     uv = rings.centre_px + mean[:, None] * outward
     by_pixel, by_parameters = probe.triangulate_jacobian(uv)
     noise_mm = np.linalg.norm(np.einsum("mij,mj->mi", by_pixel, outward), axis=1) * noise_px
-    sigma = np.sqrt(_CORRELATED_FRAMES * wall_sigma_mm**2 + noise_mm**2)
+    sigma = np.sqrt(CORRELATED_FRAMES * wall_sigma_mm**2 + noise_mm**2)
     frame = np.broadcast_to(rings.frame[:, None], keep.shape)[keep]
     xyz_c = probe.triangulate(uv)
     ok = np.isfinite(xyz_c).all(1)

@@ -78,8 +78,8 @@ class Submap:
         Frame of the window from which errors are counted.
     some : (k,) int
         Frames of the window whose errors are known; between them they hardly differ.
-    covariance : (k, 6, 6)
-        Of their errors since the anchor, the shared numbers as they are.
+    joint : (k, 6, k, 6)
+        Covariance of their errors since the anchor, the shared numbers as they are.
     response : (k, 6, S)
         Change of their poses since the anchor with the shared numbers.
     radius_variance : float
@@ -94,10 +94,16 @@ class Submap:
     radius_mm: float
     anchor: int
     some: Int
-    covariance: Float
+    joint: Float
     response: Float
     radius_variance: float
     radius_response: Float
+
+    @property
+    def covariance(self) -> Float:
+        """Return the covariance (k, 6, 6) of each frame's error since the anchor."""
+        each = np.arange(len(self.some))
+        return np.asarray(self.joint[each, :, each])
 
 
 def estimated(start: State, measured: Measurements, parameters: MotionParameters) -> Estimate:
@@ -181,11 +187,11 @@ def submap_of(estimate: Estimate, window: Window, anchor: int, last: int, window
     by_shared, border_by_shared = factor.response(which)
     shared, T_pc = border[np.ix_(which, which)], state.T_pc[some]
     response = _since_first(by_shared[some, :6], T_pc)
-    covariance = _relative(factor.joint_covariance(some)[:, :6, :, :6], T_pc)
-    covariance -= response @ shared @ np.swapaxes(response, 1, 2)
+    joint = _relative(factor.joint_covariance(some)[:, :6, :, :6], T_pc)
+    joint -= np.swapaxes(response[:, None] @ shared @ np.swapaxes(response, 1, 2), 1, 2)
     radius = border_by_shared[0]
     return Submap(
-        window, state.T_pc, state.slip, state.axis, float(state.globals[0]), anchor, some, covariance,
+        window, state.T_pc, state.slip, state.axis, float(state.globals[0]), anchor, some, joint,
         response, max(float(border[0, 0] - radius @ shared @ radius), 0.0), radius,
     )  # fmt: skip
 
@@ -210,13 +216,13 @@ def _since_first(change: Float, T_pc: Float) -> Float:
 
 
 def _relative(joint: Float, T_pc: Float) -> Float:
-    """Return the covariances (k, 6, 6) of poses as seen from the first, of joint ones (k, 6, k, 6)."""
-    each, carry = np.arange(len(T_pc)), carried(T_pc, T_pc[0])
+    """Return the covariances (k, 6, k, 6) of poses as seen from the first, of joint ones (k, 6, k, 6)."""
+    carry = carried(T_pc, T_pc[0])
     back = np.swapaxes(carry, 1, 2)
-    cross = np.swapaxes(joint[:, :, 0], 1, 2)  # (k, anchor's 6, frame's 6)
-    both = carry @ cross
-    out = joint[each, :, each] + carry @ joint[0, :, 0] @ back - both - np.swapaxes(both, 1, 2)
-    return np.asarray(out)
+    with_first = carry[:, None] @ np.swapaxes(joint[:, :, 0], 1, 2)  # (k, k, first's 6, frame's 6)
+    out = np.swapaxes(joint, 1, 2) + carry[:, None] @ joint[0, :, 0] @ back
+    out = out - with_first - np.swapaxes(np.swapaxes(with_first, 0, 1), 2, 3)
+    return np.swapaxes(out, 1, 2)
 
 
 @contextmanager

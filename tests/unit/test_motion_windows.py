@@ -103,7 +103,8 @@ def submaps(T_pc: Float, axis: PipeAxis, windows: tuple[Window, ...]) -> list[Su
         anchor = 0 if k == 0 else seam(windows[k - 1], window) - window.first
         end = window.frames - 1 if k + 1 == len(windows) else seam(window, windows[k + 1]) - window.first
         some = np.unique(np.linspace(anchor, end, 4).astype(int))
-        covariance = np.stack([1e-4 * (s - anchor) * np.eye(6) for s in some])
+        together = 1e-4 * np.minimum.outer(some - anchor, some - anchor)
+        joint = together[:, None, :, None] * np.eye(6)[None, :, None, :]
         found.append(
             Submap(
                 window,
@@ -113,7 +114,7 @@ def submaps(T_pc: Float, axis: PipeAxis, windows: tuple[Window, ...]) -> list[Su
                 50.0,
                 anchor,
                 some,
-                covariance,
+                joint,
                 np.zeros((len(some), 6, SHARED)),
                 0.01,
                 np.zeros(SHARED),

@@ -1,0 +1,222 @@
+"""Whether two unrolled strips show the same wall, and by how much it lies elsewhere in the later one.
+
+First all shifts within reach are tried at half resolution by normalised correlation of what is usable in both
+(D. Padfield, "Masked object registration in the Fourier domain", 2012); then patches are matched one by one.
+The wall is the same where most patches are found and move alike, and no other shift fits nearly as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft2, rfft2
+
+from stages.motion.matching import cut, match
+from stages.motion.parameters import MotionParameters
+from stages.motion.strip import Strip
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+_LEAST_OVERLAP = 0.3
+_MOST_RIVAL = 0.75
+_FEWEST_SPOTS = 30
+_FEWEST_AGREE = 0.5
+_ALIKE_PX = 1.5
+_LEAN_PX = 3.0
+_LEAST_SIGMA_PX = 0.05
+
+
+class Verdict(Enum):
+    """What comparing two strips says; the value is for people."""
+
+    SAME = "the same wall"
+    PLAIN = "too little texture"
+    ALIKE = "the wall looks alike elsewhere too"
+    OTHER = "the wall is not recognised"
+    UNREAD = "a frame could not be read"
+    CONTRADICTED = "contradicted by the motion or by other places"
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What is kept of a strip: its first row and its contrast (H, W), NaN where unusable."""
+
+    first_row: int
+    contrast: Float32
+
+    @property
+    def usable(self) -> Mask:
+        """Return where (H, W) the wall is seen."""
+        return np.isfinite(self.contrast)
+
+    @staticmethod
+    def of(strip: Strip) -> Piece:
+        """Return what is kept of a strip."""
+        return Piece(strip.first_row, np.where(strip.usable, strip.contrast, np.float32(np.nan)))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Verdict, and by how many rows and columns (2,) the wall lies further in the later strip, with 1 σ."""
+
+    verdict: Verdict
+    shift: Float
+    sigma: Float
+
+    @staticmethod
+    def refused(verdict: Verdict) -> Comparison:
+        """Return a comparison without a shift."""
+        return Comparison(verdict, np.full(2, np.nan), np.full(2, np.nan))
+
+
+@dataclass(frozen=True)
+class _Peak:
+    """A shift (2,) of an earlier strip at which it correlates well."""
+
+    piece: Piece
+    shift: Float
+    height: float
+
+
+def compare(earlier: Iterable[Piece], later: Strip, reach: Float, parameters: MotionParameters) -> Comparison:
+    """Compare a strip with earlier ones; the shift is at most ``reach`` (2,) rows and columns.
+
+    Shifts a little beyond the reach are tried too: a wall that repeats itself must not be taken for one that
+    is seen again.
+    """
+    row, column = _spots(later, parameters)
+    if len(row) < _FEWEST_SPOTS:
+        return Comparison.refused(Verdict.PLAIN)
+    peaks = [p for piece in earlier for p in _peaks(piece, Piece.of(later), reach, parameters)]
+    inside = [p for p in peaks if np.all(np.abs(p.shift) <= reach)]
+    if not inside:
+        return Comparison.refused(Verdict.OTHER)
+    best = max(inside, key=lambda p: p.height)
+    found = _matched(best, later, row, column, parameters)
+    if found.verdict is not Verdict.SAME:
+        return found
+    apart = 2 * parameters.patch_half_px
+    rivals = [p.height for p in peaks if np.max(np.abs(p.shift - best.shift)) > apart]
+    return (
+        Comparison.refused(Verdict.ALIKE) if max(rivals, default=0.0) > _MOST_RIVAL * best.height else found
+    )
+
+
+def _peaks(earlier: Piece, later: Piece, reach: Float, parameters: MotionParameters) -> list[_Peak]:
+    """Return the best shift within reach, and the best one elsewhere."""
+    height = _correlation(earlier, later)
+    rows, columns = height.shape
+    lag = later.first_row - earlier.first_row
+    shift_row = lag + 2 * ((np.arange(rows) + rows // 2) % rows - rows // 2)[:, None]
+    shift_column = 2 * ((np.arange(columns) + columns // 2) % columns - columns // 2)[None]
+    beyond = reach + 3 * (2 * parameters.patch_half_px + 1)
+    height = np.where((np.abs(shift_row) <= beyond[0]) & (np.abs(shift_column) <= beyond[1]), height, -1.0)
+    inside = (np.abs(shift_row) <= reach[0]) & (np.abs(shift_column) <= reach[1])
+    found: list[_Peak] = []
+    for allowed in (inside, np.ones_like(inside)):
+        for other in found:
+            apart = np.maximum(np.abs(shift_row - other.shift[0]), np.abs(shift_column - other.shift[1]))
+            allowed = allowed & (apart > 2 * parameters.patch_half_px)
+        r, c = np.unravel_index(int(np.argmax(np.where(allowed, height, -1.0))), height.shape)
+        if allowed[r, c] and height[r, c] > 0:
+            at = np.array([shift_row[r, 0], shift_column[0, c]], float)
+            found.append(_Peak(earlier, at, float(height[r, c])))
+    return found
+
+
+def _correlation(earlier: Piece, later: Piece) -> Float32:
+    """Return the normalised correlation (H, W/2) at all shifts by two rows or columns; 0: little overlap."""
+    (a, seen_a), (b, seen_b) = (_halved(p) for p in (earlier, later))
+    size = (2 * a.shape[0], a.shape[1])
+    fa, fa2, fm = (np.conj(rfft2(x, size)) for x in (a, a * a, seen_a))
+    gb, gb2, gm = (rfft2(x, size) for x in (b, b * b, seen_b))
+    product, power_a, power_b, common = (
+        irfft2(x, size) for x in (fa * gb, fa2 * gm, fm * gb2, fm * gm)
+    )  # fmt: skip
+    enough = common > _LEAST_OVERLAP * min(float(seen_a.sum()), float(seen_b.sum()))
+    scale = np.sqrt(np.maximum(power_a * power_b, 1e-12))
+    return np.asarray(np.where(enough, product / scale, 0.0), np.float32)
+
+
+def _halved(piece: Piece) -> tuple[Float32, Float32]:
+    """Return contrast and what is seen at half resolution, without what is alike all along the pipe.
+
+    A seam or a streak says nothing of distance and would fit at all.
+    """
+    seen = piece.usable
+    value = np.where(seen, np.clip(np.nan_to_num(piece.contrast), -1, 1), 0).astype(np.float32)
+    value -= (value.sum(0) / np.maximum(seen.sum(0), 1)).astype(np.float32)
+    size = (value.shape[1] // 2, value.shape[0] // 2)
+    parts = (np.where(seen, value, 0).astype(np.float32), seen.astype(np.float32))
+    a, b = (cv2.resize(x, size, interpolation=cv2.INTER_AREA) for x in parts)
+    return np.asarray(a, np.float32), np.asarray(b, np.float32)
+
+
+def _spots(strip: Strip, parameters: MotionParameters) -> tuple[Int, Int]:
+    """Return rows and columns of the most distinct spot of every cell that can be matched well enough."""
+    half, cell = parameters.patch_half_px, parameters.cell_px
+    corner = np.asarray(cv2.cornerMinEigenVal(strip.contrast, 2 * half + 1))
+    corner[cv2.erode(strip.usable.astype(np.uint8), np.ones((2 * half + 3,) * 2)) == 0] = 0
+    corner[: half + 2], corner[-half - 3 :] = 0, 0
+    rows, columns = (n // cell for n in corner.shape)
+    cells = corner[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell)
+    block = cells.transpose(0, 2, 1, 3).reshape(rows, columns, -1)
+    at, best = block.argmax(-1), block.max(-1)
+    i, j = np.nonzero(best > 0)
+    row, column = i * cell + at[i, j] // cell, j * cell + at[i, j] % cell
+    information = cut(strip.contrast, row, column, half).information
+    variance = np.trace(np.linalg.inv(information + 1e-9 * np.eye(2)), axis1=1, axis2=2) / 2
+    good = strip.noise[row] * np.sqrt(variance) < parameters.landmark_sigma_px
+    return row[good], column[good]
+
+
+def _matched(peak: _Peak, later: Strip, row: Int, column: Int, parameters: MotionParameters) -> Comparison:
+    """Match the later strip's spots one by one in an earlier strip."""
+    patches = cut(later.contrast, row, column, parameters.patch_half_px)
+    guess_row = row + later.first_row - peak.shift[0] - peak.piece.first_row
+    guess_column = column - peak.shift[1]
+    there = np.nan_to_num(peak.piece.contrast)
+    found = match(there, peak.piece.usable, patches, guess_row, guess_column)
+    tried = np.isfinite(found.offset).all(1) | _inside(peak.piece, guess_row, guess_column, parameters)
+    good = np.isfinite(found.offset).all(1) & (found.correlation > parameters.min_correlation)
+    if good.sum() < _FEWEST_SPOTS:
+        return Comparison.refused(Verdict.OTHER if tried.sum() >= _FEWEST_SPOTS else Verdict.PLAIN)
+    psi = column[good] * (2 * np.pi / later.contrast.shape[1])
+    fits = [_fit(psi, -found.offset[good, k]) for k in (0, 1)]
+    agree = np.all([np.abs(residual) < _ALIKE_PX for _, _, residual in fits], 0)
+    if agree.sum() < max(_FEWEST_AGREE * tried.sum(), _FEWEST_SPOTS):
+        return Comparison.refused(Verdict.OTHER)
+    value, sigma = (np.array(x) for x in zip(*((v, s) for v, s, _ in fits), strict=True))
+    return Comparison(Verdict.SAME, peak.shift + value, np.hypot(sigma, _LEAST_SIGMA_PX))
+
+
+def _inside(piece: Piece, row: Float, column: Float, parameters: MotionParameters) -> Mask:
+    """Return whether patches at positions (n,) are seen whole."""
+    whole = cv2.erode(piece.usable.astype(np.uint8), np.ones((2 * parameters.patch_half_px + 3,) * 2)) > 0
+    i, j = np.rint(row).astype(int), np.mod(np.rint(column).astype(int), whole.shape[1])
+    on = (i >= 0) & (i < len(whole))
+    return np.asarray(on & whole[np.where(on, i, 0), j])
+
+
+def _fit(psi: Float, value: Float) -> tuple[float, float, Float]:
+    """Return mean, its 1 σ and residuals of values (n,) that may lean to one side of the pipe, robustly.
+
+    They lean where the camera's angles or offsets are believed a little differently in the two frames.
+    """
+    design = np.stack([np.ones_like(psi), np.cos(psi), np.sin(psi)], -1)
+    known = np.diag([0.0, _LEAN_PX**-2, _LEAN_PX**-2])
+    residual, scale = value - np.median(value), 1.0
+    for _ in range(8):
+        scale = max(1.4826 * float(np.median(np.abs(residual))), 0.02)
+        weight = 1 / (scale**2 + residual**2 / 4)
+        information = (design * weight[:, None]).T @ design + known
+        found = np.linalg.solve(information, design.T @ (weight * value))
+        residual = value - design @ found
+    return float(found[0]), float(np.sqrt(np.linalg.inv(information)[0, 0])), residual

@@ -1,0 +1,255 @@
+"""Loops closed: where the probe passes a wall again, what it measured the first time is measured once more.
+
+Distance and roll come from the texture of unrolled frames; sideways and in direction the pipe itself is the
+measure, for rings place it well in every window. What closures show is distributed over the chain of windows.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.scratch import Scratch
+from pipeline.stage import Context
+from stages.motion.chain import Chain, Closures, astray, beside
+from stages.motion.closing import closed
+from stages.motion.comparing import Comparison, Piece, Verdict, compare
+from stages.motion.joining import Joined, Laid, chain_of, lay
+from stages.motion.parameters import MotionParameters
+from stages.motion.pipe_frames import PipeFrames, pipe_frames
+from stages.motion.places import Passage, Place, Signs, choose_places, widened
+from stages.motion.sections import CORRELATED_FRAMES
+from stages.motion.strip import Strip, StripGrid
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+_REACH_SIGMA = 5.0
+_LEAST_REACH_PX = 4.0
+_LEAST_PROBABILITY = 1e-6
+_DISTANCE, _ROLL = 2, 5
+_ASIDE = (0, 1, 3, 4)
+
+
+class View(Protocol):
+    """What shows the wall, unrolled."""
+
+    @property
+    def grid(self) -> StripGrid:
+        """Sampling of the strips."""
+
+    def strips(self, place: Int, T_pc: Float) -> Iterator[Strip | None]:
+        """Yield frames (n,), ascending, unrolled from poses (n, 4, 4) in the straightened pipe."""
+
+
+@dataclass(frozen=True)
+class Loops:
+    """How closing loops went.
+
+    Attributes
+    ----------
+    places : tuple of Place
+        Where the wall was compared.
+    verdicts : tuple of Verdict
+        What came of it at each.
+    taken : tuple of bool
+        Whether the loop was closed there.
+    moved_mm : float
+        Largest change of a camera's position.
+    """
+
+    places: tuple[Place, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
+    taken: tuple[bool, ...] = ()
+    moved_mm: float = 0.0
+
+    def report(self, context: Context) -> None:
+        """Report what closing loops came to."""
+        context.report("places where the wall was passed again", len(self.places), "")
+        if not self.places:
+            return
+        at_weld = sum(t and p.at_weld for t, p in zip(self.taken, self.places, strict=True))
+        context.report("loops closed there", sum(self.taken), "")
+        context.report("loops closed at welds or joints", at_weld, "")
+        for verdict, count in Counter(self.verdicts).items():
+            if verdict is not Verdict.SAME:
+                context.report(f"loops not closed: {verdict.value}", count, "")
+        context.report("largest change of position by closing loops", self.moved_mm, "mm")
+
+
+def close_loops(
+    joined: Joined,
+    passage: Passage,
+    signs: Callable[[Passage], Signs],
+    view: View,
+    parameters: MotionParameters,
+    scratch: Scratch,
+) -> tuple[Joined, Loops]:
+    """Return the run with its loops closed, and how that went; as it was where none is closed.
+
+    Parameters
+    ----------
+    joined
+    passage
+        Which frames saw the wall.
+    signs
+        Tells what makes the wall easy to recognise; asked only where some wall was passed again.
+    view
+    parameters
+    scratch
+        Where strips of the earlier passes wait for those of the later.
+    """
+    pairs = passage.seen_again(parameters.max_track_frames)
+    if not len(pairs) or not parameters.most_loops:
+        return joined, Loops()
+    at = choose_places(passage, pairs, signs(passage), parameters.loop_spacing_mm, parameters.most_loops)
+    laid = lay(joined.submaps)
+    chain = chain_of(laid, joined.settled)
+    ends = _Ends.of(at, laid, joined)
+    by_error = ends.by_error(joined, chain)
+    reach = _reach(chain, by_error, view.grid)
+    places = [widened(p, passage, r[0] * view.grid.step_mm) for p, r in zip(at, reach, strict=True)]
+    compared = _compared(places, reach, laid, joined, view, parameters, scratch)
+    closures = _closures(by_error, ends, compared, view.grid, parameters)
+    taken, verdicts = _judged(chain, closures, compared)
+    if not any(taken):
+        return joined, Loops(tuple(places), verdicts, taken)
+    found = closed(joined, laid, chain, chain.conditioned(closures.at(np.flatnonzero(taken))))
+    moved_mm = float(np.linalg.norm(found.T_pc[:, :3, 3] - joined.T_pc[:, :3, 3], axis=1).max())
+    return found, Loops(tuple(places), verdicts, taken, moved_mm)
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """The two ends of M loops: frames and where they are in the pipe."""
+
+    earlier: Int
+    later: Int
+    there: PipeFrames
+    here: PipeFrames
+
+    @staticmethod
+    def of(places: Sequence[Place], laid: Sequence[Laid], joined: Joined) -> _Ends:
+        earlier, later = np.array([(p.earlier[0], p.later) for p in places]).T
+        there, here = (pipe_frames(laid, joined, frame) for frame in (earlier, later))
+        return _Ends(earlier, later, there, here)
+
+    def by_error(self, joined: Joined, chain: Chain) -> Float:
+        """Return how errors at the chain's frames enter the difference of both ends, (K, 6, 6 M).
+
+        Six of each place: along x, y and z of its section, mm, and turns about them, rad.
+        """
+        here = _by_error(chain.at, self.later, self.here, joined)
+        return here - _by_error(chain.at, self.earlier, self.there, joined)
+
+    def aside(self) -> Float:
+        """Return by how much (M, 6) the axis of the later window lies off that of the earlier one."""
+        section = self.there.section_o
+        shift = np.einsum("nji,nj->ni", section, self.here.axis_o - self.there.axis_o)
+        lean = np.einsum("nji,nj->ni", section, self.here.section_o[..., 2])
+        zero = np.zeros(len(shift))
+        return np.stack([shift[:, 0], shift[:, 1], zero, -lean[:, 1], lean[:, 0], zero], -1)
+
+
+def _by_error(at: Int, frame: Int, view: PipeFrames, joined: Joined) -> Float:
+    back = np.swapaxes(view.section_o, 1, 2)
+    seen = np.zeros((len(frame), 6, 6))
+    seen[:, :3, :3], seen[:, 3:, 3:] = back, back @ joined.T_pc[frame, :3, :3]
+    left, right, share = beside(frame, at)
+    each, out = np.arange(len(frame)), np.zeros((len(at), 6, len(frame), 6))
+    for place, weight in ((left, 1 - share), (right, share)):
+        out[place, :, each] += weight[:, None, None] * np.swapaxes(seen, 1, 2)
+    return out.reshape(len(at), 6, -1)
+
+
+def _reach(chain: Chain, by_error: Float, grid: StripGrid) -> Float:
+    """Return how many rows and columns (M, 2) the wall may lie off at each place."""
+    variance = np.einsum("kic,kic->c", by_error, chain.covariance_with(by_error)).reshape(-1, 6)
+    sigma = np.sqrt(variance[:, [_DISTANCE, _ROLL]]) / _per_px(grid)
+    return np.asarray(np.ceil(_REACH_SIGMA * sigma + _LEAST_REACH_PX))
+
+
+def _per_px(grid: StripGrid) -> Float:
+    """Return mm per row and rad per column."""
+    return np.array([grid.step_mm, 2 * np.pi / grid.columns])
+
+
+def _compared(
+    places: Sequence[Place],
+    reach: Float,
+    laid: Sequence[Laid],
+    joined: Joined,
+    view: View,
+    parameters: MotionParameters,
+    scratch: Scratch,
+) -> list[Comparison]:
+    """Return what comparing the wall says at each place; of earlier strips no more than one is in memory."""
+    frames = np.unique([f for p in places for f in (*p.earlier, p.later)])
+    earlier = {f for p in places for f in p.earlier}
+    kept = scratch.spool(np.float16, (view.grid.rows, view.grid.columns))
+    rows: dict[int, tuple[int, int]] = {}
+    found: dict[int, Comparison] = {}
+    poses = pipe_frames(laid, joined, frames).T_pc
+    for frame, strip in zip(frames.tolist(), view.strips(frames, poses), strict=True):
+        if strip is None:
+            continue
+        for n in (n for n, p in enumerate(places) if p.later == frame):
+            known = (rows[f] for f in places[n].earlier if f in rows)
+            pieces = (Piece(first, kept.part(k, k + 1)[0].astype(np.float32)) for k, first in known)
+            found[n] = compare(pieces, strip, reach[n], parameters)
+        if frame in earlier:
+            rows[frame] = (kept.count, strip.first_row)
+            kept.append(Piece.of(strip).contrast[None])
+    return [found.get(n, Comparison.refused(Verdict.UNREAD)) for n in range(len(places))]
+
+
+def _closures(
+    by_error: Float,
+    ends: _Ends,
+    compared: Sequence[Comparison],
+    grid: StripGrid,
+    parameters: MotionParameters,
+) -> Closures:
+    """Return what all places show that have the same wall in both frames."""
+    residual, sigma = ends.aside(), np.tile(_axis_sigma(parameters), (len(compared), 1))
+    along = [_DISTANCE, _ROLL]
+    residual[:, along] = [c.shift for c in compared] * _per_px(grid)
+    sigma[:, along] = [c.sigma for c in compared] * _per_px(grid)
+    use = np.tile(np.array([c.verdict is Verdict.SAME for c in compared])[:, None], 6)
+    # One window has one axis: there is nothing to compare sideways.
+    use[:, _ASIDE] &= (ends.here.window != ends.there.window)[:, None]
+    which = np.flatnonzero(use.ravel())
+    return Closures(by_error[..., which], residual.ravel()[which], sigma.ravel()[which], which // 6)
+
+
+def _axis_sigma(parameters: MotionParameters) -> Float:
+    """Return 1 σ (6,) of the difference of two windows' axes at a place, by the rings alone.
+
+    The centre of a ring of B bins errs by √(2/B) of a bin's σ; the direction is that of two centres a knot
+    apart. Distance and roll are not known from rings.
+    """
+    bin_mm = np.sqrt(CORRELATED_FRAMES) * parameters.surface_sigma_mm
+    aside = np.sqrt(2.0) * bin_mm * np.sqrt(2 / parameters.ring_bins)
+    lean = np.sqrt(2.0) * aside / parameters.axis_knot_mm
+    return np.array([aside, aside, np.inf, lean, lean, np.inf])
+
+
+def _judged(
+    chain: Chain, closures: Closures, compared: Sequence[Comparison]
+) -> tuple[tuple[bool, ...], tuple[Verdict, ...]]:
+    """Return which places are closed, and every place's verdict.
+
+    Where as many contradict the rest as do not, nobody can tell which are wrong: none is closed.
+    """
+    verdicts = [c.verdict for c in compared]
+    out = astray(chain.spread(closures), closures, _LEAST_PROBABILITY) if closures.place.size else set()
+    for place in out:
+        verdicts[place] = Verdict.CONTRADICTED
+    same = sum(v is Verdict.SAME for v in verdicts)
+    taken = tuple(v is Verdict.SAME and same > len(out) for v in verdicts)
+    return taken, tuple(verdicts)

@@ -1,0 +1,211 @@
+"""Places that the probe passes again: where the way turned, and which frames see the same wall twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+_BESIDE = 15
+_BAND_SIGMA = 6.0
+_LEAST_BAND_MM = 0.15
+_NEAR_ENOUGH = 0.25
+_STRIDE = 0.35
+_MOST_STRIDES = 4
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Frames that see the wall, and how they drove along it.
+
+    Attributes
+    ----------
+    frame : (K,) int
+        Places in the list of all frames, ascending.
+    distance_mm : (K,)
+        Of the camera along the pipe.
+    near_mm, far_mm : float
+        Wall ahead of the camera that a frame shows.
+    number : (K,) int
+        Which pass each belongs to: a new one begins where the way turns back by more than a frame shows.
+    """
+
+    frame: Int
+    distance_mm: Float
+    near_mm: float
+    far_mm: float
+    number: Int
+
+    @staticmethod
+    def of(frame: Int, distance_mm: Float, near_mm: float, far_mm: float) -> Passage:
+        """Return the frames with their passes numbered."""
+        return Passage(frame, distance_mm, near_mm, far_mm, _passes(distance_mm, far_mm - near_mm))
+
+    @property
+    def view_mm(self) -> float:
+        """Length of wall that a frame shows."""
+        return self.far_mm - self.near_mm
+
+    def seen_again(self, apart: int) -> Int:
+        """Return pairs (M, 2) of indices here: (earlier, later) frames that see the same wall.
+
+        The earlier one is of the last pass before that saw it. Pairs fewer than ``apart`` frames apart share
+        landmarks and are left out.
+        """
+        last = int(self.number[-1]) if self.number.size else 0
+        pairs = [pair for later in range(1, last + 1) for pair in self._seen_on(later, apart)]
+        return np.array(pairs, np.int64).reshape(-1, 2)
+
+    def along(self, index: int, away_mm: Float) -> Int:
+        """Return the frames (n,) of one frame's pass that are nearest to so far away from it, mm."""
+        same = np.flatnonzero(self.number == self.number[index])
+        off = np.abs(self.distance_mm[same] - (self.distance_mm[index] + away_mm)[:, None])
+        return np.asarray(self.frame[same[np.argmin(off, 1)]])
+
+    def _seen_on(self, later: int, apart: int) -> Iterator[tuple[int, int]]:
+        left = np.flatnonzero(self.number == later)
+        for before in range(later - 1, -1, -1):
+            partner = _nearest(self.distance_mm, np.flatnonzero(self.number == before), left)
+            off = np.abs(self.distance_mm[partner] - self.distance_mm[left])
+            ok = (off < _NEAR_ENOUGH * self.view_mm) & (self.frame[left] - self.frame[partner] > apart)
+            yield from zip(partner[ok].tolist(), left[ok].tolist(), strict=True)
+            left = left[~ok]
+
+
+@dataclass(frozen=True)
+class Signs:
+    """What makes a wall easy to recognise.
+
+    Attributes
+    ----------
+    texture : (K,)
+        How well texture could be followed in each frame of a passage.
+    bands_mm : (B,)
+        Distances of bands all round the wall, such as welds, ascending.
+    """
+
+    texture: Float
+    bands_mm: Float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A stretch of wall seen again.
+
+    Attributes
+    ----------
+    earlier : tuple of int
+        Frames of an earlier pass, the one that should see the same wall first.
+    later : int
+        Frame of the later pass.
+    at_weld : bool
+        Whether a band all round the wall is in view.
+    """
+
+    earlier: tuple[int, ...]
+    later: int
+    at_weld: bool
+
+
+def choose_places(passage: Passage, pairs: Int, signs: Signs, spacing_mm: float, most: int) -> list[Place]:
+    """Return places among pairs (M, 2): in each stretch where a band is in view, else where most texture is.
+
+    Parameters
+    ----------
+    passage, pairs, signs
+    spacing_mm : float
+        Length of a stretch.
+    most : int
+        Places kept, spread evenly.
+    """
+    earlier, later = pairs.T
+    shows_band = _in_view(passage, later, signs.bands_mm)
+    stretch = np.floor(passage.distance_mm[later] / spacing_mm).astype(np.int64)
+    order = np.lexsort((-signs.texture[earlier], ~shows_band, stretch, passage.number[later]))
+    stretches = np.stack([passage.number[later], stretch])[:, order]
+    _, first = np.unique(stretches, axis=1, return_index=True)
+    chosen = _apart(np.sort(order[first]), passage.distance_mm[later], shows_band, spacing_mm / 2)
+    if len(chosen) > most:
+        chosen = chosen[np.linspace(0, len(chosen), most, endpoint=False).astype(int)]
+    frame = passage.frame
+    return [Place((int(frame[earlier[k]]),), int(frame[later[k]]), bool(shows_band[k])) for k in chosen]
+
+
+def widened(place: Place, passage: Passage, reach_mm: float) -> Place:
+    """Return a place with the frames beside the earlier one, up to ``reach_mm`` away along the same pass."""
+    stride = _STRIDE * passage.view_mm
+    count = min(int(np.ceil(max(reach_mm - stride, 0.0) / stride)), _MOST_STRIDES)
+    steps = np.array(sorted(range(-count, count + 1), key=abs))
+    index = int(np.searchsorted(passage.frame, place.earlier[0]))
+    return replace(place, earlier=tuple(dict.fromkeys(passage.along(index, stride * steps).tolist())))
+
+
+def bands_in_rings(distance_mm: Float, radius_mm: Float) -> Float:
+    """Return distances, ascending, of rings whose radius stands out from those beside: welds, joints.
+
+    The radius (F,) is that of the circle through a ring, so what stands out does so all round.
+    """
+    ok = np.isfinite(radius_mm)
+    if ok.sum() <= 2 * _BESIDE:
+        return np.zeros(0)
+    off = radius_mm[ok] - median_filter(radius_mm[ok], 2 * _BESIDE + 1, mode="nearest")
+    usual = 1.4826 * float(np.median(np.abs(off)))
+    return np.sort(distance_mm[ok][np.abs(off) > max(_BAND_SIGMA * usual, _LEAST_BAND_MM)])
+
+
+def texture_at(frame: Int, observations: Iterable[NDArray[np.void]]) -> Float:
+    """Return the information, 1/px², of all texture observations in frames (K,) that are ascending."""
+    total = np.zeros(len(frame))
+    for seen in observations:
+        at = np.searchsorted(frame, seen["frame"])
+        total += np.bincount(at, seen["sigma"] ** -2.0, minlength=len(frame))
+    return total
+
+
+def _passes(distance_mm: Float, view_mm: float) -> Int:
+    turns: list[int] = []
+    heading, farthest = 0.0, 0
+    for k, distance in enumerate(distance_mm.tolist()):
+        ahead = distance - float(distance_mm[farthest])
+        if heading == 0.0 and abs(ahead) > view_mm:
+            heading, farthest = float(np.sign(ahead)), k
+        elif heading * ahead > 0:
+            farthest = k
+        elif heading * ahead < -view_mm:
+            turns.append(farthest + 1)
+            heading, farthest = -heading, k
+    return np.asarray(np.searchsorted(turns, np.arange(len(distance_mm)), side="right"))
+
+
+def _nearest(distance_mm: Float, among: Int, of: Int) -> Int:
+    """Return for each of ``of`` the one of ``among`` that is nearest in distance."""
+    order = among[np.argsort(distance_mm[among], kind="stable")]
+    right = np.clip(np.searchsorted(distance_mm[order], distance_mm[of]), 0, len(order) - 1)
+    left = np.maximum(right - 1, 0)
+    off = np.abs(distance_mm[order[np.stack([left, right])]] - distance_mm[of])
+    return np.asarray(np.where(off[0] <= off[1], order[left], order[right]))
+
+
+def _in_view(passage: Passage, index: Int, bands_mm: Float) -> Mask:
+    """Return whether a band lies in the middle half of what frames (n,) show."""
+    first = passage.distance_mm[index] + passage.near_mm + passage.view_mm / 4
+    low, high = (np.searchsorted(bands_mm, first + x) for x in (0.0, passage.view_mm / 2))
+    return np.asarray(high > low)
+
+
+def _apart(chosen: Int, distance_mm: Float, shows_band: Mask, least_mm: float) -> Int:
+    """Return the pairs chosen but one of any two nearer to each other than so much: bands before others."""
+    kept: list[int] = []
+    for k in chosen.tolist():
+        if kept and abs(distance_mm[k] - distance_mm[kept[-1]]) < least_mm:
+            if shows_band[kept[-1]] or not shows_band[k]:
+                continue
+            kept.pop()
+        kept.append(k)
+    return np.array(kept, np.int64)

@@ -1,0 +1,134 @@
+"""Errors along a chain of windows against the same chain written out in full, and loops closed in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stages.motion.chain import Chain, Closures, Link, astray, interpolated
+
+Float = NDArray[np.float64]
+KNOTS, WINDOWS, SHARED = 4, 5, 2
+
+
+@pytest.fixture(scope="module")
+def chain() -> Chain:
+    random = np.random.default_rng(5)
+    links = []
+    for n in range(WINDOWS):
+        carry = np.eye(6) + 0.02 * random.standard_normal((KNOTS, 6, 6))
+        carry[0] = np.eye(6)
+        root = np.zeros((KNOTS, 6, 24))
+        root[1:] = np.cumsum(random.standard_normal((KNOTS - 1, 6, 24)), 0)
+        joint = np.einsum("air,bjr->aibj", root, root)
+        response = random.standard_normal((KNOTS, 6, SHARED))
+        links.append(Link(30 * n + np.arange(0, 31, 10), carry, joint, response))
+    return Chain(tuple(links), 0.3 * np.eye(6), np.diag([0.5, 0.2]))
+
+
+def written_out(chain: Chain) -> Float:
+    """Return the covariance (6 K, 6 K) by the linear map from all independent sources to all errors."""
+    own = 6 * KNOTS
+    sources = 6 + own * WINDOWS + SHARED
+    spread = np.zeros((sources, sources))
+    spread[:6, :6], spread[-SHARED:, -SHARED:] = chain.start, chain.shared
+    rows, anchor = [], np.eye(6, sources)
+    for n, link in enumerate(chain.links):
+        at = 6 + own * n
+        spread[at : at + own, at : at + own] = link.joint.reshape(own, own)
+        for k in range(KNOTS):
+            row = link.carry[k] @ anchor
+            row[:, at + 6 * k : at + 6 * k + 6] += np.eye(6)
+            rows.append(row)
+        anchor = rows[-1]
+    whole = np.stack(rows)
+    whole[..., -SHARED:] += np.concatenate([link.response for link in chain.links])
+    flat = whole.reshape(-1, sources)
+    return np.asarray(flat @ spread @ flat.T)
+
+
+def closures(chain: Chain, count: int, seed: int = 2) -> Closures:
+    """Return differences between far ends, two components each, as errors drawn from the chain show."""
+    random = np.random.default_rng(seed)
+    knots = len(chain.at)
+    by_error = np.zeros((knots, 6, count))
+    for c in range(count):
+        by_error[c // 2, c % 2, c], by_error[knots - 1 - c // 2, c % 2, c] = -1, 1
+    sigma = np.full(count, 0.05)
+    error = random.multivariate_normal(np.zeros(6 * knots), written_out(chain)).reshape(knots, 6)
+    seen = np.einsum("kic,ki->c", by_error, error) + sigma * random.standard_normal(count)
+    return Closures(by_error, seen, sigma, np.arange(count) // 2)
+
+
+def test_covariances_are_those_of_the_chain_written_out(chain: Chain) -> None:
+    every = np.eye(6 * len(chain.at)).reshape(len(chain.at), 6, -1)
+    got = chain.covariance_with(every).reshape(6 * len(chain.at), -1)
+    np.testing.assert_allclose(got, written_out(chain), rtol=1e-9, atol=1e-9)
+
+
+def test_closing_is_conditioning(chain: Chain) -> None:
+    known = closures(chain, 6)
+    full, by_error = written_out(chain), known.by_error.reshape(-1, 6)
+    spread = by_error.T @ full @ by_error + np.diag(known.sigma**2)
+    gain = full @ by_error @ np.linalg.inv(spread)
+    found = chain.conditioned(known)
+    np.testing.assert_allclose(found.error.ravel(), gain @ known.residual, rtol=1e-6, atol=1e-8)
+    knots, left = len(chain.at), full - gain @ by_error.T @ full
+    blocks = left.reshape(knots, 6, knots, 6)[np.arange(knots), :, np.arange(knots)]
+    before = full.reshape(knots, 6, knots, 6)[np.arange(knots), :, np.arange(knots)]
+    np.testing.assert_allclose(before - found.gained, blocks, rtol=1e-6, atol=1e-7)
+
+
+def test_errors_that_are_left_lie_within_sigma(chain: Chain) -> None:
+    """Over many drawn runs the squared error left, in its stated covariance, is on average its dimension."""
+    random, full = np.random.default_rng(0), written_out(chain)
+    known, knots = closures(chain, 6), len(chain.at)
+    marginal = full.reshape(knots, 6, knots, 6)[np.arange(knots), :, np.arange(knots)]
+    left = marginal - chain.conditioned(known).gained
+    root = np.linalg.cholesky(full + 1e-9 * np.eye(len(full)))
+    squares = []
+    for _ in range(400):
+        error = (root @ random.standard_normal(len(full))).reshape(knots, 6)
+        seen = np.einsum("kic,ki->c", known.by_error, error) + known.sigma * random.standard_normal(6)
+        rest = error - chain.conditioned(Closures(known.by_error, seen, known.sigma, known.place)).error
+        squares.append(float(rest[-1] @ np.linalg.solve(left[-1], rest[-1])))
+    assert np.mean(squares) == pytest.approx(6.0, abs=0.7)
+    open_ = (root @ random.standard_normal((len(full), 50))).T[:, -6:]
+    plain = np.einsum("ni,ij,nj->n", open_, np.linalg.inv(left[-1]), open_)
+    assert np.mean(plain) > 12, "the control: without closing they do not"
+
+
+def off_by(known: Closures, chain: Chain, component: int, sigmas: float) -> Closures:
+    """Return the closures with one component off by some σ of its prediction by the motion alone."""
+    wrong = known.residual.copy()
+    wrong[component] += sigmas * np.sqrt(chain.spread(known)[component, component])
+    return Closures(known.by_error, wrong, known.sigma, known.place)
+
+
+def test_what_contradicts_the_rest_is_found_and_nothing_else(chain: Chain) -> None:
+    known = closures(chain, 16)
+    spread = chain.spread(known)
+    assert astray(spread, known, 1e-6) == set()
+    assert astray(spread, off_by(known, chain, 6, 20.0), 1e-6) == {3}
+    assert astray(spread, off_by(off_by(known, chain, 6, 20.0), chain, 12, -25.0), 1e-6) == {3, 6}
+
+
+def test_where_two_contradict_each_other_neither_is_believed(chain: Chain) -> None:
+    first, last = closures(chain, 2), chain.at.size - 1
+    twice = Closures(
+        np.repeat(first.by_error, 2, 2),
+        np.repeat(first.residual, 2) + np.array([0.0, 2.0, 0.0, 0.0]),
+        np.full(4, 0.05),
+        np.array([0, 1, 0, 1]),
+    )
+    assert twice.by_error[last].any()
+    spread = chain.spread(twice)
+    assert np.sqrt(spread[0, 0]) > 2.0, "the motion alone would believe either"
+    assert astray(spread, twice, 1e-6) == {0, 1}
+
+
+def test_values_between_knots_are_linear() -> None:
+    at = np.array([0, 10, 10, 20])
+    got = interpolated(np.array([0, 5, 10, 15, 20, 25]), at, np.array([[0.0], [1.0], [1.0], [3.0]]))
+    np.testing.assert_allclose(got[:5, 0], [0, 0.5, 1, 2, 3])
