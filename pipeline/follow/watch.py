@@ -11,6 +11,7 @@ from pathlib import Path
 from pipeline.errors import Cancelled, InputError
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
+from pipeline.recording.growing import GrowingRecording
 
 
 @dataclass(frozen=True)
@@ -49,24 +50,24 @@ def glimpses(place: Path, quiet_s: float, poll_s: float, wish: threading.Event) 
     Cancelled
         When ``wish`` is set.
     """
-    size, grown_at = -1, time.monotonic()
+    growing, size, grown_at = GrowingRecording(place), -1, time.monotonic()
     while True:
         if wish.is_set():
             raise Cancelled
         now = _size(place)
         if now != size:
             size, grown_at = now, time.monotonic()
-            yield _glimpse(place, resting=False)
+            yield _glimpse(growing, resting=False)
         elif time.monotonic() - grown_at >= quiet_s:
-            yield _glimpse(place, resting=True)
+            yield _glimpse(growing, resting=True)
             return
         wish.wait(poll_s)
 
 
-def _glimpse(place: Path, *, resting: bool) -> Glimpse:
+def _glimpse(growing: GrowingRecording, *, resting: bool) -> Glimpse:
     # A line or a packet that is half there is no fault before the end.
     try:
-        return Glimpse(open_recording(place), "", resting)
+        return Glimpse(open_recording(growing.path) if resting else growing.look(), "", resting)
     except InputError as error:
         return Glimpse(None, str(error), resting)
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.recording.base import FrameTable, Recording
+from pipeline.recording.base import Encoder, FrameTable, Recording
 from pipeline.recording.checks import common_frames, encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe, inside, optional_file, required_file
 from pipeline.recording.images import ImageSequence, is_pattern, open_images
@@ -36,32 +37,59 @@ def open_folder(path: Path) -> Recording:
         When a file is missing or wrong; what can be mended is named in `Recording.warnings` instead.
     """
     description = input_file(path / DESCRIPTION)
-    section = read_yaml(description.path)
-    section.refuse_unknown(_KEYS)
-    described = describe(section)
-    frame_rate = section.number("frame_rate", above=0)
-    frames_file = required_file(section, "frames")
-    encoder_file, no_encoder = optional_file(section, "encoder")
+    section = described_in(description.path)
+    frames_file, encoder_file, no_encoder = table_files(section)
     tables = [input_file(f) for f in (frames_file, encoder_file) if f is not None]
     table = read_frame_table(frames_file)
     encoder = read_encoder(encoder_file) if encoder_file else None
     source, image_files = _open_source(section, table)
-    frames, mended = _match(frames_file, table, source)
-    files = (description, *tables, *image_files)
+    parts = FolderParts(table, encoder, source, no_encoder, (description, *tables, *image_files))
+    return assembled(section, frames_file, parts)
+
+
+def described_in(file: Path) -> Section:
+    """Return what recording.yaml says; raises `InputError`."""
+    section = read_yaml(file)
+    section.refuse_unknown(_KEYS)
+    return section
+
+
+def table_files(section: Section) -> tuple[Path, Path | None, tuple[str, ...]]:
+    """Return the files of frames and encoder, and a warning where the encoder's is not there."""
+    return required_file(section, "frames"), *optional_file(section, "encoder")
+
+
+@dataclass(frozen=True)
+class FolderParts:
+    """What was read from a recording folder; ``files`` as they were before."""
+
+    table: FrameTable
+    encoder: Encoder | None
+    source: VideoSource | ImageSequence
+    warnings: tuple[str, ...]
+    files: tuple[InputFile, ...]
+
+
+def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Recording:
+    """Return the recording that a description and what was read make; raises `InputError`."""
+    described = describe(section)
+    frames, mended = _match(frames_file, parts.table, parts.source)
     return Recording(
         name=described.name,
         kind=described.kind,
-        path=path,
+        path=section.file.parent,
         frames=frames,
-        encoder=encoder,
+        encoder=parts.encoder,
         pipe=described.pipe,
-        frame_rate=frame_rate,
-        source=source,
+        frame_rate=section.number("frame_rate", above=0),
+        source=parts.source,
         probe_file=described.probe_file,
-        content_key=content_key(files),
-        warnings=(*described.warnings, *no_encoder, *mended, *encoder_warnings(encoder, frames)),
-        files=files,
-    )
+        content_key=content_key(parts.files),
+        warnings=(
+            *described.warnings, *parts.warnings, *mended, *encoder_warnings(parts.encoder, frames)
+        ),
+        files=parts.files,
+    )  # fmt: skip
 
 
 def _match(

@@ -30,8 +30,13 @@ def read_frame_table(file: Path) -> FrameTable:
     InputError
         With the line of what is missing, mistyped, not finite or out of order.
     """
+    return frame_table(file, _text(file, FRAME_COLUMNS))
+
+
+def frame_table(file: Path, text: str) -> FrameTable:
+    """Return the table of frames that ``text`` of a file holds; raises as `read_frame_table`."""
     frame, time_s, illumination = [], [], []
-    for line, (number, time, light) in _rows(file, FRAME_COLUMNS):
+    for line, (number, time, light) in _rows(file, text, FRAME_COLUMNS):
         frame.append(_whole(file, line, "frame", number))
         time_s.append(_finite(file, line, "time_s", time))
         illumination.append(_light(file, line, light))
@@ -50,9 +55,14 @@ def read_encoder(file: Path) -> Encoder:
     InputError
         As `read_frame_table`; also with fewer than two lines.
     """
+    return encoder_readings(file, _text(file, ENCODER_COLUMNS))
+
+
+def encoder_readings(file: Path, text: str) -> Encoder:
+    """Return the readings that ``text`` of a file holds; raises as `read_encoder`."""
     rows = [
         (_finite(file, line, "time_s", time), _finite(file, line, "distance_mm", distance))
-        for line, (time, distance) in _rows(file, ENCODER_COLUMNS)
+        for line, (time, distance) in _rows(file, text, ENCODER_COLUMNS)
     ]
     if len(rows) < 2:
         raise InputError(
@@ -64,17 +74,20 @@ def read_encoder(file: Path) -> Encoder:
     return Encoder(table[:, 0], table[:, 1])
 
 
-def _rows(file: Path, columns: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
-    """Yield (line number, cells in the order of ``columns``)."""
+def _text(file: Path, columns: Sequence[str]) -> str:
     try:
         size = file.stat().st_size
         if size > LARGEST_BYTES:
             raise InputError(file, f"is {size} bytes long", expected=f"at most {LARGEST_BYTES} bytes")
-        text = file.read_text("utf-8-sig")
+        return file.read_text("utf-8-sig")
     except OSError as error:
         raise InputError(file, f"cannot be read ({error.strerror})", expected=",".join(columns)) from error
     except UnicodeDecodeError as error:
         raise InputError(file, "is not UTF-8 text", expected=",".join(columns)) from error
+
+
+def _rows(file: Path, text: str, columns: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield (line number, cells in the order of ``columns``)."""
     rows = csv.reader(io.StringIO(text, newline=""))
     try:
         header = [h.strip() for h in next(rows, [])]

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import av
 import numpy as np
@@ -111,9 +112,7 @@ class VideoSource:
         needed = self.index.needed(wanted)
         only = set(self.index.pts[needed].tolist()) if self.index.timed else None
         listed, expected = set(needed.tolist()), start
-        with _opened(self.path) as (container, stream):
-            if start > 0:
-                container.seek(int(self.index.pts[start]), stream=stream)
+        with self.opened_at(start) as (container, stream):
             for frame in _decoded(container, stream, only):
                 number = self._number(frame, expected)
                 if number is None or number < start:
@@ -126,6 +125,14 @@ class VideoSource:
                 expected = number + 1
             damaged.update(listed.intersection(range(expected, self.index.pts.size)))
 
+    @contextmanager
+    def opened_at(self, keyframe: int) -> Iterator[tuple[av.container.InputContainer, av.VideoStream]]:
+        """Lend the file opened where the packets from a keyframe on can be read."""
+        with opened(self.path, str(self.path)) as (container, stream):
+            if keyframe > 0:
+                container.seek(int(self.index.pts[keyframe]), stream=stream)
+            yield container, stream
+
     def _number(self, frame: av.VideoFrame | None, expected: int) -> int | None:
         """Return a frame's number; None where it is not known."""
         if not self.index.timed:
@@ -133,6 +140,13 @@ class VideoSource:
         if frame is None or frame.pts is None:
             return None
         return int(np.searchsorted(self.index.pts, frame.pts))
+
+
+class Readable(Protocol):
+    """Bytes that are read one after the other."""
+
+    def read(self, size: int) -> bytes:
+        """Return at most ``size`` bytes, none at the end."""
 
 
 def open_video(path: Path) -> VideoSource:
@@ -143,19 +157,26 @@ def open_video(path: Path) -> VideoSource:
     InputError
         When the file cannot be opened or holds no video frames.
     """
-    with _opened(path) as (container, stream):
+    with opened(path, str(path)) as (container, stream):
         size = (stream.codec_context.width, stream.codec_context.height)
         index = list_frames(container, stream)
-    if index.pts.size == 0 or min(size) <= 0:
-        raise InputError(path, "holds no video frames", hint="the recording may have been stopped at once")
+    refuse_empty(path, index, size)
     return VideoSource(path, index, size, np.arange(index.pts.size))
 
 
+def refuse_empty(path: Path, index: VideoIndex, size_px: tuple[int, int]) -> None:
+    """Raise `InputError` where a video holds no frames."""
+    if index.pts.size == 0 or min(size_px) <= 0:
+        raise InputError(path, "holds no video frames", hint="the recording may have been stopped at once")
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[av.container.InputContainer, av.VideoStream]]:
-    """Lend a video's container and stream; raises `InputError` when they cannot be opened or listed."""
+def opened(
+    path: Path, content: str | Readable
+) -> Iterator[tuple[av.container.InputContainer, av.VideoStream]]:
+    """Lend container and stream of a video's ``content``; raises `InputError` naming ``path``."""
     try:
-        with av.open(str(path)) as container:
+        with av.open(content, "r") as container:
             yield container, _prepare(container)
     except (av.FFmpegError, OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError | av.FFmpegError) else error

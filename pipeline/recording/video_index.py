@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -93,7 +93,12 @@ class VideoIndex:
 
 def list_frames(container: av.container.InputContainer, stream: av.VideoStream) -> VideoIndex:
     """List a stream's packets; what lies behind damage of the container is left out."""
-    packets: list[_Packet] = []
+    return index_of(list_packets(container, stream), container, stream)
+
+
+def list_packets(container: av.container.InputContainer, stream: av.VideoStream) -> list[Packet]:
+    """Return what is to be known of a stream's packets, in the order of the file."""
+    packets: list[Packet] = []
     codec = stream.codec_context
     checked = codec.name == "ffv1"
     length_size = length_bytes(codec.extradata) if codec.name == "h264" else 0
@@ -102,12 +107,20 @@ def list_frames(container: av.container.InputContainer, stream: av.VideoStream) 
             if packet.size:
                 sound = checked and checksums_hold(bytes(packet))
                 needed = not length_size or is_reference(bytes(packet), length_size)
-                packets.append(_Packet(packet.pts, packet.is_keyframe, sound, needed))
+                place = -1 if packet.pos is None else packet.pos
+                packets.append(Packet(packet.pts, packet.is_keyframe, sound, needed, place))
     except av.FFmpegError:
         pass  # the table of frames tells what is missing behind this place
-    reordered = codec.has_b_frames
+    return packets
+
+
+def index_of(
+    packets: Sequence[Packet], container: av.container.InputContainer, stream: av.VideoStream
+) -> VideoIndex:
+    """Return the index of a stream's packets."""
     # AVI keeps no times of presentation: with frames out of order, what it gives are times of decoding.
-    timed = not (container.format.name == "avi" and reordered) and all(p.pts is not None for p in packets)
+    told = not (container.format.name == "avi" and stream.codec_context.has_b_frames)
+    timed = told and all(p.pts is not None for p in packets)
     pts = np.array([p.pts for p in packets] if timed else range(len(packets)), np.int64)
     order = np.argsort(pts, kind="stable")
     key = np.array([timed and p.key for p in packets], bool)[order]
@@ -124,10 +137,15 @@ def list_frames(container: av.container.InputContainer, stream: av.VideoStream) 
     )
 
 
-class _Packet(NamedTuple):
-    """A coded frame: its time, can decoding begin there, does its checksum hold, do others refer to it."""
+class Packet(NamedTuple):
+    """A coded frame.
+
+    Its time, can decoding begin there, does its checksum hold, do others refer to it, and its first byte in
+    what was read; −1 where that is not known.
+    """
 
     pts: int | None
     key: bool
     sound: bool
     reference: bool
+    place: int

@@ -1,0 +1,103 @@
+"""The end of a Matroska file that is still being written, as a file of its own.
+
+Behind the head of the file (what comes before its first cluster) clusters stand for themselves: head and all
+from some cluster on are again a Matroska file (RFC 9559, § 5.1.3). So what is new can be read alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+_CLUSTER = b"\x1f\x43\xb6\x75"
+_TIMESTAMP, _CRC32 = 0xE7, 0xBF
+_CRC32_BYTES = 6
+_LONGEST_START = 4 + 8 + _CRC32_BYTES + 1
+_HEAD_BYTES = 1 << 20
+_AT_ONCE = 1 << 20
+
+
+@dataclass(frozen=True)
+class MatroskaTail:
+    """A Matroska file of whose head it is known where it ends."""
+
+    path: Path
+    head_bytes: int
+
+    def since(self, cluster: int) -> HeadAndTail:
+        """Return the file's head and all from a cluster on that begins at byte ``cluster``."""
+        return HeadAndTail(self, cluster)
+
+    def place_of(self, place: int, cluster: int) -> int:
+        """Return where in the file a byte lies that is at ``place`` of `since` a cluster."""
+        return place - self.head_bytes + cluster
+
+    def last_cluster(self, after: int) -> int:
+        """Return where the last cluster begins; ``after``, where an earlier one begins, if there is none."""
+        with self.path.open("rb") as file:
+            end = file.seek(0, 2)
+            while end > after:
+                begin = max(after, end - _AT_ONCE)
+                file.seek(begin)
+                found = _last_cluster_in(file.read(end - begin + _LONGEST_START))
+                if found >= 0:
+                    return begin + found
+                end = begin
+        return after
+
+
+def matroska_tail(path: Path) -> MatroskaTail | None:
+    """Return a file's head and tail; None where it is no Matroska file with a cluster."""
+    with path.open("rb") as file:
+        start = file.read(_HEAD_BYTES)
+    place = start.find(_CLUSTER)
+    while place >= 0 and not _is_cluster(start, place):
+        place = start.find(_CLUSTER, place + 1)
+    is_matroska = start.startswith(b"\x1a\x45\xdf\xa3")
+    return MatroskaTail(path, place) if is_matroska and place > 0 else None
+
+
+def _last_cluster_in(content: bytes) -> int:
+    """Return where the last cluster in ``content`` begins, −1 where none does."""
+    place = content.rfind(_CLUSTER)
+    while place >= 0 and not _is_cluster(content, place):
+        place = content.rfind(_CLUSTER, 0, place)
+    return place
+
+
+def _is_cluster(content: bytes, place: int) -> bool:
+    """Tell whether an identifier is a cluster's: its size and its timestamp follow, maybe its checksum."""
+    place += len(_CLUSTER)
+    if place >= len(content) or content[place] == 0:
+        return False
+    place += 9 - content[place].bit_length()  # the size is as many bytes long as its first has leading zeros
+    if place < len(content) and content[place] == _CRC32:
+        place += _CRC32_BYTES
+    return place < len(content) and content[place] == _TIMESTAMP
+
+
+class HeadAndTail:
+    """Bytes of the head, then those from a cluster on; it can be read once, not sought in."""
+
+    def __init__(self, tail: MatroskaTail, cluster: int) -> None:
+        self._file = tail.path.open("rb")
+        self._head_left, self._cluster = tail.head_bytes, cluster
+
+    def read(self, size: int) -> bytes:
+        """Return at most ``size`` bytes, none at the end."""
+        if self._head_left == 0:
+            return self._file.read(size)
+        content = self._file.read(min(size, self._head_left))
+        self._head_left -= len(content)
+        if self._head_left == 0:
+            self._file.seek(self._cluster)
+        return content
+
+    def __enter__(self) -> HeadAndTail:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
