@@ -98,7 +98,7 @@ def run(
     from pipeline.display import ProgressDisplay
     from pipeline.export.catalogue import EXPORTERS
     from pipeline.job import open_job, run_job
-    from pipeline.runner import Selection
+    from pipeline.plan import Selection
     from stages.catalogue import PIPELINE
 
     console = Console(stderr=True)

@@ -25,8 +25,8 @@ class Display(Protocol):
     def started(self, stage: str) -> None:
         """Hear that a stage started."""
 
-    def progressed(self, done: int, total: int) -> None:
-        """Hear how far the running stage is."""
+    def progressed(self, stage: str, done: int, total: int) -> None:
+        """Hear how far a running stage is; several may run at a time, each on a thread of its own."""
 
     def ended(self, outcome: StageOutcome) -> None:
         """Hear how a stage ended."""
@@ -38,7 +38,7 @@ class SilentDisplay:
     def started(self, stage: str) -> None:
         """Ignore."""
 
-    def progressed(self, done: int, total: int) -> None:
+    def progressed(self, stage: str, done: int, total: int) -> None:
         """Ignore."""
 
     def ended(self, outcome: StageOutcome) -> None:
@@ -46,7 +46,7 @@ class SilentDisplay:
 
 
 class ProgressDisplay:
-    """A bar with the time left for the running stage, and a line for each stage that ended."""
+    """A bar with the time left for each running stage, and a line for each stage that ended."""
 
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
@@ -61,7 +61,7 @@ class ProgressDisplay:
             transient=True,
         )
         self._console = console
-        self._task: TaskID | None = None
+        self._tasks: dict[str, TaskID] = {}
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -74,17 +74,16 @@ class ProgressDisplay:
 
     def started(self, stage: str) -> None:
         """Open a bar."""
-        self._task = self._progress.add_task(stage, total=None)
+        self._tasks[stage] = self._progress.add_task(stage, total=None)
 
-    def progressed(self, done: int, total: int) -> None:
+    def progressed(self, stage: str, done: int, total: int) -> None:
         """Move the bar."""
-        if self._task is not None:
-            self._progress.update(self._task, completed=done, total=total)
+        if stage in self._tasks:
+            self._progress.update(self._tasks[stage], completed=done, total=total)
 
     def ended(self, outcome: StageOutcome) -> None:
         """Replace the bar by a line."""
-        if self._task is not None:
-            self._progress.remove_task(self._task)
-            self._task = None
+        if outcome.name in self._tasks:
+            self._progress.remove_task(self._tasks.pop(outcome.name))
         time = f"{outcome.seconds:8.1f} s" if outcome.state == State.COMPLETED else " " * 10
         self._console.print(f"  {outcome.name:<12} {outcome.state.value:<10}{time}", highlight=False)

@@ -18,12 +18,12 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource, read_with_source
 from pipeline.interrupt import stop_wish
 from pipeline.outcome import RunOutcome
-from pipeline.plan import Plan, Source, make_plan
+from pipeline.plan import Plan, Selection, Source, make_plan
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
 from pipeline.run_folder import claimed, logged
-from pipeline.runner import Runner, Selection
+from pipeline.runner import Runner
 from pipeline.stage import Stage
 
 

@@ -97,6 +97,42 @@ class Plan:
         return {s.kind: s.key for s in self.sources} | {s.output: s.key for s in self.steps}
 
 
+@dataclass(frozen=True)
+class Selection:
+    """Which stages to run.
+
+    Attributes
+    ----------
+    recompute_from
+        Compute this stage and all after it again; empty to reuse all that is there.
+    only
+        Run this stage alone; empty for all.
+    resume
+        False to compute everything again.
+    """
+
+    recompute_from: str = ""
+    only: str = ""
+    resume: bool = True
+
+    def check(self, plan: Plan) -> None:
+        """Raise `PipelineError` when a stage named is not in the plan."""
+        for name in filter(None, (self.recompute_from, self.only)):
+            plan.step(name)
+
+    def skips(self, step: Step) -> bool:
+        """Return whether a step is not to be computed even when its result is missing."""
+        return bool(self.only) and step.stage.name != self.only
+
+    def recomputes(self, step: Step, plan: Plan) -> bool:
+        """Return whether a step is to be computed even when its result is there."""
+        if self.skips(step):
+            return False
+        names = [s.stage.name for s in plan.steps]
+        since = self.recompute_from
+        return not self.resume or (bool(since) and names.index(step.stage.name) >= names.index(since))
+
+
 def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Sequence[Source]) -> Plan:
     """Wire the stages and derive their keys.
 

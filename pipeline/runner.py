@@ -6,8 +6,9 @@ import hashlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,53 +18,19 @@ from pipeline.export.exporter import Exporter, published_key, withdraw
 from pipeline.export.writer import Writer
 from pipeline.headline import headline
 from pipeline.outcome import Number, Results, RunOutcome, StageOutcome, State
-from pipeline.plan import Plan, Step
+from pipeline.plan import Plan, Selection, Step
 from pipeline.run_folder import RunFolder
 from pipeline.scratch import Scratch
 from pipeline.stage import Context
 from pipeline.store import Provenance, Stored
 
 _LONGEST_PROBLEM = 300
+_AT_ONCE = 2  # stages side by side; more would only share memory and cores among them
+_LOOK_S = 0.2  # a signal that reaches another thread is seen after so long
 
 
 class FailedError(BoresightError):
     """A bug: something broke that no input should break. The log holds the traceback."""
-
-
-@dataclass(frozen=True)
-class Selection:
-    """Which stages to run.
-
-    Attributes
-    ----------
-    recompute_from
-        Compute this stage and all after it again; empty to reuse all that is there.
-    only
-        Run this stage alone; empty for all.
-    resume
-        False to compute everything again.
-    """
-
-    recompute_from: str = ""
-    only: str = ""
-    resume: bool = True
-
-    def check(self, plan: Plan) -> None:
-        """Raise `pipeline.plan.PipelineError` when a stage named is not in the plan."""
-        for name in filter(None, (self.recompute_from, self.only)):
-            plan.step(name)
-
-    def skips(self, step: Step) -> bool:
-        """Return whether a step is not to be computed even when its result is missing."""
-        return bool(self.only) and step.stage.name != self.only
-
-    def recomputes(self, step: Step, plan: Plan) -> bool:
-        """Return whether a step is to be computed even when its result is there."""
-        if self.skips(step):
-            return False
-        names = [s.stage.name for s in plan.steps]
-        since = self.recompute_from
-        return not self.resume or (bool(since) and names.index(step.stage.name) >= names.index(since))
 
 
 class Runner:
@@ -102,6 +69,7 @@ class Runner:
         }
         self._artefacts: dict[type, object] = {s.kind: s.value for s in plan.sources}
         self._writer = Writer(folder, logger)
+        self._over = threading.Event()
         self._at = ""
 
     def run(self, selection: Selection) -> RunOutcome:
@@ -119,8 +87,7 @@ class Runner:
             with self._writer:
                 self._withdraw_stale()
                 self._note(State.RUNNING)
-                for step in self._plan.steps:
-                    self._complete(step, selection)
+                self._complete_all(selection)
                 self._publish_results(selection)
             return self._note(State.COMPLETED)
         except BoresightError as error:
@@ -136,29 +103,50 @@ class Runner:
                 f"This is a fault of the program. The log with the details: {self._folder.log}"
             ) from error
 
-    def _complete(self, step: Step, selection: Selection) -> None:
-        self._at = f"stage {step.stage.name}"
-        self._stop_if_wished()
-        name, key = step.stage.name, step.key
-        store, again = self._folder.store, selection.recomputes(step, self._plan)
-        stored = None if again else store.read(name, key, step.output)
-        state = State.REUSED
-        if stored is None:
-            if selection.skips(step):
-                return
-            self._check_inputs(step)
-            stored, state = self._compute(step), State.COMPLETED
-        self._artefacts[step.output] = stored.artefact
-        made = stored.provenance
-        self._settle(replace(self._outcomes[name], state=state, seconds=made.seconds, numbers=made.numbers))
-        self._publish_ready()
+    def _complete_all(self, selection: Selection) -> None:
+        """Complete every step as soon as what it needs is there; some run side by side."""
+        waiting = list(self._plan.steps)
+        running: dict[Future[Stored], Step] = {}
+        with ThreadPoolExecutor(_AT_ONCE, "stage") as pool:
+            try:
+                while waiting or running:
+                    step = _next(waiting, running.values())
+                    if step is None:
+                        self._await(running)
+                    elif self._is_due(step, selection):
+                        running[pool.submit(self._compute, step)] = step
+            finally:
+                self._over.set()
 
-    def _compute(self, step: Step) -> Stored:
+    def _is_due(self, step: Step, selection: Selection) -> bool:
+        """Return whether a step has to be computed, and say that it starts; settle it if it is there."""
         name = step.stage.name
+        self._at = f"stage {name}"
+        self._stop_if_wished()
+        if not selection.recomputes(step, self._plan):
+            stored = self._folder.store.read(name, step.key, step.output)
+            if stored is not None:
+                self._settle(step, stored, State.REUSED)
+            if stored is not None or selection.skips(step):
+                return False
+        self._check_inputs(step)
         self._outcomes[name] = replace(self._outcomes[name], state=State.RUNNING)
         self._note(State.RUNNING)
         self._display.started(name)
         self._logger.info("stage %s starts, key %s", name, step.key)
+        return True
+
+    def _await(self, running: dict[Future[Stored], Step]) -> None:
+        """Settle the steps that have ended, or wait a moment for one to end."""
+        ended = wait(running, _LOOK_S, FIRST_COMPLETED).done
+        for future in [f for f in running if f in ended]:
+            step = running.pop(future)
+            self._at = f"stage {step.stage.name}"
+            self._settle(step, future.result(), State.COMPLETED)
+
+    def _compute(self, step: Step) -> Stored:
+        """Compute a step and return it as the store gives it back; on a thread of its own."""
+        name = step.stage.name
         numbers: list[Number] = []
         start = time.monotonic()
         artefact = self._artefact(step, numbers)
@@ -186,7 +174,7 @@ class Runner:
     def _context(self, step: Step, numbers: list[Number]) -> Context:
         def progress(done: int, total: int) -> None:
             self._stop_if_wished()
-            self._display.progressed(done, total)
+            self._display.progressed(step.stage.name, done, total)
 
         def report(name: str, value: float | int | str, unit: str = "") -> None:
             self._logger.info("%s: %s = %s %s", step.stage.name, name, value, unit)
@@ -199,6 +187,8 @@ class Runner:
     def _stop_if_wished(self) -> None:
         if self._wish.is_set():
             raise Cancelled("stopped; the same command continues from here")
+        if self._over.is_set():
+            raise Cancelled("stopped with the others")
 
     def _check_inputs(self, step: Step) -> None:
         for _, kind in step.inputs:
@@ -210,14 +200,21 @@ class Runner:
                     hint="run without --only, or that stage first",
                 )
 
-    def _settle(self, outcome: StageOutcome) -> None:
-        self._outcomes[outcome.name] = outcome
-        self._logger.info("stage %s %s, %.1f s", outcome.name, outcome.state.value, outcome.seconds)
+    def _settle(self, step: Step, stored: Stored, state: State) -> None:
+        name, made = step.stage.name, stored.provenance
+        self._artefacts[step.output] = stored.artefact
+        outcome = replace(self._outcomes[name], state=state, seconds=made.seconds, numbers=made.numbers)
+        self._outcomes[name] = outcome
+        self._logger.info("stage %s %s, %.1f s", name, state.value, outcome.seconds)
         self._display.ended(outcome)
         self._note(State.RUNNING)
+        self._publish_ready()
 
     def _publish_ready(self) -> None:
-        self._writer.check()
+        try:
+            self._writer.check()
+        finally:
+            self._at = self._writer.failed or self._at
         for exporter in self._exporters:
             kinds = exporter.inputs().values()
             if all(k in self._artefacts for k in kinds):
@@ -240,7 +237,12 @@ class Runner:
         self._logger.info("ended: %s: %s", state.value, problem)
         for name, outcome in self._outcomes.items():
             if outcome.state == State.RUNNING:
-                self._outcomes[name] = replace(outcome, state=state, problem=problem)
+                own = name == self._at.removeprefix("stage ")
+                self._outcomes[name] = replace(
+                    outcome,
+                    state=state if own else State.CANCELLED,
+                    problem=problem if own else f"stopped with {self._at}",
+                )
                 self._display.ended(self._outcomes[name])
         try:
             self._note(state, problem)
@@ -254,6 +256,16 @@ class Runner:
 
     def _outcome(self, state: State, problem: str) -> RunOutcome:
         return RunOutcome(state, tuple(self._outcomes.values()), headline(self._artefacts), problem)
+
+
+def _next(waiting: list[Step], running: Collection[Step]) -> Step | None:
+    """Take the first step off the list that needs nothing still to be made; None while there is no room."""
+    missing = {s.output for s in (*waiting, *running)}
+    ready = (s for s in waiting if not any(kind in missing for _, kind in s.inputs))
+    step = next(ready, None) if len(running) < _AT_ONCE else None
+    if step is not None:
+        waiting.remove(step)
+    return step
 
 
 def _state_of(error: BoresightError) -> State:

@@ -14,7 +14,7 @@ from pipeline.config import resolve
 from pipeline.display import SilentDisplay
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.job import open_job, run_job
-from pipeline.runner import Selection
+from pipeline.plan import Selection
 from pipeline.simulator.scene import Scene
 from stages.catalogue import PIPELINE
 from tests.simulated import rendered

@@ -18,8 +18,8 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource
 from pipeline.job import Job, run_job
 from pipeline.outcome import RunOutcome
+from pipeline.plan import Selection
 from pipeline.recording.base import FrameTable, Image, Int, PipeFacts, Planes, Recording
-from pipeline.runner import Selection
 from tests.toy_stages import TOYS, write_numbers, write_page
 
 TOY_EXPORTERS = (Exporter("numbers", write_numbers), Exporter("page", write_page))

@@ -17,8 +17,8 @@ from pipeline.display import ProgressDisplay
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.instrument.probe_file import read_with_source
 from pipeline.job import Job, run_job
+from pipeline.plan import Selection
 from pipeline.recording.base import Recording
-from pipeline.runner import Selection
 from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import Examination
 from stages.diagnose.encoder import encoder_effects, with_true_readings

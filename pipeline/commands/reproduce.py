@@ -16,6 +16,7 @@ from pipeline.display import ProgressDisplay
 from pipeline.errors import BoresightError
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.job import Job, open_job, run_job
+from pipeline.plan import Selection
 from pipeline.provenance import library_versions
 from pipeline.reproduce import (
     Agreement,
@@ -26,7 +27,6 @@ from pipeline.reproduce import (
     read_run_record,
 )
 from pipeline.run_folder import RunFolder
-from pipeline.runner import Selection
 from stages.catalogue import PIPELINE
 
 

@@ -20,7 +20,7 @@ from pipeline.errors import InputError
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.job import open_job, run_job
 from pipeline.outcome import RunOutcome
-from pipeline.runner import Selection
+from pipeline.plan import Selection
 from stages.catalogue import PIPELINE
 from tests.bad_recordings import cut_sample
 from tests.faults import MeddlingDisplay, obeying_permissions, on_small_disk
@@ -87,7 +87,9 @@ def test_inputs_that_change_while_stages_work(good: Path, tmp_path: Path, whole:
         assert refusal.value.file == copy / name
         assert "same command" in refusal.value.hint
         told = states(tmp_path / "run")
-        assert told[stage] == "unusable"
+        # The stage that runs beside it may be the first to see it, and stops it.
+        assert told[stage] in ("unusable", "cancelled")
+        assert "unusable" in told.values()
         assert all(told[d] in ("completed", "reused") for d in done)
         done = [n for n, state in told.items() if state in ("completed", "reused")]
         shutil.copy(good / name, copy / name)

@@ -7,9 +7,9 @@ from pathlib import Path
 from pipeline.display import SilentDisplay
 from pipeline.instrument.probe_file import read_with_source, write_probe
 from pipeline.job import run_job
+from pipeline.plan import Selection
 from pipeline.provenance import MadeBy
 from pipeline.recording.input_file import files_sha256
-from pipeline.runner import Selection
 from tests.toys import toy_job, toy_probe
 
 MADE_BY = MadeBy("diagnose", {"gauge": "ab" * 32}, {"without": ["laser_tilt"]})

@@ -8,20 +8,23 @@ import shutil
 import signal
 import subprocess
 import sys
-from dataclasses import replace
+import threading
+import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from pipeline.config import resolve
 from pipeline.display import SilentDisplay
 from pipeline.errors import Cancelled, InputError, UnusableError
-from pipeline.job import run_job
+from pipeline.job import Job, run_job
 from pipeline.outcome import RunOutcome, State
-from pipeline.plan import PipelineError
-from pipeline.runner import FailedError, Selection
-from pipeline.stage import Context
+from pipeline.plan import PipelineError, Selection
+from pipeline.runner import FailedError
+from pipeline.stage import Context, Parameters, Stage
 from tests.disk_limit import file_size_limit
 from tests.shared_data import PROJECT_ROOT
 from tests.toy_stages import DRAW, SMOOTH, Drawn, DrawParameters
@@ -170,7 +173,9 @@ def test_a_file_lost_or_changed_is_written_again(tmp_path: Path, name: str, dama
 def stop_in_the_middle(*, parameters: DrawParameters, context: Context) -> Drawn:
     context.progress(1, 4)
     os.kill(os.getpid(), signal.SIGINT)
-    context.progress(2, 4)
+    for _ in range(1000):  # the thread that takes signals is another
+        time.sleep(0.01)
+        context.progress(2, 4)
     raise AssertionError("it went on")
 
 
@@ -182,6 +187,63 @@ def test_ctrl_c_stops_at_the_next_progress(tmp_path: Path) -> None:
         run_job(job, Selection(), SilentDisplay())
     assert record(tmp_path / "run")["state"] == State.CANCELLED
     assert signal.getsignal(signal.SIGINT) is before
+
+
+@dataclass(frozen=True)
+class Left:
+    value: float
+
+
+@dataclass(frozen=True)
+class Right:
+    value: float
+
+
+_MEETING = threading.Barrier(2, timeout=60)
+
+
+def go_left(drawn: Drawn, *, parameters: Parameters, context: Context) -> Left:
+    _MEETING.wait()
+    return Left(1.0)
+
+
+def go_right(drawn: Drawn, *, parameters: Parameters, context: Context) -> Right:
+    _MEETING.wait()
+    return Right(2.0)
+
+
+def fail_left(drawn: Drawn, *, parameters: Parameters, context: Context) -> Left:
+    _MEETING.wait()
+    raise UnusableError("left", "there is no way")
+
+
+def linger_right(drawn: Drawn, *, parameters: Parameters, context: Context) -> Right:
+    _MEETING.wait()
+    for _ in range(3000):
+        time.sleep(0.01)
+        context.progress(1, 2)
+    raise AssertionError("it went on")
+
+
+def forked_job(folder: Path, left: Any, right: Any) -> Job:
+    stages = (DRAW, Stage("left", "1", Parameters, left), Stage("right", "1", Parameters, right))
+    return replace(toy_job(folder), stages=stages, exporters=(), configuration=resolve(stages, None, ()))
+
+
+def test_stages_that_need_nothing_of_each_other_run_side_by_side(tmp_path: Path) -> None:
+    """Each waits for the other: one after the other, they would wait for ever."""
+    outcome = run_job(forked_job(tmp_path / "run", go_left, go_right), Selection(), SilentDisplay())
+    assert states(outcome) == ["completed"] * 3
+    assert [s.name for s in outcome.stages] == ["draw", "left", "right"]
+
+
+def test_a_stage_that_fails_stops_the_one_beside_it(tmp_path: Path) -> None:
+    with pytest.raises(UnusableError, match="there is no way"):
+        run_job(forked_job(tmp_path / "run", fail_left, linger_right), Selection(), SilentDisplay())
+    told = record(tmp_path / "run")
+    assert told["state"] == "unusable"
+    assert [s["state"] for s in told["stages"]] == ["completed", "unusable", "cancelled"]
+    assert told["stages"][2]["problem"] == "stopped with stage left"
 
 
 def answer_something_else(drawn: Drawn, *, parameters: Any, context: Context) -> SMOOTH.output():  # type: ignore[valid-type]
