@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pipeline.simulator.produce import Places, produce
+from pipeline.simulator.produce import Order, Places, produce
 from pipeline.simulator.scene import Scene, read_scene, scene_from
 from tests.shared_data import PROJECT_ROOT
 
@@ -32,5 +32,5 @@ def smaller(scene: Scene, shrink: int, frames: int, **changes: Any) -> Scene:
 def rendered(scene: Scene, folder: Path, sealed: bool = False) -> tuple[Path, Path]:
     """Return the folders of a rendered recording and of its truth."""
     places = Places(folder / scene.name, folder / "truth" / scene.name, sealed)
-    produce(scene, SCENES / "scene.yaml", places, lambda done, total: None)
+    produce([Order(scene, SCENES / "scene.yaml", places)], lambda order, done: None)
     return places.recording, places.truth

@@ -14,11 +14,10 @@ from pipeline.errors import InputError
 from pipeline.simulator.effects.switch import parse_switches
 from pipeline.simulator.premises.base import Premise
 from pipeline.simulator.prior import draw_pair, read_prior
-from pipeline.simulator.produce import Places, beside, produce
+from pipeline.simulator.produce import Order, Places, beside, produce
 from pipeline.simulator.scene import Scene, read_scene
 
 _PRIOR = Path(__file__).resolve().parents[2] / "configs" / "priors" / "pairs.yaml"
-Job = tuple[Scene, Path, Places]
 
 
 def simulate(
@@ -53,20 +52,19 @@ def simulate(
     """
     console = Console(stderr=True)
     if draw:
-        jobs = _drawn(range(first, first + draw), prior or _PRIOR, seed or 0, output, truth, seal, frames)
+        orders = _drawn(range(first, first + draw), prior or _PRIOR, seed or 0, output, truth, seal, frames)
         if scene or effects:
             raise InputError("--draw", "draws scene and effects itself", hint="leave out SCENE and --with")
     else:
-        jobs = iter(
-            [_single(scene, effects or (), seed, frames, Places(output, truth or beside(output), seal))]
-        )
-    for job in jobs:
-        _render(job, console)
+        places = Places(output, truth or beside(output), seal)
+        orders = iter([[_single(scene, effects or (), seed, frames, places)]])
+    for together in orders:
+        _render(together, console)
 
 
 def _single(
     file: Path | None, effects: Sequence[str], seed: int | None, frames: int | None, places: Places
-) -> Job:
+) -> Order:
     if file is None:
         raise InputError("simulate", "is given no scene", hint="name a scene file, or use --draw N")
     scene = read_scene(file)
@@ -74,7 +72,7 @@ def _single(
     changes: dict[str, object] = {"effects": {**scene.effects, **switched}}
     if seed is not None:
         changes["seed"] = seed
-    return _shortened(scene.model_copy(update=changes), frames), file, places
+    return Order(_shortened(scene.model_copy(update=changes), frames), file, places)
 
 
 def _drawn(
@@ -85,31 +83,35 @@ def _drawn(
     truth: Path | None,
     sealed: bool,
     frames: int | None,
-) -> Iterator[Job]:
+) -> Iterator[list[Order]]:
+    """Yield the gauge run and the inspection of every pair."""
     prior = read_prior(prior_file)
     truths = truth or beside(folder)
     for index in which:
         pair = draw_pair(prior, prior_file, seed, index)
-        for scene in (pair.gauge, pair.field):
-            places = Places(folder / scene.name, truths / scene.name, sealed)
-            yield _shortened(scene, frames), pair.folder / "scene.yaml", places
+        yield [
+            Order(
+                _shortened(scene, frames),
+                pair.folder / "scene.yaml",
+                Places(folder / scene.name, truths / scene.name, sealed),
+            )
+            for scene in (pair.gauge, pair.field)
+        ]
 
 
 def _shortened(scene: Scene, frames: int | None) -> Scene:
     return scene if frames is None else scene.model_copy(update={"frames": min(frames, scene.frames)})
 
 
-def _render(job: Job, console: Console) -> None:
-    scene, file, places = job
+def _render(together: Sequence[Order], console: Console) -> None:
     columns = (
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
     )  # fmt: skip
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(scene.name, total=scene.frames)
-        premises = produce(
-            scene, file, places, lambda done, total: bar.update(task, completed=done, total=total)
-        )
-    _show(premises, scene, places)
+        tasks = {o.scene.name: bar.add_task(o.scene.name, total=o.scene.frames) for o in together}
+        found = produce(together, lambda order, done: bar.update(tasks[order.scene.name], completed=done))
+    for order, premises in zip(together, found, strict=True):
+        _show(premises, order.scene, order.places)
 
 
 def _show(premises: Sequence[Premise], scene: Scene, places: Places) -> None:

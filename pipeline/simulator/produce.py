@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,9 +16,10 @@ from pipeline.simulator.effects.switch import switches_from_mapping
 from pipeline.simulator.premises.base import Premise
 from pipeline.simulator.premises.check import require_recording, require_scene
 from pipeline.simulator.record import write_recording
-from pipeline.simulator.render import renderer_of
+from pipeline.simulator.render import Renderer, renderer_of
 from pipeline.simulator.scene import Scene
 from pipeline.simulator.seal import seal_truth
+from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.truth_files import write_truth
 
 
@@ -36,40 +37,74 @@ def beside(recording: Path) -> Path:
     return recording.with_name(f"{recording.name}-truth")
 
 
-def produce(
-    scene: Scene, file: Path, places: Places, progress: Callable[[int, int], None]
-) -> tuple[Premise, ...]:
-    """Check a scene, render it, check the recording, write its truth, seal it; return what was checked.
+@dataclass(frozen=True)
+class Order:
+    """A scene, where it was read from (a photograph is looked for beside it), and where it is to go."""
+
+    scene: Scene
+    file: Path
+    places: Places
+
+
+def produce(orders: Sequence[Order], progress: Callable[[Order, int], None]) -> list[tuple[Premise, ...]]:
+    """Render recordings that belong together, each with its truth; return what was checked of each.
+
+    All scenes are checked before the first is rendered. Where one cannot be rendered, none is left.
 
     Parameters
     ----------
-    scene : Scene
-    file : Path
-        Where it was read from; a photograph is looked for beside it.
-    places : Places
+    orders : sequence of Order
     progress : callable
-        Told the frames done, of how many.
+        Told how many frames of an order are done.
 
     Raises
     ------
     InputError
-        When the scene or a place cannot be used.
+        When a scene or a place cannot be used.
     UnusableError
-        When the scene cannot show what it is meant to show.
+        When a scene cannot show what it is meant to show.
     """
-    _require_apart(places)
-    plain = plain_truth(scene, file)
-    switches = switches_from_mapping(scene.effects, file)
+    for order in orders:
+        _require_apart(order.places)
+    checked = [_checked(order) for order in orders]
+    with ExitStack() as stack:
+        new = [stack.enter_context(_whole_or_nothing(order.places)) for order in orders]
+        return [
+            _rendered(order, one, places, progress)
+            for order, one, places in zip(orders, checked, new, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class _Checked:
+    """A scene that can be rendered, and what was checked of it."""
+
+    truth: SceneTruth
+    renderer: Renderer
+    premises: tuple[Premise, ...]
+
+
+def _checked(order: Order) -> _Checked:
+    plain = plain_truth(order.scene, order.file)
+    switches = switches_from_mapping(order.scene.effects, order.file)
     truth = switch_on(plain, switches)
     renderer = renderer_of(truth)
-    before = require_scene(plain, switches, renderer)
-    with _whole_or_nothing(places) as new:
-        write_recording(renderer, new.recording, scene.codec, scene.quality, progress)
-        after = require_recording(new.recording, truth)
-        write_truth(scene, truth, [p.record for p in (*before, *after)], new.truth)
-        if places.sealed:
-            seal_truth(new.truth, new.recording)
-    return (*before, *after)
+    return _Checked(truth, renderer, tuple(require_scene(plain, switches, renderer)))
+
+
+def _rendered(
+    order: Order, one: _Checked, new: Places, progress: Callable[[Order, int], None]
+) -> tuple[Premise, ...]:
+    """Render a scene, check the recording, write its truth, seal it."""
+    scene = order.scene
+    write_recording(
+        one.renderer, new.recording, scene.codec, scene.quality, lambda done, _: progress(order, done)
+    )
+    premises = (*one.premises, *require_recording(new.recording, one.truth))
+    write_truth(scene, one.truth, [p.record for p in premises], new.truth)
+    if new.sealed:
+        seal_truth(new.truth, new.recording)
+    return premises
 
 
 @contextmanager

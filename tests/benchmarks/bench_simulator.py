@@ -25,7 +25,7 @@ import numpy as np
 
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.exact import exact_rings
-from pipeline.simulator.produce import Places, produce
+from pipeline.simulator.produce import Order, Places, produce
 from pipeline.simulator.render import Renderer, renderer_of
 from pipeline.simulator.scene import read_scene
 from pipeline.simulator.sensor import through_lens
@@ -115,8 +115,8 @@ def gauge() -> None:
     file = SCENES / "gauge-4-inch.yaml"
     scene = read_scene(file)
     with tempfile.TemporaryDirectory() as folder:
-        places = Places(Path(folder) / "gauge", Path(folder) / "truth")
-        cpu, clock = timed(lambda: produce(scene, file, places, lambda done, total: None))
+        order = Order(scene, file, Places(Path(folder) / "gauge", Path(folder) / "truth"))
+        cpu, clock = timed(lambda: produce([order], lambda order, done: None))
     print(f"gauge-4-inch, {scene.frames} frames: CPU {cpu:.0f} s, by the clock {clock:.0f} s")
 
 

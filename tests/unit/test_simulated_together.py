@@ -1,0 +1,51 @@
+"""Recordings that belong together are rendered all or none: a pair has no half."""
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import UnusableError
+from pipeline.simulator import produce as production
+from pipeline.simulator.produce import Order, Places, produce
+from tests.simulated import SCENES, shipped, smaller
+
+
+def pair(folder: Path) -> list[Order]:
+    scene = smaller(shipped("straight-4-inch"), 4, 4)
+    named = [scene.model_copy(update={"name": name}) for name in ("gauge", "field")]
+    places = [Places(folder / s.name, folder / f"{s.name}-truth") for s in named]
+    return [Order(s, SCENES / "scene.yaml", p) for s, p in zip(named, places, strict=True)]
+
+
+def refuse_field(monkeypatch: pytest.MonkeyPatch, check: str, told: list[str]) -> None:
+    """Have the second recording that comes to a check refused by it."""
+    sound = getattr(production, check)
+
+    def refusing(*arguments: object) -> object:
+        told.append(check)
+        if told.count(check) == 2:
+            raise UnusableError("simulate", "its effect would not show")
+        return sound(*arguments)
+
+    monkeypatch.setattr(production, check, refusing)
+
+
+def test_both_are_there_when_both_can_be(tmp_path: Path) -> None:
+    done: list[str] = []
+    found = produce(pair(tmp_path), lambda order, frames: done.append(order.scene.name))
+    assert len(found) == 2
+    assert {p.name for p in tmp_path.iterdir()} == {"gauge", "gauge-truth", "field", "field-truth"}
+    assert set(done) == {"gauge", "field"}
+
+
+@pytest.mark.parametrize("check", ["require_scene", "require_recording"])
+def test_none_is_left_when_the_second_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str
+) -> None:
+    rendered: list[str] = []
+    refuse_field(monkeypatch, check, [])
+    with pytest.raises(UnusableError, match="would not show"):
+        produce(pair(tmp_path), lambda order, frames: rendered.append(order.scene.name))
+    assert list(tmp_path.iterdir()) == []
+    # what can be told before rendering is told before the first is rendered
+    assert bool(rendered) == (check == "require_recording")
