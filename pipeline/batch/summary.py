@@ -25,7 +25,10 @@ def write_summary(endings: Iterable[Ending], folder: Path) -> None:
     ordered = sorted(endings, key=lambda e: e.name)
     runs: list[Json] = [_document(e) for e in ordered]
     rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
-    text = page_template("pipeline.batch").render(rows=rows, states=_states(ordered), metrics=SHOWN_METRICS)
+    warned = sum(bool(e.warnings) for e in ordered)
+    text = page_template("pipeline.batch").render(
+        rows=rows, states=_states(ordered), metrics=SHOWN_METRICS, warned=warned
+    )
     with disk_errors_named(folder):
         replace_json(folder / "batch.json", {"format": 1, "runs": runs, "states": dict(_states(ordered))})
         replace_text(folder / "batch.html", text)
@@ -37,4 +40,7 @@ def _states(endings: list[Ending]) -> Counter[str]:
 
 def _document(ending: Ending) -> Json:
     metrics: list[Json] = [{"name": n, "value": v, "unit": u} for n, v, u in ending.metrics]
-    return {"name": ending.name, "state": ending.state, "problem": ending.problem, "metrics": metrics}
+    return {
+        "name": ending.name, "state": ending.state, "problem": ending.problem, "metrics": metrics,
+        "warnings": list(ending.warnings),
+    }  # fmt: skip

@@ -44,12 +44,15 @@ class Ending:
     problem : str
         Empty when it completed.
     metrics : tuple of (name, value, unit)
+    warnings : tuple of str
+        What the reader mended and what stages warn of: a completed run that wants a look.
     """
 
     name: str
     state: str
     problem: str
     metrics: tuple[tuple[str, Any, str], ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def run_one(work: Work) -> Ending:
@@ -88,7 +91,8 @@ def ending_of(work: Work, code: int, told: str) -> Ending:
     if record is None:
         return Ending(work.name, "failed", "the run left no record")
     metrics = tuple((m["name"], m["value"], m["unit"]) for m in record.get("metrics", ()))
-    return Ending(work.name, str(record["state"]), str(record.get("problem", "")), metrics)
+    warnings = tuple(map(str, (*record.get("reader_warnings", ()), *record.get("warnings", ()))))
+    return Ending(work.name, str(record["state"]), str(record.get("problem", "")), metrics, warnings)
 
 
 def _record(folder: Path) -> dict[str, Any] | None:

@@ -174,6 +174,22 @@ def test_the_summary_tells_every_ending_in_the_order_of_names(tmp_path):
     assert 'href="&lt;i' not in page
 
 
+def test_what_a_completed_run_warns_of_is_on_the_page(tmp_path):
+    record = {"state": "completed", "problem": "", "warnings": ["motion: moved <6 σ>"],
+              "reader_warnings": ["2 images are missing"]}  # fmt: skip
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    ending = ending_of(Work("a", tmp_path, tmp_path, ()), 0, "")
+    assert ending.warnings == ("2 images are missing", "motion: moved <6 σ>")
+    write_summary([ending, Ending("b", "completed", "")], tmp_path)
+    runs = json.loads((tmp_path / "batch.json").read_text())["runs"]
+    assert [r["warnings"] for r in runs] == [list(ending.warnings), []]
+    page = (tmp_path / "batch.html").read_text()
+    assert "1 with warnings" in page
+    assert "<li>2 images are missing</li><li>motion: moved &lt;6 σ&gt;</li>" in page
+    write_summary([Ending("b", "completed", "")], tmp_path)
+    assert "with warnings" not in (tmp_path / "batch.html").read_text()
+
+
 def test_workers_and_a_scheduler_exclude_each_other(recordings, tmp_path):
     batch = batch_of(recordings, tmp_path, "--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
     _, told = batch.communicate(timeout=60)
