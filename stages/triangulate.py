@@ -13,6 +13,7 @@ from pipeline.artefacts import Float, Float32, RingPoints, RingSamples, RingVali
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.stage import Context, Parameters, Stage
+from pipeline.threads import in_threads
 
 _UPPER = np.triu_indices(3)
 _CHUNK_FRAMES = 16
@@ -52,20 +53,22 @@ def triangulate_rings(
     shape = rings.validity.shape
     xyz, uncorrected, noise = (context.scratch.zeros((*shape, 3), np.float32) for _ in range(3))
     covariance = context.scratch.zeros((*shape, 6), np.float32)
-    placed, missed, off = 0, 0, 0
-    for start in range(0, len(rings.frame), _CHUNK_FRAMES):
-        frames = slice(start, start + _CHUNK_FRAMES)
+
+    def place(frames: slice) -> NDArray[np.int64]:
         found = _triangulate_chunk(rings, frames, probe)
         hit = np.isfinite(found[0][..., 0])
-        missed += int((_valid(rings, frames) & ~hit).sum())
         apart = off_the_ring(np.hypot(*np.moveaxis(found[0][..., :2], -1, 0)), parameters.largest_departure)
-        off += int(apart.sum())
         for whole, part in zip((xyz, uncorrected, noise, covariance), found, strict=True):
             part[apart] = np.nan
             whole[frames] = part
-        placed += int((hit & ~apart).sum())
-        context.progress(min(frames.stop, len(rings.frame)), len(rings.frame))
-    _report(context, placed, missed, off, noise)
+        return np.array([(hit & ~apart).sum(), (_valid(rings, frames) & ~hit).sum(), apart.sum()])
+
+    chunks = [slice(a, a + _CHUNK_FRAMES) for a in range(0, len(rings.frame), _CHUNK_FRAMES)]
+    counts = np.zeros(3, np.int64)
+    for done, count in enumerate(in_threads(place, chunks, context.workers), 1):
+        counts += count
+        context.progress(done, len(chunks))
+    _report(context, counts, noise)
     return RingPoints(rings.frame, rings.azimuth_rad, xyz, uncorrected, noise, covariance)
 
 
@@ -100,10 +103,10 @@ def untilted_sheet(laser: LaserSheet) -> LaserSheet:
 
 def calibration_covariance(by_parameters: Float, covariance: Float) -> Float:
     """Return J Σ Jᵀ as (..., 6) entries xx, xy, xz, yy, yz, zz of Jacobians (..., 3, P) and Σ (P, P)."""
-    spread = by_parameters @ covariance
-    return np.stack(
-        [np.sum(spread[..., i, :] * by_parameters[..., j, :], -1) for i, j in zip(*_UPPER, strict=True)], -1
-    )
+    flat = by_parameters.reshape(-1, len(covariance))  # one large product instead of many small ones
+    spread = (flat @ covariance).reshape(by_parameters.shape)
+    full = np.einsum("...ip,...jp->...ij", spread, by_parameters)
+    return np.asarray(full[..., _UPPER[0], _UPPER[1]])
 
 
 def _triangulate_chunk(
@@ -134,7 +137,8 @@ def _valid(rings: RingSamples, frames: slice) -> NDArray[np.bool_]:
     return np.asarray(rings.validity[frames] == RingValidity.VALID)
 
 
-def _report(context: Context, placed: int, missed: int, off: int, noise: Float32) -> None:
+def _report(context: Context, counts: NDArray[np.int64], noise: Float32) -> None:
+    placed, missed, off = counts.tolist()
     context.report("points triangulated", placed, "points")
     context.report("ring samples that miss the laser sheet", missed, "samples")
     context.report("rejected: far off the ring beside them", off, "samples")

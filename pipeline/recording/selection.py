@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import islice
 from typing import TypeVar
 
 import numpy as np
 
 from pipeline.recording.base import Int
+from pipeline.threads import in_threads
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 _THREADS = 2
-_AHEAD = 4
 
 
 def ascending(frames: Sequence[int] | Int) -> Int:
@@ -48,12 +45,4 @@ def decoded_ahead(
     items: Iterator[tuple[int, Item]], decode: Callable[[Item], Made]
 ) -> Iterator[tuple[int, Made]]:
     """Yield (number, decoded item) in order, decoding a few ahead on other threads."""
-    ahead: deque[tuple[int, Future[Made]]] = deque()
-    with ThreadPoolExecutor(_THREADS) as pool:
-        for number, item in islice(items, _AHEAD):
-            ahead.append((number, pool.submit(decode, item)))
-        while ahead:
-            number, made = ahead.popleft()
-            yield number, made.result()
-            for later, item in islice(items, 1):
-                ahead.append((later, pool.submit(decode, item)))
+    return in_threads(lambda item: (item[0], decode(item[1])), items, _THREADS)

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from pipeline.threads import in_threads
 from stages.accumulate.samples import WallSamples
 from stages.accumulate.survey import RingSurvey
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
-_BLOCK = 64
+_BLOCK, _THREADS = 64, 2
 _WIDTH_IN_RINGS = 0.4
 _FINE_CELLS = (9, 9)
 _SEEN_SHARE = 0.1
@@ -125,13 +126,17 @@ def _map_of(
     shape = (len(grid.distance_mm), len(grid.azimuth_rad))
     radius, sigma, misalignment = (np.full(shape, np.nan, np.float32) for _ in range(3))
     count = np.zeros(shape, np.int64)
-    for a in range(0, shape[1], _BLOCK):
-        part = slice(a, min(a + _BLOCK, shape[1]))
+
+    def fill(part: slice) -> None:
         _regress(
             columns.distance_mm[part], columns.radius_mm[part], columns.variance[part],
             columns.misalignment_mm[part], columns.count[part], grid.distance_mm, width, gap,
             radius[:, part], sigma[:, part], count[:, part], misalignment[:, part],
         )  # fmt: skip
+
+    blocks = (slice(a, min(a + _BLOCK, shape[1])) for a in range(0, shape[1], _BLOCK))
+    for _ in in_threads(fill, blocks, _THREADS):
+        pass
     return radius, sigma, count, misalignment
 
 
@@ -163,7 +168,7 @@ def _usual_spacing(columns: RingColumns) -> float:
     return float(np.median(step)) if step.size else 0.0
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _bin(valid, bin_of, distance, radius, misalignment, sigma, sums, count):  # type: ignore[no-untyped-def]
     for f in range(valid.shape[0]):
         for a in range(valid.shape[1]):
@@ -177,7 +182,7 @@ def _bin(valid, bin_of, distance, radius, misalignment, sigma, sums, count):  # 
                 count[j, f] += 1
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _regress(  # type: ignore[no-untyped-def]
     distance, radius, variance, misalignment, count, rows, width, gap,
     out_radius, out_sigma, out_count, out_misalignment,
@@ -203,7 +208,7 @@ def _regress(  # type: ignore[no-untyped-def]
             out_misalignment[i, a] = (weight * misalignment[a, first:last]).sum() / weight.sum()
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _near_rings(d, width, gap):  # type: ignore[no-untyped-def]
     """Tell if rings at signed distances ``d``, ascending, are near: on both sides, or one very near."""
     before, after = np.inf, np.inf
@@ -215,7 +220,7 @@ def _near_rings(d, width, gap):  # type: ignore[no-untyped-def]
     return before + after <= gap or min(before, after) <= 0.5 * width
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _line_at(d, kernel, radius, variance, width):  # type: ignore[no-untyped-def]
     """Return value at d = 0 of the weighted line and its 1 σ, from the scatter about it where larger."""
     w = kernel / variance

@@ -1,0 +1,42 @@
+"""Work shared among threads: order, errors in their place, and no more made ahead than a few."""
+
+import threading
+
+import pytest
+
+from pipeline.threads import in_threads
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_results_come_in_order_and_are_made_elsewhere(threads: int) -> None:
+    found = list(in_threads(lambda k: (k * k, threading.get_ident()), range(50), threads))
+    assert [square for square, _ in found] == [k * k for k in range(50)]
+    assert threading.get_ident() not in {thread for _, thread in found}
+
+
+def test_two_are_made_at_once() -> None:
+    meeting = threading.Barrier(2, timeout=60)
+    assert sorted(in_threads(lambda k: meeting.wait(), range(2), 2)) == [0, 1]
+
+
+def test_an_error_is_raised_in_its_place_and_the_rest_is_not_taken() -> None:
+    taken = []
+
+    def items():
+        for k in range(1000):
+            taken.append(k)
+            yield k
+
+    made = in_threads(lambda k: 1 // (5 - k), items(), 2)
+    assert [next(made) for _ in range(5)] == [0, 0, 0, 0, 1]
+    with pytest.raises(ZeroDivisionError):
+        next(made)
+    assert len(taken) < 12
+
+
+def test_threads_end_with_the_caller() -> None:
+    before = threading.active_count()
+    made = in_threads(lambda k: k, range(1000), 3)
+    next(made)
+    made.close()
+    assert threading.active_count() == before
