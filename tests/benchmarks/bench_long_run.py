@@ -10,6 +10,7 @@ and 7 GiB of memory, none of which counts. Nothing is extrapolated: a length tha
 The run is one process with its helpers, and told is the most that they held of their own at one moment
 (RssAnon: pages mapped from files are the system's to drop), and the processor time of all of them. Files for
 people are written beside the stages that follow: what they cost counts there, the last of it as ``files``.
+Stages that work side by side have a line together.
 """
 
 from __future__ import annotations
@@ -33,8 +34,7 @@ from tests.benchmarks.watch import Watch
 
 ROOT = Path(__file__).resolve().parents[2]
 TEMPLATE, CONFIG = Path(__file__).with_name("pulled_4_inch.yaml"), ROOT / "configs/long.yaml"
-_ENDED = re.compile(r" INFO stage \w+ (?:completed|reused)")
-_STARTS = re.compile(r" INFO stage (\w+) starts")
+_CHANGE = re.compile(r" INFO stage (\w+) (starts|completed|reused)")
 
 
 @dataclass(frozen=True)
@@ -108,10 +108,10 @@ def boresight(*arguments: str) -> subprocess.Popen[bytes]:
 
 
 class Progress:
-    """Tells from a run's log, read on as it grows, at which stage it is."""
+    """Tells from a run's log, read on as it grows, at which stages it is."""
 
     def __init__(self, log: Path) -> None:
-        self._log, self._read, self._stage = log, 0, "start"
+        self._log, self._read, self._at = log, 0, ["start"]
 
     def __call__(self) -> str:
         if self._log.exists():
@@ -120,14 +120,15 @@ class Progress:
                 for line in file:
                     self._take(line.decode())
                 self._read = file.tell()
-        return self._stage
+        return " and ".join(self._at) or "files"
 
     def _take(self, line: str) -> None:
-        starts = _STARTS.search(line)
-        if starts:
-            self._stage = starts[1]
-        elif _ENDED.search(line):
-            self._stage = "files"
+        change = _CHANGE.search(line)
+        if change is None:
+            return
+        self._at = [stage for stage in self._at if stage not in ("start", change[1])]
+        if change[2] == "starts":
+            self._at.append(change[1])
 
 
 def against_truth(place: Place) -> str:
