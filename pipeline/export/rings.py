@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 
 from pipeline.artefacts import RingSamples, RingValidity
+
+if TYPE_CHECKING:
+    import zarr
 
 _FRAMES_PER_CHUNK = 64
 
 
 def write_rings(rings: RingSamples, folder: Path) -> None:
     """Write ``rings.zarr``: laser frames × azimuth, with the meaning of every array in its attributes."""
+    # zarr is slow to import: a run is under way by then.
+    import zarr
+
     group = zarr.open_group(folder / "rings.zarr", mode="w")
     group.attrs.update(
         {
