@@ -30,6 +30,7 @@ _FEWEST_SPOTS = 30
 _FEWEST_AGREE = 0.5
 _ALIKE_PX = 1.5
 _LEAN_PX = 3.0
+_BEYOND = 3
 _LEAST_SIGMA_PX = 0.05
 
 
@@ -85,8 +86,22 @@ class _Peak:
     height: float
 
 
-def compare(earlier: Iterable[Piece], later: Strip, reach: Float, parameters: MotionParameters) -> Comparison:
-    """Compare a strip with earlier ones; the shift is at most ``reach`` (2,) rows and columns.
+@dataclass(frozen=True)
+class Expected:
+    """Rows and columns (2,) by which the wall should lie further in the later strip, and how far off that."""
+
+    shift: Float
+    reach: Float
+
+    def allows(self, shift: Float) -> bool:
+        """Whether a shift (2,) is within reach."""
+        return bool(np.all(np.abs(shift - self.shift) <= self.reach))
+
+
+def compare(
+    earlier: Iterable[Piece], later: Strip, expected: Expected, parameters: MotionParameters
+) -> Comparison:
+    """Compare a strip with earlier ones.
 
     Shifts a little beyond the reach are tried too: a wall that repeats itself must not be taken for one that
     is seen again.
@@ -94,8 +109,8 @@ def compare(earlier: Iterable[Piece], later: Strip, reach: Float, parameters: Mo
     row, column = _spots(later, parameters)
     if len(row) < _FEWEST_SPOTS:
         return Comparison.refused(Verdict.PLAIN)
-    peaks = [p for piece in earlier for p in _peaks(piece, Piece.of(later), reach, parameters)]
-    inside = [p for p in peaks if np.all(np.abs(p.shift) <= reach)]
+    peaks = [p for piece in earlier for p in _peaks(piece, Piece.of(later), expected, parameters)]
+    inside = [p for p in peaks if expected.allows(p.shift)]
     if not inside:
         return Comparison.refused(Verdict.OTHER)
     best = max(inside, key=lambda p: p.height)
@@ -109,16 +124,17 @@ def compare(earlier: Iterable[Piece], later: Strip, reach: Float, parameters: Mo
     )
 
 
-def _peaks(earlier: Piece, later: Piece, reach: Float, parameters: MotionParameters) -> list[_Peak]:
+def _peaks(earlier: Piece, later: Piece, expected: Expected, parameters: MotionParameters) -> list[_Peak]:
     """Return the best shift within reach, and the best one elsewhere."""
     height = _correlation(earlier, later)
     rows, columns = height.shape
     lag = later.first_row - earlier.first_row
     shift_row = lag + 2 * ((np.arange(rows) + rows // 2) % rows - rows // 2)[:, None]
     shift_column = 2 * ((np.arange(columns) + columns // 2) % columns - columns // 2)[None]
-    beyond = reach + 3 * (2 * parameters.patch_half_px + 1)
-    height = np.where((np.abs(shift_row) <= beyond[0]) & (np.abs(shift_column) <= beyond[1]), height, -1.0)
-    inside = (np.abs(shift_row) <= reach[0]) & (np.abs(shift_column) <= reach[1])
+    off = [np.abs(s - e) for s, e in zip((shift_row, shift_column), expected.shift, strict=True)]
+    beyond = expected.reach + _BEYOND * (2 * parameters.patch_half_px + 1)
+    height = np.where((off[0] <= beyond[0]) & (off[1] <= beyond[1]), height, -1.0)
+    inside = (off[0] <= expected.reach[0]) & (off[1] <= expected.reach[1])
     found: list[_Peak] = []
     for allowed in (inside, np.ones_like(inside)):
         for other in found:

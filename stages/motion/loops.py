@@ -19,6 +19,7 @@ from pipeline.stage import Context
 from stages.motion.chain import Chain, Closures, astray, beside
 from stages.motion.closing import closed
 from stages.motion.comparing import Comparison, Piece, Verdict, compare
+from stages.motion.foresight import Foresight
 from stages.motion.joining import Joined, Laid, chain_of, lay
 from stages.motion.parameters import MotionParameters
 from stages.motion.pipe_frames import PipeFrames, pipe_frames
@@ -29,8 +30,6 @@ from stages.motion.strip import Strip, StripGrid
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-_REACH_SIGMA = 5.0
-_LEAST_REACH_PX = 4.0
 _LEAST_PROBABILITY = 1e-6
 _DISTANCE, _ROLL = 2, 5
 _ASIDE = (0, 1, 3, 4)
@@ -112,9 +111,10 @@ def close_loops(
     chain = chain_of(laid, joined.settled)
     ends = _Ends.of(at, laid, joined)
     by_error = ends.by_error(joined, chain)
-    reach = _reach(chain, by_error, view.grid)
-    places = [widened(p, passage, r[0] * view.grid.step_mm) for p, r in zip(at, reach, strict=True)]
-    compared = _compared(places, reach, laid, joined, view, parameters, scratch)
+    foresight = Foresight(_spread_px(chain, by_error, view.grid))
+    reach_mm = [foresight.of(n).reach[0] * view.grid.step_mm for n in range(len(at))]
+    places = [widened(p, passage, far) for p, far in zip(at, reach_mm, strict=True)]
+    compared = _compared(places, foresight, laid, joined, view, parameters, scratch)
     closures = _closures(by_error, ends, compared, view.grid, parameters)
     taken, verdicts = _judged(chain, closures, compared)
     if not any(taken):
@@ -167,11 +167,11 @@ def _by_error(at: Int, frame: Int, view: PipeFrames, joined: Joined) -> Float:
     return out.reshape(len(at), 6, -1)
 
 
-def _reach(chain: Chain, by_error: Float, grid: StripGrid) -> Float:
-    """Return how many rows and columns (M, 2) the wall may lie off at each place."""
-    variance = np.einsum("kic,kic->c", by_error, chain.covariance_with(by_error)).reshape(-1, 6)
-    sigma = np.sqrt(variance[:, [_DISTANCE, _ROLL]]) / _per_px(grid)
-    return np.asarray(np.ceil(_REACH_SIGMA * sigma + _LEAST_REACH_PX))
+def _spread_px(chain: Chain, by_error: Float, grid: StripGrid) -> Float:
+    """Return the covariance (2 M, 2 M) of the shifts before any loop is closed."""
+    along = by_error.reshape(*by_error.shape[:2], -1, 6)[..., [_DISTANCE, _ROLL]] / _per_px(grid)
+    seen = along.reshape(*by_error.shape[:2], -1)
+    return np.asarray(np.einsum("kic,kid->cd", seen, chain.covariance_with(seen)))
 
 
 def _per_px(grid: StripGrid) -> Float:
@@ -181,7 +181,7 @@ def _per_px(grid: StripGrid) -> Float:
 
 def _compared(
     places: Sequence[Place],
-    reach: Float,
+    foresight: Foresight,
     laid: Sequence[Laid],
     joined: Joined,
     view: View,
@@ -201,7 +201,8 @@ def _compared(
         for n in (n for n, p in enumerate(places) if p.later == frame):
             known = (rows[f] for f in places[n].earlier if f in rows)
             pieces = (Piece(first, kept.part(k, k + 1)[0].astype(np.float32)) for k, first in known)
-            found[n] = compare(pieces, strip, reach[n], parameters)
+            found[n] = compare(pieces, strip, foresight.of(n), parameters)
+            foresight.learn(n, found[n])
         if frame in earlier:
             rows[frame] = (kept.count, strip.first_row)
             kept.append(Piece.of(strip).contrast[None])

@@ -1,4 +1,8 @@
-"""Frames of joined windows as seen from the pipe: each from the axis of its own window."""
+"""Frames of joined windows as seen from the pipe: each from the axis of its own window.
+
+The one axis of a run is no good for this while loops are open: it is the mean of what the windows say of a
+place, and turns where these are far apart.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.geometry.axis import frames_at, to_pipe
-from pipeline.geometry.rigid import from_parts, inverse, transform
+from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from stages.motion.joining import Joined, Laid
 
 Float = NDArray[np.float64]
@@ -25,11 +29,11 @@ class PipeFrames:
     window : (n,) int
         The window that each belongs to.
     distance_mm : (n,)
-        Along the one axis of the run.
+        Along the windows' axes, one after the other.
     axis_o : (n, 3)
         The point of the own window's axis beside the camera.
     section_o : (n, 3, 3)
-        Section there: z along the own window's axis, x next to that of the run's axis.
+        Section there: z along the own window's axis, x carried on from the first window without a turn.
     T_pc : (n, 4, 4)
         Poses in the straightened pipe.
     """
@@ -49,29 +53,43 @@ def pipe_frames(laid: Sequence[Laid], joined: Joined, frame: Int) -> PipeFrames:
     """
     first = np.array([part.submap.window.first + part.submap.anchor for part in laid])
     window = np.searchsorted(first, frame, side="right") - 1
-    T_oc = joined.T_pc[frame]
-    axis_o, section_o = np.empty((len(frame), 3)), np.empty((len(frame), 3, 3))
+    T_oc, sections = joined.T_pc[frame], _sections(laid)
+    distance, axis_o, section_o = (
+        np.empty(len(frame)),
+        np.empty((len(frame), 3)),
+        np.empty((len(frame), 3, 3)),
+    )
     for n in np.unique(window):
         mine = window == n
-        axis_o[mine], section_o[mine] = _own_sections(laid[n], T_oc[mine, :3, 3])
-    distance = to_pipe(joined.axis, T_oc[:, :3, 3])[0]
-    section_o = _turned(section_o, frames_at(joined.axis, distance)[1][..., 0])
+        distance[mine], axis_o[mine], section_o[mine] = sections[n].beside(T_oc[mine, :3, 3])
     back = np.swapaxes(section_o, 1, 2)
     origin = np.einsum("nij,nj->ni", back, T_oc[:, :3, 3] - axis_o)
     origin[:, 2] = distance
     return PipeFrames(window, distance, axis_o, section_o, from_parts(back @ T_oc[:, :3, :3], origin))
 
 
-def _own_sections(part: Laid, xyz_o: Float) -> tuple[Float, Float]:
-    """Return a window's axis points (n, 3) and sections (n, 3, 3) beside points (n, 3)."""
-    axis = part.submap.axis
-    origin, rotation = frames_at(axis, to_pipe(axis, transform(inverse(part.T_ow), xyz_o))[0])
-    return transform(part.T_ow, origin), part.T_ow[:3, :3] @ rotation
+@dataclass(frozen=True)
+class _Sections:
+    """Sections of a window's axis, turned about it by so much."""
+
+    part: Laid
+    turn_rad: float
+
+    def beside(self, xyz_o: Float) -> tuple[Float, Float, Float]:
+        """Return distance (n,), axis points (n, 3) and sections (n, 3, 3) beside points (n, 3)."""
+        axis, T_ow = self.part.submap.axis, self.part.T_ow
+        distance = to_pipe(axis, transform(inverse(T_ow), xyz_o))[0]
+        origin, rotation = frames_at(axis, distance)
+        turn = rotation_from_vector(np.array([0.0, 0.0, self.turn_rad]))
+        return distance + self.part.distance_mm, transform(T_ow, origin), T_ow[:3, :3] @ rotation @ turn
 
 
-def _turned(section_o: Float, x_o: Float) -> Float:
-    """Return sections (n, 3, 3) turned about their z so that their x is next to ``x_o`` (n, 3)."""
-    z = section_o[..., 2]
-    x = x_o - z * np.sum(z * x_o, -1, keepdims=True)
-    x /= np.linalg.norm(x, axis=-1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], -1)
+def _sections(laid: Sequence[Laid]) -> list[_Sections]:
+    """Return every window's sections, which at the seam are turned as those of the window before."""
+    found = [_Sections(laid[0], 0.0)]
+    for part in laid[1:]:
+        seam_o = part.T_pc[[part.submap.anchor], :3, 3]
+        before, own = found[-1].beside(seam_o)[2][0], _Sections(part, 0.0).beside(seam_o)[2][0]
+        x, y = before[:, 0] @ own[:, :2]
+        found.append(_Sections(part, float(np.arctan2(y, x))))
+    return found

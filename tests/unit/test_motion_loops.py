@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.scratch import Scratch
-from stages.motion.comparing import Piece, Verdict, compare
+from stages.motion.comparing import Expected, Piece, Verdict, compare
 from stages.motion.joining import Joined
 from stages.motion.loops import Loops, close_loops
 from stages.motion.parameters import MotionParameters
@@ -133,11 +133,11 @@ def test_shift_and_its_sigma_are_right(run: LoopedRun) -> None:
         T[2, 3] = run.distance_mm[frame]
         earlier = next(view.strips(np.array([frame]), T[None]))
         later = next(DrawnView(run, WALL, WALL, {frame: off}).strips(np.array([frame]), T[None]))
-        found = compare([Piece.of(earlier)], later, np.array([20.0, 20.0]), PARAMETERS)
+        found = compare([Piece.of(earlier)], later, Expected(np.zeros(2), np.array([20.0, 20.0])), PARAMETERS)
         assert found.verdict is Verdict.SAME
         errors.append((found.shift[0] - off / GRID.step_mm) / found.sigma[0])
     assert np.abs(errors).max() < 3
-    beyond = compare([Piece.of(earlier)], later, np.array([5.0, 20.0]), PARAMETERS)
+    beyond = compare([Piece.of(earlier)], later, Expected(np.zeros(2), np.array([5.0, 20.0])), PARAMETERS)
     assert beyond.verdict is not Verdict.SAME, "further off than can be"
 
 
