@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from pipeline.threads import in_threads
 from stages.motion.elimination import add_landmarks, add_rows
 from stages.motion.robust import Loss, Squares
+from stages.motion.sums import BLOCK, Sums
 from stages.motion.tridiagonal import BlockTridiagonal
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-BLOCK = 7
 
 
 @dataclass(frozen=True)
@@ -159,39 +160,44 @@ class BorderedSystem:
     """
 
     def __init__(self, frames: int, border: int, bandwidth: int) -> None:
-        size = BLOCK * frames
-        self._band = np.zeros((frames, min(bandwidth, frames - 1) + 1, BLOCK, BLOCK))
-        self._border = np.zeros((size, border))
-        self._corner = np.zeros((border, border))
-        self._right = np.zeros(size)
-        self._right_border = np.zeros(border)
+        self._sums = Sums.empty(frames, border, min(bandwidth, frames - 1) + 1)
 
     def add(self, rows: Rows) -> None:
         """Add equations without landmarks."""
-        add_rows(
-            rows.frame, rows.by_frame, rows.by_border, rows.residual, rows.weight,
-            self._band, self._border, self._corner, self._right, self._right_border,
-        )  # fmt: skip
+        add_rows(rows.frame, rows.by_frame, rows.by_border, rows.residual, rows.weight, *self._sums.arrays)
 
     def add_landmarks(self, rows: LandmarkRows, damping: float = 0.0) -> tuple[Float, Float]:
         """Add texture and eliminate its landmarks; return their inverse information and right sides.
 
-        The landmarks' own information is raised by a relative ``damping``.
+        The landmarks' own information is raised by a relative ``damping``. They are added up in two shares,
+        always the same ones, each on a thread of its own.
         """
-        count, weight = len(rows.start) - 1, rows.weight
+        count, weight, surface_weight = len(rows.start) - 1, rows.weight, rows.surface_weight
+        self._add_instrument(rows, weight)
+        inverse, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
+
+        def add_share(sums: Sums, part: slice) -> None:
+            add_landmarks(
+                rows.start[part.start : part.stop + 1], rows.frame, rows.by_pose, rows.by_point,
+                rows.by_instrument, rows.residual, weight, rows.surface_by_point[part],
+                rows.surface_by_border[part], rows.surface_residual[part], surface_weight[part], damping,
+                *sums.arrays, inverse[part], right[part],
+            )  # fmt: skip
+
+        other, half = self._sums.like(), count // 2
+        shares = [(self._sums, slice(0, half)), (other, slice(half, count))]
+        for _ in in_threads(lambda share: add_share(*share), shares, len(shares)):
+            pass
+        self._sums.add(other)
+        return inverse, right
+
+    def _add_instrument(self, rows: LandmarkRows, weight: Float) -> None:
+        """Add the products of the instrument's derivatives with themselves."""
         instrument = rows.by_instrument.reshape(2 * len(weight), rows.by_instrument.shape[2])
         weighted = instrument * np.repeat(weight, 2)[:, None]
-        own = slice(len(self._corner) - instrument.shape[1], None)
-        self._corner[own, own] += weighted.T @ instrument
-        self._right_border[own] -= weighted.T @ rows.residual.ravel()
-        inverse, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
-        add_landmarks(
-            rows.start, rows.frame, rows.by_pose, rows.by_point, rows.by_instrument,
-            rows.residual, weight, rows.surface_by_point, rows.surface_by_border,
-            rows.surface_residual, rows.surface_weight, damping,
-            self._band, self._border, self._corner, self._right, self._right_border, inverse, right,
-        )  # fmt: skip
-        return inverse, right
+        own = slice(len(self._sums.corner) - instrument.shape[1], None)
+        self._sums.corner[own, own] += weighted.T @ instrument
+        self._sums.right_border[own] -= weighted.T @ rows.residual.ravel()
 
     def factor(self, damping: float = 0.0) -> Factor:
         """Return the factorised system, the diagonal raised by a relative ``damping``.
@@ -201,15 +207,16 @@ class BorderedSystem:
         numpy.linalg.LinAlgError
             When some unknown is not determined.
         """
-        band, corner = self._band, self._corner
+        sums = self._sums
+        band, corner = sums.band, sums.corner
         if damping:
             band, corner = band.copy(), corner + damping * np.diag(np.diag(corner))
             diagonal = np.arange(BLOCK)
             band[:, 0, diagonal, diagonal] *= 1 + damping
         tridiagonal = BlockTridiagonal.of_band(band)
-        solved = tridiagonal.solve(self._border)
-        left = cho_factor(corner - self._border.T @ solved)
-        return Factor(tridiagonal, self._border, solved, left, self._right, self._right_border)
+        solved = tridiagonal.solve(sums.border)
+        left = cho_factor(corner - sums.border.T @ solved)
+        return Factor(tridiagonal, sums.border, solved, left, sums.right, sums.right_border)
 
 
 @dataclass(frozen=True)

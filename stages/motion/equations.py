@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
+from pipeline.threads import in_threads
 from stages.motion import terms
 from stages.motion.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
 from stages.motion.elimination import by_point_and_pose
@@ -27,6 +28,7 @@ _LEAST_EXCESS = 0.3
 _ASTRAY_PX = 1000.0
 _ROUNDING = 1e-5
 _LEAST_REACH = 4
+_AT_ONCE, _THREADS = 16384, 2
 
 
 @dataclass(frozen=True)
@@ -188,11 +190,36 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
 
     A landmark without a pixel pulls nothing, but costs as one far astray.
     """
+    tracks, count = measured.tracks, len(measured.tracks.frame)
+    unsure = measured.unsure.shape[1]
+    residual, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
+    by_pose, by_instrument = np.empty((count, 2, 6)), np.empty((count, 2, unsure + MATCH_BIASES))
+
+    def fill(part: slice) -> None:
+        found = _observed(state, measured, parameters.match_bias_px, part)
+        for whole, own in zip((residual, by_point, by_pose, by_instrument), found, strict=True):
+            whole[part] = own
+
+    parts = [slice(a, a + _AT_ONCE) for a in range(0, count, _AT_ONCE)]
+    for _ in in_threads(fill, parts, _THREADS):
+        pass
+    start = np.searchsorted(tracks.landmark, np.arange(len(state.xyz_p) + 1))
+    relief, normal, by_border = terms.surface(state, state.xyz_p)
+    return LandmarkRows(
+        start, tracks.frame, by_pose, by_point, by_instrument, residual, tracks.sigma_px,
+        normal, by_border, relief, np.full(len(relief), parameters.surface_sigma_mm), Cauchy(),
+    )  # fmt: skip
+
+
+def _observed(
+    state: State, measured: Measurements, match_bias_px: float, part: slice
+) -> tuple[Float, Float, Float, Float]:
+    """Return residuals of some observations and their derivatives by point, pose and instrument."""
     tracks, camera = measured.tracks, measured.camera_at(state)
-    T = state.T_pc[tracks.frame]
-    xyz_c = transform(inverse(T), state.xyz_p[tracks.landmark])
-    bias = _match_bias(xyz_c, tracks.uv - camera.centre_px) * parameters.match_bias_px
-    residual = camera.project(xyz_c).uv + bias @ state.instrument[-MATCH_BIASES:] - tracks.uv
+    T = state.T_pc[tracks.frame[part]]
+    xyz_c = transform(inverse(T), state.xyz_p[tracks.landmark[part]])
+    bias = _match_bias(xyz_c, tracks.uv[part] - camera.centre_px) * match_bias_px
+    residual = camera.project(xyz_c).uv + bias @ state.instrument[-MATCH_BIASES:] - tracks.uv[part]
     by_c, by_parameters = camera.project_jacobian(xyz_c)
     unsure = measured.unsure[: by_parameters.shape[2]]
     by_camera = by_parameters.reshape(2 * len(T), len(unsure)) @ unsure
@@ -200,14 +227,9 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     by_point, by_pose = by_point_and_pose(by_c, T, xyz_c)
     astray = ~np.isfinite(residual).all(1)
     residual[astray] = _ASTRAY_PX
-    for part in (by_point, by_pose, by_instrument):
-        part[astray] = 0.0
-    start = np.searchsorted(tracks.landmark, np.arange(len(state.xyz_p) + 1))
-    relief, normal, by_border = terms.surface(state, state.xyz_p)
-    return LandmarkRows(
-        start, tracks.frame, by_pose, by_point, by_instrument, residual, tracks.sigma_px,
-        normal, by_border, relief, np.full(len(relief), parameters.surface_sigma_mm), Cauchy(),
-    )  # fmt: skip
+    for derivative in (by_point, by_pose, by_instrument):
+        derivative[astray] = 0.0
+    return residual, by_point, by_pose, by_instrument
 
 
 def _excess_of(size: Float, sigma: Float) -> float:

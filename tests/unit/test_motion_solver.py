@@ -9,11 +9,12 @@ from scipy.optimize import least_squares
 
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.adjustment import Damping, adjust
-from stages.motion.bordered import BLOCK, BorderedSystem, LandmarkRows, Rows, Step, landmark_steps
+from stages.motion.bordered import BorderedSystem, LandmarkRows, Rows, Step, landmark_steps
 from stages.motion.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.robust import Cauchy, GemanMcClure, Loss, Squares
 from stages.motion.state import State
+from stages.motion.sums import BLOCK
 from stages.motion.tridiagonal import BlockTridiagonal
 from tests.motion_scene import displaced, scene
 

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.calibrate.gauge.state import Unknowns
-from stages.motion.bordered import BLOCK, Rows
+from stages.motion.bordered import Rows
 from stages.motion.robust import Cauchy
+from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

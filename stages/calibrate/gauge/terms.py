@@ -13,8 +13,9 @@ from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
-from stages.motion.bordered import BLOCK, Rows
+from stages.motion.bordered import Rows
 from stages.motion.robust import Cauchy
+from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

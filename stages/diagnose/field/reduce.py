@@ -11,7 +11,8 @@ from threadpoolctl import threadpool_limits
 
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.field.system import FieldSystem
-from stages.motion.bordered import BLOCK, BorderedSystem, Factor, Rows
+from stages.motion.bordered import BorderedSystem, Factor, Rows
+from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

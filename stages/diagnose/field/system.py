@@ -15,10 +15,11 @@ from stages.diagnose.evidence import INSTRUMENT, Column
 from stages.diagnose.field.points import distance_mm, ring_points, speed_mm_s, texture_points
 from stages.diagnose.field.run import FieldRun
 from stages.motion import terms
-from stages.motion.bordered import BLOCK, LandmarkRows, Rows
+from stages.motion.bordered import LandmarkRows, Rows
 from stages.motion.equations import MATCH_BIASES
 from stages.motion.robust import Squares
 from stages.motion.state import EncoderReadings, State
+from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
