@@ -16,6 +16,7 @@ from pipeline.codec import Json
 from pipeline.errors import InputError
 
 _CHUNK = 1 << 20
+_UNFINISHED = ".unfinished"
 _GO_ON = "free space or give another folder with -o; the same command then continues"
 
 
@@ -130,6 +131,53 @@ def remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
+
+
+def require_writable(folder: Path) -> None:
+    """Try to write in a folder for results, before work is put into what would go there; leave nothing.
+
+    Raises
+    ------
+    InputError
+        When it cannot be made or written.
+    """
+    with disk_errors_named(folder):
+        made = [p for p in (folder, *folder.parents) if not p.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        trial = folder / _UNFINISHED
+        remove(trial)
+        trial.mkdir()
+        for empty in (trial, *made):
+            empty.rmdir()
+
+
+@contextmanager
+def written_together(folder: Path, last: str) -> Iterator[Path]:
+    """Lend a folder for files that belong together, which take their places in ``folder`` at the end.
+
+    The file ``last`` is taken away first and put there last: where it is, all of them are, and all of one
+    call. Of a call that fails or is killed before, nothing is left but what an earlier one wrote.
+
+    Raises
+    ------
+    InputError
+        When the disk is full or cannot be written.
+    """
+    with disk_errors_named(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        unfinished = folder / _UNFINISHED
+        remove(unfinished)
+        unfinished.mkdir()
+        try:
+            yield unfinished
+            sync_tree(unfinished)
+            (folder / last).unlink(missing_ok=True)
+            sync_folder(folder)
+            for file in sorted(unfinished.iterdir(), key=lambda f: (f.name == last, f.name)):
+                file.replace(folder / file.name)
+            sync_folder(folder)
+        finally:
+            shutil.rmtree(unfinished, ignore_errors=True)
 
 
 @contextmanager

@@ -1,12 +1,25 @@
-"""Ctrl-C and the request to end, taken as a wish to stop at the next safe place."""
+"""Ctrl-C and the request to end, taken as a wish to stop at a safe place; children that end with us."""
 
 from __future__ import annotations
 
+import ctypes
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+_PR_SET_PDEATHSIG = 1
+
+
+def end_with_parent() -> None:
+    """Have the system end this process when its parent is lost; for a child, before it starts.
+
+    Elsewhere than on Linux nothing is done.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 @contextmanager

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -13,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pipeline
+from pipeline.interrupt import end_with_parent
 from pipeline.json_file import read_json
 
-_PR_SET_PDEATHSIG = 1
 _REFUSED = 2
 _BUSY = "is at work in this run folder"
 _WAIT_S, _PATIENCE_S = 2.0, 120.0
@@ -71,14 +69,9 @@ def _run(work: Work) -> tuple[int, str]:
     environment = os.environ | {"PYTHONPATH": str(Path(pipeline.__file__).resolve().parents[1])}
     done = subprocess.run(
         [*words, *work.options], env=environment, capture_output=True, text=True, check=False,
-        preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+        preexec_fn=end_with_parent,
     )  # fmt: skip
     return done.returncode, done.stderr
-
-
-def _end_with_parent() -> None:
-    """Have the system end this process when the worker that started it is lost."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def ending_of(work: Work, code: int, told: str) -> Ending:

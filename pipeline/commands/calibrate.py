@@ -14,14 +14,14 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.codec import digest
-from pipeline.disk import disk_errors_named
+from pipeline.disk import require_writable, written_together
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.provenance import MadeBy
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
-from pipeline.recording.checks import check_probe_fits
+from pipeline.recording.checks import check_probe_fits, refuse_changed
 from pipeline.stage import quiet_context
 from stages.calibrate.gauge.calibrate import calibrate_gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
@@ -49,20 +49,21 @@ def calibrate(
     recording = open_recording(gauge)
     stated = _stated_probe(recording, probe)
     require_gauge(recording)
+    require_writable(output)
     console = Console(stderr=True)
     with console.status("measuring rings"):
         rings = extract_rings(recording, stated, RingParameters.model_validate({}), quiet_context())
     with console.status("measuring fiducials, adjusting"):
         result = calibrate_gauge(recording, rings, stated, parameters, quiet_context())
+    refuse_changed(recording)
     inputs = {"gauge": recording.content_key, "probe": digest(stated)}
     made_by = MadeBy("calibrate", inputs, parameters.model_dump(mode="json"))
     # matplotlib takes a second to load, for which a refusal need not wait
     from pipeline.commands.calibrate_report import write_report
 
-    with disk_errors_named(output):
-        output.mkdir(parents=True, exist_ok=True)
-        write_probe(result.probe, output / "probe.yaml", made_by)
-        write_report(result, made_by, output)
+    with written_together(output, last="probe.yaml") as folder:
+        write_probe(result.probe, folder / "probe.yaml", made_by)
+        write_report(result, made_by, folder)
     _show(result, output, console)
 
 

@@ -18,12 +18,12 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from pipeline.disk import disk_errors_named
+from pipeline.disk import disk_errors_named, require_writable, written_together
 from pipeline.errors import InputError, UnusableError
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport
 from pipeline.instrument.camera.formats import WRITTEN, read_camera, write_camera
 from pipeline.provenance import MadeBy
-from pipeline.recording.input_file import files_sha256
+from pipeline.recording.input_file import content_key, input_file
 from pipeline.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import LEAST_CORNERS, detect
@@ -104,22 +104,25 @@ def calibrate_camera(
     models = MODEL_NAMES if model is ModelChoice.BEST else [m for m in MODEL_NAMES if m == model.value]
     console = Console(stderr=True)
     files = list_images(images)
+    pictures = [input_file(file) for file in files]
+    require_writable(output)
     made_by = MadeBy(
-        "calibrate-camera", {"pictures": files_sha256(files)}, parameters.model_dump(mode="json")
+        "calibrate-camera", {"pictures": content_key(pictures)}, parameters.model_dump(mode="json")
     )
     views, image_size, rejected = find_boards(files, target, console)
     with console.status("fitting"):
         report = calibrate_boards(views, image_size, models, reference, parameters, quiet_context())
     report = report.with_rejected(rejected)
+    for picture in pictures:
+        picture.refuse_changed()
     # matplotlib takes a second to load, for which a refusal need not wait
     from pipeline.commands.calibrate_camera_report import write_report
 
-    with disk_errors_named(output):
-        output.mkdir(parents=True, exist_ok=True)
-        write_camera(report.calibration.camera, output / "camera.yaml", "boresight")
-        write_report(report, "" if compare is None else compare.name, made_by, output)
+    with written_together(output, last="camera.yaml") as folder:
+        write_camera(report.calibration.camera, folder / "camera.yaml", "boresight")
+        write_report(report, "" if compare is None else compare.name, made_by, folder)
         if file_format is not None:
-            write_camera(report.calibration.camera, output / f"camera-{file_format}.txt", file_format)
+            write_camera(report.calibration.camera, folder / f"camera-{file_format}.txt", file_format)
     _show(report, output, console)
 
 

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.commands.calibrate_camera import BoardKind, describe_board, find_boards, list_images
-from pipeline.disk import disk_errors_named
+from pipeline.disk import disk_errors_named, require_writable, written_together
 from pipeline.errors import InputError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView
@@ -25,7 +25,7 @@ from pipeline.instrument.laser_plane import LaserPlane
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.provenance import MadeBy
-from pipeline.recording.input_file import files_sha256
+from pipeline.recording.input_file import content_key, input_file
 from pipeline.stage import quiet_context
 from stages.calibrate.laser.calibrate import LaserCalibration, LaserPicture, calibrate_laser_plane
 from stages.calibrate.laser.parameters import LaserPlaneParameters
@@ -62,25 +62,29 @@ def calibrate_laser(
     Writes laser.json and, with --probe, the probe with the given camera and the plane found as its sheet.
     """
     target = describe_board(board, columns, rows, square_mm, marker_mm, dictionary)
+    camera_file = input_file(camera)
     model = read_camera(camera)
     stated = None if probe is None else read_probe(probe)
     parameters = LaserPlaneParameters(wavelength_nm=wavelength_nm, margin_squares=margin_squares)
     console = Console(stderr=True)
     files = list_images(images)
+    pictures = [input_file(file) for file in files]
+    require_writable(output)
     views, image_size, without_board = find_boards(files, target, console)
     _refuse_other_size(image_size, model, camera)
     with console.status("measuring lines"):
         result = calibrate_laser_plane(_pictures(files, views), model, parameters, quiet_context())
     result = replace(result, rejected=(*without_board, *result.rejected))
     refined = None if stated is None else with_plane(stated, model, result.plane, wavelength_nm)
-    inputs = {"pictures": files_sha256(files), "camera": files_sha256((camera,))}
+    for file in (*pictures, camera_file):
+        file.refuse_changed()
+    inputs = {"pictures": content_key(pictures), "camera": content_key((camera_file,))}
     made_by = MadeBy("calibrate-laser", inputs, parameters.model_dump(mode="json"))
     document = description(result) | {"made_by": made_by.document()}
-    with disk_errors_named(output):
-        output.mkdir(parents=True, exist_ok=True)
-        (output / "laser.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
+    with written_together(output, last="laser.json") as folder:
+        (folder / "laser.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
         if refined is not None:
-            write_probe(refined, output / "probe.yaml", made_by)
+            write_probe(refined, folder / "probe.yaml", made_by)
     _show(result, output, console)
 
 

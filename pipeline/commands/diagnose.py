@@ -19,17 +19,18 @@ from pipeline.commands.diagnose_image import image_of
 from pipeline.commands.diagnose_report import Shown, write_page
 from pipeline.commands.diagnose_resimulate import resimulate
 from pipeline.config import resolve
-from pipeline.disk import disk_errors_named
+from pipeline.disk import disk_errors_named, require_writable, written_together
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.provenance import MadeBy
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
-from pipeline.recording.checks import check_probe_fits
+from pipeline.recording.checks import check_probe_fits, refuse_changed
 from pipeline.stage import quiet_context
 from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import diagnose as diagnose_recordings
+from stages.diagnose.drill.cases import ANSWER
 from stages.diagnose.result import Diagnosis, to_json
 
 # Stated parameters farther apart than so many σ are not one probe's.
@@ -70,22 +71,24 @@ def diagnose(
         recordings[1] = None
     for recording in (r for r in recordings if r is not None):
         check_probe_fits(recording, stated)
+    require_writable(output)
     console = Console(stderr=True)
     with console.status("comparing the recordings with the stated instrument"):
         examination = diagnose_recordings(
             recordings[0], recordings[1], stated, quiet_context(), tuple(without or ())
         )
         simulated = resimulate(examination)
+    for recording in (r for r in recordings if r is not None):
+        refuse_changed(recording)
     found = examination.found
     if foreign:
         found = replace(found, shortcomings=(foreign, *found.shortcomings))
     made_by = _made_by(recordings, stated, tuple(without or ()))
-    with disk_errors_named(output):
-        output.mkdir(parents=True, exist_ok=True)
-        write_files(examination, stated, made_by, output)
-        shown = Shown(simulated, None, image_of(examination))
-        write_page(found, shown, output)
-        _write(found, made_by, output)
+    shown = Shown(simulated, None, image_of(examination))
+    with written_together(output, last=ANSWER) as folder:
+        write_files(examination, stated, made_by, folder)
+        write_page(found, shown, folder)
+        (folder / ANSWER).write_text(_answer(found, made_by), "utf-8")
     _show(found, output, console)
     if apply and recordings[0] is not None and recordings[1] is not None:
         configuration = resolve(PIPELINE, None, ())
@@ -132,12 +135,9 @@ def _made_by(recordings: Sequence[Recording | None], stated: Probe, without: Seq
     return MadeBy("diagnose", inputs, {"without": list(without)})
 
 
-def _write(found: Diagnosis, made_by: MadeBy, output: Path) -> None:
-    """Write the answer last: where it is, all of it is."""
-    text = json.dumps(to_json(found) | {"made_by": made_by.document()}, indent=1, ensure_ascii=False)
-    unfinished = output / "diagnosis.json.part"
-    unfinished.write_text(text + "\n", "utf-8")
-    unfinished.replace(output / "diagnosis.json")
+def _answer(found: Diagnosis, made_by: MadeBy) -> str:
+    document = to_json(found) | {"made_by": made_by.document()}
+    return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
 
 
 def _show(found: Diagnosis, output: Path, console: Console) -> None:

@@ -19,6 +19,7 @@ from pipeline.commands.diagnose_figures import (
 )
 from pipeline.commands.diagnose_image import OnImage
 from pipeline.commands.diagnose_resimulate import Resimulated
+from pipeline.disk import replace_text
 from pipeline.pages import page_template
 from stages.diagnose.result import Diagnosis, Verdict, to_json
 
@@ -53,7 +54,7 @@ def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
         consequence=consequence(change) if change is not None else "",
         hours=_by_hour(change) if change is not None else (), pictures=_pictures(found, shown),
     )  # fmt: skip
-    (folder / "diagnosis.html").write_text(text, "utf-8")
+    replace_text(folder / "diagnosis.html", text)
 
 
 def headline(found: Diagnosis) -> str:

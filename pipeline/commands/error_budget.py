@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.disk import disk_errors_named
+from pipeline.disk import written_together
 from pipeline.errors import InputError
 from pipeline.instrument.budget.combine import error_budget as analytic_budget
 from pipeline.instrument.budget.design import baseline_study, tolerances
@@ -64,8 +64,8 @@ def error_budget(
     document = budget_document(budget, drawn, _enough(draws), study, allowed, name)
     folder = output if output is not None else None if as_json else Path("error-budget")
     if folder is not None:
-        with disk_errors_named(folder):
-            write_budget(document, budget, study, folder)
+        with written_together(folder, last="budget.json") as new:
+            write_budget(document, budget, study, new)
     if as_json:
         typer.echo(json.dumps(document, ensure_ascii=False))
     else:

@@ -88,7 +88,6 @@ def budget_document(
 
 def write_budget(document: dict[str, Any], budget: Budget, study: BaselineStudy, folder: Path) -> None:
     """Write budget.json, budget.png, budget.svg and budget.html."""
-    folder.mkdir(parents=True, exist_ok=True)
     (folder / "budget.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
     figure = budget_figure(budget, study)
     pictures = {kind: _rendered(figure, kind) for kind in ("png", "svg")}

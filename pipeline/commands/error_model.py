@@ -14,7 +14,7 @@ import typer
 from jinja2 import Environment, StrictUndefined
 from rich.console import Console
 
-from pipeline.disk import disk_errors_named
+from pipeline.disk import written_together
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.misalignment import (
@@ -96,12 +96,11 @@ def write_error_model(
     # matplotlib takes a second to load, which --json alone need not wait for
     from pipeline.commands.error_model_figures import ring_figure, save_figure, tilt_figure
 
-    with disk_errors_named(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        save_figure(ring_figure(scan), folder, "fig4-ring")
-        save_figure(tilt_figure(scan, accuracy_mm), folder, "fig5-tilt")
+    with written_together(folder, last="error-model.html") as new:
+        save_figure(ring_figure(scan), new, "fig4-ring")
+        save_figure(tilt_figure(scan, accuracy_mm), new, "fig5-tilt")
         page = error_model_page(scan, camera, camera_name, accuracy_mm)
-        (folder / "error-model.html").write_text(page, "utf-8")
+        (new / "error-model.html").write_text(page, "utf-8")
 
 
 def error_model_page(

@@ -11,10 +11,18 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.commands.prove_cases import Drawing, Worked, draw_case, require_seal, worked
+from pipeline.commands.prove_cases import (
+    Drawing,
+    NotRenderedError,
+    Worked,
+    draw_case,
+    require_seal,
+    sweep,
+    worked,
+)
 from pipeline.commands.prove_report import rows_of, write_report
-from pipeline.disk import disk_errors_named
-from pipeline.errors import BoresightError, InputError
+from pipeline.disk import require_writable, written_together
+from pipeline.errors import InputError
 from stages.diagnose.drill.cases import find_cases
 
 _PRIOR = Path(__file__).resolve().parents[2] / "configs" / "priors" / "pairs.yaml"
@@ -48,14 +56,15 @@ def prove(
     scored. What is there already is kept: an interrupted proof goes on where it stopped.
     """
     console = Console(stderr=True)
-    with disk_errors_named(output):
-        output.mkdir(parents=True, exist_ok=True)
-        if sealed is None:
-            drawing = Drawing(prior or _PRIOR, seed, output / "recordings", output / "truth")
-            done = _drawn_and_worked(drawing, cases, output, leave_out, workers, console)
-        else:
-            done = _sealed_and_worked(sealed, truth, output, leave_out, workers, console)
-        write_report(done, output)
+    require_writable(output)
+    sweep(output)
+    if sealed is None:
+        drawing = Drawing(prior or _PRIOR, seed, output / "recordings", output / "truth")
+        done = _drawn_and_worked(drawing, cases, output, leave_out, workers, console)
+    else:
+        done = _sealed_and_worked(sealed, truth, output, leave_out, workers, console)
+    with written_together(output, last="proof.json") as folder:
+        write_report(done, folder)
     _show(done, console)
     console.print(f"Report: {output / 'proof.html'}")
 
@@ -68,7 +77,7 @@ def _drawn_and_worked(
     def work(index: int) -> Worked:
         try:
             case = draw_case(drawing, index)
-        except BoresightError as error:
+        except NotRenderedError as error:
             # An effect too small for its scene to show is refused: the others go on.
             return _told(Worked((), None, (str(error),), None), console)
         return _told(worked(case, output, drawing.truth, leave_out), console)

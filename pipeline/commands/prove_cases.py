@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pipeline.commands.prove_geometry import WallErrors, wall_errors
 from pipeline.errors import BoresightError, InputError
+from pipeline.interrupt import end_with_parent
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.seal import SEAL_FILE, open_seal
 from stages.diagnose.drill.cases import (
@@ -21,7 +22,16 @@ from stages.diagnose.drill.cases import (
     diagnose_apart,
     trial_of,
 )
+from stages.diagnose.drill.cases import sweep as sweep_answers
 from stages.diagnose.drill.score import Trial
+
+ANSWERS, ANSWERS_WITHOUT = "answers", "answers-without"
+_REFUSED_SCENE = 3
+_GO_ON = "mend what it names, then give the same command again: what is there is kept"
+
+
+class NotRenderedError(BoresightError):
+    """A drawn scene cannot show what it is meant to show."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +71,10 @@ def draw_case(drawing: Drawing, index: int) -> Case:
 
     Raises
     ------
-    BoresightError
-        When it cannot be rendered.
+    NotRenderedError
+        When its effect would not show in its scene.
+    InputError
+        When it cannot be rendered for another reason: the disk is full, the renderer was killed.
     """
     pair = draw_pair(read_prior(drawing.prior), drawing.prior, drawing.seed, index)
     names = (pair.gauge.name, pair.field.name)
@@ -79,12 +91,13 @@ def _render(drawing: Drawing, index: int) -> None:
     words = ["simulate", "--draw", "1", "--first", str(index), "--seed", str(drawing.seed), "--seal"]
     words += ["--prior", str(drawing.prior), "-o", str(drawing.recordings), "--truth", str(drawing.truth)]
     command = [sys.executable, "-m", "pipeline.cli", *words]
-    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    done = subprocess.run(command, check=False, capture_output=True, text=True, preexec_fn=end_with_parent)
     if done.returncode:
         last = "\n".join(done.stderr.strip().splitlines()[-6:])
-        raise BoresightError(
-            f"pair {index} could not be rendered: simulate ended with {done.returncode}\n{last}"
-        )
+        problem = f"pair {index} could not be rendered: simulate ended with {done.returncode}\n{last}"
+        if done.returncode == _REFUSED_SCENE:
+            raise NotRenderedError(problem)
+        raise InputError(drawing.recordings, problem, hint=_GO_ON)
 
 
 def require_seal(case: Case, truth: Path) -> None:
@@ -106,16 +119,22 @@ def require_seal(case: Case, truth: Path) -> None:
             )  # fmt: skip
 
 
+def sweep(output: Path) -> None:
+    """Remove what a killed proof left of diagnoses that were under way."""
+    for folder in (ANSWERS, ANSWERS_WITHOUT):
+        sweep_answers(output / folder)
+
+
 def worked(case: Case, output: Path, truth: Path, leave_out: bool) -> Worked:
     """Diagnose a case, check its seal, open its truth; where asked, diagnose it without what it conceals."""
-    answer, failures = output / "answers" / case.name, []
+    answer, failures = output / ANSWERS / case.name, []
     failures += _answered(case, answer, ())
     require_seal(case, truth)
     trials = [trial_of(case, answer, truth)]
     concealed = concealed_in(case, truth)
     if leave_out and len(concealed) == 1:
         without = (concealed[0].name,)
-        second = output / "answers-without" / case.name
+        second = output / ANSWERS_WITHOUT / case.name
         failures += _answered(case, second, without)
         trials.append(trial_of(case, second, truth, without))
     return Worked(tuple(trials), _seconds(answer), tuple(failures), wall_errors(case, answer, truth))
@@ -126,6 +145,9 @@ def _answered(case: Case, answer: Path, without: tuple[str, ...]) -> list[str]:
     try:
         diagnose_apart(case, answer, without)
     except DiagnosisFailedError as error:
+        if error.code < 0:
+            # It was killed: nothing that the diagnosis could do better.
+            raise InputError(answer, str(error), hint=_GO_ON) from error
         return [str(error)]
     return []
 

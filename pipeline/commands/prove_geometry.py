@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts import RingSamples
+from pipeline.disk import replace_json
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
+from pipeline.json_file import read_json
 from pipeline.recording import open_recording
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.exact import room_mm, wall_radius
@@ -54,16 +55,24 @@ def wall_errors(case: Case, answer: Path, truth: Path) -> WallErrors | None:
     None without an inspection, a corrected probe, or the scene that it was rendered from.
     """
     probe_file, kept = answer / "probe.yaml", answer / _CACHE
-    if kept.is_file():
-        return WallErrors(**json.loads(kept.read_text("utf-8")))
+    if (known := _kept(kept)) is not None:
+        return known
     if case.field is None or not probe_file.is_file():
         return None
     scene_file = truth / case.field.name / _SCENE
     if not scene_file.is_file():
         return None
     found = _errors(case.field, read_probe(probe_file), build_truth(read_scene(scene_file), scene_file))
-    kept.write_text(json.dumps(vars(found)) + "\n", "utf-8")
+    replace_json(kept, vars(found))
     return found
+
+
+def _kept(file: Path) -> WallErrors | None:
+    """Return what was kept, None where it is not there or not whole: it is worked out again."""
+    try:
+        return WallErrors(**read_json(file))
+    except (OSError, ValueError, TypeError):
+        return None
 
 
 def _errors(field: Path, corrected: Probe, truth: SceneTruth) -> WallErrors:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from pipeline.disk import disk_errors_named
+from pipeline.disk import written_together
 from pipeline.errors import InputError
 from pipeline.provenance import MadeBy
 from pipeline.recording.input_file import files_sha256
@@ -81,8 +81,8 @@ def verify(
         from pipeline.commands.verify_report import write_certificate
 
         folder = run / "verify" if output is None else output
-        with disk_errors_named(folder):
-            write_certificate(document, found.differences, folder)
+        with written_together(folder, last="certificate.json") as new:
+            write_certificate(document, found.differences, new)
     if as_json:
         typer.echo(json.dumps(document, ensure_ascii=False))
     else:

@@ -24,7 +24,6 @@ _STATIONS, _SECTORS = 300, 120
 
 def write_certificate(document: dict[str, Any], differences: Differences, folder: Path) -> None:
     """Write certificate.json, certificate.png and certificate.html."""
-    folder.mkdir(parents=True, exist_ok=True)
     (folder / "certificate.json").write_text(
         json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8"
     )

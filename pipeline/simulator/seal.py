@@ -53,8 +53,19 @@ def open_seal(recording: Path, truth: Path) -> tuple[Comparison, ...]:
     Raises
     ------
     InputError
-        When there is no seal, or no nonce to check it with.
+        When there is no seal, no nonce to check it with, or a file cannot be read.
     """
+    try:
+        return _opened(recording, truth)
+    except (OSError, UnicodeDecodeError) as error:
+        file = error.filename if isinstance(error, OSError) else truth / NONCE_FILE
+        raise InputError(
+            Path(file or recording), f"cannot be read: {error}", expected="a sealed file that may be read",
+            hint="mend its permissions, or copy recording and truth again, whole",
+        ) from error  # fmt: skip
+
+
+def _opened(recording: Path, truth: Path) -> tuple[Comparison, ...]:
     seal = read_yaml(recording / SEAL_FILE)
     if seal.integer("format", least=1) != _FORMAT:
         raise seal.fail("format", "is of another version", str(_FORMAT))

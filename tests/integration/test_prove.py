@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from pipeline.cli import app
-from pipeline.commands.prove_cases import require_seal
-from pipeline.errors import BoresightError, InputError
+from pipeline.commands.prove_cases import NotRenderedError, require_seal
+from pipeline.errors import InputError
 from pipeline.simulator.seal import seal_truth
 from stages.diagnose.drill.cases import Case, DiagnosisFailedError, diagnose_apart, find_cases
 
@@ -125,7 +125,7 @@ def test_a_case_without_an_answer_is_counted_and_told(drill):
 
 def test_a_pair_that_cannot_be_rendered_is_told_and_counts_nowhere(tmp_path, monkeypatch):
     def refused(drawing, index):
-        raise BoresightError(f"pair {index} could not be rendered: nothing would show")
+        raise NotRenderedError(f"pair {index} could not be rendered: nothing would show")
 
     monkeypatch.setattr("pipeline.commands.prove.draw_case", refused)
     done = CliRunner().invoke(app, ["prove", "-o", str(tmp_path / "out"), "--cases", "2"])

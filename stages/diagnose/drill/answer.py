@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.errors import InputError
+from pipeline.json_file import read_json
 
 Verdict = Literal["consistent", "named", "class", "unexplained", "not_identifiable"]
 
@@ -136,8 +136,9 @@ def _numbers(values: object) -> tuple[float, ...]:
 
 def _json(file: Path) -> object:
     try:
-        return json.loads(file.read_text("utf-8"))
+        return read_json(file)
     except OSError as error:
-        raise InputError(file, error.strerror or "cannot be read") from error
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise InputError(file, f"is not JSON: {error}", hint="it may have been cut short") from error
+        raise InputError(file, error.strerror or "cannot be read", expected="a JSON file") from error
+    except ValueError as error:
+        hint = "it may have been cut short; an answer that is removed is made again"
+        raise InputError(file, f"is not JSON: {error}", expected="a JSON file", hint=hint) from error

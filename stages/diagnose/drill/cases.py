@@ -13,16 +13,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pipeline
+from pipeline.disk import disk_errors_named, sync_tree
 from pipeline.errors import BoresightError, InputError
+from pipeline.interrupt import end_with_parent
 from stages.diagnose.drill.answer import Answer, Concealed, read_answer, read_concealed
 from stages.diagnose.drill.score import Trial
 
-TIMING = "timing.json"
+ANSWER, TIMING = "diagnosis.json", "timing.json"
+_APART = ".apart-"
 _KINDS = ("gauge", "field")
 
 
 class DiagnosisFailedError(BoresightError):
-    """A diagnosis ended without an answer."""
+    """A diagnosis ended without an answer, with the exit status ``code``."""
+
+    def __init__(self, problem: str, code: int) -> None:
+        super().__init__(problem)
+        self.code = code
 
 
 @dataclass(frozen=True)
@@ -63,24 +70,41 @@ def diagnose_apart(case: Case, output: Path, without: tuple[str, ...] = ()) -> N
     ------
     DiagnosisFailedError
         With the last lines that the process wrote.
+    InputError
+        When the disk is full or cannot be written.
     """
-    if (output / "diagnosis.json").is_file():
+    if (output / ANSWER).is_file():
         return
+    with disk_errors_named(output.parent):
+        output.parent.mkdir(parents=True, exist_ok=True)
+        _diagnose_into(case, output, without)
+
+
+def _diagnose_into(case: Case, output: Path, without: tuple[str, ...]) -> None:
     environment = os.environ | {"PYTHONPATH": str(Path(pipeline.__file__).resolve().parents[1])}
-    output.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=output.parent, prefix=".apart-") as elsewhere:
+    with tempfile.TemporaryDirectory(dir=output.parent, prefix=_APART) as elsewhere:
         alone, answer = _alone(case, Path(elsewhere)), Path(elsewhere) / "answer"
         start = time.monotonic()
         done = subprocess.run(
             _command(alone, answer.resolve(), without),
             cwd=elsewhere, env=environment, capture_output=True, text=True, check=False,
+            preexec_fn=end_with_parent,
         )  # fmt: skip
         if done.returncode:
             last = "\n".join(done.stderr.strip().splitlines()[-6:])
-            raise DiagnosisFailedError(f"{case.name}: the diagnosis ended with {done.returncode}\n{last}")
+            raise DiagnosisFailedError(
+                f"{case.name}: the diagnosis ended with {done.returncode}\n{last}", done.returncode
+            )
         (answer / TIMING).write_text(json.dumps({"seconds": round(time.monotonic() - start, 1)}), "utf-8")
+        sync_tree(answer)
         shutil.rmtree(output, ignore_errors=True)
         answer.rename(output)
+
+
+def sweep(answers: Path) -> None:
+    """Remove what diagnoses left in a folder of answers that were killed."""
+    for left in answers.glob(f"{_APART}*"):
+        shutil.rmtree(left, ignore_errors=True)
 
 
 def _alone(case: Case, folder: Path) -> Case:
@@ -108,7 +132,7 @@ def trial_of(case: Case, answer: Path, truth: Path, left_out: tuple[str, ...] = 
     InputError
         When either cannot be read.
     """
-    file = answer / "diagnosis.json"
+    file = answer / ANSWER
     said = read_answer(file) if file.is_file() else Answer.model_validate({"verdict": "not_identifiable"})
     return Trial(case.name, concealed_in(case, truth), said, left_out)
 
