@@ -5,7 +5,9 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from types import MappingProxyType
 
 from pipeline.codec import Json
 
@@ -53,6 +55,8 @@ def program_version() -> str:
         return "unknown"
 
 
-def library_versions() -> dict[str, str]:
+@cache
+def library_versions() -> Mapping[str, str]:
     """Return the versions of Python and of the libraries that compute."""
-    return {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES}
+    found = {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES}
+    return MappingProxyType(found)

@@ -68,6 +68,7 @@ class Runner:
             s.stage.name: StageOutcome(s.stage.name, s.stage.version, s.key) for s in plan.steps
         }
         self._artefacts: dict[type, object] = {s.kind: s.value for s in plan.sources}
+        self._metrics: tuple[Number, ...] = ()
         self._writer = Writer(folder, logger)
         self._over = threading.Event()
         self._at = ""
@@ -203,6 +204,7 @@ class Runner:
     def _settle(self, step: Step, stored: Stored, state: State) -> None:
         name, made = step.stage.name, stored.provenance
         self._artefacts[step.output] = stored.artefact
+        self._metrics += headline({step.output: stored.artefact})
         outcome = replace(self._outcomes[name], state=state, seconds=made.seconds, numbers=made.numbers)
         self._outcomes[name] = outcome
         self._logger.info("stage %s %s, %.1f s", name, state.value, outcome.seconds)
@@ -255,7 +257,7 @@ class Runner:
         return outcome
 
     def _outcome(self, state: State, problem: str) -> RunOutcome:
-        return RunOutcome(state, tuple(self._outcomes.values()), headline(self._artefacts), problem)
+        return RunOutcome(state, tuple(self._outcomes.values()), self._metrics, problem)
 
 
 def _next(waiting: list[Step], running: Collection[Step]) -> Step | None:
