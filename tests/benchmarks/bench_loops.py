@@ -24,8 +24,9 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
-from pipeline.simulator.produce import Places, produce
+from pipeline.simulator.produce import Order, Places, produce
 from pipeline.stage import Context, quiet_context
+from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
 from stages.motion.comparing import Expected, Piece, Verdict, compare
 from stages.motion.strip import Strip, StripGrid
@@ -33,6 +34,7 @@ from stages.motion.view import WallView
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.benchmarks.loop_scenes import SCENES_BY_NAME, WELD_SPACING_MM
+from tests.truth_comparison import compare_wall
 
 Float = NDArray[np.float64]
 _WINDOWS = {"window_frames": 150, "overlap_frames": 40}
@@ -47,6 +49,7 @@ class Measured:
     probe: Probe
     rings: RingSamples
     points: RingPoints
+    truth: Path
     T_pc: Float
 
 
@@ -68,7 +71,7 @@ def _rendered(name: str, length_mm: float, out: Path) -> tuple[Path, Path]:
     scene = SCENES_BY_NAME[name](length_mm)
     places = Places(out / name, out / f"{name}-truth")
     if not places.recording.exists():
-        produce(scene, out / f"{name}.yaml", places, lambda done, total: None)
+        produce([Order(scene, out / f"{name}.yaml", places)], lambda order, done: None)
     return places.recording, places.truth
 
 
@@ -79,7 +82,7 @@ def _measured(folder: Path, truth: Path) -> Measured:
     rings = extract_rings(recording, probe, RingParameters.model_validate({}), context)
     points = triangulate_rings(rings, probe, TriangulateParameters.model_validate({}), context)
     poses = np.array(json.loads((truth / "truth.json").read_text())["camera_pose_in_pipe"])
-    return Measured(recording, probe, rings, points, poses)
+    return Measured(recording, probe, rings, points, truth, poses)
 
 
 def _compare_runs(name: str, measured: Measured, encoder: bool) -> None:
@@ -93,6 +96,7 @@ def _compare_runs(name: str, measured: Measured, encoder: bool) -> None:
         )
         print(f"  {'loops closed' if most else 'as it was'}")
         _print_errors(found, measured.T_pc)
+        _print_wall(found, measured)
         if most:
             for words in (w for w in told if "loop" in w or "passed again" in w):
                 print(f"    {words}: {told[words]}")
@@ -121,6 +125,17 @@ def _print_errors(found: Trajectory, true_T_pc: Float) -> None:
             f"    {what:<5} frame {frame:>4}: distance {distance[frame]:+.3f} ± {sigma[frame, 2]:.3f} mm, "
             f"roll {off:+.4f} ± {np.degrees(sigma[frame, 5]):.4f} deg"
         )
+
+
+def _print_wall(found: Trajectory, measured: Measured) -> None:
+    """Print the errors of the wall that both ways together give."""
+    parameters, context = AccumulateParameters.model_validate({}), quiet_context()
+    wall = accumulate_wall(measured.probe, measured.rings, measured.points, found, parameters, context)
+    compared = compare_wall(wall.radius_map, measured.truth)
+    print(
+        f"    wall's radius off the truth, rms: {_rms(compared.error_mm):.3f} mm, "
+        f"within 95 % of the stated: {100 * compared.inside_95:.0f} %"
+    )
 
 
 def _errors(found: Trajectory, true_T_pc: Float) -> tuple[Float, Float, Float]:

@@ -21,7 +21,7 @@ def back(length_mm: float) -> Scene:
 
 
 def faint(length_mm: float) -> Scene:
-    """Return a pale pipe with little texture at 8 mm a frame, without encoder: what drifts most."""
+    """Return a pipe with little texture at 8 mm a frame: what drifts most."""
     return _scene("faint", length_mm, 240.0, {}, _PLAIN)
 
 
