@@ -8,6 +8,7 @@ two far ends; conditioning on all closures is the least-squares distribution of 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,12 +43,55 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Closures:
-    """What C measured differences show of errors at the chain's K frames.
+class Sums:
+    """C weighed sums of errors, each at a few of the chain's K frames.
 
     Attributes
     ----------
-    by_error : (K, 6, C)
+    knot : (E,) int
+        Which of the chain's frames, ascending.
+    column : (E,) int
+        Which sum.
+    weight : (E, 6)
+    columns : int
+        Number C of sums.
+    """
+
+    knot: Int
+    column: Int
+    weight: Float
+    columns: int
+
+    @staticmethod
+    def of(knot: Int, column: Int, weight: Float, columns: int) -> Sums:
+        """Return the sums of terms in any order."""
+        order = np.argsort(knot, kind="stable")
+        return Sums(knot[order], column[order], weight[order], columns)
+
+    def on(self, first: int, last: int) -> Float:
+        """Return the weights (k, 6, C) at frames ``first`` to ``last`` (exclusive) of the chain."""
+        part = slice(*np.searchsorted(self.knot, [first, last]))
+        out = np.zeros(((last - first) * self.columns, 6))
+        np.add.at(out, (self.knot[part] - first) * self.columns + self.column[part], self.weight[part])
+        return out.reshape(-1, self.columns, 6).swapaxes(1, 2)
+
+    def some(self, columns: Int, factor: Float) -> Sums:
+        """Return some of the sums (c,), each times a factor (c,)."""
+        place = np.full(self.columns, -1)
+        place[columns] = np.arange(len(columns))
+        at = place[self.column]
+        mine = at >= 0
+        weight = self.weight[mine] * factor[at[mine], None]
+        return Sums(self.knot[mine], at[mine], weight, len(columns))
+
+
+@dataclass(frozen=True)
+class Closures:
+    """What C measured differences show of the chain's errors.
+
+    Attributes
+    ----------
+    by_error : Sums
     residual : (C,)
     sigma : (C,)
         1 σ of the measurements, which do not err alike.
@@ -55,15 +99,16 @@ class Closures:
         Which place each belongs to: those of one place are judged together.
     """
 
-    by_error: Float
+    by_error: Sums
     residual: Float
     sigma: Float
     place: Int
 
     def at(self, places: Int) -> Closures:
         """Return those of some places."""
-        mine = np.isin(self.place, places)
-        return Closures(self.by_error[..., mine], self.residual[mine], self.sigma[mine], self.place[mine])
+        mine = np.flatnonzero(np.isin(self.place, places))
+        by_error = self.by_error.some(mine, np.ones(len(mine)))
+        return Closures(by_error, self.residual[mine], self.sigma[mine], self.place[mine])
 
 
 @dataclass(frozen=True)
@@ -87,37 +132,55 @@ class Chain:
         """Return the frames (K,), ascending, whose errors are known."""
         return np.concatenate([link.at for link in self.links])
 
-    def covariance_with(self, by_error: Float) -> Float:
-        """Return the covariance (K, 6, C) of all errors with C sums of them, given by weights (K, 6, C).
+    def covariances_with(self, sums: Sums) -> Iterator[Float]:
+        """Yield the covariance (k, 6, C) of each window's errors with C sums of errors.
 
-        Once back through the chain and once forth: the work grows with its length and no faster.
+        Once back through the chain and once forth: the work grows with its length and no faster, and in
+        memory is a window's covariance alone, besides six numbers a window and sum.
         """
-        cuts = np.cumsum([len(link.at) for link in self.links])[:-1]
-        weights = [part.copy() for part in np.split(by_error, cuts)]
-        response = np.concatenate([link.response for link in self.links])
-        shared = self.shared @ np.einsum("kis,kic->sc", response, by_error)
-        later = np.zeros(by_error.shape[1:])
-        for link, weight in zip(reversed(self.links), reversed(weights), strict=True):
-            weight[-1] += later
-            later = np.einsum("kij,kic->jc", link.carry, weight)
-        anchor, found = self.start @ later, []
-        for link, weight in zip(self.links, weights, strict=True):
-            found.append(np.tensordot(link.joint, weight, 2) + link.carry @ anchor)
-            anchor = found[-1][-1]
-        return np.asarray(np.concatenate(found) + response @ shared)
+        ends = np.cumsum([0] + [len(link.at) for link in self.links])
+        later = np.zeros((6, sums.columns))
+        behind, by_shared = [], np.zeros((len(self.shared), sums.columns))
+        for n, link in reversed(list(enumerate(self.links))):
+            weight = sums.on(ends[n], ends[n + 1])
+            by_shared += np.einsum("kis,kic->sc", link.response, weight)
+            behind.append(later)
+            later = np.einsum("kij,kic->jc", link.carry, _with_last(weight, later))
+        anchor, shared = self.start @ later, self.shared @ by_shared
+        for n, link in enumerate(self.links):
+            weight = _with_last(sums.on(ends[n], ends[n + 1]), behind.pop())
+            own = np.tensordot(link.joint, weight, 2) + link.carry @ anchor
+            anchor = own[-1]
+            yield own + link.response @ shared
+
+    def covariance_of(self, sums: Sums) -> Float:
+        """Return the covariance (C, C) of sums of errors."""
+        out, first = np.zeros((sums.columns, sums.columns)), 0
+        for found in self.covariances_with(sums):
+            out += np.einsum("kic,kid->cd", sums.on(first, first + len(found)), found)
+            first += len(found)
+        return (out + out.T) / 2
 
     def spread(self, closures: Closures) -> Float:
         """Return the covariance (C, C) of the residuals before any loop is closed."""
-        own = np.einsum("kic,kid->cd", closures.by_error, self.covariance_with(closures.by_error))
-        return np.asarray((own + own.T) / 2 + np.diag(closures.sigma**2))
+        return self.covariance_of(closures.by_error) + np.diag(closures.sigma**2)
 
     def conditioned(self, closures: Closures) -> Conditioned:
         """Return what closures together say of the errors."""
-        with_all = self.covariance_with(closures.by_error)
         solved = cho_factor(self.spread(closures), lower=True)
-        gain = cho_solve(solved, with_all.reshape(-1, len(closures.residual)).T).T.reshape(with_all.shape)
-        gained = np.einsum("kic,kjc->kij", gain, with_all)
-        return Conditioned(gain @ closures.residual, (gained + np.swapaxes(gained, 1, 2)) / 2)
+        error, gained = [], []
+        for found in self.covariances_with(closures.by_error):
+            gain = cho_solve(solved, found.reshape(-1, found.shape[2]).T).T.reshape(found.shape)
+            error.append(gain @ closures.residual)
+            gained.append(np.einsum("kic,kjc->kij", gain, found))
+        fall = np.concatenate(gained)
+        return Conditioned(np.concatenate(error), (fall + np.swapaxes(fall, 1, 2)) / 2)
+
+
+def _with_last(weight: Float, later: Float) -> Float:
+    """Return a window's weights (k, 6, C) with those that came in by the windows after it (6, C)."""
+    weight[-1] += later
+    return weight
 
 
 def beside(wanted: Int, at: Int) -> tuple[Int, Int, Float]:

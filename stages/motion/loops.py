@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.scratch import Scratch
 from pipeline.stage import Context
-from stages.motion.chain import Chain, Closures, astray, beside
+from stages.motion.chain import Chain, Closures, Sums, astray, beside
 from stages.motion.closing import closed
 from stages.motion.comparing import Comparison, Piece, Verdict, compare
 from stages.motion.foresight import Foresight
@@ -139,13 +139,21 @@ class _Ends:
         there, here = (pipe_frames(laid, joined, frame) for frame in (earlier, later))
         return _Ends(earlier, later, there, here)
 
-    def by_error(self, joined: Joined, chain: Chain) -> Float:
-        """Return how errors at the chain's frames enter the difference of both ends, (K, 6, 6 M).
+    def by_error(self, joined: Joined, chain: Chain) -> Sums:
+        """Return how errors at the chain's frames enter the difference of both ends, 6 M sums.
 
         Six of each place: along x, y and z of its section, mm, and turns about them, rad.
         """
-        here = _by_error(chain.at, self.later, self.here, joined)
-        return here - _by_error(chain.at, self.earlier, self.there, joined)
+        at, places = chain.at, len(self.earlier)
+        knots, weights = [], []
+        for frame, view, sign in ((self.later, self.here, 1.0), (self.earlier, self.there, -1.0)):
+            seen = sign * _by_error(frame, view, joined)
+            left, right, share = beside(frame, at)
+            for knot, part in ((left, 1 - share), (right, share)):
+                knots.append(np.repeat(knot, 6))
+                weights.append((part[:, None, None] * seen).reshape(-1, 6))
+        column = np.tile(np.arange(6 * places), len(knots))
+        return Sums.of(np.concatenate(knots), column, np.concatenate(weights), 6 * places)
 
     def aside(self) -> Float:
         """Return by how much (M, 6) the axis of the later window lies off that of the earlier one."""
@@ -156,22 +164,18 @@ class _Ends:
         return np.stack([shift[:, 0], shift[:, 1], zero, -lean[:, 1], lean[:, 0], zero], -1)
 
 
-def _by_error(at: Int, frame: Int, view: PipeFrames, joined: Joined) -> Float:
+def _by_error(frame: Int, view: PipeFrames, joined: Joined) -> Float:
+    """Return how errors at frames (n,) move them along and about the axes of their sections, (n, 6, 6)."""
     back = np.swapaxes(view.section_o, 1, 2)
     seen = np.zeros((len(frame), 6, 6))
     seen[:, :3, :3], seen[:, 3:, 3:] = back, back @ joined.T_pc[frame, :3, :3]
-    left, right, share = beside(frame, at)
-    each, out = np.arange(len(frame)), np.zeros((len(at), 6, len(frame), 6))
-    for place, weight in ((left, 1 - share), (right, share)):
-        out[place, :, each] += weight[:, None, None] * np.swapaxes(seen, 1, 2)
-    return out.reshape(len(at), 6, -1)
+    return seen
 
 
-def _spread_px(chain: Chain, by_error: Float, grid: StripGrid) -> Float:
+def _spread_px(chain: Chain, by_error: Sums, grid: StripGrid) -> Float:
     """Return the covariance (2 M, 2 M) of the shifts before any loop is closed."""
-    along = by_error.reshape(*by_error.shape[:2], -1, 6)[..., [_DISTANCE, _ROLL]] / _per_px(grid)
-    seen = along.reshape(*by_error.shape[:2], -1)
-    return np.asarray(np.einsum("kic,kid->cd", seen, chain.covariance_with(seen)))
+    along = (6 * np.arange(by_error.columns // 6)[:, None] + np.array([_DISTANCE, _ROLL])).ravel()
+    return chain.covariance_of(by_error.some(along, np.tile(1 / _per_px(grid), len(along) // 2)))
 
 
 def _per_px(grid: StripGrid) -> Float:
@@ -210,7 +214,7 @@ def _compared(
 
 
 def _closures(
-    by_error: Float,
+    by_error: Sums,
     ends: _Ends,
     compared: Sequence[Comparison],
     grid: StripGrid,
@@ -225,7 +229,8 @@ def _closures(
     # One window has one axis: there is nothing to compare sideways.
     use[:, _ASIDE] &= (ends.here.window != ends.there.window)[:, None]
     which = np.flatnonzero(use.ravel())
-    return Closures(by_error[..., which], residual.ravel()[which], sigma.ravel()[which], which // 6)
+    seen = by_error.some(which, np.ones(len(which)))
+    return Closures(seen, residual.ravel()[which], sigma.ravel()[which], which // 6)
 
 
 def _axis_sigma(parameters: MotionParameters) -> Float:

@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.scratch import Scratch
-from stages.motion.comparing import Expected, Piece, Verdict, compare
+from stages.motion.comparing import Comparison, Expected, Piece, Verdict, compare
+from stages.motion.foresight import Foresight
 from stages.motion.joining import Joined
 from stages.motion.loops import Loops, close_loops
 from stages.motion.parameters import MotionParameters
@@ -190,3 +191,19 @@ def test_texture_is_counted_by_frame() -> None:
     seen = np.zeros(3, [("frame", "i8"), ("sigma", "f8")])
     seen["frame"], seen["sigma"] = [3, 7, 7], [0.5, 1.0, 1.0]
     np.testing.assert_allclose(texture_at(np.array([3, 5, 7]), [seen, seen]), [8.0, 0.0, 4.0])
+
+
+def test_what_is_expected_is_learnt_from_place_to_place() -> None:
+    """Shifts that grow as a random walk, one step a place: the reach stays that of the next step."""
+    walk = 100.0 * np.minimum.outer(np.arange(1, 7), np.arange(1, 7))
+    foresight = Foresight(np.kron(walk, np.eye(2)))
+    before = foresight.of(5).reach
+    for place in range(5):
+        found = Comparison(Verdict.SAME, np.array([7.0 * place, -3.0]), np.array([0.1, 0.1]))
+        foresight.learn(place, found)
+    foresight.learn(4, Comparison.refused(Verdict.OTHER))
+    expected = foresight.of(5)
+    np.testing.assert_allclose(expected.shift, [28.0, -3.0], atol=0.1)
+    assert np.all(expected.reach < 0.5 * before)
+    assert expected.allows(np.array([40.0, 20.0]))
+    assert not expected.allows(np.array([28.0, 60.0]))
