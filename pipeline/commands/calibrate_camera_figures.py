@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pipeline.commands.figure import rendered
 from pipeline.instrument.camera.calibration import CalibrationReport
 
 Float = NDArray[np.float64]
@@ -71,10 +69,7 @@ def displacement_figure(report: CalibrationReport) -> Figure:
 
 def png(figure: Figure) -> bytes:
     """Return a figure as PNG, the same bytes for the same content."""
-    FigureCanvasAgg(figure)
-    out = BytesIO()
-    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
-    return out.getvalue()
+    return rendered(figure, dpi=110)
 
 
 def _heat(

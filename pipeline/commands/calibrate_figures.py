@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import binned_statistic_2d
 
+from pipeline.commands.figure import rendered
 from stages.calibrate.gauge.result import GaugeCalibration
 
 Float = NDArray[np.float64]
@@ -81,9 +80,7 @@ def correlation_figure(correlations: dict[str, Any]) -> Figure:
 
 def png(figure: Figure) -> bytes:
     """Return the figure as a PNG, the same for the same data."""
-    buffer = BytesIO()
-    FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
-    return buffer.getvalue()
+    return rendered(figure, dpi=figure.dpi)
 
 
 def _map(figure: Figure, axes: Axes, result: GaugeCalibration, uv: Float, value: Float, unit: str) -> None:

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from io import BytesIO
-
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
@@ -14,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.commands.diagnose_image import OnImage
 from pipeline.commands.diagnose_resimulate import Resimulated
+from pipeline.commands.figure import rendered, tidy
 from stages.diagnose.result import Candidate, Picture, WallPicture
 
 Float = NDArray[np.float64]
@@ -52,8 +49,8 @@ def azimuth_figure(picture: Picture) -> bytes:
     axes.set(
         xlabel="azimuth in C, °", ylabel="residual radius, µm", xlim=(-180, 180), xticks=range(-180, 181, 45)
     )
-    _finish(axes)
-    return _png(figure)
+    tidy(axes)
+    return rendered(figure)
 
 
 def image_figure(shown: OnImage) -> bytes:
@@ -83,7 +80,7 @@ def image_figure(shown: OnImage) -> bytes:
         ylabel="v, px",
     )
     figure.colorbar(lines, ax=both, label="ring farther out than texture has it, px")
-    return _png(figure)
+    return rendered(figure)
 
 
 def simulated_figure(simulated: Resimulated) -> bytes:
@@ -104,7 +101,7 @@ def simulated_figure(simulated: Resimulated) -> bytes:
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
     both[0].set_ylabel("measured − simulated ring, px")
-    return _png(figure)
+    return rendered(figure)
 
 
 def candidates_figure(candidates: tuple[Candidate, ...]) -> bytes:
@@ -119,8 +116,8 @@ def candidates_figure(candidates: tuple[Candidate, ...]) -> bytes:
     axes.invert_yaxis()
     axes.set(xlabel="drop of χ² against the stated instrument (square-root scale)")
     axes.set_xscale("function", functions=(_signed_root, _signed_square))
-    _finish(axes)
-    return _png(figure)
+    tidy(axes)
+    return rendered(figure)
 
 
 def _pair(before: Float, after: Float, extent: tuple[float, float, float, float], x: str, y: str) -> bytes:
@@ -138,7 +135,7 @@ def _pair(before: Float, after: Float, extent: tuple[float, float, float, float]
         axes.set_title(title, fontsize=11, loc="left")
     both[1].set_xlabel(x)
     figure.colorbar(image, ax=both, label="residual radius, µm (grey: not measured)")
-    return _png(figure)
+    return rendered(figure)
 
 
 def _quantiles(values: Float) -> tuple[Float, Float, Float]:
@@ -155,16 +152,3 @@ def _signed_root(values: Float) -> Float:
 
 def _signed_square(values: Float) -> Float:
     return np.asarray(np.sign(values) * np.square(values))
-
-
-def _finish(axes: Axes) -> None:
-    axes.grid(alpha=0.3)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=9)
-
-
-def _png(figure: Figure) -> bytes:
-    FigureCanvasAgg(figure)
-    out = BytesIO()
-    figure.savefig(out, format="png", dpi=130, metadata={"Software": None})
-    return out.getvalue()

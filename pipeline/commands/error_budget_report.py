@@ -7,18 +7,16 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 from numpy.typing import NDArray
 
+from pipeline.commands.figure import rendered
 from pipeline.instrument.budget.combine import Budget
 from pipeline.instrument.budget.design import BaselineStudy, Tolerance, dominant_rows
 from pipeline.instrument.budget.monte_carlo import MonteCarlo
@@ -90,7 +88,7 @@ def write_budget(document: dict[str, Any], budget: Budget, study: BaselineStudy,
     """Write budget.json, budget.png, budget.svg and budget.html."""
     (folder / "budget.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
     figure = budget_figure(budget, study)
-    pictures = {kind: _rendered(figure, kind) for kind in ("png", "svg")}
+    pictures = {kind: rendered(figure, kind, dpi=150, salt="budget") for kind in ("png", "svg")}
     for kind, content in pictures.items():
         (folder / f"budget.{kind}").write_bytes(content)
     (folder / "budget.html").write_text(budget_page(document, pictures["svg"]), "utf-8")
@@ -171,13 +169,3 @@ def _finish(axes: Axes) -> None:
     axes.grid(alpha=0.3, which="both")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=9, loc="upper right", ncols=2)
-
-
-def _rendered(figure: Figure, kind: str) -> bytes:
-    """Return the picture; the same figure gives the same bytes."""
-    FigureCanvasAgg(figure)
-    out = BytesIO()
-    metadata: dict[str, None] = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
-    with rc_context({"svg.hashsalt": "budget"}):
-        figure.savefig(out, format=kind, dpi=150, metadata=metadata)
-    return out.getvalue()

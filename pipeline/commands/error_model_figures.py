@@ -6,13 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from pipeline.commands.figure import rendered, tidy
 from pipeline.instrument.misalignment import (
     MisalignedScan,
     MisreadRing,
@@ -69,10 +68,8 @@ def tilt_figure(scan: MisalignedScan, accuracy_mm: float) -> Figure:
 
 def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write ``name``.png and ``name``.svg; the same figure gives the same bytes."""
-    FigureCanvasAgg(figure)
-    with rc_context({"svg.hashsalt": name}):
-        figure.savefig(folder / f"{name}.png", dpi=150, metadata={"Software": None})
-        figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+    for kind in ("png", "svg"):
+        (folder / f"{name}.{kind}").write_bytes(rendered(figure, kind, dpi=150, salt=name))
 
 
 def _draw_rings(axes: Axes3D, ring: MisreadRing) -> None:
@@ -108,6 +105,4 @@ def _draw_around(axes: Axes, scan: MisalignedScan, ring: MisreadRing) -> None:
 
 def _finish(axes: Axes, x_label: str, y_label: str) -> None:
     axes.set(xlabel=x_label, ylabel=y_label)
-    axes.grid(alpha=0.3)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=9)
+    tidy(axes)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import base64
 import json
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import binned_statistic_2d
 
+from pipeline.commands.figure import rendered, tidy
 from pipeline.pages import page_template
 from stages.verify.accuracy import Differences
 
@@ -27,9 +26,9 @@ def write_certificate(document: dict[str, Any], differences: Differences, folder
     (folder / "certificate.json").write_text(
         json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8"
     )
-    picture = _rendered(differences_figure(differences))
-    (folder / "certificate.png").write_bytes(picture)
-    (folder / "certificate.html").write_text(certificate_page(document, picture), "utf-8")
+    drawn = rendered(differences_figure(differences))
+    (folder / "certificate.png").write_bytes(drawn)
+    (folder / "certificate.html").write_text(certificate_page(document, drawn), "utf-8")
 
 
 def certificate_page(document: dict[str, Any], picture_png: bytes) -> str:
@@ -78,7 +77,7 @@ def _draw_along(axes: Axes, d: Differences) -> None:
     axes.plot(middle[seen], mean[seen], color="#0a5ea8", label="mean")
     axes.axhline(0, color="#5b6875", lw=0.8)
     axes.set(xlabel="distance, mm", ylabel="run − reference, µm", xlim=(edges[0], edges[-1]))
-    _finish(axes)
+    tidy(axes)
 
 
 def _draw_distribution(axes: Axes, d: Differences) -> None:
@@ -91,18 +90,4 @@ def _draw_distribution(axes: Axes, d: Differences) -> None:
         axes.plot(x, stated, color="#b04a00", ls="--", label="as the stated σ has it")
     axes.set(xlabel="run − reference, µm", yticks=[])
     axes.set_title("Distribution", fontsize=11)
-    _finish(axes)
-
-
-def _finish(axes: Axes) -> None:
-    axes.grid(alpha=0.3)
-    axes.spines[["top", "right"]].set_visible(False)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=9)
-
-
-def _rendered(figure: Figure) -> bytes:
-    FigureCanvasAgg(figure)
-    out = BytesIO()
-    figure.savefig(out, format="png", dpi=130, metadata={"Software": None})
-    return out.getvalue()
+    tidy(axes)
