@@ -1,13 +1,16 @@
-"""Kill -9 at random moments of a run, a batch and a review, go on, and compare with an undisturbed one.
+"""Kill -9 at random moments of what boresight does, go on, and compare with what was not disturbed.
 
-``python -m tests.benchmarks.bench_kills [RUN_KILLS BATCH_KILLS REVIEW_KILLS]`` prints how often each was
-killed, in which stages, and what was lost or came out different; it fails when anything was.
+``python -m tests.benchmarks.bench_kills [run=140 batch=40 review=40 calibrate=20 diagnose=10 prove=10]``
+prints how often each was killed, in which stages, and what was lost or came out different; it fails when
+anything was. Calibrate, diagnose and prove take a pair drawn from the small prior, minutes of work each.
 """
 
 from __future__ import annotations
 
 import os
 import random
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,17 +26,18 @@ from tests.shared_data import PROJECT_ROOT
 
 SEED = 20261121
 QUICK = ("--set", "rings.azimuths=360")
+PRIOR, PAIR = PROJECT_ROOT / "configs" / "priors" / "small.yaml", "small-001"
+TIMED = re.compile(r"^(timing\.json|proof\.(json|html)|nonce\.txt|sealed\.yaml)$")
 
 
-def main(kills: tuple[int, int, int]) -> int:
+def main(kills: dict[str, int]) -> int:
     """Return the number of results lost or different."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for name in ("one", "two"):
             cut_sample(folder / "recordings" / name, frames=16)
-        run, batch, review = kills
-        wrong = killed_runs(folder, run) + killed_batches(folder, batch) + killed_reviews(folder, review)
-    print(f"{sum(kills)} kills: {wrong} results lost or different")
+        wrong = sum(KILLED[name](folder, number) for name, number in kills.items())
+    print(f"{sum(kills.values())} kills: {wrong} results lost or different")
     return wrong
 
 
@@ -68,6 +72,72 @@ def killed_reviews(folder: Path, kills: int) -> int:
             answered = kept
     print(f"review: {kills} kills, {answered} actions kept, none of the acknowledged lost")
     return 0
+
+
+def killed_calibrations(folder: Path, kills: int) -> int:
+    """Return how many files of calibrations came out different."""
+    return _killed_command(folder, ["calibrate", str(_pair(folder) / f"{PAIR}-gauge")], "probe.yaml", kills)
+
+
+def killed_diagnoses(folder: Path, kills: int) -> int:
+    """Return how many files of diagnoses came out different."""
+    field, gauge = (str(_pair(folder) / f"{PAIR}-{kind}") for kind in ("field", "gauge"))
+    return _killed_command(folder, ["diagnose", field, "--gauge", gauge], "diagnosis.json", kills)
+
+
+def killed_proofs(folder: Path, kills: int) -> int:
+    """Return how many files of proofs came out different; killed in rendering, diagnosing and scoring."""
+    return _killed_command(folder, ["prove", "--cases", "1", "--prior", str(PRIOR)], "proof.json", kills)
+
+
+def _pair(folder: Path) -> Path:
+    """Return the folder of a drawn pair of recordings."""
+    pairs = folder / "pairs"
+    if not pairs.exists():
+        _finish(["simulate", "--draw", "1", "--prior", str(PRIOR), "--truth", str(folder / "truth")], pairs)
+    return pairs
+
+
+def _killed_command(folder: Path, words: list[str], answer: str, kills: int) -> int:
+    """Kill a command again and again; whenever its answer is there, all its files must be the right ones."""
+    started = time.perf_counter()
+    _finish(words, folder / f"whole-{words[0]}")
+    duration, whole = time.perf_counter() - started, _files(folder / f"whole-{words[0]}")
+    chance, answers, wrong = random.Random(SEED), 0, set[str]()
+    output = folder / words[0]
+    for _ in range(kills):
+        process = _start(words, output)
+        try:
+            process.wait(chance.uniform(0.1, 1.1 * duration))
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+        if (output / answer).exists():
+            answers += 1
+            wrong |= _different(whole, output)
+            shutil.rmtree(output)
+    _finish(words, output)
+    wrong |= _different(whole, output)
+    print("".join(f"  {words[0]}: {file} differs\n" for file in sorted(wrong)), end="")
+    print(
+        f"{words[0]}: {kills} kills in {duration:.0f} s of work, {answers} ended before, "
+        f"{len(wrong)} files different"
+    )
+    return len(wrong)
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    """Return the files that must come out the same: all but times, and random nonces of seals."""
+    return {
+        str(p.relative_to(folder)): p.read_bytes()
+        for p in sorted(folder.rglob("*"))
+        if p.is_file() and not TIMED.search(p.name)
+    }
+
+
+def _different(whole: dict[str, bytes], output: Path) -> set[str]:
+    found = _files(output)
+    return {name for name in whole.keys() | found.keys() if whole.get(name) != found.get(name)}
 
 
 def _added(server: ReviewServer, revision: int) -> int:
@@ -133,6 +203,11 @@ def _stage(output: Path) -> str:
     return told[-1] if told else "before the first stage"
 
 
+KILLED = {
+    "run": killed_runs, "batch": killed_batches, "review": killed_reviews,
+    "calibrate": killed_calibrations, "diagnose": killed_diagnoses, "prove": killed_proofs,
+}  # fmt: skip
+
 if __name__ == "__main__":
-    asked = tuple(map(int, sys.argv[1:4])) or (140, 40, 40)
-    sys.exit(bool(main(asked)))
+    words = sys.argv[1:] or ["run=140", "batch=40", "review=40", "calibrate=20", "diagnose=10", "prove=10"]
+    sys.exit(bool(main({name: int(number) for name, number in (word.split("=") for word in words)})))
