@@ -34,7 +34,7 @@ class TextureParameters(Parameters):
     reach_radii: float = Field(
         0.5, ge=0.02, le=1.0, description="wall used on either side of the laser sheet, in pipe radii"
     )
-    most_views: int = Field(24, ge=3, le=64, description="most frames blended into one place")
+    most_views: int = Field(48, ge=3, le=64, description="most frames blended into one place")
     tile_mm: float = Field(10.0, ge=1.0, le=200.0, description="length of the tiles worked on, mm")
     smoothing_mm: float = Field(0.2, ge=0.0, le=10.0, description="1 σ of the radius map's smoothing, mm")
     shading_mm: float = Field(0.4, ge=0.1, le=20.0, description="1 σ of the wall slopes' smoothing, mm")
