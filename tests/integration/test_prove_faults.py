@@ -1,0 +1,157 @@
+"""A proof when things go wrong: killed, answers and truth that were changed, files that may not be read."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from pipeline.cli import app
+from pipeline.commands.prove_geometry import wall_errors
+from pipeline.errors import InputError
+from pipeline.simulator.seal import seal_truth
+from stages.diagnose.drill.cases import Case
+from tests.faults import obeying_permissions
+from tests.shared_data import PROJECT_ROOT
+
+
+def cut_off(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+
+
+@pytest.fixture
+def drill(tmp_path: Path) -> Path:
+    """Two sealed probes, one with a tilted sheet, and the answer to one of them."""
+    for name, effects in (("a", [["laser_tilt", [0.6, 40.0]]]), ("b", [])):
+        recording, truth = tmp_path / "recordings" / f"{name}-gauge", tmp_path / "truth" / f"{name}-gauge"
+        for folder in (recording, truth):
+            folder.mkdir(parents=True)
+        (recording / "recording.yaml").write_text("name: x\n")
+        (truth / "truth.json").write_text(json.dumps({"effects": effects}))
+        seal_truth(truth, recording)
+    answered(tmp_path, "a")
+    return tmp_path
+
+
+def answered(drill: Path, name: str) -> Path:
+    folder = drill / "out" / "answers" / name
+    folder.mkdir(parents=True)
+    (folder / "diagnosis.json").write_text(json.dumps({"format": 1, "verdict": "consistent", "effects": []}))
+    return folder
+
+
+def proof(drill: Path) -> list[str]:
+    words = ["prove", "--sealed", str(drill / "recordings"), "--truth", str(drill / "truth")]
+    return [*words, "-o", str(drill / "out")]
+
+
+def half_of(file: Path) -> Path:
+    cut_off(file)
+    return file
+
+
+def other_truth(file: Path) -> Path:
+    file.write_text(json.dumps({"effects": []}))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("place", "spoil", "told"),
+    [
+        ("out/answers/a/diagnosis.json", half_of, "removed is made again"),
+        ("truth/a-gauge/truth.json", other_truth, "is not what was sealed"),
+        ("truth/a-gauge/nonce.txt", lambda f: f.unlink(), "without it no hash can be checked"),
+        ("truth/a-gauge", shutil.rmtree, "nonce.txt"),
+        ("recordings/a-gauge/recording.yaml", half_of, "is not what was sealed"),
+        ("recordings/a-gauge/sealed.yaml", half_of, "sealed.yaml"),
+    ],
+)
+def test_a_proof_is_not_scored_from_what_was_changed(
+    drill: Path, place: str, spoil: Callable[[Path], object], told: str
+) -> None:
+    answered(drill, "b")
+    assert CliRunner().invoke(app, proof(drill)).exit_code == 0
+    first = (drill / "out" / "proof.json").read_bytes()
+    spoil(drill / place)
+    done = CliRunner().invoke(app, proof(drill))
+    assert isinstance(done.exception, InputError), done.output
+    assert told in str(done.exception)
+    assert (drill / "out" / "proof.json").read_bytes() == first
+
+
+def test_a_truth_that_may_not_be_read_is_named(drill: Path) -> None:
+    answered(drill, "b")
+    (drill / "truth" / "a-gauge" / "truth.json").chmod(0)
+    done = subprocess.run(
+        [sys.executable, "-m", "pipeline.cli", *proof(drill)],
+        cwd=PROJECT_ROOT, capture_output=True, text=True, preexec_fn=obeying_permissions, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "a-gauge/truth.json: cannot be read" in done.stderr
+    assert "mend its permissions" in done.stderr
+
+
+def test_a_diagnosis_that_was_killed_is_no_failure_of_the_diagnosis(
+    drill: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    killed = [sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"]
+    monkeypatch.setattr("stages.diagnose.drill.cases._command", lambda *_: killed)
+    done = CliRunner().invoke(app, proof(drill))
+    assert isinstance(done.exception, InputError), done.output
+    assert "b: the diagnosis ended with -9" in str(done.exception)
+    assert "same command again" in done.exception.hint
+    assert not (drill / "out" / "proof.json").exists()
+
+
+def test_wall_errors_kept_half_are_worked_out_again(tmp_path: Path) -> None:
+    case = Case("a", None, None)
+    (tmp_path / "wall_errors.json").write_text('{"stated_mm": 1')
+    kept = next(iter(tmp_path.iterdir()))
+    assert wall_errors(case, tmp_path, tmp_path) is None
+    kept.write_text('{"stated_mm": 1.0, "corrected_mm": 0.5, "oracle_mm": 0.4}')
+    assert wall_errors(case, tmp_path, tmp_path).corrected_mm == 0.5
+
+
+# Stands for a diagnosis that takes its time; the proof is killed while it is at work.
+_SLOW_PROOF = """
+import sys
+from stages.diagnose.drill import cases
+cases._command = lambda case, output, without: [sys.executable, "-c", "import time; time.sleep(600)"]
+sys.argv[1:] = {words!r}
+from pipeline.cli import main
+main()
+"""
+
+
+def children_of(pid: int) -> Iterator[int]:
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        yield from map(int, (task / "children").read_text().split())
+
+
+def test_a_proof_killed_amid_a_diagnosis_leaves_no_process_and_no_rest(drill: Path) -> None:
+    command = [sys.executable, "-c", _SLOW_PROOF.format(words=proof(drill))]
+    process = subprocess.Popen(command, cwd=PROJECT_ROOT)
+    until = time.monotonic() + 60
+    while not (below := [c for c in children_of(process.pid)]):
+        assert process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    while any(Path(f"/proc/{child}").exists() for child in below):
+        assert time.monotonic() < until, "a diagnosis goes on without its proof"
+        time.sleep(0.05)
+    left = [p.name for p in (drill / "out" / "answers").iterdir()]
+    assert any(name.startswith(".apart-") for name in left), "else this test shows nothing"
+    answered(drill, "b")
+    assert CliRunner().invoke(app, proof(drill)).exit_code == 0
+    assert sorted(p.name for p in (drill / "out" / "answers").iterdir()) == ["a", "b"]
