@@ -91,3 +91,11 @@ def test_the_default_file_is_up_to_date() -> None:
     text = (PROJECT_ROOT / "configs" / "default.yaml").read_text("utf-8")
     assert text == default_text(PIPELINE), "run: boresight config --default > configs/default.yaml"
     assert list(yaml.safe_load(text)) == [s.name for s in PIPELINE]
+
+
+def test_the_configuration_for_long_pipes_is_one_and_differs_in_all_it_names() -> None:
+    file = PROJECT_ROOT / "configs" / "long.yaml"
+    long, usual = resolve(PIPELINE, file), resolve(PIPELINE)
+    for stage, named in yaml.safe_load(file.read_text("utf-8")).items():
+        for name in named:
+            assert getattr(long.of(stage), name) != getattr(usual.of(stage), name), f"{stage}.{name}"
