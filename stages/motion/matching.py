@@ -98,13 +98,14 @@ def _wrapped(contrast: Float32, usable: NDArray[np.bool_], side: int) -> tuple[F
     return wide, np.asarray(cv2.integral(spoilt), np.int32)
 
 
-@numba.njit(cache=True, nogil=True)
+# Inlined in one kernel: a fast function on its own rounds otherwise freshly compiled than from the cache.
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _whole(spoilt, i, j, n):  # type: ignore[no-untyped-def]
     """Whether the square of side n from (i, j) on holds no unusable sample."""
     return spoilt[i + n, j + n] - spoilt[i, j + n] - spoilt[i + n, j] + spoilt[i, j] == 0
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, forceinline=True)
 def _sums(contrast, i0, j0, a, b, template, by_row, by_column):  # type: ignore[no-untyped-def]
     """Return Σ s, Σ s², Σ t s, Σ s ∂t/∂row and Σ s ∂t/∂column of the patch s at (i0 + a, j0 + b)."""
     n = template.shape[0]
@@ -123,7 +124,7 @@ def _sums(contrast, i0, j0, a, b, template, by_row, by_column):  # type: ignore[
     return s1, s2, ts, rs, cs
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _settled(contrast, spoilt, width, template, by_row, by_column, own, inverse, row, column, steps):  # type: ignore[no-untyped-def]
     """Return the offset of one patch with Σ t s and Σ s² about the mean there; 0 where it is lost.
 
