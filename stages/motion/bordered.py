@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.threads import in_threads
+from stages.motion.banded import BandedCholesky
 from stages.motion.elimination import add_landmarks, add_rows
 from stages.motion.robust import Loss, Squares
 from stages.motion.sums import BLOCK, Sums
-from stages.motion.tridiagonal import BlockTridiagonal
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -213,17 +213,17 @@ class BorderedSystem:
             band, corner = band.copy(), corner + damping * np.diag(np.diag(corner))
             diagonal = np.arange(BLOCK)
             band[:, 0, diagonal, diagonal] *= 1 + damping
-        tridiagonal = BlockTridiagonal.of_band(band)
-        solved = tridiagonal.solve(sums.border)
+        banded = BandedCholesky.of_band(band)
+        solved = banded.solve(sums.border)
         left = cho_factor(corner - sums.border.T @ solved)
-        return Factor(tridiagonal, sums.border, solved, left, sums.right, sums.right_border)
+        return Factor(banded, sums.border, solved, left, sums.right, sums.right_border)
 
 
 @dataclass(frozen=True)
 class Factor:
     """A factorised `BorderedSystem`."""
 
-    band: BlockTridiagonal
+    band: BandedCholesky
     border: Float
     solved_border: Float
     corner: tuple[Float, bool]
