@@ -11,7 +11,6 @@ import numba
 import numpy as np
 
 _HOLD = 1e-4  # 1/mm²: a landmark that nothing holds any more keeps its place
-_CONTRACTED = {"contract"}
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -112,7 +111,7 @@ def _cofactors(h, out):  # type: ignore[no-untyped-def]
     return h[0, 0] * out[0, 0] + h[0, 1] * out[0, 1] + h[0, 2] * out[0, 2]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _add_observation(  # type: ignore[no-untyped-def]
     w, f, jp, jx, jc, r, first, band, border, right, h, g, side, cross
 ):
@@ -138,7 +137,7 @@ def _add_observation(  # type: ignore[no-untyped-def]
                 border[row + a, first + b] += wa * jc[c, b]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _eliminate_from_corner(hi, g, side, corner, right_border):  # type: ignore[no-untyped-def]
     """Subtract what one landmark takes from the border numbers; ``side`` is (3, B)."""
     for a in range(side.shape[1]):
@@ -152,7 +151,7 @@ def _eliminate_from_corner(hi, g, side, corner, right_border):  # type: ignore[n
             corner[a, b] -= s0 * side[0, b] + s1 * side[1, b] + s2 * side[2, b]
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _eliminate_from_frames(frame, cross, solved, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
     """Subtract what one landmark, seen in ``frame``, takes from its frames; ``cross`` is (·, 3, 6)."""
     for i in range(len(frame)):
@@ -170,7 +169,7 @@ def _eliminate_from_frames(frame, cross, solved, hi, g, side, band, border, righ
             _subtract_pair(solved[i], cross[j], band[frame[i], frame[i] - frame[j]])
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _subtract_pair(solved, cross, block):  # type: ignore[no-untyped-def]
     for a in range(6):
         for b in range(6):
@@ -179,7 +178,7 @@ def _subtract_pair(solved, cross, block):  # type: ignore[no-untyped-def]
             )
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_CONTRACTED)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def by_point_and_pose(by_c, T_pc, xyz_c):  # type: ignore[no-untyped-def]
     """Return derivatives by the point in P (M, 2, 3) and by the pose (M, 2, 6) from those by the point in C.
 

@@ -183,11 +183,13 @@ def submap_of(estimate: Estimate, window: Window, anchor: int, last: int, window
     which = shared_numbers(state)
     count = max(_COVARIANCES // windows, _FEWEST_COVARIANCES)
     some = np.unique(np.linspace(anchor, last, min(last - anchor + 1, count)).round().astype(int))
-    border = factor.border_covariance()
-    by_shared, border_by_shared = factor.response(which)
+    with threadpool_limits(1):  # as in `_refusals_named`
+        border = factor.border_covariance()
+        by_shared, border_by_shared = factor.response(which)
+        covariance = factor.joint_covariance(some)[:, :6, :, :6]
     shared, T_pc = border[np.ix_(which, which)], state.T_pc[some]
     response = _since_first(by_shared[some, :6], T_pc)
-    joint = _relative(factor.joint_covariance(some)[:, :6, :, :6], T_pc)
+    joint = _relative(covariance, T_pc)
     joint -= np.swapaxes(response[:, None] @ shared @ np.swapaxes(response, 1, 2), 1, 2)
     radius = border_by_shared[0]
     return Submap(
