@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -12,8 +14,9 @@ import yaml
 from rich.console import Console
 
 from pipeline.config import resolve
+from pipeline.disk import disk_errors_named
 from pipeline.display import ProgressDisplay
-from pipeline.errors import BoresightError
+from pipeline.errors import BoresightError, InputError
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.job import Job, open_job, run_job
 from pipeline.plan import Selection
@@ -43,9 +46,13 @@ def reproduce(
 ) -> None:
     """Compute a run again from its recording, probe and parameters; fail when a file differs."""
     record = read_run_record(run)
-    with TemporaryDirectory(prefix="boresight-") as temporary:
-        again = output or Path(temporary) / "run"
-        job = _job(record, again, Path(temporary))
+    if output is not None and output.resolve() == run.resolve():
+        raise InputError(
+            output, "is the run itself, which would be lost", expected="another folder for the run made again"
+        )
+    with _temporary_folder() as temporary:
+        again = output or temporary / "run"
+        job = _job(record, again, temporary)
         check_inputs_unchanged(record, job.plan().input_hashes())
         with ProgressDisplay(Console(stderr=True)) as display:
             run_job(job, Selection("", "", True), display)
@@ -53,9 +60,20 @@ def reproduce(
     _tell(compared, record)
 
 
+@contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    with ExitStack() as stack:
+        with disk_errors_named(
+            Path("the system's temporary folder"), hint="free space there, or set TMPDIR to another"
+        ):
+            folder = stack.enter_context(TemporaryDirectory(prefix="boresight-"))
+        yield Path(folder)
+
+
 def _job(record: RunRecord, folder: Path, temporary: Path) -> Job:
     parameters = temporary / "configuration.yaml"
-    parameters.write_text(yaml.safe_dump({s: dict(p) for s, p in record.configuration.items()}), "utf-8")
+    with disk_errors_named(temporary):
+        parameters.write_text(yaml.safe_dump({s: dict(p) for s, p in record.configuration.items()}), "utf-8")
     configuration = resolve(PIPELINE, parameters)
     return open_job(record.recording, folder, record.probe, PIPELINE, EXPORTERS, configuration)
 

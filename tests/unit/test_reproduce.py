@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
+from pipeline.commands.reproduce import reproduce
 from pipeline.disk import record_of
 from pipeline.errors import InputError
 from pipeline.export.exporter import Exporter
@@ -80,3 +82,23 @@ def test_an_unfinished_run_is_told(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(RECORD | {"state": "failed"}))
     with pytest.raises(InputError, match="the run is failed"):
         read_run_record(tmp_path)
+
+
+def test_a_run_is_not_made_again_over_itself(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "run.json").write_text(json.dumps({"format": 1, **RECORD}))
+    (tmp_path / "same").symlink_to(run)
+    for output in (run, tmp_path / "run" / ".." / "run", tmp_path / "same"):
+        with pytest.raises(InputError, match="is the run itself"):
+            reproduce(run, output)
+
+
+def test_no_room_for_what_is_only_compared_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "run.json").write_text(json.dumps({"format": 1, **RECORD}))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(InputError, match="temporary folder: cannot be written") as refusal:
+        reproduce(run)
+    assert "TMPDIR" in refusal.value.hint
