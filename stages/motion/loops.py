@@ -69,7 +69,7 @@ class Loops:
 
     def report(self, context: Context) -> None:
         """Report what closing loops came to."""
-        context.report("places where the wall was passed again", len(self.places), "")
+        context.report("places where the wall was compared with what was seen before", len(self.places), "")
         if not self.places:
             return
         at_weld = sum(t and p.at_weld for t, p in zip(self.taken, self.places, strict=True))

@@ -98,7 +98,7 @@ def _compare_runs(name: str, measured: Measured, encoder: bool) -> None:
         _print_errors(found, measured.T_pc)
         _print_wall(found, measured)
         if most:
-            for words in (w for w in told if "loop" in w or "passed again" in w):
+            for words in (w for w in told if "loop" in w or "seen before" in w):
                 print(f"    {words}: {told[words]}")
 
 
@@ -133,8 +133,8 @@ def _print_wall(found: Trajectory, measured: Measured) -> None:
     wall = accumulate_wall(measured.probe, measured.rings, measured.points, found, parameters, context)
     compared = compare_wall(wall.radius_map, measured.truth)
     print(
-        f"    wall's radius off the truth, rms: {_rms(compared.error_mm):.3f} mm, "
-        f"within 95 % of the stated: {100 * compared.inside_95:.0f} %"
+        f"    wall's radius off the truth: 1 σ of most {compared.robust_sigma_mm:.3f} mm, rms with welds "
+        f"{_rms(compared.error_mm):.3f} mm, inside the stated 95 %: {100 * compared.inside_95:.0f} %"
     )
 
 

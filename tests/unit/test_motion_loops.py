@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pipeline.scratch import Scratch
+from pipeline.stage import quiet_context
+from stages.motion import estimate_motion
 from stages.motion.comparing import Comparison, Expected, Piece, Verdict, compare
 from stages.motion.foresight import Foresight
 from stages.motion.joining import Joined
 from stages.motion.loops import Loops, close_loops
 from stages.motion.parameters import MotionParameters
 from stages.motion.places import Passage, Place, Signs, bands_in_rings, choose_places, texture_at, widened
+from tests.drawn_run import drawn_run, without_encoder
 from tests.looped_run import FRAMES, GRID, DrawnView, LoopedRun, looped_run, rough_wall
 
 Float = NDArray[np.float64]
@@ -207,3 +212,28 @@ def test_what_is_expected_is_learnt_from_place_to_place() -> None:
     assert np.all(expected.reach < 0.5 * before)
     assert expected.allows(np.array([40.0, 20.0]))
     assert not expected.allows(np.array([28.0, 60.0]))
+
+
+@pytest.mark.parametrize("most", [100, 0])
+def test_pictures_there_and_back_close_loops_and_the_report_says_so(most: int) -> None:
+    way = np.concatenate([np.arange(0, 110, 2.0), np.arange(110, 0, -2.0)])
+    drawn = without_encoder(drawn_run(way, 0.1 * np.sin(np.arange(len(way)) / 20)))
+    told: dict[str, float | int | str] = {}
+
+    def tell(name: str, value: float | int | str, unit: str = "") -> None:
+        told[name] = value
+
+    windows = {"window_frames": 44, "overlap_frames": 16, "max_track_frames": 20}
+    chosen = MotionParameters.model_validate(windows | {"loop_spacing_mm": 20.0, "most_loops": most})
+    context = replace(quiet_context(), report=tell)
+    found = estimate_motion(drawn.recording, drawn.probe, drawn.rings, drawn.points, chosen, context)
+    compared = told["places where the wall was compared with what was seen before"]
+    if most == 0:
+        assert compared == 0
+        assert "loops closed there" not in told
+        return
+    assert 3 <= int(compared) == told["loops closed there"]
+    off = found.T_pc[:, 2, 3] - drawn.T_pc[:, 2, 3]
+    there, here = np.arange(11, 50, 2), len(way) - np.arange(11, 50, 2)
+    assert np.abs(off[here] - off[there]).max() < 0.03
+    assert np.all(np.linalg.eigvalsh(found.covariance[1:]) > 0)
