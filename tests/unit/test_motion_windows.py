@@ -16,7 +16,7 @@ from pipeline.scratch import Scratch
 from stages.motion.joining import Joined, join, seam
 from stages.motion.parameters import MotionParameters
 from stages.motion.sliding import RunEstimate, adjust_run
-from stages.motion.submaps import Settled, Submap, carried
+from stages.motion.submaps import Say, Settled, Submap, carried, settle
 from stages.motion.tracks import TrackStore
 from stages.motion.windows import Window, cut_windows
 from tests.long_motion import LongMotion, long_motion
@@ -80,6 +80,24 @@ def test_errors_lie_within_sigma(drawn: LongMotion, in_windows: RunEstimate) -> 
     run = in_windows.joined
     error = difference(run.T_pc, drawn.T_pc)[10:]
     assert np.mean(np.abs(error / sigma_of(run)[10:]) < 3) > 0.97
+
+
+def test_many_windows_that_err_alike_do_not_overrule_what_is_stated(drawn: LongMotion) -> None:
+    parameters, window = MotionParameters.model_validate({}), Window(0, 110)
+    measured = drawn.run.measured(window, parameters)
+    state = drawn.run.start(window, measured, parameters)
+    numbers = 1 + len(state.instrument)
+    say = Say(np.append(1.0, np.full(numbers - 1, 0.5)), np.eye(numbers))
+
+    def settled(windows: int) -> Settled:
+        return settle([say] * windows, [1.0] * windows, measured, state)
+
+    one, two, three, many = (settled(windows) for windows in (1, 2, 3, 80))
+    np.testing.assert_allclose(one.value, say.value)
+    assert np.all(two.value[1:] > one.value[1:])
+    assert np.all(three.value[1:] > two.value[1:])
+    np.testing.assert_allclose(many.value, three.value)
+    np.testing.assert_allclose(many.covariance, three.covariance)
 
 
 def test_windows_cover_all_frames_and_overlap() -> None:
