@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.geometry.axis import axis_through, to_pipe
+from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion.joining import Joined, join, seam
 from stages.motion.places import Passage
@@ -26,6 +26,7 @@ _FROM_MM = -100.0
 # 1 σ of the drift from frame to frame: position, mm, and turns, rad.
 DRIFT = np.array([2e-3, 2e-3, 0.05, 2e-5, 2e-5, 2e-4])
 _BEND_PER_MM = 2e-6
+_BEND_FROM_MM, _BEND_TO_MM = 300.0, 600.0
 
 
 @dataclass(frozen=True)
@@ -46,22 +47,26 @@ class LoopedRun:
         """Return distance, roll and offset (N, 2) from the axis as a run has them; the true offset is 0."""
         run = joined or self.joined
         distance, azimuth, radius = to_pipe(run.axis, run.T_pc[:, :3, 3])
-        roll = np.unwrap(np.arctan2(run.T_pc[:, 1, 0], run.T_pc[:, 0, 0]))
+        own = np.swapaxes(frames_at(run.axis, distance)[1], 1, 2) @ run.T_pc[:, :3, :3]
+        roll = np.unwrap(np.arctan2(own[:, 1, 0], own[:, 0, 0]))
         return distance, roll, radius[:, None] * np.stack([np.cos(azimuth), np.sin(azimuth)], -1)
 
 
-def looped_run(seed: int = 0) -> LoopedRun:
-    """Return 400 frames, 0.8 m in and back, in windows of 80 that each drift and bend a little."""
+def looped_run(seed: int = 0, curvature_per_mm: float = 0.0) -> LoopedRun:
+    """Return 400 frames, 0.8 m in and back, in windows of 80 that each drift and bend a little.
+
+    The pipe itself is straight up to 0.3 m, and from there to 0.6 m bent by so much.
+    """
     random, k = np.random.default_rng(seed), np.arange(FRAMES)
     distance = STEP_MM * np.minimum(k, FRAMES - 1 - k).astype(float)
     roll = 0.1 * np.sin(k / 60)
     windows = cut_windows(FRAMES, LENGTH, OVERLAP)
-    submaps = [_submap(windows, n, distance, roll, random) for n in range(len(windows))]
+    submaps = [_submap(windows, n, distance, roll, curvature_per_mm, random) for n in range(len(windows))]
     return LoopedRun(join(submaps, Settled(np.zeros(SHARED), np.eye(SHARED))), distance, roll)
 
 
 def _submap(
-    windows: tuple[Window, ...], n: int, distance_mm: Float, roll_rad: Float,
+    windows: tuple[Window, ...], n: int, distance_mm: Float, roll_rad: Float, curvature: float,
     random: np.random.Generator,
 ) -> Submap:  # fmt: skip
     window = windows[n]
@@ -70,12 +75,14 @@ def _submap(
     bend = _BEND_PER_MM * random.standard_normal()
     away = np.arange(window.frames) - window.frames // 2
     z = distance_mm[mine] + rate[2] * away
-    origin, lean = _bent(z, bend, float(z.mean()))
+    origin, lean = _bent(z, bend, float(z.mean()), curvature)
     roll = roll_rad[mine] + rate[5] * away
     turn = rotation_from_vector(np.stack([0 * z, lean, 0 * z], -1))
     T_pc = from_parts(turn @ rotation_from_vector(np.stack([0 * z, 0 * z, roll], -1)), origin)
     along = np.arange(z.min() - 20.0, z.max() + 90.0, 2.0)
-    axis = axis_through(_bent(along, bend, float(z.mean()))[0], np.array([1.0, 0, 0]), float(along[0]))
+    axis = axis_through(
+        _bent(along, bend, float(z.mean()), curvature)[0], np.array([1.0, 0, 0]), float(along[0])
+    )
     anchor = seam(windows[n - 1], window) - window.first if n else 0
     end = seam(window, windows[n + 1]) - window.first if n + 1 < len(windows) else window.frames - 1
     some = np.unique(np.linspace(anchor, end, 8).astype(int))
@@ -86,10 +93,15 @@ def _submap(
     return Submap(window, T_pc, zero, axis, 50.0, anchor, some, joint, response, 0.01, np.zeros(SHARED))
 
 
-def _bent(z: Float, bend: float, middle: float) -> tuple[Float, Float]:
-    """Return points (n, 3) of a pipe believed to bend, and its lean there."""
-    off = z - middle
-    return np.stack([0.5 * bend * off**2, 0 * z, z], -1), bend * off
+def _bent(z: Float, bend: float, middle: float, curvature: float) -> tuple[Float, Float]:
+    """Return points (n, 3) and lean (n,) of a pipe believed to bend about a middle besides its own bend."""
+    s = np.arange(-200.0, 1200.0, 0.5)
+    lean = curvature * np.clip(s - _BEND_FROM_MM, 0, _BEND_TO_MM - _BEND_FROM_MM) + bend * (s - middle)
+    x, along = (
+        0.5 * np.concatenate([[0.0], np.cumsum(f((lean[:-1] + lean[1:]) / 2))]) for f in (np.sin, np.cos)
+    )
+    start = np.interp(0.0, s, along)
+    return np.stack([np.interp(z, s, x), 0 * z, np.interp(z, s, along) - start], -1), np.interp(z, s, lean)
 
 
 def rough_wall(seed: int = 1, repeat_mm: float | None = None, welds_every_mm: float | None = None) -> Float32:

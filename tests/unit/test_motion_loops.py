@@ -65,6 +65,18 @@ def test_what_drifted_comes_together_again(run: LoopedRun, closed: tuple[Joined,
     assert np.abs(after[2]).max() < 0.05
 
 
+def test_loops_are_closed_beyond_a_bend() -> None:
+    bent = looped_run(curvature_per_mm=2e-3)
+    joined, loops = closing(bent, DrawnView(bent, WALL, WALL, {}))
+    assert all(loops.taken)
+    before, after = gap(bent, bent.joined), gap(bent, joined)
+    assert np.abs(before[0]).max() > 0.5
+    assert np.abs(after[0]).max() < 0.15
+    assert np.abs(after[1]).max() < 0.001
+    assert np.abs(before[2]).max() > 0.5
+    assert np.abs(after[2]).max() < 0.15
+
+
 def test_sigma_falls_and_holds(run: LoopedRun, closed: tuple[Joined, Loops]) -> None:
     joined, _ = closed
     sigma = [np.sqrt(np.diagonal(j.covariance, axis1=1, axis2=2)) for j in (run.joined, joined)]
