@@ -34,11 +34,11 @@ class Bell:
 
 
 def fit_bell(relief: Relief, region: Region, points: DeviationPoints) -> Bell | None:
-    """Fit height · exp(−(x²/a² + y²/b²)^p) to a region's points; None where they are too few."""
+    """Fit height · exp(−(x²/a² + y²/b²)^p) to a region's points; None where few are or none stands out."""
     x, y, value = _near(relief, region, points)
-    if len(value) < _LEAST:
-        return None
     value = region.sign * value
+    if len(value) < _LEAST or value.max() <= 0:
+        return None
     size = np.array(region.mask.shape) * relief.cell_mm
     top = np.argmax(value)
     start = np.array([value[top], x[top], y[top], *np.log(0.35 * size), 0.0])

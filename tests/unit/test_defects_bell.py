@@ -1,0 +1,46 @@
+"""A bell is fitted to the points of a small defect, where they show one at all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stages.defects.bell import fit_bell
+from stages.defects.fine import DeviationPoints
+from stages.defects.relief import Relief, Typical
+from stages.defects.segment import Region
+
+Float = NDArray[np.float64]
+_ROWS, _COLUMNS, _RADIUS_MM = 40, 720, 50.0
+
+
+def relief() -> Relief:
+    flat = np.zeros((_ROWS, _COLUMNS))
+    azimuth = np.linspace(-np.pi, np.pi, _COLUMNS, endpoint=False)
+    distance = 0.5 * np.arange(_ROWS)
+    harmonics, typical = np.zeros((_ROWS, 5)), Typical(0.02, 0.02)
+    return Relief(distance, azimuth, _RADIUS_MM, flat, flat, flat + 0.02, (), harmonics, typical)
+
+
+def points(height_mm: float) -> DeviationPoints:
+    """Return a point every half cell about the middle of the map, on a bell 2 mm wide, with noise."""
+    random = np.random.default_rng(0)
+    row, column = (g.ravel() for g in np.meshgrid(np.arange(10, 30, 0.5), np.arange(345, 375, 0.5)))
+    off = ((row - 20) * 0.5) ** 2 + ((column - 360) * 2 * np.pi / _COLUMNS * _RADIUS_MM) ** 2
+    deviation = height_mm * np.exp(-off / 4.0) + 0.01 * random.standard_normal(len(row))
+    return DeviationPoints(np.zeros(1, np.int64), row, column, deviation, 2.0)
+
+
+def test_the_height_of_a_bell_is_found() -> None:
+    found = fit_bell(relief(), Region(14, 350, np.ones((12, 20), bool), 1.0), points(1.0))
+    assert found is not None
+    assert found.height_mm == pytest.approx(0.96, abs=0.04)
+
+
+def test_where_no_point_stands_out_there_is_no_bell() -> None:
+    sunk = points(0.0)
+    below = DeviationPoints(sunk.first, sunk.row, sunk.column, sunk.deviation_mm - 0.5, sunk.spacing_mm)
+    region = Region(14, 350, np.ones((12, 20), bool), 1.0)
+    assert fit_bell(relief(), region, below) is None
+    assert fit_bell(relief(), region, sunk) is not None, "the control: noise alone does stand out"
