@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import ctypes
+import sys
 from functools import cache
 from types import ModuleType
 
 import libusb_package
+
+
+def give_back_memory() -> None:
+    """Return to the system what was freed: the GNU C library keeps it for each thread by itself."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
+    if trim is not None:
+        trim(0)
 
 
 @cache

@@ -17,6 +17,7 @@ from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 from pipeline.export.exporter import Exporter, published_key, withdraw
 from pipeline.export.writer import Writer
 from pipeline.headline import headline
+from pipeline.native import give_back_memory
 from pipeline.outcome import Number, Results, RunOutcome, StageOutcome, State
 from pipeline.plan import Plan, Selection, Step
 from pipeline.run_folder import RunFolder
@@ -151,13 +152,16 @@ class Runner:
         numbers: list[Number] = []
         start = time.monotonic()
         artefact = self._artefact(step, numbers)
+        kind = type(artefact).__name__
         provenance = Provenance(
             name, step.stage.version, step.key, round(time.monotonic() - start, 3), tuple(numbers)
         )
         self._folder.store.write(artefact, provenance)
+        del artefact
+        give_back_memory()
         stored = self._folder.store.read(name, step.key, step.output)
         if stored is None:
-            raise TypeError(f"stage {name} made a {type(artefact).__name__} that does not read back")
+            raise TypeError(f"stage {name} made a {kind} that does not read back")
         return stored
 
     def _artefact(self, step: Step, numbers: list[Number]) -> object:
