@@ -20,6 +20,7 @@ from stages.defects.surface import Surface
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+Byte = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -109,10 +110,23 @@ def _outline(relief: Relief, region: Region) -> Float:
     while cv2.connectedComponents(mask)[0] > 2:
         closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((bridge, bridge), np.uint8))
         mask, bridge = np.asarray(closed, np.uint8), bridge + 2
-    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    polygon = cv2.approxPolyDP(max(contours, key=cv2.contourArea), 0.7, True)[:, 0].astype(float)
+    polygon = _polygon(mask)
     scale = (bottom - top) / region.mask.shape[0], (last - first) / region.mask.shape[1]
     return np.stack([top + (polygon[:, 1] - 0.5) * scale[0], first + (polygon[:, 0] - 0.5) * scale[1]], -1)
+
+
+def _polygon(mask: Byte) -> Float:
+    """Return the outer contour (V, 2) of a mask as (column, row), which encloses an area."""
+    polygon = cv2.approxPolyDP(_contour(mask), 0.7, True)
+    if cv2.contourArea(polygon) > 0:
+        return np.asarray(polygon[:, 0], float)
+    # the contour through the middles of cells in one line encloses nothing: it goes through their quarters
+    return (_contour(np.repeat(np.repeat(mask, 2, 0), 2, 1))[:, 0] - 0.5) / 2
+
+
+def _contour(mask: Byte) -> Int:
+    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(max(contours, key=len))
 
 
 def _darkness(texture: WallTexture, relief: Relief, region: Region) -> float:
