@@ -33,7 +33,7 @@ from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
 from stages.defects.stretch import stretches
-from stages.defects.surface import MeasuredWall
+from stages.defects.surface import MeasuredWall, Surface
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
@@ -63,7 +63,11 @@ def find_defects(
     found = _described(measured, regions, scene, parameters, context)
     items = tuple(replace(defect, id=n) for n, defect in enumerate(found, 1))
     context.report("defects", len(items), "")
-    context.report("rejected: shallower than the smallest depth", len(regions) - len(items), "detections")
+    context.report(
+        "rejected: shallower than the smallest depth or between rings",
+        len(regions) - len(items),
+        "detections",
+    )
     return Defects(items, parameters.false_alarms, _smallest_depth(seeds, parameters))
 
 
@@ -74,14 +78,22 @@ def _described(
     parameters: DefectParameters,
     context: Context,
 ) -> Iterator[Defect]:
-    """Yield the defects among the regions: those as deep as is worth reporting."""
+    """Yield the defects among the regions: those that were measured and are as deep as is worth reporting."""
     clean = clean_wall(wall, regions)
     for done, region in enumerate(regions, 1):
         surface, here = wall.surface_about(region)
+        if not _is_measured(surface, here):
+            continue
         depth = measure_depth(here, surface, clean, parameters.draws, context.random)
         context.progress(len(regions) + done, 2 * len(regions))
         if region.sign * depth.depth_mm >= parameters.min_depth_mm:
             yield describe(here, depth, surface, scene)
+
+
+def _is_measured(surface: Surface, region: Region) -> bool:
+    """Whether any cell of a region has a surface: between rings far apart some have none."""
+    shown = region.cut(surface.all_mm if region.all_round else surface.local_mm)
+    return bool(np.isfinite(shown[region.mask]).any())
 
 
 def _refuse_unseen(wall: Wall) -> None:

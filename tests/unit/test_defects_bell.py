@@ -1,4 +1,4 @@
-"""A bell is fitted to the points of a small defect, where they show one at all."""
+"""What the points of a small defect show: a bell, nothing that stands out, or nothing at all."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.artefacts import PointCloud
+from stages.defects import _is_measured
 from stages.defects.bell import fit_bell
 from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief, Typical
 from stages.defects.segment import Region
+from stages.defects.surface import Surface
 
 Float = NDArray[np.float64]
 _ROWS, _COLUMNS, _RADIUS_MM = 40, 720, 50.0
@@ -44,3 +47,12 @@ def test_where_no_point_stands_out_there_is_no_bell() -> None:
     region = Region(14, 350, np.ones((12, 20), bool), 1.0)
     assert fit_bell(relief(), region, below) is None
     assert fit_bell(relief(), region, sunk) is not None, "the control: noise alone does stand out"
+
+
+def test_a_find_between_rings_without_any_surface_is_not_measured() -> None:
+    cloud = PointCloud(*[np.zeros((0, 3), np.float32)] * 2, *[np.zeros(0, np.float32)] * 4, np.zeros(0, int))
+    unseen = np.full((_ROWS, _COLUMNS), np.nan)
+    row = Region(14, 350, np.ones((1, 7), bool), -1.0)
+    assert not _is_measured(Surface(relief(), unseen, unseen, unseen, cloud, points(0.0)), row)
+    unseen[14, 353] = 0.1
+    assert _is_measured(Surface(relief(), unseen, unseen, unseen, cloud, points(0.0)), row)
