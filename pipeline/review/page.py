@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from pipeline.review.plots import Plot, Tick
 
+_MOST_NUMBERED = 40
+
 
 @dataclass(frozen=True)
 class Card:
@@ -37,6 +39,11 @@ class Strip:
     aspect: float
     marks: tuple[Mark, ...]
     ticks: tuple[Tick, ...]
+
+    @property
+    def crowded(self) -> bool:
+        """Whether the marks' numbers would hide the wall."""
+        return len(self.marks) > _MOST_NUMBERED
 
 
 @dataclass(frozen=True)

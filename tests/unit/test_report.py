@@ -127,6 +127,16 @@ def test_mark_lies_in_the_middle_of_the_flat_view(summary):
     assert mark.top + mark.height / 2 == pytest.approx(50, abs=2)
 
 
+def test_the_wall_is_not_hidden_behind_the_numbers_of_very_many_findings(summary, tmp_path):
+    few = written(summary, tmp_path)
+    one = summary.defects.items[0]
+    many = replace(summary.defects, items=tuple(replace(one, id=k + 1) for k in range(60)))
+    crowd = written(replace(summary, defects=many), tmp_path)
+    assert '<div class="strip">' in few
+    assert '<div class="strip crowded">' in crowd
+    assert re.search(r"\.crowded \.mark b \{ display: none", crowd)
+
+
 def test_what_stages_warn_of_is_told_first_and_as_text(summary, tmp_path):
     warned = replace(
         summary, numbers=(*summary.numbers, ReportedNumber("motion", "warning", f"36 σ {HOSTILE}"))
