@@ -160,6 +160,8 @@ class Trajectory:
         None where they are as stated. `Probe.as_found_in` applies them.
     instrument_covariance : (P, P) or None
         Their covariance.
+    distance_sigma_mm : float
+        1 σ of the distance along the axis from the first frame to the last.
     """
 
     frame: Int
@@ -174,6 +176,7 @@ class Trajectory:
     events: tuple[MotionEvent, ...]
     instrument: Float | None = None
     instrument_covariance: Float | None = None
+    distance_sigma_mm: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def _measured(summary: RunSummary) -> Card:
 def _motion(trajectory: Trajectory) -> list[str]:
     path = float(np.abs(np.diff(distance_along(trajectory.axis, trajectory.T_pc))).sum())
     last = np.sqrt(np.maximum(np.diag(trajectory.covariance[-1]), 0))
-    along = float(np.hypot(last[2], trajectory.scale_sigma * path))
+    along = float(np.hypot(trajectory.distance_sigma_mm, trajectory.scale_sigma * path))
     return [
         f"distance ± {along:.2f} mm and roll ± {np.degrees(last[5]):.2f}° at the end of {path:.0f} mm (1 σ)"
     ]

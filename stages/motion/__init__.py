@@ -186,7 +186,7 @@ def _report(context: Context, estimate: RunEstimate, followed: Followed, traject
     context.report(
         "distance travelled", float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc))), "mm"
     )
-    context.report("1 σ of distance at the end", float(np.sqrt(trajectory.covariance[-1, 2, 2])), "mm")
+    context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")
 
 
 MOTION = Stage(

@@ -23,13 +23,16 @@ def closed(joined: Joined, laid: Sequence[Laid], chain: Chain, found: Conditione
     frames = np.arange(len(joined.T_pc))
     error = interpolated(frames, chain.at, found.error)
     tangent = frames_at(joined.axis, to_pipe(joined.axis, joined.T_pc[:, :3, 3])[0])[1][..., 2]
+    covariance = joined.covariance - interpolated(frames, chain.at, found.gained)
+    before, after = (tangent[-1] @ c[-1, :3, :3] @ tangent[-1] for c in (joined.covariance, covariance))
     straightened = [_without(part, joined.T_pc, error) for part in laid]
     return replace(
         joined,
         T_pc=moved(joined.T_pc, -error),
         slip=joined.slip - np.einsum("ni,ni->n", tangent, error[:, :3]),
         axis=one_axis(straightened),
-        covariance=joined.covariance - interpolated(frames, chain.at, found.gained),
+        covariance=covariance,
+        distance_sigma_mm=joined.distance_sigma_mm * float(np.sqrt(max(after, 0.0) / before)),
     )
 
 

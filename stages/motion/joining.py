@@ -39,6 +39,8 @@ class Joined:
     radius_mm, radius_sigma_mm : float
     settled : Settled
         Encoder scale and instrument.
+    distance_sigma_mm : float
+        1 σ of the distance along the axis from the first frame to the last.
     """
 
     submaps: tuple[Submap, ...]
@@ -49,6 +51,7 @@ class Joined:
     radius_mm: float
     radius_sigma_mm: float
     settled: Settled
+    distance_sigma_mm: float
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ def join(submaps: Sequence[Submap], settled: Settled) -> Joined:
     variance += float(response @ settled.covariance @ response)
     return Joined(
         tuple(submaps), T_pc, slip, one_axis(laid), _covariance(laid, settled), float(radius),
-        float(np.sqrt(variance)), settled,
+        float(np.sqrt(variance)), settled, _distance_sigma(submaps, settled),
     )  # fmt: skip
 
 
@@ -185,6 +188,19 @@ def one_axis(laid: Sequence[Laid]) -> PipeAxis:
         weight[mine] += share
     origin = total / weight[:, None]
     return axis_through(origin, laid[0].submap.axis.R_pa[0, :, 0], float(first))
+
+
+def _distance_sigma(submaps: Sequence[Submap], settled: Settled) -> float:
+    """Return 1 σ of the distance along the axis: each window's own, and what they share.
+
+    Where the pipe points drifts from window to window, which turns the way behind and does not lengthen it.
+    """
+    variance, response = 0.0, np.zeros(len(settled.value))
+    for own in submaps:
+        tangent = frames_at(own.axis, to_pipe(own.axis, own.T_pc[own.some[-1], :3, 3])[0])[1][:, 2]
+        variance += float(tangent @ own.covariance[-1, :3, :3] @ tangent)
+        response += tangent @ own.response[-1, :3]
+    return float(np.sqrt(variance + response @ settled.covariance @ response))
 
 
 def _covariance(laid: Sequence[Laid], settled: Settled) -> Float:

@@ -51,6 +51,7 @@ def trajectory_of(
         encoder_scale=float(run.settled.value[0]) if has_encoder else float("nan"),
         encoder_scale_sigma=scale_sigma if has_encoder else float("nan"),
         scale_sigma=run.radius_sigma_mm / run.radius_mm,
+        distance_sigma_mm=run.distance_sigma_mm,
         events=(),
         instrument=probe.parameters + unsure @ found,
         instrument_covariance=unsure @ spread @ unsure.T,

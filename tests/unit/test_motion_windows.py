@@ -76,6 +76,17 @@ def test_stated_sigma_is_that_of_all_frames_at_once(at_once: RunEstimate, in_win
     assert np.all(many / one < 1.5)
 
 
+def test_sigma_of_the_way_is_that_of_a_straight_pipe_and_of_all_frames_at_once(
+    at_once: RunEstimate, in_windows: RunEstimate
+) -> None:
+    # Along a straight pipe of a few windows, heading lengthens nothing: the last pose's z has the same σ.
+    for estimate in (at_once, in_windows):
+        last = np.sqrt(estimate.joined.covariance[-1, 2, 2])
+        assert estimate.joined.distance_sigma_mm == pytest.approx(last, rel=0.05)
+    alone, cut = (e.joined.distance_sigma_mm for e in (at_once, in_windows))
+    assert cut == pytest.approx(alone, rel=0.1)
+
+
 def test_errors_lie_within_sigma(drawn: LongMotion, in_windows: RunEstimate) -> None:
     run = in_windows.joined
     error = difference(run.T_pc, drawn.T_pc)[10:]
