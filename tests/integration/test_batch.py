@@ -60,7 +60,7 @@ def test_a_lost_worker_loses_nothing(recordings, single, tmp_path):
         "deep-two": "completed",
         "broken": "refused",
     }
-    assert "key kind: is missing" in ended["broken"].problem
+    assert "recording.yaml, key frames: is missing" in ended["broken"].problem
     for name in ("radius_map.npz", "trajectory.csv", "defects.json", "model.glb"):
         assert (tmp_path / "one" / name).read_bytes() == (single / name).read_bytes()
 

@@ -28,7 +28,7 @@ export class Stretches {
   get parts(): Part[] { return [...this.held.values()].flat(); }
   get meshes(): THREE.Mesh[] { return this.parts.map((p) => p.mesh); }
   get isAll(): boolean { return this.wanted().length === this.list.length; }
-  get isReady(): boolean { return this.wanted().every((k) => this.held.has(k)); }
+  get isReady(): boolean { return this.list.length > 0 && this.wanted().every((k) => this.held.has(k)); }
 
   /** The distances between which everything is there in detail. */
   get span(): [number, number] | null {
