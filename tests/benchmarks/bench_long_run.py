@@ -145,7 +145,7 @@ def against_truth(place: Place) -> str:
     bias_mm = float(np.mean(radius_map.radius_mm[seen], dtype=float)) - true_radius_mm
     return (
         f"distance {off_mm[-1]:+.2f} mm at the end of {np.ptp(T_pc[:, 2, 3]):.0f} mm "
-        f"(1 sigma {np.sqrt(motion.covariance[-1, 2, 2]):.2f}), mean radius {bias_mm:+.4f} mm, "
+        f"(1 sigma {motion.distance_sigma_mm:.2f}), mean radius {bias_mm:+.4f} mm, "
         f"seen {100 * np.mean(seen[seen.any(1)]):.1f} %"
     )
 
