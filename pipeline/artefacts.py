@@ -161,7 +161,8 @@ class Trajectory:
     instrument_covariance : (P, P) or None
         Their covariance.
     distance_sigma_mm : float
-        1 σ of the distance along the axis from the first frame to the last.
+        1 σ of the distance along the axis from the first frame to the last, calibration included; NaN where
+        it was not worked out.
     """
 
     frame: Int
@@ -176,7 +177,7 @@ class Trajectory:
     events: tuple[MotionEvent, ...]
     instrument: Float | None = None
     instrument_covariance: Float | None = None
-    distance_sigma_mm: float = 0.0
+    distance_sigma_mm: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,7 @@ class Defects:
     ----------
     items : tuple of Defect
     false_alarm_rate : float
-        Expected number of false reports in this recording.
+        Expected number of false reports that the wall's noise and roughness make in this recording.
     smallest_depth_mm : float
         Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
     """

@@ -88,10 +88,8 @@ def _measured(summary: RunSummary) -> Card:
 def _motion(trajectory: Trajectory) -> list[str]:
     path = float(np.abs(np.diff(distance_along(trajectory.axis, trajectory.T_pc))).sum())
     last = np.sqrt(np.maximum(np.diag(trajectory.covariance[-1]), 0))
-    along = float(np.hypot(trajectory.distance_sigma_mm, trajectory.scale_sigma * path))
-    return [
-        f"distance ± {along:.2f} mm and roll ± {np.degrees(last[5]):.2f}° at the end of {path:.0f} mm (1 σ)"
-    ]
+    distance, roll = f"{trajectory.distance_sigma_mm:.2f} mm", f"{np.degrees(last[5]):.2f}°"
+    return [f"distance ± {distance} and roll ± {roll} at the end of {path:.0f} mm (1 σ)"]
 
 
 def _found(summary: RunSummary) -> Card:
@@ -100,7 +98,8 @@ def _found(summary: RunSummary) -> Card:
         return Card("What was found", "not searched", ())
     lines = [
         f"nine of ten defects of 3 mm × 3 mm are found from {defects.smallest_depth_mm:.2f} mm depth on",
-        f"{defects.false_alarm_rate:g} false reports are to be expected in this recording",
+        f"the wall's noise and roughness would make {defects.false_alarm_rate:g} false reports in this "
+        "recording; what is taken for the line and is not, such as bright texture beside it, comes on top",
     ]
     if not defects.items:
         return Card("What was found", "no defect", tuple(lines))

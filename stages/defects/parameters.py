@@ -14,7 +14,7 @@ class DefectParameters(Parameters):
         0.2, ge=0.01, le=10.0, description="smallest depth or height worth reporting, mm"
     )
     false_alarms: float = Field(
-        0.05, ge=1e-6, le=1.0, description="expected number of false detections in a recording"
+        0.05, ge=1e-6, le=1.0, description="expected number of false detections by noise in a recording"
     )
     smooth_mm: float = Field(
         60.0, ge=20.0, le=2000.0, description="length over which the pipe's own shape may vary, mm"

@@ -24,6 +24,7 @@ def closed(joined: Joined, laid: Sequence[Laid], chain: Chain, found: Conditione
     error = interpolated(frames, chain.at, found.error)
     tangent = frames_at(joined.axis, to_pipe(joined.axis, joined.T_pc[:, :3, 3])[0])[1][..., 2]
     covariance = joined.covariance - interpolated(frames, chain.at, found.gained)
+    # Closed loops take from the way what they take from the last pose, along the pipe there.
     before, after = (tangent[-1] @ c[-1, :3, :3] @ tangent[-1] for c in (joined.covariance, covariance))
     straightened = [_without(part, joined.T_pc, error) for part in laid]
     return replace(
