@@ -43,7 +43,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Sums:
+class ErrorSums:
     """C weighed sums of errors, each at a few of the chain's K frames.
 
     Attributes
@@ -63,10 +63,10 @@ class Sums:
     columns: int
 
     @staticmethod
-    def of(knot: Int, column: Int, weight: Float, columns: int) -> Sums:
+    def of(knot: Int, column: Int, weight: Float, columns: int) -> ErrorSums:
         """Return the sums of terms in any order."""
         order = np.argsort(knot, kind="stable")
-        return Sums(knot[order], column[order], weight[order], columns)
+        return ErrorSums(knot[order], column[order], weight[order], columns)
 
     def on(self, first: int, last: int) -> Float:
         """Return the weights (k, 6, C) at frames ``first`` to ``last`` (exclusive) of the chain."""
@@ -75,14 +75,14 @@ class Sums:
         np.add.at(out, (self.knot[part] - first) * self.columns + self.column[part], self.weight[part])
         return out.reshape(-1, self.columns, 6).swapaxes(1, 2)
 
-    def some(self, columns: Int, factor: Float) -> Sums:
+    def some(self, columns: Int, factor: Float) -> ErrorSums:
         """Return some of the sums (c,), each times a factor (c,)."""
         place = np.full(self.columns, -1)
         place[columns] = np.arange(len(columns))
         at = place[self.column]
         mine = at >= 0
         weight = self.weight[mine] * factor[at[mine], None]
-        return Sums(self.knot[mine], at[mine], weight, len(columns))
+        return ErrorSums(self.knot[mine], at[mine], weight, len(columns))
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Closures:
 
     Attributes
     ----------
-    by_error : Sums
+    by_error : ErrorSums
     residual : (C,)
     sigma : (C,)
         1 σ of the measurements, which do not err alike.
@@ -99,7 +99,7 @@ class Closures:
         Which place each belongs to: those of one place are judged together.
     """
 
-    by_error: Sums
+    by_error: ErrorSums
     residual: Float
     sigma: Float
     place: Int
@@ -132,7 +132,7 @@ class Chain:
         """Return the frames (K,), ascending, whose errors are known."""
         return np.concatenate([link.at for link in self.links])
 
-    def covariances_with(self, sums: Sums) -> Iterator[Float]:
+    def covariances_with(self, sums: ErrorSums) -> Iterator[Float]:
         """Yield the covariance (k, 6, C) of each window's errors with C sums of errors.
 
         Once back through the chain and once forth: the work grows with its length and no faster, and in
@@ -153,7 +153,7 @@ class Chain:
             anchor = own[-1]
             yield own + link.response @ shared
 
-    def covariance_of(self, sums: Sums) -> Float:
+    def covariance_of(self, sums: ErrorSums) -> Float:
         """Return the covariance (C, C) of sums of errors."""
         out, first = np.zeros((sums.columns, sums.columns)), 0
         for found in self.covariances_with(sums):

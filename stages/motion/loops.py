@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.scratch import Scratch
 from pipeline.stage import Context
-from stages.motion.chain import Chain, Closures, Sums, astray, beside
+from stages.motion.chain import Chain, Closures, ErrorSums, astray, beside
 from stages.motion.closing import closed
 from stages.motion.comparing import Comparison, Piece, Verdict, compare
 from stages.motion.foresight import Foresight
@@ -139,7 +139,7 @@ class _Ends:
         there, here = (pipe_frames(laid, joined, frame) for frame in (earlier, later))
         return _Ends(earlier, later, there, here)
 
-    def by_error(self, joined: Joined, chain: Chain) -> Sums:
+    def by_error(self, joined: Joined, chain: Chain) -> ErrorSums:
         """Return how errors at the chain's frames enter the difference of both ends, 6 M sums.
 
         Six of each place: along x, y and z of its section, mm, and turns about them, rad.
@@ -153,7 +153,7 @@ class _Ends:
                 knots.append(np.repeat(knot, 6))
                 weights.append((part[:, None, None] * seen).reshape(-1, 6))
         column = np.tile(np.arange(6 * places), len(knots))
-        return Sums.of(np.concatenate(knots), column, np.concatenate(weights), 6 * places)
+        return ErrorSums.of(np.concatenate(knots), column, np.concatenate(weights), 6 * places)
 
     def aside(self) -> Float:
         """Return by how much (M, 6) the axis of the later window lies off that of the earlier one."""
@@ -172,7 +172,7 @@ def _by_error(frame: Int, view: PipeFrames, joined: Joined) -> Float:
     return seen
 
 
-def _spread_px(chain: Chain, by_error: Sums, grid: StripGrid) -> Float:
+def _spread_px(chain: Chain, by_error: ErrorSums, grid: StripGrid) -> Float:
     """Return the covariance (2 M, 2 M) of the shifts before any loop is closed."""
     along = (6 * np.arange(by_error.columns // 6)[:, None] + np.array([_DISTANCE, _ROLL])).ravel()
     return chain.covariance_of(by_error.some(along, np.tile(1 / _per_px(grid), len(along) // 2)))
@@ -214,7 +214,7 @@ def _compared(
 
 
 def _closures(
-    by_error: Sums,
+    by_error: ErrorSums,
     ends: _Ends,
     compared: Sequence[Comparison],
     grid: StripGrid,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stages.motion.chain import Chain, Closures, Link, Sums, astray, interpolated
+from stages.motion.chain import Chain, Closures, ErrorSums, Link, astray, interpolated
 
 Float = NDArray[np.float64]
 KNOTS, WINDOWS, SHARED = 4, 5, 2
@@ -48,13 +48,13 @@ def written_out(chain: Chain) -> Float:
     return np.asarray(flat @ spread @ flat.T)
 
 
-def sums_of(dense: Float) -> Sums:
+def sums_of(dense: Float) -> ErrorSums:
     """Return sums given by weights (K, 6, C)."""
     knot, column = np.nonzero(dense.any(1))
-    return Sums.of(knot, column, dense[knot, :, column], dense.shape[2])
+    return ErrorSums.of(knot, column, dense[knot, :, column], dense.shape[2])
 
 
-def dense(sums: Sums, chain: Chain) -> Float:
+def dense(sums: ErrorSums, chain: Chain) -> Float:
     return sums.on(0, len(chain.at))
 
 

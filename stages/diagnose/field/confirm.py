@@ -13,7 +13,6 @@ from stages.diagnose.effects.predict import columns
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.points import ring_points
-from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import Score, Stated, places_of, score
@@ -95,14 +94,6 @@ def met_in_field(
         except np.linalg.LinAlgError:
             out.append(None)
     return tuple(out)
-
-
-def ring_noise_px(run: FieldRun) -> float:
-    """Return the robust r.m.s. of single ring bins about the smooth pipe, px."""
-    points = ring_points(run)
-    by_pixel = run.probe.triangulate_jacobian(points.uv)[0]
-    inclined = np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward)
-    return float(1.4826 * np.median(np.abs(run.equations.rings.residual / inclined)))
 
 
 def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: Stated) -> Score | None:
