@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+_KNOWN_SIGMA = 2.0
 
 
 class DefectKind(StrEnum):
@@ -154,6 +155,12 @@ class Defects:
     items: tuple[Defect, ...]
     false_alarm_rate: float
     smallest_depth_mm: float
+
+    @property
+    def deepest(self) -> Defect | None:
+        """The one that is farthest off the wall, of those whose depth is known not to be zero (2 σ)."""
+        known = [d for d in self.items if abs(d.depth_mm) >= _KNOWN_SIGMA * d.depth_sigma_mm]
+        return max(known, key=lambda d: abs(d.depth_mm), default=None)
 
 
 def clock_of_azimuth(azimuth_rad: Float | float) -> Float:

@@ -63,6 +63,5 @@ def _of_wall(wall: Wall) -> Iterator[Number]:
 
 def _of_defects(defects: Defects) -> Iterator[Number]:
     yield Number("defects", len(defects.items))
-    depths = [abs(d.depth_mm) for d in defects.items]
-    if depths:
-        yield Number("deepest defect", round(max(depths), 3), "mm")
+    if defects.deepest is not None:
+        yield Number("deepest defect", round(abs(defects.deepest.depth_mm), 3), "mm")

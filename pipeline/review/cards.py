@@ -27,11 +27,12 @@ def verdict(summary: RunSummary) -> str:
     found = summary.defects.items
     if not found:
         return f"{length:.0f} mm of pipe were inspected and no defect was found."
-    deepest = max(found, key=lambda d: abs(d.depth_mm))
-    return (
-        f"{length:.0f} mm of pipe were inspected. Found: {_counted(found)}. The largest deviation is a "
-        f"{deepest.kind} of {_depth(deepest)} at {deepest.distance_from_mm:.0f} mm."
-    )
+    told = f"{length:.0f} mm of pipe were inspected. Found: {_counted(found)}."
+    deepest = summary.defects.deepest
+    if deepest is None:
+        return told
+    where = f"{_depth(deepest)} at {deepest.distance_from_mm:.0f} mm"
+    return f"{told} The largest deviation is a {deepest.kind} of {where}."
 
 
 def cards(summary: RunSummary) -> tuple[Card, ...]:
