@@ -16,8 +16,8 @@ from pipeline.errors import BoresightError, Cancelled, UnusableError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from pipeline.config import Configuration
-    from pipeline.outcome import RunOutcome
+    from pipeline.machine.configuration import Configuration
+    from pipeline.machine.outcome import RunOutcome
 
 _EXIT_FAILED, _EXIT_REFUSED, _EXIT_UNUSABLE, _EXIT_CANCELLED = 1, 2, 3, 130
 
@@ -95,10 +95,10 @@ def run(
     """Turn a recording into a run folder: model, measurements, defects and report."""
     from rich.console import Console
 
-    from pipeline.display import ProgressDisplay
     from pipeline.export.catalogue import EXPORTERS
-    from pipeline.job import open_job, run_job
-    from pipeline.plan import Selection
+    from pipeline.machine.display import ProgressDisplay
+    from pipeline.machine.job import open_job, run_job
+    from pipeline.machine.plan import Selection
     from stages.catalogue import PIPELINE
 
     console = Console(stderr=True)
@@ -134,7 +134,7 @@ def config(
     ] = False,
 ) -> None:
     """Print the configuration that a run would use, as YAML."""
-    from pipeline.config import default_text, resolved_text
+    from pipeline.machine.configuration import default_text, resolved_text
     from stages.catalogue import PIPELINE
 
     text = default_text(PIPELINE) if default else resolved_text(_configuration(file, assignments))
@@ -151,7 +151,7 @@ def main() -> None:
 
 
 def _exit_code(error: BoresightError) -> int:
-    from pipeline.runner import FailedError
+    from pipeline.machine.runner import FailedError
 
     codes: tuple[tuple[type[BoresightError], int], ...] = (
         (FailedError, _EXIT_FAILED),
@@ -177,7 +177,7 @@ def _attach(command: _Attached) -> None:
 
 
 def _configuration(file: Path | None, assignments: list[str] | None) -> Configuration:
-    from pipeline.config import resolve
+    from pipeline.machine.configuration import resolve
     from stages.catalogue import PIPELINE
 
     return resolve(PIPELINE, file, assignments or ())
@@ -190,7 +190,7 @@ def _print_inputs(console: Console, name: str, warnings: tuple[str, ...]) -> Non
 
 
 def _print_outcome(outcome: RunOutcome, folder: Path) -> None:
-    from pipeline.outcome import warnings_of
+    from pipeline.machine.outcome import warnings_of
 
     for number in outcome.metrics:
         typer.echo(f"{number.name:<48} {number.value} {number.unit}".rstrip())

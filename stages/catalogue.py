@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.stage import Stage
+from pipeline.machine.stage import Stage
 from stages.accumulate import ACCUMULATE
 from stages.defects import DEFECTS
 from stages.mesh import MESH

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pipeline.errors import UnusableError
 from pipeline.instrument.misalignment import fit_circle
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable, Recording
-from pipeline.stage import Context
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 

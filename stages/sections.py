@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from pipeline.artefacts import RadiusMap, Wall
+from pipeline.artefacts.findings import Sections
+from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.errors import UnusableError
-from pipeline.findings import Sections
+from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
-from pipeline.stage import Context, Parameters, Stage
 
 Float = NDArray[np.float64]
 

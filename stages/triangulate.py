@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.ndimage import median_filter
 
-from pipeline.artefacts import Float, Float32, RingPoints, RingSamples, RingValidity
+from pipeline.artefacts.measured import Float, Float32, RingPoints, RingSamples, RingValidity
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.stage import Context, Parameters, Stage
-from pipeline.threads import in_threads
+from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.machine.threads import in_threads
 
 _UPPER = np.triu_indices(3)
 _CHUNK_FRAMES = 16

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingPoints, RingSamples
+from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
-from pipeline.stage import quiet_context
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.ring_images import MemorySource
 from tests.unit.drawn_pipe import led_light

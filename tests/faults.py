@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.display import SilentDisplay
+from pipeline.machine.display import SilentDisplay
 from tests.shared_data import PROJECT_ROOT
 
 _PR_CAPBSET_DROP = 24

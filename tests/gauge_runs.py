@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet

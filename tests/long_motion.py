@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.probe import Probe
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 from stages.motion.parameters import MotionParameters
 from stages.motion.state import EncoderReadings
 from stages.motion.strip import StripGrid

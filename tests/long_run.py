@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, RadiusMap, RingSamples, Trajectory, Wall, WallTexture
-from pipeline.findings import Sections
-from pipeline.model import Overlay, Overlays
+from pipeline.artefacts.findings import Sections
+from pipeline.artefacts.measured import PipeAxis, RadiusMap, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.model import Overlay, Overlays
+from pipeline.machine.run_folder import RunFolder
+from pipeline.machine.store import Provenance
 from pipeline.review.run_files import RunFiles
-from pipeline.run_folder import RunFolder
-from pipeline.store import Provenance
 
 KEY = "0" * 64
 STAGES = {"rings": RingSamples, "motion": Trajectory, "accumulate": Wall, "texture": WallTexture,

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.artefacts import RadiusMap
-from pipeline.config import resolve
-from pipeline.display import SilentDisplay
+from pipeline.artefacts.measured import RadiusMap
 from pipeline.export.catalogue import EXPORTERS
-from pipeline.job import open_job, run_job
-from pipeline.plan import Selection
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.job import open_job, run_job
+from pipeline.machine.plan import Selection
 from pipeline.simulator.scene import Scene
 from stages.catalogue import PIPELINE
 from tests.simulated import rendered

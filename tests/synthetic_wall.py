@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pipeline.artefacts import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
+from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
 from pipeline.recording.base import FrameTable, PipeFacts, Recording
 
 

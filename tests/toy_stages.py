@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from pipeline.errors import UnusableError
-from pipeline.outcome import Results
+from pipeline.machine.outcome import Results
+from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
-from pipeline.stage import Context, Parameters, Stage
 
 Float = NDArray[np.float64]
 

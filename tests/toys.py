@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.config import resolve
-from pipeline.display import SilentDisplay
 from pipeline.export.exporter import Exporter
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource
-from pipeline.job import Job, run_job
-from pipeline.outcome import RunOutcome
-from pipeline.plan import Selection
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.job import Job, run_job
+from pipeline.machine.outcome import RunOutcome
+from pipeline.machine.plan import Selection
 from pipeline.recording.base import FrameTable, Image, Int, PipeFacts, Planes, Recording
 from tests.toy_stages import TOYS, write_numbers, write_page
 

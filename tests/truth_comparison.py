@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import least_squares
 
-from pipeline.artefacts import RadiusMap, Trajectory
+from pipeline.artefacts.measured import RadiusMap, Trajectory
 
 Float = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.measured import WallTexture
 from pipeline.review.comparison.changes import changes
 from pipeline.review.comparison.growth import Resolution
 from pipeline.review.comparison.paired import PairedWalls

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from pipeline.config import CLUSTER
 from pipeline.errors import InputError
-from pipeline.stage import Parameters
-from pipeline.yaml_file import read_yaml
+from pipeline.files.yaml_file import read_yaml
+from pipeline.machine.configuration import CLUSTER
+from pipeline.machine.stage import Parameters
 
 _EXPECTED = (
     "kind: local (count), scheduler (address), slurm or pbs (jobs, cores, memory_gib, walltime, queue, "

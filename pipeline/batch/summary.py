@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pipeline.batch.work import Ending
-from pipeline.codec import Json
-from pipeline.disk import disk_errors_named, replace_json, replace_text
+from pipeline.files.disk import disk_errors_named, replace_json, replace_text
+from pipeline.machine.codec import Json
 from pipeline.pages import page_template
 
 SHOWN_METRICS = ("inspected length", "wall seen", "mean diameter", "defects", "deepest defect")

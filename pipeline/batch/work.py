@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pipeline
-from pipeline.interrupt import end_with_parent
-from pipeline.json_file import read_json
+from pipeline.files.json_file import read_json
+from pipeline.machine.stopping import end_with_parent
 
 _REFUSED = 2
 _BUSY = "is at work in this run folder"

@@ -14,9 +14,9 @@ from pipeline.batch.find import find_recordings
 from pipeline.batch.kinds import Cluster, LocalWorkers, RunningScheduler, read_cluster
 from pipeline.batch.summary import write_summary
 from pipeline.batch.work import Ending, Work
-from pipeline.config import resolve
-from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
+from pipeline.files.disk import disk_errors_named
+from pipeline.machine.configuration import resolve
 from stages.catalogue import PIPELINE
 
 _EXIT_SOME_FAILED = 3

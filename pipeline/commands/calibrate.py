@@ -13,16 +13,16 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.codec import digest
-from pipeline.disk import require_writable, written_together
 from pipeline.errors import InputError
+from pipeline.files.disk import require_writable, written_together
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.provenance import MadeBy
+from pipeline.machine.codec import digest
+from pipeline.machine.provenance import MadeBy
+from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
-from pipeline.stage import quiet_context
 from stages.calibrate.gauge.calibrate import calibrate_gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.premises import require_gauge

@@ -18,13 +18,13 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from pipeline.disk import disk_errors_named, require_writable, written_together
 from pipeline.errors import InputError, UnusableError
+from pipeline.files.disk import disk_errors_named, require_writable, written_together
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport
 from pipeline.instrument.camera.formats import WRITTEN, read_camera, write_camera
-from pipeline.provenance import MadeBy
+from pipeline.machine.provenance import MadeBy
+from pipeline.machine.stage import quiet_context
 from pipeline.recording.input_file import content_key, input_file
-from pipeline.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import LEAST_CORNERS, detect
 from stages.calibrate.boards.fit import NAME

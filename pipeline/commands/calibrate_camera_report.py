@@ -18,8 +18,8 @@ from pipeline.commands.calibrate_camera_figures import (
 )
 from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
+from pipeline.machine.provenance import MadeBy
 from pipeline.pages import page_template
-from pipeline.provenance import MadeBy
 
 Float = NDArray[np.float64]
 

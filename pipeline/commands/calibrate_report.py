@@ -18,8 +18,8 @@ from pipeline.commands.calibrate_figures import (
     run_figure,
 )
 from pipeline.instrument.probe import Probe
+from pipeline.machine.provenance import MadeBy
 from pipeline.pages import page_template
-from pipeline.provenance import MadeBy
 from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
 
 Float = NDArray[np.float64]

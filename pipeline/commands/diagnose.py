@@ -12,22 +12,22 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from pipeline.codec import digest
 from pipeline.commands.diagnose_apply import apply_correction, consequence
 from pipeline.commands.diagnose_files import write_files
 from pipeline.commands.diagnose_image import image_of
 from pipeline.commands.diagnose_report import Shown, write_page
 from pipeline.commands.diagnose_resimulate import resimulate
-from pipeline.config import resolve
-from pipeline.disk import disk_errors_named, require_writable, written_together
 from pipeline.errors import InputError
+from pipeline.files.disk import disk_errors_named, require_writable, written_together
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.provenance import MadeBy
+from pipeline.machine.codec import digest
+from pipeline.machine.configuration import resolve
+from pipeline.machine.provenance import MadeBy
+from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
-from pipeline.stage import quiet_context
 from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import diagnose as diagnose_recordings
 from stages.diagnose.drill.cases import ANSWER

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from pipeline.codec import digest
-from pipeline.config import Configuration
-from pipeline.display import ProgressDisplay
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.instrument.probe_file import read_with_source
-from pipeline.job import Job, run_job
-from pipeline.plan import Selection
+from pipeline.machine.codec import digest
+from pipeline.machine.configuration import Configuration
+from pipeline.machine.display import ProgressDisplay
+from pipeline.machine.job import Job, run_job
+from pipeline.machine.plan import Selection
 from pipeline.recording.base import Recording
 from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import Examination

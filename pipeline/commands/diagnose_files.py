@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import write_probe
-from pipeline.provenance import MadeBy
+from pipeline.machine.provenance import MadeBy
 from stages.diagnose.diagnose import Examination
 
 

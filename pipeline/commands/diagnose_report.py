@@ -19,7 +19,7 @@ from pipeline.commands.diagnose_figures import (
 )
 from pipeline.commands.diagnose_image import OnImage
 from pipeline.commands.diagnose_resimulate import Resimulated
-from pipeline.disk import replace_text
+from pipeline.files.disk import replace_text
 from pipeline.pages import page_template
 from stages.diagnose.result import Diagnosis, Verdict, to_json
 

@@ -10,8 +10,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.disk import written_together
 from pipeline.errors import InputError
+from pipeline.files.disk import written_together
 from pipeline.instrument.budget.combine import error_budget as analytic_budget
 from pipeline.instrument.budget.design import baseline_study, tolerances
 from pipeline.instrument.budget.monte_carlo import monte_carlo

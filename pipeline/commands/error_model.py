@@ -14,7 +14,7 @@ import typer
 from jinja2 import Environment, StrictUndefined
 from rich.console import Console
 
-from pipeline.disk import written_together
+from pipeline.files.disk import written_together
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.misalignment import (

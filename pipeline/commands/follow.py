@@ -11,9 +11,9 @@ from pipeline.errors import InputError
 from pipeline.follow.live_page import write_live_page
 from pipeline.follow.watch import Glimpse, glimpses
 from pipeline.instrument.probe_file import read_probe
-from pipeline.interrupt import stop_wish
-from pipeline.run_folder import claimed
-from pipeline.stage import quiet_context
+from pipeline.machine.run_folder import claimed
+from pipeline.machine.stage import quiet_context
+from pipeline.machine.stopping import stop_wish
 from stages.preview import PreliminarySection, preliminary_sections
 from stages.rings import RingParameters
 

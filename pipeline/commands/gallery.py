@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from pipeline.commands.gallery_report import write_gallery
-from pipeline.disk import disk_errors_named
+from pipeline.files.disk import disk_errors_named
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.switch import parse_switches, typical_switch
 from pipeline.simulator.gallery.exhibit import exhibit

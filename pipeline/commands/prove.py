@@ -21,8 +21,8 @@ from pipeline.commands.prove_cases import (
     worked,
 )
 from pipeline.commands.prove_report import rows_of, write_report
-from pipeline.disk import require_writable, written_together
 from pipeline.errors import InputError
+from pipeline.files.disk import require_writable, written_together
 from stages.diagnose.drill.cases import find_cases
 
 _PRIOR = Path(__file__).resolve().parents[2] / "configs" / "priors" / "pairs.yaml"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pipeline.commands.prove_geometry import WallErrors, wall_errors
 from pipeline.errors import BoresightError, InputError
-from pipeline.interrupt import end_with_parent
+from pipeline.machine.stopping import end_with_parent
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.seal import SEAL_FILE, open_seal
 from stages.diagnose.drill.cases import (

@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples
-from pipeline.disk import replace_json
+from pipeline.artefacts.measured import RingSamples
+from pipeline.files.disk import replace_json
+from pipeline.files.json_file import read_json
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.json_file import read_json
+from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.exact import room_mm, wall_radius
 from pipeline.simulator.scene import read_scene
 from pipeline.simulator.truth import SceneTruth
-from pipeline.stage import quiet_context
 from stages.diagnose.drill.cases import Case
 from stages.rings import RingParameters, extract_rings
 

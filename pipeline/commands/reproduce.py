@@ -13,15 +13,15 @@ import typer
 import yaml
 from rich.console import Console
 
-from pipeline.config import resolve
-from pipeline.disk import disk_errors_named
-from pipeline.display import ProgressDisplay
 from pipeline.errors import BoresightError, InputError
 from pipeline.export.catalogue import EXPORTERS
-from pipeline.job import Job, open_job, run_job
-from pipeline.plan import Selection
-from pipeline.provenance import library_versions
-from pipeline.reproduce import (
+from pipeline.files.disk import disk_errors_named
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import ProgressDisplay
+from pipeline.machine.job import Job, open_job, run_job
+from pipeline.machine.plan import Selection
+from pipeline.machine.provenance import library_versions
+from pipeline.machine.reproduce import (
     Agreement,
     Compared,
     RunRecord,
@@ -29,7 +29,7 @@ from pipeline.reproduce import (
     compare_runs,
     read_run_record,
 )
-from pipeline.run_folder import RunFolder
+from pipeline.machine.run_folder import RunFolder
 from stages.catalogue import PIPELINE
 
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 import uvicorn
 
-from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
+from pipeline.files.disk import disk_errors_named
 from pipeline.review.review import FOLDER, Review, open_review
 from pipeline.review.run_files import RunFiles
 from pipeline.review.server.app import application

@@ -11,11 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from pipeline.disk import written_together
-from pipeline.errors import InputError
-from pipeline.provenance import MadeBy
-from pipeline.recording.input_file import files_sha256
-from pipeline.reference import (
+from pipeline.artefacts.reference import (
     SURFACE_SUFFIXES,
     WallMap,
     map_file,
@@ -23,6 +19,10 @@ from pipeline.reference import (
     read_wall_map,
     read_wall_points,
 )
+from pipeline.errors import InputError
+from pipeline.files.disk import written_together
+from pipeline.machine.provenance import MadeBy
+from pipeline.recording.input_file import files_sha256
 from stages.verify.accuracy import Accuracy, Differences, accuracy, bore_differences, wall_coverage
 from stages.verify.maps import align_maps, map_differences
 from stages.verify.surfaces import register, surface_differences

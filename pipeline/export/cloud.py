@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PointCloud, Wall, WallTexture
+from pipeline.artefacts.measured import PointCloud, Wall, WallTexture
 from pipeline.export.unrolled import display_colours
 
 _AT_ONCE = 1 << 20

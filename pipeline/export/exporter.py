@@ -8,8 +8,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from pipeline.codec import canonical
-from pipeline.disk import (
+from pipeline.files.disk import (
     FileRecord,
     disk_errors_named,
     record_of,
@@ -18,9 +17,10 @@ from pipeline.disk import (
     sync_folder,
     sync_tree,
 )
-from pipeline.json_file import read_json
-from pipeline.run_folder import RunFolder
-from pipeline.source_code import source_digest
+from pipeline.files.json_file import read_json
+from pipeline.machine.codec import canonical
+from pipeline.machine.run_folder import RunFolder
+from pipeline.machine.source_code import source_digest
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.findings import Defect, Defects, Sections
+from pipeline.artefacts.findings import Defect, Defects, Sections
 
 _DEGREES = {"major_axis_rad": "major_axis_deg"}
 _TABLE = (

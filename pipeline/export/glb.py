@@ -16,8 +16,8 @@ import pygltflib as gltf
 from numpy.typing import NDArray
 from PIL import Image
 
+from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, TexturedMesh
 from pipeline.export.glb_builder import GlbBuilder
-from pipeline.model import VARIANTS, ErrorTexture, MeshTile, TexturedMesh
 
 HALF_TURN_ABOUT_X = [1.0, 0.0, 0.0, 0.0]
 _JPEG_QUALITY = 88

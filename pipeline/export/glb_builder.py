@@ -10,7 +10,7 @@ import numpy as np
 import pygltflib as gltf
 from numpy.typing import NDArray
 
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 
 _GLTF, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _VERSION = 2

@@ -9,7 +9,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pipeline.model import Overlay, Overlays
+from pipeline.artefacts.model import Overlay, Overlays
 
 DPI = 120
 _MM_PER_INCH = 30.0

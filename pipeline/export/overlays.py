@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.model import Overlays
+from pipeline.artefacts.model import Overlays
 
 
 def write_overlays(overlays: Overlays, folder: Path) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.artefacts import Wall
+from pipeline.artefacts.measured import Wall
 
 
 def write_radius_map(wall: Wall, folder: Path) -> None:

@@ -6,13 +6,13 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
-from pipeline.codec import digest
-from pipeline.findings import Defects, Sections
+from pipeline.artefacts.findings import Defects, Sections
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.model import Overlays
 from pipeline.instrument.probe import Probe
-from pipeline.model import Overlays
-from pipeline.outcome import Results, StageOutcome
-from pipeline.provenance import program_version
+from pipeline.machine.codec import digest
+from pipeline.machine.outcome import Results, StageOutcome
+from pipeline.machine.provenance import program_version
 from pipeline.recording.base import Recording
 from pipeline.review.report import write_report
 from pipeline.review.summary import ReportedNumber, RunSummary, StageRecord

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.artefacts.measured import RingSamples, RingValidity
 
 if TYPE_CHECKING:
     import zarr

@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, RadiusMap, WallTexture
+from pipeline.artefacts.measured import PipeAxis, RadiusMap, WallTexture
+from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
 from pipeline.export.unrolled import display_colours
 from pipeline.geometry.axis import from_pipe
-from pipeline.model import VARIANTS, ErrorTexture, MeshTile, Overlays
 
 Float = NDArray[np.float64]
 Byte = NDArray[np.uint8]

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RadiusMap
+from pipeline.artefacts.findings import Defect
+from pipeline.artefacts.measured import RadiusMap
 from pipeline.export.glb_builder import GlbBuilder
-from pipeline.findings import Defect
 
 Float = NDArray[np.float64]
 Json = dict[str, Any]

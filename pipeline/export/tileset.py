@@ -18,14 +18,14 @@ import numpy as np
 import pygltflib as gltf
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, RadiusMap, Wall, WallTexture
+from pipeline.artefacts.findings import Defect, Defects
+from pipeline.artefacts.measured import PipeAxis, RadiusMap, Wall, WallTexture
+from pipeline.artefacts.model import MeshTile, Overlays, TexturedMesh
 from pipeline.export import tile_metadata as metadata
 from pipeline.export.glb import complete, tile_primitive
 from pipeline.export.glb_builder import GlbBuilder
 from pipeline.export.tile_levels import Flat, coarse_tile, flat_of, joined, shrunk
-from pipeline.findings import Defect, Defects
 from pipeline.geometry.axis import to_pipe
-from pipeline.model import MeshTile, Overlays, TexturedMesh
 from pipeline.recording.base import Recording
 
 Float = NDArray[np.float64]

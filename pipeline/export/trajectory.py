@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.artefacts import Trajectory
+from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.rigid import quaternion_from_rotation
 
 _POSE = ("frame", "time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")

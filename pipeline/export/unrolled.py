@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pipeline.artefacts import Byte, WallTexture
+from pipeline.artefacts.measured import Byte, WallTexture
 
 _GAMMA = 2.2
 _MOST_ROWS = 16384

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Self
 
 from pipeline.export.exporter import Exporter, is_published, publish
-from pipeline.run_folder import RunFolder
+from pipeline.machine.run_folder import RunFolder
 
 
 class Writer:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from pipeline.disk import disk_errors_named
+from pipeline.files.disk import disk_errors_named
 from pipeline.pages import page_template
 
 _WIDTH, _HEIGHT, _SHOWN = 1000, 260, 2000

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Trajectory
+from pipeline.artefacts.measured import Trajectory
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
 

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from pipeline.codec import Json
+from pipeline.files.yaml_file import Section, read_yaml
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Lighting, Probe, Shutter
@@ -20,8 +20,8 @@ from pipeline.instrument.stated_uncertainty import (
     covariance_from_stated,
     stated_from_covariance,
 )
-from pipeline.provenance import MadeBy
-from pipeline.yaml_file import Section, read_yaml
+from pipeline.machine.codec import Json
+from pipeline.machine.provenance import MadeBy
 
 Float = NDArray[np.float64]
 _KEYS = (

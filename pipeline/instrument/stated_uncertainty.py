@@ -13,9 +13,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.files.yaml_file import Section
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.yaml_file import Section
 
 Float = NDArray[np.float64]
 UNCERTAINTY_KEYS = (

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import Section
 from pipeline.recording.bag_file import Bag
 from pipeline.recording.bag_images import IMAGE_TYPES
 from pipeline.recording.base import Encoder, FrameTable, Illumination, Int
 from pipeline.recording.checks import refuse_backward
-from pipeline.yaml_file import Section
 
 IMAGE_TOPICS = ("/camera/image_raw", "/camera/image_raw/compressed", "/camera/image/compressed")
 ILLUMINATION_TOPIC, ILLUMINATION_TYPE = "/illumination", "std_msgs/msg/String"

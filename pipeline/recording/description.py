@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import Section
 from pipeline.recording.base import PipeFacts
 from pipeline.recording.facts import pipe_facts
-from pipeline.yaml_file import Section
 
 COMMON_KEYS = ("name", "kind", "frame_rate", "probe", "pipe")
 

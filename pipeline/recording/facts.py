@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from pipeline.files.yaml_file import Section
 from pipeline.recording.base import BoreSection, Fiducials, Marker, PipeFacts
-from pipeline.yaml_file import Section
 
 _PIPE_KEYS = ("nominal_diameter_mm", "wall_thickness_mm", "bore", "bore_tolerance_mm", "fiducials")
 _FIDUCIAL_KEYS = ("dictionary", "size_mm", "columns_along", "rows_along", "markers")

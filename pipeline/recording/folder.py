@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import Section, read_yaml
 from pipeline.recording.base import Encoder, FrameTable, Recording
 from pipeline.recording.checks import common_frames, encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe, inside, optional_file, required_file
@@ -13,7 +14,6 @@ from pipeline.recording.images import ImageSequence, is_pattern, open_images
 from pipeline.recording.input_file import InputFile, content_key, input_file
 from pipeline.recording.tables import read_encoder, read_frame_table
 from pipeline.recording.video import VideoSource, open_video
-from pipeline.yaml_file import Section, read_yaml
 
 DESCRIPTION = "recording.yaml"
 _KEYS = (*COMMON_KEYS, "video", "frames", "encoder")

@@ -16,6 +16,7 @@ import av
 import numpy as np
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import Section
 from pipeline.recording import open_recording
 from pipeline.recording.base import Encoder, FrameTable, Int, Recording
 from pipeline.recording.description import inside, required_file
@@ -32,7 +33,6 @@ from pipeline.recording.matroska_tail import MatroskaTail, matroska_tail
 from pipeline.recording.tables import LARGEST_BYTES, encoder_readings, frame_table
 from pipeline.recording.video import VideoSource, open_video, opened, refuse_empty
 from pipeline.recording.video_index import Packet, index_of, list_packets
-from pipeline.yaml_file import Section
 
 
 class GrowingRecording:

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.disk import FileStamp, stamp_of
 from pipeline.errors import InputError
+from pipeline.files.disk import FileStamp, stamp_of
 
 _EXPECTED = "the file as it was at the start"
 _HINT = "let the copy or the recorder finish, then give the same command again: what is complete is kept"

@@ -7,8 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from pipeline.machine.threads import in_threads
 from pipeline.recording.base import Int
-from pipeline.threads import in_threads
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")

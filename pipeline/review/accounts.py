@@ -6,8 +6,8 @@ from collections import Counter
 
 import numpy as np
 
-from pipeline.artefacts import RingSamples, RingValidity
-from pipeline.outcome import WARNING
+from pipeline.artefacts.measured import RingSamples, RingValidity
+from pipeline.machine.outcome import WARNING
 from pipeline.review.page import Table
 from pipeline.review.summary import ReportedNumber, RunSummary
 

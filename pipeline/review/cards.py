@@ -6,8 +6,8 @@ from collections import Counter
 
 import numpy as np
 
-from pipeline.artefacts import Trajectory, Wall
-from pipeline.findings import Defect
+from pipeline.artefacts.findings import Defect
+from pipeline.artefacts.measured import Trajectory, Wall
 from pipeline.geometry.axis import distance_along
 from pipeline.review.page import Card
 from pipeline.review.summary import RunSummary

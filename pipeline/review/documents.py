@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Trajectory
-from pipeline.findings import DefectKind
-from pipeline.json_file import parse_json, read_json
-from pipeline.model import Overlay, Overlays
+from pipeline.artefacts.findings import DefectKind
+from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.model import Overlay, Overlays
+from pipeline.files.json_file import parse_json, read_json
 from pipeline.review.assessment import strength
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.overlap import covered

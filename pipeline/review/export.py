@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
-from pipeline.model import Overlays
 from pipeline.review import documents
 from pipeline.review.flat_tiles import TILE_PX, FlatPicture, layers_of, picture_of
 from pipeline.review.frames import UnseenError, finder_of

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.findings import Defect
+from pipeline.artefacts.measured import WallTexture
+from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.export.unrolled import display_colours
-from pipeline.findings import Defect
-from pipeline.model import Overlay, Overlays
 
 Float = NDArray[np.float64]
 Byte = NDArray[np.uint8]

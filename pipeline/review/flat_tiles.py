@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.measured import WallTexture
+from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import InputError
 from pipeline.export.unrolled import display_colours
-from pipeline.model import Overlay, Overlays
 from pipeline.review.run_files import RunFiles
 
 Byte = NDArray[np.uint8]

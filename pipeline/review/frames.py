@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.model import Overlays
 from pipeline.errors import BoresightError, InputError
 from pipeline.geometry.axis import from_pipe, to_pipe
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
-from pipeline.model import Overlays
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import refuse_changed
 from pipeline.review.run_files import RunFiles

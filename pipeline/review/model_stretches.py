@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, Trajectory
-from pipeline.disk import FileStamp, stamp_of
+from pipeline.artefacts.measured import PipeAxis, Trajectory
 from pipeline.errors import InputError
+from pipeline.files.disk import FileStamp, stamp_of
+from pipeline.files.json_file import parse_json
 from pipeline.geometry.axis import to_pipe
-from pipeline.json_file import parse_json
 from pipeline.review.run_files import RunFiles
 
 Json = dict[str, Any]

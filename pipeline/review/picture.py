@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.model import MeshTile, TexturedMesh
-from pipeline.native import open3d
+from pipeline.artefacts.model import MeshTile, TexturedMesh
+from pipeline.machine.native import open3d
 
 Float = NDArray[np.float64]
 Byte = NDArray[np.uint8]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.findings import Defect
-from pipeline.model import Overlay
+from pipeline.artefacts.findings import Defect
+from pipeline.artefacts.model import Overlay
 from pipeline.review.flat import (
     FlatImage,
     Window,

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.findings import Sections
+from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.errors import InputError
-from pipeline.findings import Sections
 from pipeline.review.accounts import REASONS
 from pipeline.review.documents import cleaned
 from pipeline.review.measuring.wall import MeasuredWall

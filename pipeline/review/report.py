@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from pipeline.findings import Defect, Sections
+from pipeline.artefacts.findings import Defect, Sections
 from pipeline.review import cards
 from pipeline.review.accounts import stage_warnings, tables
 from pipeline.review.page import Finding, Page

@@ -10,20 +10,20 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
-from pipeline.codec import digest
-from pipeline.disk import FileStamp, stamp_of
+from pipeline.artefacts.findings import DefectKind, Sections
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
-from pipeline.findings import DefectKind, Sections
+from pipeline.files.disk import FileStamp, stamp_of
+from pipeline.files.json_file import parse_json, read_json
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.json_file import parse_json, read_json
-from pipeline.model import Overlays
+from pipeline.machine.codec import digest
+from pipeline.machine.run_folder import RunFolder
 from pipeline.recording import open_recording
 from pipeline.recording.base import PipeFacts, Recording
 from pipeline.recording.input_file import content_key
 from pipeline.review.decisions.replay import Finding, Measured
-from pipeline.run_folder import RunFolder
 
 _Artefact = TypeVar("_Artefact")
 _MAKERS: dict[type, str] = {

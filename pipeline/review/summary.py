@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.artefacts import RingSamples, Trajectory, Wall, WallTexture
-from pipeline.findings import Defects, Sections
+from pipeline.artefacts.findings import Defects, Sections
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.model import Overlays
 from pipeline.instrument.probe import Probe
-from pipeline.model import Overlays
 from pipeline.recording.base import Recording
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.files.yaml_file import Section
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import probe_from
 from pipeline.recording.base import FrameTable
@@ -23,7 +24,6 @@ from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.base import Wall
 from pipeline.simulator.wall.build import build_wall
 from pipeline.simulator.wall.facts import facts_of
-from pipeline.yaml_file import Section
 
 Float = NDArray[np.float64]
 _INSTRUMENT_STREAM = 1

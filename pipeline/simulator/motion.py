@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import frames_at
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.recording.base import Encoder

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.simulator.motion import Motion, Signal, Wave

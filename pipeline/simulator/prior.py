@@ -12,12 +12,12 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import read_yaml
+from pipeline.machine.stage import Parameters
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Quantity
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.scene import Scene, read_scene, scene_from
-from pipeline.stage import Parameters
-from pipeline.yaml_file import read_yaml
 
 Range = tuple[float, float]
 _DIRECTION = "direction_deg"

@@ -8,8 +8,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
+from pipeline.files.disk import disk_errors_named
 from pipeline.simulator.build import plain_truth
 from pipeline.simulator.effects.catalogue import switch_on
 from pipeline.simulator.effects.switch import switches_from_mapping

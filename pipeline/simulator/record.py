@@ -15,8 +15,8 @@ from av.container import OutputContainer
 from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
-from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
+from pipeline.files.disk import disk_errors_named
 from pipeline.instrument.probe_file import write_probe
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from pipeline.simulator.render import Renderer

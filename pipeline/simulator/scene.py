@@ -10,9 +10,9 @@ import yaml
 from pydantic import Field, ValidationError
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import read_yaml
+from pipeline.machine.stage import Parameters
 from pipeline.simulator.wall.description import Pipe
-from pipeline.stage import Parameters
-from pipeline.yaml_file import read_yaml
 
 Bgr = tuple[float, float, float]
 Pattern = Literal["laser", "led", "both"]

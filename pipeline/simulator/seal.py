@@ -15,7 +15,7 @@ from pathlib import Path
 import yaml
 
 from pipeline.errors import InputError
-from pipeline.yaml_file import read_yaml
+from pipeline.files.yaml_file import read_yaml
 
 SEAL_FILE = "sealed.yaml"
 NONCE_FILE = "nonce.txt"

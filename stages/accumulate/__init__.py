@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from pipeline.artefacts import RingPoints, RingSamples, Trajectory, Wall
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
-from pipeline.stage import Context, Parameters, Stage
+from pipeline.machine.stage import Context, Parameters, Stage
 from stages.accumulate.calibration import CalibrationSpread, calibration_spread
 from stages.accumulate.grid import map_grid
 from stages.accumulate.samples import RingsOnWall

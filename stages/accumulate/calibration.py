@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.geometry.axis import frames_at
 from pipeline.instrument.probe import Probe
 from stages.accumulate.grid import MapGrid

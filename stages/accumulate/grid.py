@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from pipeline.threads import in_threads
+from pipeline.machine.threads import in_threads
 from stages.accumulate.samples import WallSamples
 from stages.accumulate.survey import RingSurvey
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingPoints, RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe

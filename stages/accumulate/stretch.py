@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, PointCloud, RadiusMap, Wall
-from pipeline.scratch import Scratch
+from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall
+from pipeline.machine.scratch import Scratch
 from stages.accumulate.calibration import CalibrationSpread
 from stages.accumulate.centring import centred
 from stages.accumulate.grid import MapGrid, gridded, rings_on_columns

@@ -18,12 +18,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.artefacts import Wall, WallTexture
-from pipeline.cloud_along import cloud_along
+from pipeline.artefacts.cloud_along import cloud_along
+from pipeline.artefacts.findings import Defect, Defects
+from pipeline.artefacts.measured import Wall, WallTexture
 from pipeline.errors import UnusableError
-from pipeline.findings import Defect, Defects
+from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
-from pipeline.stage import Context, Stage
 from stages.defects.clean import clean_wall
 from stages.defects.depth import measure_depth
 from stages.defects.describe import Scene, describe

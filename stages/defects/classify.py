@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.findings import DefectKind
+from pipeline.artefacts.findings import DefectKind
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from pipeline.artefacts import PointCloud, WallTexture
-from pipeline.findings import Defect, DefectKind, clock_of_azimuth
-from pipeline.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
+from pipeline.artefacts.findings import Defect, DefectKind, clock_of_azimuth
+from pipeline.artefacts.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
+from pipeline.artefacts.measured import PointCloud, WallTexture
 from stages.defects.classify import Features, features_of, probabilities
 from stages.defects.depth import Depth
 from stages.defects.relief import Relief

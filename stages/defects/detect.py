@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from pipeline.scratch import Scratch
-from pipeline.stage import Progress
+from pipeline.machine.scratch import Scratch
+from pipeline.machine.stage import Progress
 from stages.defects.relief import Relief, WallRelief
 from stages.defects.stretch import stretches, widened
 

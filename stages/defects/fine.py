@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PointCloud
+from pipeline.artefacts.measured import PointCloud
 from stages.defects.relief import Relief
 
 Float = NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import label
 
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 from stages.defects.detect import Detection
 from stages.defects.harmonics import MAD
 from stages.defects.parameters import DefectParameters

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RadiusMap
+from pipeline.artefacts.measured import RadiusMap
 from stages.defects.harmonics import MAD, basis_of, ring_harmonics, row_median, slow_along
 from stages.defects.parameters import DefectParameters
 from stages.defects.stretch import sample, stretches

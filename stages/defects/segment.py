@@ -11,7 +11,7 @@ from scipy.ndimage import find_objects, label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 from stages.defects.grow import Grown, joined
 from stages.defects.relief import WallRelief
 from stages.defects.stretch import stretches

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PointCloud
-from pipeline.cloud_along import CloudAlong
+from pipeline.artefacts.cloud_along import CloudAlong
+from pipeline.artefacts.measured import PointCloud
 from stages.defects.fine import DeviationPoints, deviation_points, fine_surface
 from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief, WallRelief

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Recording
-from pipeline.stage import Context
 from stages.calibrate.gauge.calibrate import measure_gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.diagnose.compared import Compared, compared, with_pictures

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import WallTexture
-from pipeline.model import VARIANTS, ErrorTexture, MeshTile, Overlays
-from pipeline.native import open3d
+from pipeline.artefacts.measured import WallTexture
+from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
+from pipeline.machine.native import open3d
 from stages.mesh.charts import PADDING_PX, Atlas, Chart, Unrolled
 from stages.mesh.surface import Float, Surface
 

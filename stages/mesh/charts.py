@@ -8,7 +8,7 @@ import numpy as np
 import xatlas
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import frames_at, to_pipe
 from stages.mesh.surface import Face, Float, Index, Surface
 

@@ -8,7 +8,7 @@ import numpy as np
 import pyfqmr
 from numpy.typing import NDArray
 
-from pipeline.native import open3d
+from pipeline.machine.native import open3d
 from stages.mesh.surface import Float, Surface
 
 _WORTHWHILE = 0.9

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.model import MeshTile, PackedTiles
-from pipeline.scratch import Scratch, Spool
+from pipeline.artefacts.model import MeshTile, PackedTiles
+from pipeline.machine.scratch import Scratch, Spool
 
 _ARRAYS: dict[str, tuple[str, tuple[int, ...]]] = {
     "vertex_p": ("f4", (3,)), "normal_p": ("f4", (3,)), "uv": ("f4", (2,)), "face": ("i4", (3,)),

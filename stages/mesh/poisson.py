@@ -13,10 +13,10 @@ import pymeshlab
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.artefacts import PipeAxis, PointCloud
-from pipeline.cloud_along import CloudAlong
+from pipeline.artefacts.cloud_along import CloudAlong
+from pipeline.artefacts.measured import PipeAxis, PointCloud
 from pipeline.geometry.axis import frames_at
-from pipeline.native import open3d
+from pipeline.machine.native import open3d
 from stages.mesh.clip import NO_CUT, NOTHING, OpenMesh, clip
 from stages.mesh.join import join
 from stages.mesh.surface import Float, Surface

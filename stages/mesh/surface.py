@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Wall
+from pipeline.artefacts.measured import Wall
 from pipeline.geometry.axis import from_pipe
-from pipeline.native import open3d
+from pipeline.machine.native import open3d
 
 Float = NDArray[np.float64]
 Face = NDArray[np.int32]

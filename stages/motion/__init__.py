@@ -8,12 +8,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingPoints, RingSamples, Trajectory
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
-from pipeline.stage import Context, Stage
 from stages.motion.encoder import contradicted, encoder_at_frames
 from stages.motion.events import find_events
 from stages.motion.loops import close_loops

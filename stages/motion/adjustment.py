@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import Step
 from pipeline.geometry.rigid import vector_from_rotation
-from stages.motion.bordered import Step
 from stages.motion.equations import Equations, Measurements, Scales, linearised, rescaled, scales_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.state import State

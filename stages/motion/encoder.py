@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
-from pipeline.stage import Context
 from stages.motion.state import EncoderReadings
 from stages.motion.tracks import Course
 

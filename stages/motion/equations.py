@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
+from pipeline.adjustment.elimination import by_point_and_pose
+from pipeline.adjustment.robust import Cauchy, GemanMcClure
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
-from pipeline.threads import in_threads
+from pipeline.machine.threads import in_threads
 from stages.motion import terms
-from stages.motion.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
-from stages.motion.elimination import by_point_and_pose
 from stages.motion.parameters import MotionParameters
-from stages.motion.robust import Cauchy, GemanMcClure
 from stages.motion.state import EncoderReadings, State
 from stages.motion.terms import RingBins
 from stages.motion.tracks import Tracks

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import MotionEvent, Trajectory
+from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
 from pipeline.recording.base import FrameTable
 from stages.motion.tracks import Course

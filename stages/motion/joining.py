@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from stages.motion.chain import Chain, Link, interpolated
@@ -35,7 +35,7 @@ class Joined:
     slip : (N,)
     axis : PipeAxis
     covariance : (N, 6, 6)
-        Of the poses, as in `pipeline.artefacts.Trajectory`.
+        Of the poses, as in `pipeline.artefacts.measured.Trajectory`.
     radius_mm, radius_sigma_mm : float
     settled : Settled
         Encoder scale and instrument.

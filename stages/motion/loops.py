@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.scratch import Scratch
-from pipeline.stage import Context
+from pipeline.machine.scratch import Scratch
+from pipeline.machine.stage import Context
 from stages.motion.chain import Chain, Closures, ErrorSums, astray, beside
 from stages.motion.closing import closed
 from stages.motion.comparing import Comparison, Piece, Verdict, compare

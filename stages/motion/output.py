@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, Trajectory
+from pipeline.artefacts.measured import PipeAxis, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
 from pipeline.instrument.probe import Probe

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import interp1d
 
-from pipeline.artefacts import Float32, RingPoints, RingSamples
+from pipeline.artefacts.measured import Float32, RingPoints, RingSamples
 from pipeline.instrument.probe import Probe
 from stages.motion.terms import RingBins
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import axis_through, frames_at, from_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from pipeline.artefacts import PipeAxis
+from pipeline.adjustment.bordered import Factor
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import skew
 from stages.motion.adjustment import Adjusted, adjust, third_difference_sigma
-from stages.motion.bordered import Factor
 from stages.motion.equations import Measurements
 from stages.motion.parameters import MotionParameters
 from stages.motion.state import GLOBALS, State

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.robust import Cauchy, Loss, Squares
+from pipeline.adjustment.sums import BLOCK
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation
-from stages.motion.bordered import Rows
-from stages.motion.robust import Cauchy, Loss, Squares
 from stages.motion.state import GLOBALS, EncoderReadings, State
-from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

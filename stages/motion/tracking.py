@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 from stages.motion.landmarks import LandmarkMap
 from stages.motion.matching import cut, match
 from stages.motion.parameters import MotionParameters

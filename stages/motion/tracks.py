@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.scratch import Scratch, Spool
+from pipeline.machine.scratch import Scratch, Spool
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

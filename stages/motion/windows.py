@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from stages.motion.equations import MATCH_BIASES, Measurements
 from stages.motion.parameters import MotionParameters

@@ -1,6 +1,6 @@
 """Frames -> ring samples: sub-pixel radius, σ, width, amplitude and validity at every azimuth."""
 
-from pipeline.stage import Stage
+from pipeline.machine.stage import Stage
 from stages.rings.extract import RingParameters, extract_rings
 
 __all__ = ["RINGS", "RingParameters", "extract_rings"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Float
+from pipeline.artefacts.measured import Float
 from stages.rings.noise import QUANTISATION_VARIANCE
 from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from pipeline.artefacts import Float, Int, RingSamples, RingValidity
+from pipeline.artefacts.measured import Float, Int, RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
+from pipeline.machine.scratch import Scratch
+from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Image, Recording
-from pipeline.scratch import Scratch
-from pipeline.stage import Context, Parameters
 from stages.rings.colour import discriminant_weights, excess_weights, mix
 from stages.rings.noise import clip_level_of, noise_response
 from stages.rings.sectors import Sectors, cut_sectors

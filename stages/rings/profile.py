@@ -16,7 +16,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Float
+from pipeline.artefacts.measured import Float
 from stages.rings.kernels import FAST, bell, factor, first_at_least, inverse_diagonal, solve
 from stages.rings.sectors import Sectors
 

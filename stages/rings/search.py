@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Float
+from pipeline.artefacts.measured import Float
 from stages.rings.kernels import FAST, first_at_least
 from stages.rings.sectors import Sectors
 

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Float
+from pipeline.artefacts.measured import Float
 from stages.rings.kernels import first_at_least
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Byte, Float, RingValidity
+from pipeline.artefacts.measured import Byte, Float, RingValidity
 from stages.rings.noise import dark_response, noise_response
 from stages.rings.profile import ProfileFit, Response, fit_line
 from stages.rings.search import BAND_WIDTHS, Image, Peaks, detection_limit, find_ring, search_band

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from pipeline.artefacts import Byte, Float32, RingSamples, RingValidity
+from pipeline.artefacts.measured import Byte, Float32, RingSamples, RingValidity
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0

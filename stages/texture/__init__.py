@@ -1,6 +1,6 @@
 """Texture: lit frames, motion and wall to the wall's photo as a flat picture."""
 
-from pipeline.stage import Stage
+from pipeline.machine.stage import Stage
 from stages.texture.texture import TextureParameters, photograph_wall
 
 TEXTURE = Stage(

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Byte
+from pipeline.artefacts.measured import Byte
 from pipeline.instrument.probe import Probe
+from pipeline.machine.scratch import Scratch
 from pipeline.recording.base import Image
-from pipeline.scratch import Scratch
 from stages.texture.blend import TileStack
 from stages.texture.grid import FlatGrid
 from stages.texture.photometry import Light

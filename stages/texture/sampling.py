@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Float, Int
+from pipeline.artefacts.measured import Float, Int
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Image

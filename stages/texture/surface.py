@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from pipeline.artefacts import Float, PipeAxis, RadiusMap, Wall
+from pipeline.artefacts.measured import Float, PipeAxis, RadiusMap, Wall
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import frames_at
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 
 _SEEN_ROW = 0.2
 _BLOCK_ROWS, _MORE_ROWS = 2000, 200

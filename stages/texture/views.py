@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Float, Int, Trajectory
+from pipeline.artefacts.measured import Float, Int, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import inverse
 from pipeline.instrument.laser import LaserSheet

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.reference import WallMap
 from pipeline.errors import UnusableError
-from pipeline.reference import WallMap
 
 Float = NDArray[np.float64]
 _NORMAL_95 = 1.959964

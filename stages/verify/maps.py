@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import least_squares
 
+from pipeline.artefacts.reference import WallMap
 from pipeline.errors import UnusableError
-from pipeline.reference import WallMap
 from stages.verify.accuracy import Differences
 
 Float = NDArray[np.float64]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.artefacts.reference import Surface, WallPoints
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
-from pipeline.native import open3d
-from pipeline.reference import Surface, WallPoints
+from pipeline.machine.native import open3d
 from stages.verify.accuracy import Differences
 
 Float = NDArray[np.float64]

@@ -30,22 +30,22 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.artefacts import RingPoints, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.findings import Defects, Sections
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.model import Overlays, TexturedMesh
 from pipeline.export.cloud import write_cloud
 from pipeline.export.glb import write_model
 from pipeline.export.overlays import write_overlays
 from pipeline.export.radius_map import write_radius_map
 from pipeline.export.tileset import write_tileset
 from pipeline.export.unrolled import write_unrolled
-from pipeline.findings import Defects, Sections
 from pipeline.instrument.probe_file import read_probe
-from pipeline.model import Overlays, TexturedMesh
+from pipeline.machine.scratch import Scratch
+from pipeline.machine.stage import Context, quiet_context
+from pipeline.machine.store import Provenance, Store
 from pipeline.recording import open_recording
 from pipeline.recording.base import FrameTable, Recording
 from pipeline.review.run_files import RunFiles
-from pipeline.scratch import Scratch
-from pipeline.stage import Context, quiet_context
-from pipeline.store import Provenance, Store
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.defects import DefectParameters, find_defects
 from stages.mesh import MeshParameters, make_mesh

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.artefacts import Trajectory, Wall
+from pipeline.artefacts.measured import Trajectory, Wall
 from pipeline.geometry.axis import to_pipe
 from pipeline.review.run_files import RunFiles
 from pipeline.simulator.scene import read_scene, write_scene

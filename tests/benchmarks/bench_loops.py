@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingPoints, RingSamples, Trajectory
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
+from pipeline.machine.stage import Context, quiet_context
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.simulator.produce import Order, Places, produce
-from pipeline.stage import Context, quiet_context
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
 from stages.motion.comparing import Expected, Piece, Verdict, compare

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 
 from pipeline.instrument.probe_file import read_probe
+from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
-from pipeline.stage import quiet_context
 from stages.rings import RingParameters, extract_rings
 from stages.rings.profile import Response, fit_line
 from stages.rings.sectors import cut_sectors

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.measured import PipeAxis, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.machine.scratch import Scratch
 from pipeline.recording.base import Image, Planes, Recording
-from pipeline.scratch import Scratch
 
 
 def repeated_rings(rings: RingSamples, times: int, coarser: int, scratch: Scratch) -> RingSamples:

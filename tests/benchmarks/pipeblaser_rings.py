@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from pipeline.artefacts import RingValidity
+from pipeline.artefacts.measured import RingValidity
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.base import Image as GreyImage

@@ -11,23 +11,23 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from pipeline.artefacts.reference import read_wall_map, read_wall_points
 from pipeline.batch.kinds import read_cluster
-from pipeline.config import resolve
 from pipeline.errors import InputError
 from pipeline.instrument.camera.formats import read_camera, write_camera
 from pipeline.instrument.probe_file import read_probe
+from pipeline.machine.configuration import resolve
+from pipeline.machine.reproduce import read_run_record
+from pipeline.machine.store import Store
 from pipeline.recording import open_recording
 from pipeline.recording.tables import read_encoder, read_frame_table
 from pipeline.recording.video import open_video
-from pipeline.reference import read_wall_map, read_wall_points
-from pipeline.reproduce import read_run_record
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.model_stretches import read_model
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.run_files import RunFiles, measured_findings
 from pipeline.simulator.prior import read_prior
 from pipeline.simulator.scene import read_scene
-from pipeline.store import Store
 from stages.catalogue import PIPELINE
 from stages.diagnose.drill.answer import read_answer, read_concealed
 from tests.made_recording import write_folder, write_mcap, write_ros1, write_ros2

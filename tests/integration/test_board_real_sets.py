@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.camera.calibration import rms
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.fit import fit, held_out_residuals
 from stages.calibrate.boards.parameters import BoardCalibrationParameters

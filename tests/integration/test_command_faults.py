@@ -36,7 +36,7 @@ def counted(function):
             os.kill(os.getpid(), signal.SIGKILL)
         return function(*arguments, **named)
     return step
-from pipeline.disk import written_together
+from pipeline.files.disk import written_together
 for name in ("mkdir", "replace", "unlink", "rename", "rmdir"):
     setattr(Path, name, counted(getattr(Path, name)))
 os.fsync = counted(os.fsync)
@@ -83,7 +83,7 @@ def test_killed_at_any_step_the_answer_stands_for_all_files_of_one_call(tmp_path
 
 
 _FULL = """
-from pipeline.disk import written_together
+from pipeline.files.disk import written_together
 from pipeline.errors import InputError
 def write(generation):
     with written_together(disk / "out", last="answer.json") as new:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.export.findings import write_defects
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
 from tests.shared_data import shared
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of

@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 
 from pipeline.cli import app
 from pipeline.instrument.probe_file import read_probe, read_with_source
+from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.simulator.scene import scene_from
-from pipeline.stage import quiet_context
 from stages.diagnose.diagnose import diagnose
 from stages.diagnose.result import Verdict
 from tests.simulated import SCENES, rendered, shipped, smaller

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.config import resolve
-from pipeline.display import SilentDisplay
 from pipeline.errors import InputError
 from pipeline.export.catalogue import EXPORTERS
-from pipeline.job import open_job, run_job
-from pipeline.outcome import RunOutcome
-from pipeline.plan import Selection
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.job import open_job, run_job
+from pipeline.machine.outcome import RunOutcome
+from pipeline.machine.plan import Selection
 from stages.catalogue import PIPELINE
 from tests.bad_recordings import cut_sample
 from tests.faults import MeddlingDisplay, obeying_permissions, on_small_disk

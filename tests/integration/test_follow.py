@@ -20,8 +20,8 @@ from pipeline.commands.follow import begun_anew, new_sections
 from pipeline.errors import Cancelled, InputError
 from pipeline.follow.watch import Glimpse, glimpses
 from pipeline.instrument.probe_file import read_probe
+from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
-from pipeline.stage import quiet_context
 from stages.preview import preliminary_sections
 from stages.rings import RingParameters
 from tests.bad_recordings import cut_sample

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.camera.formats import read_camera
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import detect
 from stages.calibrate.boards.parameters import BoardCalibrationParameters

@@ -10,12 +10,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pipeline.artefacts import Trajectory, Wall
+from pipeline.artefacts.measured import Trajectory, Wall
 from pipeline.export.radius_map import write_radius_map
 from pipeline.export.trajectory import write_trajectory
 from pipeline.instrument.probe_file import read_probe
+from pipeline.machine.stage import quiet_context
 from pipeline.recording.folder import open_folder
-from pipeline.stage import quiet_context
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
 from stages.rings import RingParameters, extract_rings

@@ -12,9 +12,9 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from pipeline.instrument.probe_file import read_probe
+from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.recording.base import FrameTable
-from pipeline.stage import quiet_context
 from stages.rings import RingParameters, extract_rings
 from tests.shared_data import shared
 

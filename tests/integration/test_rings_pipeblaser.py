@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.artefacts import RingValidity
+from pipeline.artefacts.measured import RingValidity
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from stages.rings.colour import excess_weights, mix
 from stages.rings.sectors import cut_sectors

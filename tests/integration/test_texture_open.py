@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.export.unrolled import write_unrolled
+from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import FrameTable
-from pipeline.stage import quiet_context
 from stages.texture.texture import TextureParameters, photograph_wall
 from tests.shared_data import shared
 from tests.truth_run import true_radius_map, truth_run

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.artefacts import Trajectory
+from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.artefacts import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
+from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
 from pipeline.geometry.axis import axis_through, from_pipe, straight_axis, to_pipe
 
 RADIUS = 25.0

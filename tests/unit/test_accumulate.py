@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, RingValidity, Trajectory, Wall
+from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, Wall
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.accumulate import AccumulateParameters, accumulate_wall, stretch, survey
 from stages.accumulate.grid import _regress
 from stages.triangulate import TriangulateParameters, triangulate_rings

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import distance_along, frames_at, from_pipe, to_pipe
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.parameters import BoardCalibrationParameters
 from stages.calibrate.boards.start import start

@@ -6,8 +6,8 @@ import pytest
 
 from pipeline.batch.cluster import workers
 from pipeline.batch.kinds import LocalWorkers, QueuedJobs, RunningScheduler, read_cluster
-from pipeline.config import resolve
 from pipeline.errors import InputError
+from pipeline.machine.configuration import resolve
 from stages.catalogue import PIPELINE
 
 

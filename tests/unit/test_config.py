@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from pipeline.config import default_text, resolve, resolved_text
 from pipeline.errors import InputError
+from pipeline.machine.configuration import default_text, resolve, resolved_text
 from stages.catalogue import PIPELINE
 from tests.shared_data import PROJECT_ROOT
 from tests.toy_stages import TOYS, DrawParameters, Mood, SmoothParameters, TotalParameters

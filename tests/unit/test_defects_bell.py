@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PointCloud
+from pipeline.artefacts.measured import PointCloud
 from stages.defects import _is_measured
 from stages.defects.bell import fit_bell
 from stages.defects.fine import DeviationPoints

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import label
 
-from pipeline import scratch as scratch_module
-from pipeline.scratch import Scratch
-from pipeline.stage import quiet_context
+from pipeline.machine import scratch as scratch_module
+from pipeline.machine.scratch import Scratch
+from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects, grow, segment, stretch
 from stages.defects.detect import detect
 from stages.defects.relief import smooth_shape_removed

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import zarr
 
-from pipeline.artefacts import PipeAxis, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
+from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
 from pipeline.export.radius_map import write_radius_map
 from pipeline.export.rings import write_rings
 from pipeline.export.trajectory import write_trajectory

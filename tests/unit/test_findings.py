@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.findings import Defect, Defects
+from pipeline.artefacts.findings import Defect, Defects
 
 PIT = Defect(
     id=1, kind="pit", distance_from_mm=10.0, distance_to_mm=14.0, clock_from=3.0, clock_to=3.2, length_mm=4.0,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.cloud_along import cloud_along
+from pipeline.artefacts.cloud_along import cloud_along
 from stages.defects.fine import deviation_points, fine_surface
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.measured import WallTexture
 from pipeline.export.unrolled import display_colours, write_unrolled
 from pipeline.review.flat import TOP_RAD, Window, photo, seen_through
 

@@ -11,7 +11,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.laser_plane import LaserPlane
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.detect import detect
 from stages.calibrate.boards.targets import Chessboard
 from stages.calibrate.laser.calibrate import LaserPicture, calibrate_laser_plane, line_on_board

@@ -12,15 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import json_file, reference, yaml_file
+from pipeline.artefacts import reference
+from pipeline.artefacts.reference import read_wall_map
 from pipeline.errors import InputError
+from pipeline.files import json_file, yaml_file
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.camera.section_values import LARGEST_SIDE_PX
 from pipeline.instrument.probe_file import read_probe
+from pipeline.machine.reproduce import read_run_record
 from pipeline.recording import tables
 from pipeline.recording.tables import read_encoder, read_frame_table
-from pipeline.reference import read_wall_map
-from pipeline.reproduce import read_run_record
 from pipeline.review import model_stretches, quality
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.model_stretches import read_model

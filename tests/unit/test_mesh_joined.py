@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pipeline.artefacts import Wall
-from pipeline.cloud_along import cloud_along
-from pipeline.native import open3d
-from pipeline.stage import quiet_context
+from pipeline.artefacts.cloud_along import cloud_along
+from pipeline.artefacts.measured import Wall
+from pipeline.machine.native import open3d
+from pipeline.machine.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.clip import OpenMesh, clip
 from stages.mesh.join import join

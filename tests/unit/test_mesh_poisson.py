@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.artefacts import Wall
+from pipeline.artefacts.measured import Wall
+from pipeline.artefacts.model import TexturedMesh
 from pipeline.errors import UnusableError
-from pipeline.model import TexturedMesh
-from pipeline.native import open3d
-from pipeline.stage import quiet_context
+from pipeline.machine.native import open3d
+from pipeline.machine.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.poisson import folded_cells
 from stages.overlays import OverlayParameters, overlays_of

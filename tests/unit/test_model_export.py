@@ -10,13 +10,13 @@ import pytest
 from PIL import Image
 from plyfile import PlyData
 
-from pipeline.artefacts import Wall
+from pipeline.artefacts.measured import Wall
+from pipeline.artefacts.model import VARIANTS, TexturedMesh
 from pipeline.export.cloud import write_cloud
 from pipeline.export.glb import write_model
 from pipeline.export.overlays import write_overlays
-from pipeline.model import VARIANTS, TexturedMesh
+from pipeline.machine.stage import quiet_context
 from pipeline.review.picture import inside_view, render
-from pipeline.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
 from tests.unit.small_wall import RADIUS, small_wall, smooth_photo

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import Encoder, FrameTable
-from pipeline.stage import quiet_context
 from stages.motion.encoder import contradicted, encoder_at_frames
 from stages.motion.state import EncoderReadings
 from stages.motion.tracks import Tracks

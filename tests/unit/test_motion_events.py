@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.artefacts import MotionEvent, PipeAxis, Trajectory
+from pipeline.artefacts.measured import MotionEvent, PipeAxis, Trajectory
 from pipeline.geometry.axis import axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.robust import GemanMcClure
 from stages.motion import terms
-from stages.motion.bordered import Rows
 from stages.motion.equations import landmark_rows
 from stages.motion.parameters import MotionParameters
-from stages.motion.robust import GemanMcClure
 from stages.motion.state import GLOBALS, State
 from tests.motion_scene import displaced, scene
 

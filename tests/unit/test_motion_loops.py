@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.scratch import Scratch
-from pipeline.stage import quiet_context
+from pipeline.machine.scratch import Scratch
+from pipeline.machine.stage import quiet_context
 from stages.motion import estimate_motion
 from stages.motion.comparing import Comparison, Expected, Piece, Verdict, compare
 from stages.motion.foresight import Foresight

@@ -7,15 +7,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pipeline.adjustment.banded_cholesky import BandedCholesky
+from pipeline.adjustment.bordered import BorderedSystem, LandmarkRows, Rows, Step, landmark_steps
+from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
+from pipeline.adjustment.sums import BLOCK
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.adjustment import Damping, adjust
-from stages.motion.banded import BandedCholesky
-from stages.motion.bordered import BorderedSystem, LandmarkRows, Rows, Step, landmark_steps
 from stages.motion.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
 from stages.motion.parameters import MotionParameters
-from stages.motion.robust import Cauchy, GemanMcClure, Loss, Squares
 from stages.motion.state import State
-from stages.motion.sums import BLOCK
 from tests.motion_scene import displaced, scene
 
 Float = NDArray[np.float64]

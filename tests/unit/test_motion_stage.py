@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.artefacts import Trajectory
+from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.motion import MotionParameters, estimate_motion
 from tests.drawn_run import DrawnRun, drawn_run, without_encoder
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.artefacts import PipeAxis, Trajectory
+from pipeline.artefacts.measured import PipeAxis, Trajectory
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.motion.stated import report_instrument
 
 COUNT = 20

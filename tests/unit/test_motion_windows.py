@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 from stages.motion.joining import Joined, join, seam
 from stages.motion.parameters import MotionParameters
 from stages.motion.sliding import RunEstimate, adjust_run

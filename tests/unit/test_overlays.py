@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.overlays import OverlayParameters, draw_overlays, fitted_pipe, overlays_of
 from tests.unit.small_wall import PIT, RADIUS, small_wall
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.config import resolve
-from pipeline.plan import PipelineError, Plan, Source, make_plan
+from pipeline.machine.configuration import resolve
+from pipeline.machine.plan import PipelineError, Plan, Source, make_plan
+from pipeline.machine.stage import Stage
 from pipeline.recording.base import Recording
-from pipeline.stage import Stage
 from tests.toy_stages import DRAW, SMOOTH, TOTAL, TOYS
 from tests.toys import toy_recording
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.profile.finding import Finding, Size, finding

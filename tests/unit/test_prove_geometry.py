@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.commands import prove_geometry
 from pipeline.commands.prove_geometry import wall_errors
+from pipeline.files.yaml_file import Section
 from pipeline.instrument.probe_file import probe_from, write_probe
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.scene import read_scene, write_scene
-from pipeline.yaml_file import Section
 from stages.diagnose.drill.cases import Case
 
 SMALL = Path(__file__).resolve().parents[2] / "configs" / "priors" / "small" / "straight-4-inch.yaml"

@@ -4,11 +4,11 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.display import SilentDisplay
 from pipeline.instrument.probe_file import read_with_source, write_probe
-from pipeline.job import run_job
-from pipeline.plan import Selection
-from pipeline.provenance import MadeBy
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.job import run_job
+from pipeline.machine.plan import Selection
+from pipeline.machine.provenance import MadeBy
 from pipeline.recording.input_file import files_sha256
 from tests.toys import toy_job, toy_probe
 

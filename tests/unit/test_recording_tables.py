@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import parse_yaml
 from pipeline.recording.tables import read_encoder, read_frame_table
-from pipeline.yaml_file import parse_yaml
 
 relaxed = settings(
     max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None

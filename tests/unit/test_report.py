@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.artefacts import MotionEvent, PipeAxis, RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import MotionEvent, PipeAxis, RingSamples, RingValidity, Trajectory
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import quiet_context
 from pipeline.review import report
 from pipeline.review.accounts import tables
 from pipeline.review.report import page_of, write_report
 from pipeline.review.summary import ReportedNumber, RunSummary, StageRecord
-from pipeline.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
 from stages.overlays import OverlayParameters, draw_overlays
 from stages.sections import SectionParameters, measure_sections

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from pipeline.commands.reproduce import reproduce
-from pipeline.disk import record_of
 from pipeline.errors import InputError
 from pipeline.export.exporter import Exporter
-from pipeline.reproduce import Agreement, check_inputs_unchanged, compare_runs, read_run_record
-from pipeline.run_folder import RunFolder
+from pipeline.files.disk import record_of
+from pipeline.machine.reproduce import Agreement, check_inputs_unchanged, compare_runs, read_run_record
+from pipeline.machine.run_folder import RunFolder
 
 RECORD = {
     "recording": {"path": "recording"},

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.measured import WallTexture
 from pipeline.errors import InputError
 from pipeline.review.flat_tiles import TILE_PX, FlatPicture, photo_picture
 

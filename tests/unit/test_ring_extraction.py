@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.rings import RINGS, RingParameters, extract, extract_rings
 from stages.rings.validity import mark_outliers
 from tests.ring_images import exposed, memory_recording, off_centre, ring_light

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.artefacts import RingValidity
+from pipeline.artefacts.measured import RingValidity
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 from tests.ring_images import exposed, off_centre, ring_light

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.config import resolve
-from pipeline.display import SilentDisplay
 from pipeline.errors import Cancelled, InputError, UnusableError
-from pipeline.job import Job, run_job
-from pipeline.outcome import RunOutcome, State
-from pipeline.plan import PipelineError, Selection
-from pipeline.runner import FailedError
-from pipeline.stage import Context, Parameters, Stage
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.job import Job, run_job
+from pipeline.machine.outcome import RunOutcome, State
+from pipeline.machine.plan import PipelineError, Selection
+from pipeline.machine.runner import FailedError
+from pipeline.machine.stage import Context, Parameters, Stage
 from tests.disk_limit import file_size_limit
 from tests.shared_data import PROJECT_ROOT
 from tests.toy_stages import DRAW, SMOOTH, Drawn, DrawParameters

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 from tests.disk_limit import file_size_limit
 from tests.faults import on_small_disk
 
@@ -40,7 +40,7 @@ def test_a_spool_on_a_full_disk_is_told(tmp_path: Path) -> None:
 _MAPPED = """
 import numpy as np
 from pipeline.errors import InputError
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 try:
     Scratch(disk).zeros((1 << 23,), np.float64)[:] = 1.0
 except InputError as error:

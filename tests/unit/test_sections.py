@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.sections import SectionParameters, measure_sections
 from tests.synthetic_wall import bare_recording, smooth_noise, wall_of
 

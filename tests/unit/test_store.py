@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from pipeline.codec import digest, encode
 from pipeline.errors import InputError
-from pipeline.outcome import Number
-from pipeline.store import Provenance, Store
+from pipeline.machine.codec import digest, encode
+from pipeline.machine.outcome import Number
+from pipeline.machine.store import Provenance, Store
 from tests.disk_limit import file_size_limit
 from tests.toy_stages import Mood
 

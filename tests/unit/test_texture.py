@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.measured import WallTexture
 from pipeline.errors import UnusableError
 from pipeline.export.unrolled import write_unrolled
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.texture import TEXTURE
 from stages.texture.texture import TextureParameters, photograph_wall
 from tests.unit.drawn_pipe import (

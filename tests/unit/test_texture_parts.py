@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.artefacts import Trajectory
+from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Lighting
 from stages.texture.blend import blend_samples

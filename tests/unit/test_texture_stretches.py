@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.artefacts import WallTexture
-from pipeline.stage import quiet_context
+from pipeline.artefacts.measured import WallTexture
+from pipeline.machine.stage import quiet_context
 from stages.texture.chain import LightChain, cut_plan
 from stages.texture.grid import FlatGrid
 from stages.texture.sampling import LightSamples

@@ -15,11 +15,11 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from pipeline.artefacts import Wall
+from pipeline.artefacts.findings import Defect, Defects
+from pipeline.artefacts.measured import Wall
+from pipeline.artefacts.model import VARIANTS, TexturedMesh
 from pipeline.export.tileset import write_tileset
-from pipeline.findings import Defect, Defects
-from pipeline.model import VARIANTS, TexturedMesh
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
 from tests.synthetic_wall import bare_recording

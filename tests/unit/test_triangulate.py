@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.artefacts import RingSamples, RingValidity
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.stage import quiet_context
+from pipeline.machine.stage import quiet_context
 from stages.triangulate import TRIANGULATE, TriangulateParameters, off_the_ring, triangulate_rings
 
 CAMERA = KannalaBrandt((1600, 1200), (366.1, 365.8), (796.9, 591.8), (-0.0118, 0.0008, -0.0008, 0.0))

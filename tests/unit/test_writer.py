@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.export.exporter import Exporter
 from pipeline.export.writer import Writer
-from pipeline.run_folder import claimed
+from pipeline.machine.run_folder import claimed
 
 GATE = threading.Event()
 LOGGER = logging.getLogger("test")

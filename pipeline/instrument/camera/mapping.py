@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from pipeline.files.yaml_file import Section
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.equidistant import Equidistant
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
@@ -12,7 +13,6 @@ from pipeline.instrument.camera.pinhole import Pinhole
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem
 from pipeline.instrument.camera.section_values import focal_pair, image_size, number_list, pair
 from pipeline.instrument.camera.unified import Unified
-from pipeline.yaml_file import Section
 
 SCARAMUZZA_TERMS = (3, 15)
 _COMMON = ("model", "image_size", "centre_px")

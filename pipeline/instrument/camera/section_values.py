@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.yaml_file import Section
+from pipeline.files.yaml_file import Section
 
 LARGEST_SIDE_PX = 65535
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from pipeline.findings import DefectKind
+from pipeline.artefacts.findings import DefectKind
 from pipeline.review.comparison.growth import Growth, Resolution, measure_growth
 from pipeline.review.comparison.paired import PairedWalls
 from pipeline.review.comparison.patch import Cutter, Patch, outline_mask

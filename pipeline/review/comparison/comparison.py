@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipeline.artefacts import RingSamples, Trajectory, WallTexture
-from pipeline.findings import DefectKind
+from pipeline.artefacts.findings import DefectKind
+from pipeline.artefacts.measured import RingSamples, Trajectory, WallTexture
+from pipeline.artefacts.model import Overlays
 from pipeline.geometry.axis import distance_along
-from pipeline.model import Overlays
 from pipeline.review.comparison.changes import Change, changes
 from pipeline.review.comparison.growth import Resolution, Value
 from pipeline.review.comparison.paired import PairedWalls

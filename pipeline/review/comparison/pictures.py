@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.model import Overlay, Overlays
+from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.review.comparison.paired import PairedWalls
 
 Float = NDArray[np.float64]

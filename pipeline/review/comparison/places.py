@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.findings import DefectKind
+from pipeline.artefacts.findings import DefectKind
 from pipeline.review.comparison.registration import Registration
 from pipeline.review.decisions.replay import Finding
 

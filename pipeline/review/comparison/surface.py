@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.measured import WallTexture
 from pipeline.review.measuring.wall import MeasuredWall
 
 Float = NDArray[np.float64]

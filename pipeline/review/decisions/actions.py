@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
+from pipeline.artefacts.findings import DefectKind
 from pipeline.errors import InputError
-from pipeline.findings import DefectKind
 
 FindingId = Annotated[str, Field(pattern=r"^(m|a)?[0-9]{1,9}(\.[0-9]{1,3})*$")]
 Text = Annotated[str, Field(max_length=4000)]

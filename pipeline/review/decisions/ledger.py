@@ -11,8 +11,8 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from pipeline.disk import disk_errors_named
 from pipeline.errors import BoresightError, InputError
+from pipeline.files.disk import disk_errors_named
 from pipeline.review.decisions.actions import Action, action_of
 
 _BUSY_S = 10.0

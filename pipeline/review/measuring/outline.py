@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.findings import clock_of_azimuth
+from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.review.decisions.replay import Measured, Outline
 from pipeline.review.measuring.wall import MeasuredWall
 

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.errors import BoresightError
-from pipeline.findings import clock_of_azimuth
 from pipeline.review.decisions.replay import Outline
 from pipeline.review.measuring.outline import OutlineGauge
 from pipeline.review.measuring.wall import MeasuredWall

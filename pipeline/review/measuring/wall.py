@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RadiusMap
+from pipeline.artefacts.measured import RadiusMap
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pipeline.model import Overlays
+from pipeline.artefacts.model import Overlays
 from pipeline.review.decisions.replay import Finding
 from pipeline.review.flat_tiles import PHOTO, FlatPicture, picture_of
 from pipeline.review.measuring.wall import MeasuredWall

@@ -16,7 +16,7 @@ import numpy as np
 import typst
 from jinja2 import Environment, StrictUndefined
 
-from pipeline.model import Overlays
+from pipeline.artefacts.model import Overlays
 from pipeline.review.decisions.replay import REJECTED, Finding
 from pipeline.review.documents import cleaned, run_document
 from pipeline.review.papers.pictures import finding_picture, section_plot

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.findings import DefectKind
-from pipeline.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
-from pipeline.model import Overlays
+from pipeline.artefacts.findings import DefectKind
+from pipeline.artefacts.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
+from pipeline.artefacts.model import Overlays
 from pipeline.review.decisions.replay import GONE, Finding
 from pipeline.review.documents import state_document
 from pipeline.review.review import Review, State

@@ -15,8 +15,8 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from pipeline.artefacts.model import Overlays
 from pipeline.errors import BoresightError, InputError
-from pipeline.model import Overlays
 from pipeline.review import documents
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.decisions.ledger import StaleError

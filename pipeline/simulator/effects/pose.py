@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.errors import InputError
 from pipeline.simulator.effects.parts import cartesian, require_odometer, with_odometer
 from pipeline.simulator.motion import Signal, Slip, Wave

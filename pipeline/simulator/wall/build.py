@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PipeAxis
+from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.simulator.wall.albedo import FINEST_OVER_RADIUS, paint, stain

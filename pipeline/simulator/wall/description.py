@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from pipeline.stage import Parameters
+from pipeline.machine.stage import Parameters
 
 Tint = tuple[float, float, float]
 

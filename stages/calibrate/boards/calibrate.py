@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport, ModelScore
-from pipeline.stage import Context
+from pipeline.machine.stage import Context
 from stages.calibrate.boards.bundle import Estimate
 from stages.calibrate.boards.compare import (
     displacement_map,

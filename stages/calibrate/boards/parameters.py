@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from pipeline.stage import Parameters
+from pipeline.machine.stage import Parameters
 
 ModelName = Literal["kannala_brandt", "scaramuzza", "unified", "equidistant", "pinhole"]
 MODEL_NAMES: tuple[ModelName, ...] = ("kannala_brandt", "scaramuzza", "unified", "equidistant", "pinhole")

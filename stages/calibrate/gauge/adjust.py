@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import BorderedSystem, Factor
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.parameters import GaugeParameters
@@ -21,7 +22,6 @@ from stages.calibrate.gauge.terms import (
     ring_equations,
     slip_origin,
 )
-from stages.motion.bordered import BorderedSystem, Factor
 
 Float = NDArray[np.float64]
 _CONVERGED_SIGMA = 0.02

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
-from pipeline.stage import Context
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.detect import Sighting, find_fiducials

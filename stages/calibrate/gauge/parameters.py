@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from pipeline.stage import Parameters
+from pipeline.machine.stage import Parameters
 
 
 class GaugeParameters(Parameters):

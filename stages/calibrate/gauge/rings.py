@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.geometry import Gauge

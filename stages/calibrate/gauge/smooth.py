@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.robust import Cauchy
+from pipeline.adjustment.sums import BLOCK
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.calibrate.gauge.state import Unknowns
-from stages.motion.bordered import Rows
-from stages.motion.robust import Cauchy
-from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

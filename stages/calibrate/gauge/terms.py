@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.robust import Cauchy
+from pipeline.adjustment.sums import BLOCK
 from pipeline.geometry.rigid import inverse, skew, transform
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
-from stages.motion.bordered import Rows
-from stages.motion.robust import Cauchy
-from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

@@ -13,7 +13,7 @@ from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, rms
 from pipeline.instrument.laser_plane import NAME, LaserPlane
-from pipeline.stage import Context
+from pipeline.machine.stage import Context
 from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
 from stages.calibrate.boards.start import pose
 from stages.calibrate.laser.line import measure_line, patch_around

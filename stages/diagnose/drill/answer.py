@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.errors import InputError
-from pipeline.json_file import read_json
+from pipeline.files.json_file import read_json
 
 Verdict = Literal["consistent", "named", "class", "unexplained", "not_identifiable"]
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import to_pipe
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
 from pipeline.physics.effect import Channel
 from pipeline.recording.base import Recording
-from pipeline.stage import Context
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.kinds import Periodic
 from stages.diagnose.effects.library import LIBRARY

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import LandmarkRows, Rows
 from stages.diagnose.field.run import FieldRun
-from stages.motion.bordered import LandmarkRows, Rows
 from stages.motion.equations import Equations
 from stages.motion.state import EncoderReadings
 from stages.motion.terms import RingBins

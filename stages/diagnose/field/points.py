@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from stages.diagnose.effects.base import ImagePoints

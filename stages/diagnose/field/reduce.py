@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from threadpoolctl import threadpool_limits
 
+from pipeline.adjustment.bordered import BorderedSystem, Factor, Rows
+from pipeline.adjustment.sums import BLOCK
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.field.system import FieldSystem
-from stages.motion.bordered import BorderedSystem, Factor, Rows
-from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

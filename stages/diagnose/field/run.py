@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples, Trajectory
+from pipeline.artefacts.measured import RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
-from pipeline.stage import Context
 from stages import motion
 from stages.motion import MotionParameters
 from stages.motion.encoder import encoder_at_frames

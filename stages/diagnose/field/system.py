@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.bordered import LandmarkRows, Rows
+from pipeline.adjustment.robust import Squares
+from pipeline.adjustment.sums import BLOCK
 from pipeline.geometry.rigid import inverse, transform
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.predict import columns, reading_columns, texture_columns
@@ -15,11 +18,8 @@ from stages.diagnose.evidence import INSTRUMENT, Column
 from stages.diagnose.field.points import distance_mm, ring_points, speed_mm_s, texture_points
 from stages.diagnose.field.run import FieldRun
 from stages.motion import terms
-from stages.motion.bordered import LandmarkRows, Rows
 from stages.motion.equations import MATCH_BIASES
-from stages.motion.robust import Squares
 from stages.motion.state import EncoderReadings, State
-from stages.motion.sums import BLOCK
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

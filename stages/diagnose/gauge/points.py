@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.rings import BoreRings

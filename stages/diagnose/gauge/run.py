@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from pipeline.adjustment.bordered import Rows
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.rings import BoreRings
@@ -28,7 +29,6 @@ from stages.diagnose.gauge.baseline import edge_baseline, ring_baseline
 from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations, MotionPrior
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import edge_points, ring_points, speed_along
-from stages.motion.bordered import Rows
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.stats import norm
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
-from pipeline.stage import Context
 from stages.diagnose.profile.brightness import clip_finding, decentre_finding, dust_finding, stray_finding
 from stages.diagnose.profile.cells import make_cells
 from stages.diagnose.profile.finding import Finding

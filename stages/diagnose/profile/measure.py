@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from pipeline.recording.base import Illumination, Image, Planes, Recording
 from stages.diagnose.profile.kernels import stack_frame
 from stages.rings.noise import clip_level_of

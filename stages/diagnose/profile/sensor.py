@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from pipeline.artefacts import RingSamples
+from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.measure import LineProfiles

@@ -13,13 +13,13 @@ from typing import Any
 import cv2
 import numpy as np
 
-from pipeline.artefacts import PointCloud, Trajectory, Wall
-from pipeline.config import resolve
+from pipeline.artefacts.measured import PointCloud, Trajectory, Wall
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.instrument.probe import Probe
-from pipeline.job import open_job
+from pipeline.machine.configuration import resolve
+from pipeline.machine.job import open_job
+from pipeline.machine.run_folder import claimed
 from pipeline.recording.base import Illumination, Recording
-from pipeline.run_folder import claimed
 from stages.catalogue import PIPELINE
 from tests.benchmarks.page.section import Spent, clocked
 from tests.shared_data import PROJECT_ROOT

@@ -10,11 +10,11 @@ from types import ModuleType
 import cv2
 import numpy as np
 
-from pipeline.artefacts import WallTexture
+from pipeline.artefacts.measured import WallTexture
 from pipeline.export.unrolled import write_unrolled
 from pipeline.geometry.axis import from_pipe
 from pipeline.geometry.rigid import inverse
-from pipeline.native import open3d
+from pipeline.machine.native import open3d
 from stages.texture.light import irradiance
 from tests.benchmarks.page.charts import bars
 from tests.benchmarks.page.inputs import Inputs

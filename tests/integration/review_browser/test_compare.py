@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.artefacts import Wall
+from pipeline.artefacts.measured import Wall
+from pipeline.machine.run_folder import RunFolder
+from pipeline.machine.store import Provenance
 from pipeline.review.run_files import RunFiles
-from pipeline.run_folder import RunFolder
-from pipeline.store import Provenance
 from tests.review_browser import Tab, tab
 from tests.review_server import ReviewServer
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from pipeline.files.yaml_file import Section
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.camera.pinhole import Pinhole
 from pipeline.instrument.camera.section_values import side
 from pipeline.instrument.camera.unified import Unified
-from pipeline.yaml_file import Section
 
 _MODELS = ("KANNALA_BRANDT", "MEI", "PINHOLE")
 

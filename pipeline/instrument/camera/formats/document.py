@@ -9,8 +9,8 @@ from functools import cached_property
 from pathlib import Path
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import LARGEST_BYTES, Section, parse_yaml
 from pipeline.instrument.camera.base import Camera
-from pipeline.yaml_file import LARGEST_BYTES, Section, parse_yaml
 
 
 @dataclass(frozen=True)

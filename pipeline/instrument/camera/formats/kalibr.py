@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from pipeline.errors import InputError
+from pipeline.files.yaml_file import Section
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.equidistant import Equidistant
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat, cannot_hold
@@ -15,7 +16,6 @@ from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.camera.pinhole import Pinhole
 from pipeline.instrument.camera.section_values import image_size, positive
 from pipeline.instrument.camera.unified import Unified
-from pipeline.yaml_file import Section
 
 
 def _cameras(section: Section) -> list[str]:

@@ -12,18 +12,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.display import Display
+from pipeline.artefacts.headline import headline
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 from pipeline.export.exporter import Exporter, published_key, withdraw
 from pipeline.export.writer import Writer
-from pipeline.headline import headline
-from pipeline.native import give_back_memory
-from pipeline.outcome import Number, Results, RunOutcome, StageOutcome, State
-from pipeline.plan import Plan, Selection, Step
-from pipeline.run_folder import RunFolder
-from pipeline.scratch import Scratch
-from pipeline.stage import Context
-from pipeline.store import Provenance, Stored
+from pipeline.machine.display import Display
+from pipeline.machine.native import give_back_memory
+from pipeline.machine.outcome import Number, Results, RunOutcome, StageOutcome, State
+from pipeline.machine.plan import Plan, Selection, Step
+from pipeline.machine.run_folder import RunFolder
+from pipeline.machine.scratch import Scratch
+from pipeline.machine.stage import Context
+from pipeline.machine.store import Provenance, Stored
 
 _LONGEST_PROBLEM = 300
 _AT_ONCE = 2  # stages side by side; more would only share memory and cores among them

@@ -2,8 +2,8 @@
 
 Conventions: lengths mm, angles rad, times s, pixels with integer centres. Frames: C camera (x right, y down,
 z forward), P pipe (z along the pipe). ``T_pc`` maps C to P. NaN marks what was not measured.
-A field may be an array, a number, a string, a tuple of such, a nested artefact, or None: `pipeline.store`
-writes and reads any of these without further code.
+A field may be an array, a number, a string, a tuple of such, a nested artefact, or None:
+`pipeline.machine.store` writes and reads any of these without further code.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from pipeline.errors import InputError
-from pipeline.stage import Parameters, Stage
-from pipeline.yaml_file import read_yaml
+from pipeline.files.yaml_file import read_yaml
+from pipeline.machine.stage import Parameters, Stage
 
 # The section that says where a batch is worked on: of no stage, read by `pipeline.batch.kinds`.
 CLUSTER = "cluster"

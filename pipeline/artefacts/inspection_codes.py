@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.findings import DefectKind
+from pipeline.artefacts.findings import DefectKind
 
 _LONGITUDINAL, _CIRCUMFERENTIAL = np.radians(30), np.radians(60)
 

@@ -1,4 +1,4 @@
-"""What the equations of a `stages.motion.bordered.BorderedSystem` add up to."""
+"""What the equations of a `pipeline.adjustment.bordered.BorderedSystem` add up to."""
 
 from __future__ import annotations
 

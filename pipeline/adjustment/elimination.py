@@ -1,4 +1,4 @@
-"""Compiled sums of `stages.motion.bordered`: equations into a banded, bordered matrix, landmarks eliminated.
+"""Compiled sums of `bordered`: equations into a banded, bordered matrix, landmarks eliminated.
 
 The band holds the rows of frame f and the columns of frame f - l in ``band[f, l]`` (block, block); with l = 0
 only the lower triangle counts. Arguments are those of `Rows` or `LandmarkRows`, then band, border, corner and

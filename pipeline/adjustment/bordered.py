@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from pipeline.threads import in_threads
-from stages.motion.banded import BandedCholesky
-from stages.motion.elimination import add_landmarks, add_rows
-from stages.motion.robust import Loss, Squares
-from stages.motion.sums import BLOCK, Sums
+from pipeline.adjustment.banded_cholesky import BandedCholesky
+from pipeline.adjustment.elimination import add_landmarks, add_rows
+from pipeline.adjustment.robust import Loss, Squares
+from pipeline.adjustment.sums import BLOCK, Sums
+from pipeline.machine.threads import in_threads
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

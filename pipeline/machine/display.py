@@ -16,7 +16,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from pipeline.outcome import StageOutcome, State
+from pipeline.machine.outcome import StageOutcome, State
 
 
 class Display(Protocol):

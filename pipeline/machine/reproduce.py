@@ -10,8 +10,8 @@ from typing import Any
 
 from pipeline.errors import InputError
 from pipeline.export.exporter import Exporter, published_files
-from pipeline.json_file import read_json
-from pipeline.run_folder import RunFolder
+from pipeline.files.json_file import read_json
+from pipeline.machine.run_folder import RunFolder
 
 _RECORD = "run.json"
 # Bear the time they were made at; what they show is in the other files.

@@ -10,9 +10,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.disk import disk_errors_named
 from pipeline.errors import InputError
-from pipeline.store import Store
+from pipeline.files.disk import disk_errors_named
+from pipeline.machine.store import Store
 
 _INTERNAL = ".boresight"
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from pipeline.codec import Json
 from pipeline.errors import InputError
+from pipeline.machine.codec import Json
 
 _CHUNK = 1 << 20
 _UNFINISHED = ".unfinished"

@@ -13,7 +13,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from pipeline.disk import disk_errors_named
+from pipeline.files.disk import disk_errors_named
 
 _MAP_FROM_BYTES = 1 << 25
 

@@ -8,23 +8,23 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from pipeline.codec import digest
-from pipeline.config import Configuration
-from pipeline.display import Display
 from pipeline.errors import InputError
 from pipeline.export.exporter import Exporter
 from pipeline.export.run_record import write_run_record
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource, read_with_source
-from pipeline.interrupt import stop_wish
-from pipeline.outcome import RunOutcome
-from pipeline.plan import Plan, Selection, Source, make_plan
+from pipeline.machine.codec import digest
+from pipeline.machine.configuration import Configuration
+from pipeline.machine.display import Display
+from pipeline.machine.outcome import RunOutcome
+from pipeline.machine.plan import Plan, Selection, Source, make_plan
+from pipeline.machine.run_folder import claimed, logged
+from pipeline.machine.runner import Runner
+from pipeline.machine.stage import Stage
+from pipeline.machine.stopping import stop_wish
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
-from pipeline.run_folder import claimed, logged
-from pipeline.runner import Runner
-from pipeline.stage import Stage
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Job:
     folder: Path
 
     def plan(self) -> Plan:
-        """Return the wired plan; raises `pipeline.plan.PipelineError` when stages do not fit together."""
+        """Return the wired plan; raises `PipelineError` when stages do not fit together."""
         sources = (
             Source(
                 Recording,
@@ -79,7 +79,7 @@ def open_job(
 
 
 def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
-    """Run a job in its folder; raises as `pipeline.runner.Runner.run` and `pipeline.run_folder.claimed`."""
+    """Run a job in its folder; raises as `Runner.run` and `run_folder.claimed`."""
     plan = job.plan()
     selection.check(plan)
     with claimed(job.folder) as folder, logged(folder) as logger, stop_wish() as wish:

@@ -6,11 +6,11 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pipeline.codec import Json, canonical
-from pipeline.config import Configuration
 from pipeline.errors import BoresightError
-from pipeline.source_code import source_digest
-from pipeline.stage import Parameters, Stage
+from pipeline.machine.codec import Json, canonical
+from pipeline.machine.configuration import Configuration
+from pipeline.machine.source_code import source_digest
+from pipeline.machine.stage import Parameters, Stage
 
 
 class PipelineError(BoresightError):

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from pipeline.artefacts import RingSamples, Trajectory, Wall
-from pipeline.findings import Defects
+from pipeline.artefacts.findings import Defects
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
 from pipeline.geometry.axis import distance_along
-from pipeline.outcome import Number
+from pipeline.machine.outcome import Number
 
 
 def headline(artefacts: Mapping[type, object]) -> tuple[Number, ...]:

@@ -10,7 +10,7 @@ from typing import Any, Protocol, get_type_hints
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from pipeline.scratch import Scratch
+from pipeline.machine.scratch import Scratch
 
 
 class Parameters(BaseModel):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.native import open3d
+from pipeline.machine.native import open3d
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

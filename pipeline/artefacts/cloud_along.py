@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts import PointCloud
+from pipeline.artefacts.measured import PointCloud
 
 Float = NDArray[np.float64]
 

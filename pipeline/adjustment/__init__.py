@@ -1,0 +1,1 @@
+"""Least squares: normal equations (banded, bordered), elimination with covariance, robust losses."""

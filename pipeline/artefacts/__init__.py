@@ -1,0 +1,1 @@
+"""What stages hand to each other: frozen dataclasses of arrays, with units and frames."""
