@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from pipeline.arrays import Byte, Float
 from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
-
-Float = NDArray[np.float64]
-Byte = NDArray[np.uint8]
 
 _NOT_MEASURED_BGR = (128, 128, 128)
 _HARMONICS = (1, 2)

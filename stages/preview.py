@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.instrument.misalignment import fit_circle
 from pipeline.instrument.probe import Probe
@@ -18,7 +18,6 @@ from pipeline.recording.base import FrameTable, Recording
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 
-Float = NDArray[np.float64]
 _LEAST_POINTS = 90
 # A line's errors are alike over this many of 360 degrees.
 _ALIKE = 8.0

@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.findings import Sections
 from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
-
-Float = NDArray[np.float64]
 
 _DIRECTIONS: Float = np.linspace(0, np.pi, 360, endpoint=False)
 # Most of its period that a harmonic may span unseen: in mid-gap the series is then as sure as one sample.
@@ -118,7 +116,7 @@ def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
     return _Slab(mean, variance, calibration, float(seen.mean()))
 
 
-def _told_harmonics(seen: NDArray[np.bool_], most: int) -> int:
+def _told_harmonics(seen: Bool, most: int) -> int:
     """Return how many harmonics samples (A,) around a turn can tell, by the longest unseen arc."""
     edges = np.flatnonzero(np.concatenate([seen, seen]))
     if not edges.size:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy.ndimage import median_filter
 
-from pipeline.artefacts.measured import Float, Float32, RingPoints, RingSamples, RingValidity
+from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
@@ -54,7 +54,7 @@ def triangulate_rings(
     xyz, uncorrected, noise = (context.scratch.zeros((*shape, 3), np.float32) for _ in range(3))
     covariance = context.scratch.zeros((*shape, 6), np.float32)
 
-    def place(frames: slice) -> NDArray[np.int64]:
+    def place(frames: slice) -> Int:
         found = _triangulate_chunk(rings, frames, probe)
         hit = np.isfinite(found[0][..., 0])
         apart = off_the_ring(np.hypot(*np.moveaxis(found[0][..., :2], -1, 0)), parameters.largest_departure)
@@ -72,7 +72,7 @@ def triangulate_rings(
     return RingPoints(rings.frame, rings.azimuth_rad, xyz, uncorrected, noise, covariance)
 
 
-def off_the_ring(rho_mm: Float32, largest_departure: float) -> NDArray[np.bool_]:
+def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
     """Return where samples lie off the ring that their neighbours form.
 
     A dent, a step or a branch is as wide as most of its neighbours and stays; what is narrower than half of
@@ -126,18 +126,18 @@ def _triangulate_chunk(
     return xyz_c, flat_c, _spread(noise, usable), _spread(covariance, usable)
 
 
-def _spread(values: Float, where: NDArray[np.bool_]) -> Float32:
+def _spread(values: Float, where: Bool) -> Float32:
     """Put rows of ``values`` (N, K) where ``where`` (F, A) is true, NaN elsewhere."""
     out = np.full((*where.shape, values.shape[-1]), np.nan, np.float32)
     out[where] = values
     return out
 
 
-def _valid(rings: RingSamples, frames: slice) -> NDArray[np.bool_]:
+def _valid(rings: RingSamples, frames: slice) -> Bool:
     return np.asarray(rings.validity[frames] == RingValidity.VALID)
 
 
-def _report(context: Context, counts: NDArray[np.int64], noise: Float32) -> None:
+def _report(context: Context, counts: Int, noise: Float32) -> None:
     placed, missed, off = counts.tolist()
     context.report("points triangulated", placed, "points")
     context.report("ring samples that miss the laser sheet", missed, "samples")

@@ -10,13 +10,12 @@ from pathlib import Path
 
 import av
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Image
 from tests.shared_data import PROJECT_ROOT
 
 SAMPLE = PROJECT_ROOT / "data" / "sample"
 FRAMES, RATE, SIZE = 24, 30, (1600, 1200)
-Picture = NDArray[np.uint8]
 Spoil = Callable[[Path], object]
 
 
@@ -88,7 +87,7 @@ def noised(start: float, length: int) -> Spoil:
     return spoil
 
 
-def repainted(paint: Callable[[int, Picture], Picture]) -> Spoil:
+def repainted(paint: Callable[[int, Image], Image]) -> Spoil:
     """Return a way to spoil: every picture is changed by ``paint(frame, bgr)`` and encoded again."""
 
     def spoil(folder: Path) -> None:
@@ -112,6 +111,6 @@ def is_laser(frame: int) -> bool:
     return frame % 2 == 0
 
 
-def noise(frame: int, picture: Picture) -> Picture:
+def noise(frame: int, picture: Image) -> Image:
     """Return a picture of noise: what a camera sees that is nowhere near a wall."""
     return np.random.default_rng(frame).normal(60, 12, picture.shape).clip(0, 255).astype(np.uint8)

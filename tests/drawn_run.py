@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float, Float32, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
@@ -20,7 +20,6 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.ring_images import MemorySource
 from tests.unit.drawn_pipe import led_light
 
-Float = NDArray[np.float64]
 RADIUS, BASELINE = 50.0, 22.0
 _TEXEL_MM = 0.5
 
@@ -73,7 +72,7 @@ def _poses(z_mm: Float, roll_rad: Float) -> Float:
     return from_parts(rotation_from_vector(turn), origin)
 
 
-def _texture(contrast: float) -> NDArray[np.float32]:
+def _texture(contrast: float) -> Float32:
     """Return reflectance over distance −20 … 180 mm and azimuth −π … π (rows, columns)."""
     columns = round(2 * np.pi * RADIUS / _TEXEL_MM)
     white = np.random.default_rng(1).standard_normal((400, columns)).astype(np.float32)
@@ -82,9 +81,7 @@ def _texture(contrast: float) -> NDArray[np.float32]:
     return (0.5 * (1 + contrast * smooth / smooth.std())).clip(0.02, 1).astype(np.float32)
 
 
-def _picture(
-    probe: Probe, T_pc: Float, wall: NDArray[np.float32], random: np.random.Generator
-) -> NDArray[np.uint8]:
+def _picture(probe: Probe, T_pc: Float, wall: Float32, random: np.random.Generator) -> Byte:
     xyz = _wall_hits(probe, T_pc)
     row = ((xyz[..., 2] + 20) / _TEXEL_MM).astype(np.float32)
     column = ((np.arctan2(xyz[..., 1], xyz[..., 0]) + np.pi) * RADIUS / _TEXEL_MM).astype(np.float32)
@@ -116,7 +113,7 @@ def round_wall(s: Float, psi: Float) -> Float:
 def rings_on_wall(
     probe: Probe,
     T_pc: Float,
-    frames: NDArray[np.int64],
+    frames: Int,
     random: np.random.Generator,
     radius_at: Callable[[Float, Float], Float] = round_wall,
     sigma_px: float = 0.05,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
@@ -19,7 +19,6 @@ from pipeline.recording.base import (
     Encoder,
     Fiducials,
     FrameTable,
-    Image,
     Marker,
     PipeFacts,
     Planes,
@@ -36,7 +35,6 @@ from stages.calibrate.gauge.smooth import LOOSE
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
 from stages.calibrate.gauge.start import FirstPose
 
-Float = NDArray[np.float64]
 RING_PX, EDGE_PX = 0.1, 0.1
 _NEAREST, _FARTHEST = 10.0, 55.0
 
@@ -132,9 +130,7 @@ def ring_uv(T_pc: Float, probe: Probe, gauge: Gauge, azimuth_rad: Float) -> Floa
     return probe.camera.project(start + q[:, None] * direction).uv
 
 
-def rings_of(
-    T_pc: Float, index: NDArray[np.int64], probe: Probe, gauge: Gauge, random: np.random.Generator
-) -> RingSamples:
+def rings_of(T_pc: Float, index: Int, probe: Probe, gauge: Gauge, random: np.random.Generator) -> RingSamples:
     """Return the rings of frames ``index`` with white noise."""
     grid = -np.pi + np.arange(720) * 2 * np.pi / 720
     fine = np.linspace(-np.pi, np.pi, 2880, endpoint=False)
@@ -152,7 +148,7 @@ def rings_of(
 
 
 def fiducials_of(
-    T_pc: Float, index: NDArray[np.int64], camera: KannalaBrandt, gauge: Gauge, random: np.random.Generator
+    T_pc: Float, index: Int, camera: KannalaBrandt, gauge: Gauge, random: np.random.Generator
 ) -> tuple[Edges, PosedFrames]:
     """Return edges seen in frames ``index`` with white noise and print errors, and rough poses."""
     parameters = GaugeParameters.model_validate({})

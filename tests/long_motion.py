@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
@@ -18,7 +18,6 @@ from stages.motion.tracks import _SEEN, TrackStore
 from stages.motion.windows import MeasuredRun
 from tests.drawn_run import RADIUS, rings_on_wall, small_probe
 
-Float = NDArray[np.float64]
 SCALE, SIGMA_PX, ENCODER_SIGMA_MM = 1.001, 0.1, 0.005
 _NEAR, _FAR = np.radians(78.0), np.radians(38.0)
 _AT_ONCE = 4000

@@ -19,10 +19,9 @@ from pathlib import Path
 
 import av
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from pipeline.arrays import Int
+
 _CHUNK = 60
 _CRF = "12"
 _SAME = ("recording.yaml", "probe.yaml", "truth_wall.npz", "truth_albedo.jpg")

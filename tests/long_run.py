@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.findings import Sections
 from pipeline.artefacts.measured import PipeAxis, RadiusMap, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
@@ -94,9 +95,7 @@ def _overlay(overlay: Overlay, kept: slice, coarser: int, times: int) -> Overlay
     return replace(overlay, level=_tiled(overlay.level[kept, ::coarser], times))
 
 
-def _distances(
-    s: NDArray[np.float64], times: int, step: float, rows: int, coarser: int
-) -> NDArray[np.float64]:
+def _distances(s: Float, times: int, step: float, rows: int, coarser: int) -> Float:
     count = len(s[:rows:coarser])
     return s[0] + step / count * np.arange(count * times)
 
@@ -108,7 +107,7 @@ def _radius_map(wall: RadiusMap, times: int, step: float, rows: int, coarser: in
     return RadiusMap(s, wall.azimuth_rad[::coarser], **grids)
 
 
-def _axis(axis: PipeAxis, shift: NDArray[np.float64], step: float) -> PipeAxis:
+def _axis(axis: PipeAxis, shift: Float, step: float) -> PipeAxis:
     """Return a straight axis: the source's own ends would not meet."""
     s = np.linspace(axis.distance_mm[0], axis.distance_mm[0] + shift[-1] + step, 2 + len(shift))
     origin = np.stack([0 * s, 0 * s, s], -1)

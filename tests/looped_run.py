@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Int
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion.joining import Joined, join, seam
@@ -17,9 +17,6 @@ from stages.motion.strip import Strip, StripGrid
 from stages.motion.submaps import Settled, Submap
 from stages.motion.windows import Window, cut_windows
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int64]
 STEP_MM, FRAMES, LENGTH, OVERLAP, SHARED = 4.0, 400, 80, 30, 2
 GRID = StripGrid(50.0, 720, 10.5, 64.0)
 _FROM_MM = -100.0

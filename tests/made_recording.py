@@ -7,16 +7,16 @@ import av
 import cv2
 import numpy as np
 from mcap.writer import Writer as McapWriter
-from numpy.typing import NDArray
 from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_typestore
+
+from pipeline.arrays import Image
 
 COUNT, WIDTH, HEIGHT, RATE = 16, 64, 48, 30
 LIGHTS = ["laser", "led"] * (COUNT // 2)
 TIMES_S = [i / RATE for i in range(COUNT)]
 READINGS = [(0.01 * i, 0.2 * i) for i in range(56)]
 START_NS = 1_700_000_000_000_000_000
-Picture = NDArray[np.uint8]
 
 PROBE = """\
 camera: {model: kannala_brandt, image_size: [64, 48], focal_px: [15.0, 15.0], centre_px: [31.5, 23.5],
@@ -38,7 +38,7 @@ pipe: {nominal_diameter_mm: 101.6, wall_thickness_mm: 4.0}
 FOLDER_KEYS = SHARED_KEYS + "video: {video}\nframes: frames.csv\nencoder: encoder.csv\n"
 
 
-def picture(number: int) -> Picture:
+def picture(number: int) -> Image:
     """Return frame ``number`` in BGR: ramps, and a square that moves."""
     image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     image[..., 0] = np.linspace(0, 255, WIDTH)
@@ -187,7 +187,7 @@ def _image(store, number: int, taken_ns: int, kind: str, encoding: str):
     )
 
 
-def _coded(pixels: Picture, encoding: str) -> tuple[Picture, int]:
+def _coded(pixels: Image, encoding: str) -> tuple[Image, int]:
     """Return the bytes of an image, each row padded by 8 bytes, and the length of a row."""
     match encoding:
         case "bgr8":

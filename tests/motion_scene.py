@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.geometry.axis import from_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
@@ -17,7 +17,6 @@ from stages.motion.state import GLOBALS, EncoderReadings, State, straight_start
 from stages.motion.terms import RingBins
 from stages.motion.tracks import Tracks
 
-Float = NDArray[np.float64]
 RADIUS = 50.0
 ENCODER_SIGMA_MM = 0.05
 _SIGMA_PX = 0.1

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pipeline.arrays import Float
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
@@ -24,8 +24,6 @@ from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.base import Wall, WallGrid
 from pipeline.simulator.wall.build import bent_axis
 from pipeline.simulator.wall.description import Bend
-
-Float = NDArray[np.float64]
 
 
 def truth_of_recording(folder: Path) -> SceneTruth:

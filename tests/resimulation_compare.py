@@ -6,15 +6,13 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Image
 from pipeline.recording.base import Illumination
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import through_lens
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
-Image = NDArray[np.uint8]
 _REACH_PX, _STEP_PX, _SIGMA_PX, _STEPS = 8.0, 0.5, 1.3, 4
 _LEAST_HEIGHT, _CLIPPED, _GAIN_STEPS = 12.0, 250, 4
 

@@ -6,11 +6,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.recording.base import FrameTable, Image, PipeFacts, Planes, Recording
-
-Float = NDArray[np.float64]
+from pipeline.arrays import Float, Image
+from pipeline.recording.base import FrameTable, PipeFacts, Planes, Recording
 
 
 def off_centre(radius_px: float, along_px: float, towards_rad: float = 0.7) -> Callable[[Float], Float]:

@@ -8,15 +8,13 @@ from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.machine.outcome import Results
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
-
-Float = NDArray[np.float64]
 
 
 class Mood(StrEnum):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays import Image, Int
 from pipeline.export.exporter import Exporter
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
@@ -19,7 +20,7 @@ from pipeline.machine.display import SilentDisplay
 from pipeline.machine.job import Job, run_job
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Selection
-from pipeline.recording.base import FrameTable, Image, Int, PipeFacts, Planes, Recording
+from pipeline.recording.base import FrameTable, PipeFacts, Planes, Recording
 from tests.toy_stages import TOYS, write_numbers, write_page
 
 TOY_EXPORTERS = (Exporter("numbers", write_numbers), Exporter("page", write_page))

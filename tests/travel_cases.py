@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.sight import Sight
 
-Float = NDArray[np.float64]
 QUANTUM_MM = 0.05
 SECONDS = 8.0
 EASING_S = np.linspace(-0.1, 0.1, 21)

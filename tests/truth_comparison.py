@@ -13,13 +13,11 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import least_squares
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import RadiusMap, Trajectory
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from itertools import pairwise
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
+
 _AT_ONCE = 16  # frames a column
 
 

@@ -10,17 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.elimination import add_landmarks, add_rows
 from pipeline.adjustment.robust import Loss, Squares
 from pipeline.adjustment.sums import BLOCK, Sums
+from pipeline.arrays import Float, Int
 from pipeline.machine.threads import in_threads
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

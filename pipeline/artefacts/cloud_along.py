@@ -7,9 +7,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import PointCloud
-
-Float = NDArray[np.float64]
 
 _AT_ONCE = 1 << 16
 

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from pipeline.arrays import Float, Int
+
 _KNOWN_SIGMA = 2.0
 
 

@@ -12,12 +12,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int64]
-Byte = NDArray[np.uint8]
+from pipeline.arrays import Bool, Byte, Float, Float32, Int
 
 
 class RingValidity(IntEnum):
@@ -64,7 +60,7 @@ class RingSamples:
     validity: Byte
 
     @property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Bool:
         """(F, A) true where the sample may be used."""
         return np.asarray(self.validity == RingValidity.VALID)
 

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
+from pipeline.arrays import Byte, Float, Float32, Int
+
 Face = NDArray[np.int32]
-Byte = NDArray[np.uint8]
-Int = NDArray[np.int64]
 
 VARIANTS = ("photo", "deviation", "uncertainty", "misalignment")
 

@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
 from pipeline.machine.native import open3d
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _MAP_KEYS = ("distance_mm", "azimuth_rad", "radius_mm")
 _POINT_FIELDS = ("x", "y", "z", "nx", "ny", "nz", "sigma_mm", "distance_mm", "azimuth_rad")
 LARGEST_UNPACKED_BYTES = 4 << 30

@@ -13,7 +13,6 @@ from typing import Annotated
 import cv2
 import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
@@ -31,7 +30,6 @@ from stages.calibrate.boards.fit import NAME
 from stages.calibrate.boards.parameters import MODEL_NAMES, BoardCalibrationParameters
 from stages.calibrate.boards.targets import Board, Charuco, Chessboard
 
-Image = NDArray[np.uint8]
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
 
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.commands.figure import rendered
 from pipeline.instrument.camera.calibration import CalibrationReport
-
-Float = NDArray[np.float64]
 
 
 def uncertainty_figure(report: CalibrationReport) -> Figure:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.commands.calibrate_camera_figures import (
     displacement_figure,
     png,
@@ -20,8 +20,6 @@ from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
 from pipeline.machine.provenance import MadeBy
 from pipeline.pages import page_template
-
-Float = NDArray[np.float64]
 
 
 def write_report(report: CalibrationReport, compared_file: str, made_by: MadeBy, folder: Path) -> None:

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from scipy.stats import binned_statistic_2d
 
+from pipeline.arrays import Float, Int
 from pipeline.commands.figure import rendered
 from stages.calibrate.gauge.result import GaugeCalibration
 
-Float = NDArray[np.float64]
 _CELL_PX = 40
 
 
@@ -95,7 +94,7 @@ def _map(figure: Figure, axes: Axes, result: GaugeCalibration, uv: Float, value:
     axes.set(xlabel="u, px", ylabel="v, px")
 
 
-def _spread(axes: Axes, frame: NDArray[np.int64], index: NDArray[np.int64], value: Float) -> None:
+def _spread(axes: Axes, frame: Int, index: Int, value: Float) -> None:
     """Draw median and middle 68 % of the residuals in each frame."""
     numbers = np.unique(index)
     low, middle, high = np.array([np.percentile(value[index == k], (16, 50, 84)) for k in numbers]).T

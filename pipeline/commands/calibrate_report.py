@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.commands.calibrate_figures import (
     correlation_figure,
     image_figure,
@@ -22,7 +22,6 @@ from pipeline.machine.provenance import MadeBy
 from pipeline.pages import page_template
 from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
 
-Float = NDArray[np.float64]
 _UNDETERMINED = 0.7
 _SHOWN = 6
 

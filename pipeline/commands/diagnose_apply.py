@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 
+from pipeline.arrays import Float
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.instrument.probe_file import read_with_source
 from pipeline.machine.codec import digest
@@ -23,7 +23,6 @@ from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import Examination
 from stages.diagnose.encoder import encoder_effects, with_true_readings
 
-Float = NDArray[np.float64]
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
 _EVEN = 0.2
 # What shows the geometry; the model is made of the corrected run alone.

@@ -6,14 +6,13 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.commands.diagnose_image import OnImage
 from pipeline.commands.diagnose_resimulate import Resimulated
 from pipeline.commands.figure import rendered, tidy
 from stages.diagnose.result import Candidate, Picture, WallPicture
 
-Float = NDArray[np.float64]
 _SHOWN = 10
 _QUANTILE = 98.0
 _UM = 1000.0

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float
 from stages.diagnose.diagnose import Examination
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class OnImage:
     """
 
     frame: int
-    grey: NDArray[np.uint8]
+    grey: Byte
     uv_before: Float
     uv_after: Float
     before_px: Float

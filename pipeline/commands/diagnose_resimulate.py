@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
 from pipeline.geometry.axis import straight_axis
 from pipeline.physics.catalogue import EFFECTS, effect
@@ -30,8 +30,6 @@ from stages.diagnose.diagnose import Examination
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _HELD_OUT = 12
 _RELAXED, _UNHEARD = 1e-4, 1e-8
 _NEAR, _BEYOND_MM, _STEP_MM, _COLUMNS = 2, 300.0, 0.1, 16

@@ -14,8 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.commands.figure import rendered
 from pipeline.instrument.budget.combine import Budget
 from pipeline.instrument.budget.design import BaselineStudy, Tolerance, dominant_rows
@@ -24,7 +24,6 @@ from pipeline.instrument.budget.scan import Pose
 from pipeline.instrument.budget.sources import NOT_IN_RADIUS, Kind
 from pipeline.pages import page_template
 
-Float = NDArray[np.float64]
 _COLOURS = ("#0a5ea8", "#b04a00", "#1d6f42", "#7a3e9d", "#8a6d00")
 _LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float
 from pipeline.physics.effect import Channel
 from pipeline.simulator.gallery.course import Course
 from pipeline.simulator.gallery.exhibit import Exhibit
 from pipeline.simulator.gallery.line import unrolled
 
-Float = NDArray[np.float64]
 # Size of a plot's field; the page adds the margins.
 WIDTH, HEIGHT = 360.0, 130.0
 _PICTURE_PX = 300
@@ -128,13 +127,13 @@ def _around(exhibit: Exhibit, *, changed: bool) -> Float:
     return np.asarray(unrolled(picture, exhibit.scene, azimuth, _STRIP_PX, _STRIP_STEP_PX)[1].T[::-1])
 
 
-def _displayed(light: Float, white: float) -> NDArray[np.uint8]:
+def _displayed(light: Float, white: float) -> Byte:
     return np.asarray(255 * np.clip(light / white, 0, 1) ** _DISPLAY_GAMMA, np.uint8)
 
 
-def _strip(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _strip(picture: Byte) -> Byte:
     return np.asarray(np.repeat(picture, _STRIP_SCALE, axis=1))
 
 
-def _png(picture: NDArray[np.uint8]) -> bytes:
+def _png(picture: Byte) -> bytes:
     return bytes(cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes())

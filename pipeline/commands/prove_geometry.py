@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.files.disk import replace_json
 from pipeline.files.json_file import read_json
@@ -24,7 +24,6 @@ from pipeline.simulator.truth import SceneTruth
 from stages.diagnose.drill.cases import Case
 from stages.rings import RingParameters, extract_rings
 
-Float = NDArray[np.float64]
 _SCENE = "truth_scene.yaml"
 _CACHE = "wall_errors.json"
 # Samples beside the wall's own edges are no matter of the instrument.
@@ -95,7 +94,7 @@ def _uv(rings: RingSamples) -> Float:
     return np.asarray(rings.centre_px + rings.radius_px[:, ::_EVERY, None].astype(float) * outward)
 
 
-def _by_probe(truth: SceneTruth, frames: NDArray[np.int64], uv: Float, probe: Probe) -> Float:
+def _by_probe(truth: SceneTruth, frames: Int, uv: Float, probe: Probe) -> Float:
     """Return (F, A) by how much the samples lie outside the true wall when ``probe`` triangulates them."""
     out = []
     for frame, at in zip(frames, uv, strict=True):

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from scipy.stats import binned_statistic_2d
 
 from pipeline.commands.figure import rendered, tidy
 from pipeline.pages import page_template
 from stages.verify.accuracy import Differences
 
-Float = NDArray[np.float64]
 _STATIONS, _SECTORS = 300, 120
 
 

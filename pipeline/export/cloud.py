@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Byte
 from pipeline.artefacts.measured import PointCloud, Wall, WallTexture
 from pipeline.export.unrolled import display_colours
 
@@ -47,7 +48,7 @@ def _rows(cloud: PointCloud, texture: WallTexture) -> NDArray[np.void]:
     return row
 
 
-def point_colours(cloud: PointCloud, texture: WallTexture) -> NDArray[np.uint8]:
+def point_colours(cloud: PointCloud, texture: WallTexture) -> Byte:
     """Return the display colours BGR (M, 3) of the texels next to the points."""
     rows, columns = texture.bgra.shape[:2]
     i = np.rint((cloud.distance_mm - texture.distance_from_mm) / texture.mm_per_px).astype(np.int64)

@@ -13,9 +13,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pygltflib as gltf
-from numpy.typing import NDArray
 from PIL import Image
 
+from pipeline.arrays import Byte, Float
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, TexturedMesh
 from pipeline.export.glb_builder import GlbBuilder
 
@@ -64,7 +64,7 @@ def complete(
 
 
 def tile_primitive(
-    builder: GlbBuilder, tile: MeshTile, number: int, centre_mm: NDArray[np.float64] | None = None
+    builder: GlbBuilder, tile: MeshTile, number: int, centre_mm: Float | None = None
 ) -> gltf.Primitive:
     """Return a tile's primitive: one geometry, its places counted from a centre; a material a variant."""
     place = tile.vertex_p if centre_mm is None else (tile.vertex_p - centre_mm).astype(np.float32)
@@ -100,7 +100,7 @@ def _materials(builder: GlbBuilder, tile: MeshTile, number: int) -> Sequence[int
     ]
 
 
-def _jpeg(bgr: NDArray[np.uint8]) -> bytes:
+def _jpeg(bgr: Byte) -> bytes:
     good, data = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     if not good:
         raise OSError("model.glb: a photo texture cannot be encoded")

@@ -7,8 +7,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte
 from pipeline.artefacts.model import Overlay, Overlays
 
 DPI = 120
@@ -43,7 +43,7 @@ def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:
     return figure
 
 
-def _twelve_in_the_middle(overlays: Overlays, level: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _twelve_in_the_middle(overlays: Overlays, level: Byte) -> Byte:
     """Return levels (S, A) with columns from 6 o'clock over 12 (azimuth −90°) to 6 o'clock."""
     clock = (overlays.azimuth_rad + np.pi / 2 + np.pi) % (2 * np.pi)
     return np.asarray(level[:, np.argsort(clock, kind="stable")])

@@ -11,16 +11,13 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float, Float32, Int
 from pipeline.artefacts.measured import PipeAxis, RadiusMap, WallTexture
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
 from pipeline.export.unrolled import display_colours
 from pipeline.geometry.axis import from_pipe
 
-Float = NDArray[np.float64]
-Byte = NDArray[np.uint8]
-Int = NDArray[np.int64]
 _LEAST_COLUMNS = 36
 _TESTED = 4
 _GREY = 128
@@ -147,7 +144,7 @@ def _column_step(columns: int, stride: int) -> int:
     return max(steps, default=1)
 
 
-def _means(radius_mm: NDArray[np.float32], row: Int, half: int, step: int) -> Float:
+def _means(radius_mm: Float32, row: Int, half: int, step: int) -> Float:
     """Return the means (n, m) about some cells of what was measured; NaN where nothing was."""
     out = np.full((len(row), radius_mm.shape[1] // step), np.nan)
     for k, i in enumerate(row):
@@ -159,7 +156,7 @@ def _means(radius_mm: NDArray[np.float32], row: Int, half: int, step: int) -> Fl
     return out
 
 
-def _largest_error(radius_mm: NDArray[np.float32], row: Int, step: int, coarse: Float) -> float:
+def _largest_error(radius_mm: Float32, row: Int, step: int, coarse: Float) -> float:
     """Return by how much the fine map differs from the coarse one most, tested at every fourth cell."""
     rows = np.arange(row[0], row[-1] + 1, _TESTED)
     columns = np.arange(0, radius_mm.shape[1], _TESTED)

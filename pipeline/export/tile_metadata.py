@@ -11,13 +11,12 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import RadiusMap
 from pipeline.export.glb_builder import GlbBuilder
 
-Float = NDArray[np.float64]
 Json = dict[str, Any]
 FEATURES, METADATA = "EXT_mesh_features", "EXT_structural_metadata"
 _NOT_MEASURED = -1.0
@@ -94,7 +93,7 @@ def near(defects: Sequence[Defect], from_mm: float, to_mm: float) -> list[Defect
     return [d for d in defects if d.distance_to_mm >= from_mm and d.distance_from_mm <= to_mm]
 
 
-def defect_at(defects: Sequence[Defect], distance_mm: Float, azimuth_rad: Float) -> NDArray[np.int64]:
+def defect_at(defects: Sequence[Defect], distance_mm: Float, azimuth_rad: Float) -> Int:
     """Return (N,) which of the defects holds each place in its outline, their number where none does."""
     # matplotlib is slow to import: a run is under way by then.
     from matplotlib.path import Path as Outline

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 import pygltflib as gltf
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import PipeAxis, RadiusMap, Wall, WallTexture
 from pipeline.artefacts.model import MeshTile, Overlays, TexturedMesh
@@ -28,7 +28,6 @@ from pipeline.export.tile_levels import Flat, coarse_tile, flat_of, joined, shru
 from pipeline.geometry.axis import to_pipe
 from pipeline.recording.base import Recording
 
-Float = NDArray[np.float64]
 Json = dict[str, Any]
 _MOST_STRETCHES = 16
 # Viewers refine where an error shows as some 16 px or more; a texel counts as an error eight times as large.
@@ -147,7 +146,7 @@ class _Writer:
         return f"{level}/{number:05d}.glb"
 
     def _write(
-        self, tile: MeshTile, stretch: NDArray[np.int64], facts: Sequence[metadata.StretchFacts], path: str
+        self, tile: MeshTile, stretch: Int, facts: Sequence[metadata.StretchFacts], path: str
     ) -> Float:
         """Write a content; return its box (2, 3) in the tileset's coordinates, m."""
         file = self.folder / path
@@ -168,7 +167,7 @@ class _Writer:
         return _box(tile.vertex_p)
 
 
-def _box(vertex_p: NDArray[np.float32]) -> Float:
+def _box(vertex_p: Float32) -> Float:
     """Return lower and upper corner (2, 3), m; P's z is the tileset's y, P's −y its z."""
     x, y, z = vertex_p.astype(float).T / 1000
     place = np.stack([x, z, -y], -1)

@@ -8,7 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pipeline.artefacts.measured import Byte, WallTexture
+from pipeline.arrays import Byte
+from pipeline.artefacts.measured import WallTexture
 
 _GAMMA = 2.2
 _MOST_ROWS = 16384

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import PipeAxis
 
-Float = NDArray[np.float64]
 _STEPS, _NEAR_MM = 6, 1e-7
 
 

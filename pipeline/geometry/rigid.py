@@ -6,9 +6,8 @@ Formulas: J. Solà et al., "A micro Lie theory for state estimation in robotics"
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
 
 
 def skew(w: Float) -> Float:

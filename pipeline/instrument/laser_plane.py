@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.instrument.laser import LaserSheet
 
-Float = NDArray[np.float64]
 NAME = "calibrate-laser"
 _STEEPEST = 1.0
 

@@ -11,13 +11,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
 
-Float = NDArray[np.float64]
 AZIMUTHS = 720
 
 

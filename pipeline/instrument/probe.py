@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.files.yaml_file import Section, read_yaml
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
@@ -23,7 +23,6 @@ from pipeline.instrument.stated_uncertainty import (
 from pipeline.machine.codec import Json
 from pipeline.machine.provenance import MadeBy
 
-Float = NDArray[np.float64]
 _KEYS = (
     "camera", "laser", "shutter", "lighting", "standard_uncertainty", "covariance", "calibrated_from",
     "made_by",

@@ -11,13 +11,12 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.files.yaml_file import Section
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 
-Float = NDArray[np.float64]
 UNCERTAINTY_KEYS = (
     "focal_px", "centre_px", "distortion", "baseline_mm", "tilt_deg", "opening_angle_deg", "decentre_mm",
     "waviness_rad", "encoder_scale",

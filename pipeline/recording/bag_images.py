@@ -7,7 +7,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from pipeline.recording.base import Image, Planes
+from pipeline.arrays import Image
+from pipeline.recording.base import Planes
 from pipeline.recording.still import decode_still
 
 COMPRESSED_TYPE = "sensor_msgs/msg/CompressedImage"

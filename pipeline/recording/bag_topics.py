@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Int
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import Section
 from pipeline.recording.bag_file import Bag
 from pipeline.recording.bag_images import IMAGE_TYPES
-from pipeline.recording.base import Encoder, FrameTable, Illumination, Int
+from pipeline.recording.base import Encoder, FrameTable, Illumination
 from pipeline.recording.checks import refuse_backward
 
 IMAGE_TOPICS = ("/camera/image_raw", "/camera/image_raw/compressed", "/camera/image/compressed")

@@ -11,11 +11,9 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Image, Int
 from pipeline.recording.input_file import InputFile
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Image = NDArray[np.uint8]
 Planes = Literal["grey", "bgr"]
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
-from pipeline.recording.base import Encoder, Float, FrameTable, Recording
+from pipeline.recording.base import Encoder, FrameTable, Recording
 
 # A step of the encoder counts as a jump when it is this many times the usual largest, and this long.
 _JUMP_FACTOR, _JUMP_MM = 10.0, 1.0

@@ -15,10 +15,11 @@ from pathlib import Path
 import av
 import numpy as np
 
+from pipeline.arrays import Int
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import Section
 from pipeline.recording import open_recording
-from pipeline.recording.base import Encoder, FrameTable, Int, Recording
+from pipeline.recording.base import Encoder, FrameTable, Recording
 from pipeline.recording.description import inside, required_file
 from pipeline.recording.folder import (
     DESCRIPTION,

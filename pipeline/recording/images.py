@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
-from pipeline.recording.base import Image, Int, Planes
+from pipeline.recording.base import Planes
 from pipeline.recording.selection import ascending, decoded_ahead
 from pipeline.recording.still import EXPECTED, decode_still
 

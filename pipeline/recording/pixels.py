@@ -6,9 +6,9 @@ import av
 import cv2
 import numpy as np
 from av.video.reformatter import ColorRange, Colorspace
-from numpy.typing import NDArray
 
-from pipeline.recording.base import Image, Planes
+from pipeline.arrays import Float, Image
+from pipeline.recording.base import Planes
 
 # Luma weights (red, blue) of ITU-R BT.709 and BT.601; swscale takes 601 where a stream names none.
 _BT709, _BT601 = (0.2126, 0.0722), (0.299, 0.114)
@@ -50,7 +50,7 @@ def _bgr_444(frame: av.VideoFrame) -> Image:
     return np.asarray(cv2.transform(yuv, _yuv_to_bgr(weights, full)), np.uint8)
 
 
-def _yuv_to_bgr(weights: tuple[float, float], full: bool) -> NDArray[np.float64]:
+def _yuv_to_bgr(weights: tuple[float, float], full: bool) -> Float:
     """Return the (3, 4) matrix from Y, U, V, 1 to B, G, R (ITU-R BT.601-7 and BT.709-6)."""
     red, blue = weights
     green = 1 - red - blue

@@ -7,8 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from pipeline.arrays import Int
 from pipeline.machine.threads import in_threads
-from pipeline.recording.base import Int
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")

@@ -6,7 +6,8 @@ from typing import cast
 
 import av
 
-from pipeline.recording.base import Image, Planes
+from pipeline.arrays import Image
+from pipeline.recording.base import Planes
 from pipeline.recording.pixels import pixels
 
 _CODECS = {b"\x89PNG": "png", b"\xff\xd8\xff": "mjpeg", b"BM": "bmp", b"RIFF": "webp"}

@@ -12,9 +12,10 @@ from typing import Protocol
 import av
 import numpy as np
 
+from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
 from pipeline.recording.background import in_background
-from pipeline.recording.base import FrameTable, Image, Int, Planes
+from pipeline.recording.base import FrameTable, Planes
 from pipeline.recording.pixels import pixels
 from pipeline.recording.selection import ascending, complete
 from pipeline.recording.video_index import VideoIndex, list_frames

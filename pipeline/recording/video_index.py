@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import av
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.recording.base import Int
+from pipeline.arrays import Bool, Int
 from pipeline.recording.ffv1 import checksums_hold
 from pipeline.recording.h264 import is_reference, length_bytes
 
@@ -45,7 +44,7 @@ class VideoIndex:
     keyframes: Int
     timed: bool
     broken: Int
-    expendable: NDArray[np.bool_]
+    expendable: Bool
 
     @property
     def intra(self) -> bool:

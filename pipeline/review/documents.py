@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.artefacts.findings import DefectKind
 from pipeline.artefacts.measured import Trajectory
@@ -23,7 +22,6 @@ from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
 
-Float = NDArray[np.float64]
 _LEGEND_STEPS = 64
 
 

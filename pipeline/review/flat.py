@@ -8,15 +8,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.export.unrolled import display_colours
-
-Float = NDArray[np.float64]
-Byte = NDArray[np.uint8]
 
 TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
 _PAPER = 235

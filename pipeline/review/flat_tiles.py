@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import InputError
 from pipeline.export.unrolled import display_colours
 from pipeline.review.run_files import RunFiles
 
-Byte = NDArray[np.uint8]
 TILE_PX = 512
 PHOTO = "photo"
 # A shrunk pixel is the mean of this many samples each way, so that an overview need not read everything.

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import BoresightError, InputError
@@ -19,7 +20,6 @@ from pipeline.recording.base import Recording
 from pipeline.recording.checks import refuse_changed
 from pipeline.review.run_files import RunFiles
 
-Float = NDArray[np.float64]
 _QUALITY = 88
 # A wall spot is seen best well off the axis, where texture is largest, yet away from the picture's rim.
 _BEST_POLAR_RAD = 1.05
@@ -136,13 +136,13 @@ class FrameFinder:
         laser = self.probe.laser
         return np.asarray(spot_c[:, 2] - laser.height(azimuth) - rho * laser.slope(azimuth))
 
-    def _near(self, spot_p: Float) -> NDArray[np.int64]:
+    def _near(self, spot_p: Float) -> Int:
         """Return the frames taken from near a spot, or all: long runs have hundreds of thousands."""
         away = np.linalg.norm(self.trajectory.T_pc[:, :3, 3] - spot_p, axis=1)
         near = np.flatnonzero(away < _NEAR_RADII * self.radius_mm)
         return near if len(near) else np.arange(len(away))
 
-    def _illumination(self, near: NDArray[np.int64]) -> NDArray[np.str_]:
+    def _illumination(self, near: Int) -> NDArray[np.str_]:
         frames = self.recording.frames
         return np.asarray(frames.illumination[np.searchsorted(frames.frame, self.trajectory.frame[near])])
 

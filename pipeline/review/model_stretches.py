@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte
 from pipeline.artefacts.measured import PipeAxis, Trajectory
 from pipeline.errors import InputError
 from pipeline.files.disk import FileStamp, stamp_of
@@ -56,7 +56,7 @@ class StretchedModel:
 
     file: Path
     document: Json
-    binary: NDArray[np.uint8]
+    binary: Byte
     axis: PipeAxis
 
     def stretches(self) -> tuple[Stretch, ...]:
@@ -138,7 +138,7 @@ def read_model(file: Path, axis: PipeAxis) -> StretchedModel:
         document: Json = parse_json(text)
         if not document["meshes"][0]["primitives"]:
             raise InputError(file, "is a model without a wall")
-        binary: NDArray[np.uint8] = np.memmap(file, np.uint8, "r", offset=20 + length + 8)
+        binary: Byte = np.memmap(file, np.uint8, "r", offset=20 + length + 8)
     return StretchedModel(file, document, binary, axis)
 
 
@@ -153,7 +153,7 @@ def _as_written(file: Path) -> Iterator[None]:
         ) from error
 
 
-def _alone(document: Json, primitive: Json, binary: NDArray[np.uint8]) -> tuple[Json, bytes]:
+def _alone(document: Json, primitive: Json, binary: Byte) -> tuple[Json, bytes]:
     """Return a document with one primitive and nothing that it does not use, and its buffer."""
     mappings = primitive["extensions"][_VARIANTS]["mappings"]
     materials = [m["material"] for m in mappings]
@@ -190,7 +190,7 @@ def _with_texture(material: Json, index: int) -> Json:
     }
 
 
-def _buffer(document: Json, views: list[int], binary: NDArray[np.uint8]) -> tuple[bytes, list[Json]]:
+def _buffer(document: Json, views: list[int], binary: Byte) -> tuple[bytes, list[Json]]:
     """Return the bytes of views, aligned to four, and the views of the new buffer."""
     parts, packed, at = [], [], 0
     for number in views:

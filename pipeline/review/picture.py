@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float, Int
 from pipeline.artefacts.model import MeshTile, TexturedMesh
 from pipeline.machine.native import open3d
-
-Float = NDArray[np.float64]
-Byte = NDArray[np.uint8]
 
 _GAMMA = 2.2
 _SUPERSAMPLING = 2
@@ -49,8 +46,8 @@ class _Hits:
     """What rays (N,) met: distance, tile (−1: nothing), face within the tile, barycentric weights (N, 3)."""
 
     distance: Float
-    tile: NDArray[np.int64]
-    face: NDArray[np.int64]
+    tile: Int
+    face: Int
     weight: Float
 
 
@@ -129,7 +126,7 @@ def _cast(mesh: TexturedMesh, eye_p: Float, ray: Float) -> _Hits:
     return _Hits(distance, tile_number, face, np.column_stack([1 - uv.sum(1), uv]))
 
 
-def _texels(tile: MeshTile, hits: _Hits, rays: NDArray[np.int64], variant: str) -> Float:
+def _texels(tile: MeshTile, hits: _Hits, rays: Int, variant: str) -> Float:
     """Return linear colours (N, 3) of a variant where rays hit."""
     if variant == "photo":
         picture = tile.photo_bgr
@@ -153,9 +150,7 @@ def _texels(tile: MeshTile, hits: _Hits, rays: NDArray[np.int64], variant: str) 
     return np.asarray((sampled / 255.0) ** _GAMMA)
 
 
-def _light(
-    tile: MeshTile, hits: _Hits, rays: NDArray[np.int64], point: Float, ray: Float, view: View
-) -> Float:
+def _light(tile: MeshTile, hits: _Hits, rays: Int, point: Float, ray: Float, view: View) -> Float:
     """Return the brightness (N,) of matt wall under all lights, on the side that is seen."""
     normal = np.einsum("nk,nkj->nj", hits.weight[rays], tile.normal_p[tile.face[hits.face[rays]]])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32
 from pipeline.artefacts.findings import Sections
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.errors import InputError
@@ -19,7 +19,6 @@ from pipeline.review.documents import cleaned
 from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.run_files import RunFiles
 
-Float = NDArray[np.float64]
 _MOST_POINTS = 600
 _LARGEST_PAGE = 64 << 20
 _PICTURE = re.compile(r"data:image/(png|jpeg);base64,[A-Za-z0-9+/=]+")
@@ -54,7 +53,7 @@ def _wall_plots(wall: MeasuredWall) -> list[dict[str, Any]]:
     ]
 
 
-def _median_of_rows(values: NDArray[np.float32]) -> Float:
+def _median_of_rows(values: Float32) -> Float:
     out = np.full(len(values), np.nan)
     known = np.isfinite(values).any(1)
     out[known] = np.nanmedian(values[known], 1)

@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.files.yaml_file import Section
 from pipeline.instrument.probe import Probe
@@ -25,7 +24,6 @@ from pipeline.simulator.wall.base import Wall
 from pipeline.simulator.wall.build import build_wall
 from pipeline.simulator.wall.facts import facts_of
 
-Float = NDArray[np.float64]
 _INSTRUMENT_STREAM = 1
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import transform
 from pipeline.simulator.instrument import TrueInstrument
@@ -16,7 +16,6 @@ from pipeline.simulator.sheet import sheet_rays
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.base import Wall
 
-Float = NDArray[np.float64]
 _SEARCH_PX = (20.0, 900.0)
 _SEARCH_STEP_PX = 4.0
 _BISECTIONS, _NEWTON = 34, 12

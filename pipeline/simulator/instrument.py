@@ -8,16 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Shutter
 from pipeline.simulator.profile import LineProfile
 from pipeline.simulator.window import Window
 
-Float = NDArray[np.float64]
 Bgr = tuple[float, float, float]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32
 from pipeline.simulator.instrument import LedRing
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.light import REFERENCE_MM
@@ -16,8 +16,6 @@ from pipeline.simulator.surface import Surface
 from pipeline.simulator.texture import albedo_at, sheen_at
 from pipeline.simulator.view import View, Work, new_work, to_wall
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
 _CLOSE_MM = 5e-4
 _PATCH_PX = 16

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Float32
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.meet import meet, normal_at
 from pipeline.simulator.rays import part_ray_at, ray_at
@@ -12,9 +12,6 @@ from pipeline.simulator.sheet import density_at, sheet_at
 from pipeline.simulator.texture import Texture, albedo_at, sheen_at
 from pipeline.simulator.view import TILE_PX, Line, View, Work, new_work, to_wall
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 Speckle = tuple[float, float, int]
 
 REFERENCE_MM = 50.0
@@ -23,7 +20,7 @@ _CLOSE_MM = 2e-5
 
 
 def add_line(
-    view: View, line: Line, colour: Float, speckle: Speckle, tiles: Mask, samples: int, v_from: int,
+    view: View, line: Line, colour: Float, speckle: Speckle, tiles: Bool, samples: int, v_from: int,
     v_to: int, image: Float32,
 ) -> None:  # fmt: skip
     """Add a line's light to rows v_from … v_to of an image (H, W, 3), in the tiles that it may touch.
@@ -35,7 +32,7 @@ def add_line(
 
 @kernel
 def _add_rows(
-    view: View, line: Line, colour: Float, speckle: Speckle, tiles: Mask, samples: int, v_from: int,
+    view: View, line: Line, colour: Float, speckle: Speckle, tiles: Bool, samples: int, v_from: int,
     v_to: int, work: Work, total: Float, image: Float32,
 ) -> None:  # fmt: skip
     times = view.pose.shape[1]

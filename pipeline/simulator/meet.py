@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.surface import NEAR_BLOCKS, WIDE_BLOCKS, Surface
 
-Float = NDArray[np.float64]
 # A step of a ray stays within the blocks that a floor looks ahead by so much, mm.
 _SPARE = 0.1
 _FINE_MM = 0.3

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import frames_at
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.recording.base import Encoder
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.simulator.motion import Motion, Signal, Wave
 from pipeline.simulator.scene import MotionScene, SwayScene
 
-Float = NDArray[np.float64]
 _KNOTS_AN_EASING = 8
 _FINE = 16
 

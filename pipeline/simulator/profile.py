@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import exponnorm
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
+
 _LARGEST_SKEWNESS = 1.9
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.window import through
 
-Float = NDArray[np.float64]
 _STEP_PX = 8
 _MARGIN = 2
 _DECENTRING_STEPS = 20

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import av
 import cv2
-import numpy as np
 import yaml
 from av.container import OutputContainer
 from av.video.stream import VideoStream
-from numpy.typing import NDArray
 
+from pipeline.arrays import Image
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named
 from pipeline.instrument.probe_file import write_probe
@@ -22,7 +21,6 @@ from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from pipeline.simulator.render import Renderer
 from pipeline.simulator.truth import SceneTruth
 
-Image = NDArray[np.uint8]
 Codec = str
 _VIDEO = {"h264": "frames.mkv", "ffv1": "frames.mkv", "png": "frames/%06d.png"}
 

@@ -8,8 +8,8 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Image
 from pipeline.recording.base import Illumination
 from pipeline.simulator.instrument import TrueCamera, TrueInstrument, TrueSensor
 from pipeline.simulator.lamps import Lamps, add_wall_light, lamps_of, stray_light
@@ -23,9 +23,6 @@ from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.view import Line, View, line_of, line_tiles
 from pipeline.simulator.workers import in_bands
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Image = NDArray[np.uint8]
 _SHEET_MOMENTS = 5
 
 

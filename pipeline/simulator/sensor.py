@@ -6,16 +6,14 @@ from functools import cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from pipeline.arrays import Float32, Image
 from pipeline.simulator.instrument import TrueSensor
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.light import hashed
 from pipeline.simulator.workers import in_bands
 
-Float32 = NDArray[np.float32]
-Image = NDArray[np.uint8]
 _VEIL_SHRINK = 8
 _QUANTILES = 1 << 16
 

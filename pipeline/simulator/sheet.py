@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.instrument import TrueLaser
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.meet import meet, normal_at
@@ -14,7 +14,6 @@ from pipeline.simulator.profile import LineProfile
 from pipeline.simulator.surface import Surface
 from pipeline.simulator.window import through
 
-Float = NDArray[np.float64]
 _NODES = 1440
 _PROFILE_NODES = 4001
 _CLOSE_MM = 2e-5

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
+from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.rigid import from_parts, inverse
 from pipeline.simulator.wall.base import Wall
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 # Blocks of a millimetre that the two floors look ahead.
 NEAR_BLOCKS, WIDE_BLOCKS = 2, 32
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Int
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.wall.base import Wall
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int64]
 _LEVELS = 6
 _SHEEN_NODES = 4097
 

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from pipeline.simulator.instrument import Change, TrueInstrument
 from pipeline.simulator.motion import Motion, Odometer
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.wall.base import Wall
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

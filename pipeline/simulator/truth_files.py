@@ -8,7 +8,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.simulator.scene import Scene, write_scene
 from pipeline.simulator.truth import SceneTruth
@@ -16,7 +15,6 @@ from pipeline.simulator.wall.base import Wall
 from pipeline.simulator.wall.description import Defect, Pipe, Weld
 from pipeline.simulator.wall.fiducials import markers_of
 
-Float = NDArray[np.float64]
 _JPEG_QUALITY = 95
 _JPEG_LARGEST = 65000
 _PIXELS_AT_A_TIME = 1024

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
+from pipeline.arrays import Bool, Float
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.meet import meet
 from pipeline.simulator.rays import RayTable, ray_at
@@ -15,8 +15,6 @@ from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
 from pipeline.simulator.surface import Surface
 from pipeline.simulator.texture import Texture
 
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 TILE_PX = 8
 _CLOSE_MM = 1e-3
 
@@ -83,7 +81,7 @@ def line_of(sheet: SheetTable, profile: ProfileTable, surface: Surface) -> Line:
     return Line(sheet, profile, float(moved.max()))
 
 
-def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Mask:
+def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Bool:
     """Return which tiles (rows, columns) of the picture a line may touch."""
     rows, columns = -(-size[1] // TILE_PX), -(-size[0] // TILE_PX)
     touched = np.zeros((rows, columns), bool)
@@ -97,7 +95,7 @@ def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Ma
     return np.asarray(binary_dilation(touched, np.ones((3, 3), bool)))
 
 
-def _crossed(height: Float, low: float, high: float) -> Mask:
+def _crossed(height: Float, low: float, high: float) -> Bool:
     """Return the tiles between whose corners the height above the sheet comes into the profile's reach."""
     corner = np.stack([height[:-1, :-1], height[:-1, 1:], height[1:, :-1], height[1:, 1:]])
     finite = np.isfinite(corner)

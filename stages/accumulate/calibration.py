@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.geometry.axis import frames_at
 from pipeline.instrument.probe import Probe
 from stages.accumulate.grid import MapGrid
 from stages.accumulate.survey import RingSurvey
 
-Float = NDArray[np.float64]
 _AZIMUTHS = 72
 _RINGS = 24
 _EVERY = 500
@@ -55,7 +54,7 @@ def calibration_spread(
     return CalibrationSpread(survey.middle_mm[some], np.stack(profiles))
 
 
-def _nearest(distance: Float, wanted: Float) -> NDArray[np.int64]:
+def _nearest(distance: Float, wanted: Float) -> Int:
     """Return for each wanted distance the index of the nearest of the distances, in any order."""
     order = np.argsort(distance, kind="stable")
     middle = (distance[order][1:] + distance[order][:-1]) / 2

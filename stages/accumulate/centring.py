@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from pipeline.arrays import Float
 from stages.accumulate.samples import WallSamples
 
-Float = NDArray[np.float64]
 _ITERATIONS = 12
 _REDESCENT = 2.5
 _FEWEST = 0.5

@@ -12,15 +12,13 @@ from functools import partial
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from pipeline.arrays import Float, Float32, Int
 from pipeline.machine.threads import in_threads
 from stages.accumulate.samples import WallSamples
 from stages.accumulate.survey import RingSurvey
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 _BLOCK, _THREADS = 64, 2
 _WIDTH_IN_RINGS = 0.4
 _FINE_CELLS = (9, 9)
@@ -55,7 +53,7 @@ class RingColumns:
     radius_mm: Float
     variance: Float
     misalignment_mm: Float
-    count: NDArray[np.int64]
+    count: Int
 
     def every_other(self, first: int) -> RingColumns:
         """Return every second ring of each column."""
@@ -105,7 +103,7 @@ def rings_on_columns(parts: Iterable[WallSamples], rings: int, grid: MapGrid) ->
 
 def gridded(
     columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float
-) -> tuple[Float32, Float32, NDArray[np.int64], Float32]:
+) -> tuple[Float32, Float32, Int, Float32]:
     """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen.
 
     The noise of single samples does not tell all: speckle is alike in neighbouring azimuths and each ring has
@@ -122,7 +120,7 @@ def gridded(
 
 def _map_of(
     columns: RingColumns, grid: MapGrid, width: float, gap: float
-) -> tuple[Float32, Float32, NDArray[np.int64], Float32]:
+) -> tuple[Float32, Float32, Int, Float32]:
     shape = (len(grid.distance_mm), len(grid.azimuth_rad))
     radius, sigma, misalignment = (np.full(shape, np.nan, np.float32) for _ in range(3))
     count = np.zeros(shape, np.int64)

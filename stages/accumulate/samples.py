@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -35,8 +32,8 @@ class WallSamples:
         The pipe's section frame at each sample.
     """
 
-    frame: NDArray[np.int64]
-    valid: NDArray[np.bool_]
+    frame: Int
+    valid: Bool
     xyz_p: Float
     distance_mm: Float
     azimuth_rad: Float

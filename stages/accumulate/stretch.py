@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall
 from pipeline.machine.scratch import Scratch
 from stages.accumulate.calibration import CalibrationSpread
 from stages.accumulate.centring import centred
 from stages.accumulate.grid import MapGrid, gridded, rings_on_columns
-from stages.accumulate.samples import Float, Int, RingsOnWall, WallSamples
+from stages.accumulate.samples import RingsOnWall, WallSamples
 from stages.accumulate.survey import RingSurvey, some_at_a_time
 
 _ROWS = 1000
@@ -138,7 +138,7 @@ def _cloud(samples: WallSamples, radius_map: RadiusMap) -> PointCloud:
     )  # fmt: skip
 
 
-def _nearest(samples: WallSamples, radius_map: RadiusMap, ok: NDArray[np.bool_]) -> tuple[Int, Int]:
+def _nearest(samples: WallSamples, radius_map: RadiusMap, ok: Bool) -> tuple[Int, Int]:
     s, a = radius_map.distance_mm, radius_map.azimuth_rad
     row = np.clip(np.rint((samples.distance_mm[ok] - s[0]) / (s[1] - s[0])), 0, len(s) - 1).astype(np.int64)
     column = np.rint((samples.azimuth_rad[ok] - a[0]) / (a[1] - a[0])).astype(np.int64) % len(a)

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from stages.accumulate.centring import first_harmonic, slow
-from stages.accumulate.samples import Float, Int, RingsOnWall, WallSamples
+from stages.accumulate.samples import RingsOnWall, WallSamples
 
 _AT_ONCE = 512
 
@@ -66,7 +66,7 @@ def _of(samples: WallSamples) -> tuple[Float, ...]:
     )  # fmt: skip
 
 
-def _over(summary: Callable[..., NDArray[np.float64]], s: Float, any_seen: NDArray[np.bool_]) -> Float:
+def _over(summary: Callable[..., Float], s: Float, any_seen: Bool) -> Float:
     out = np.full(len(s), np.nan)
     out[any_seen] = summary(s[any_seen], axis=1)
     return out

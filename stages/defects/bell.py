@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pipeline.arrays import Float
 from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
-
-Float = NDArray[np.float64]
 
 _MARGIN_MM = 2.5
 _LEAST = 24

@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.artefacts.findings import DefectKind
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
-
-Float = NDArray[np.float64]
 
 _SMALL_MM2 = 60.0  # below this a quartic surface follows everything
 _UNKNOWN_ROUGHNESS = 0.08

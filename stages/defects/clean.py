@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from stages.defects.harmonics import MAD
 from stages.defects.relief import Typical
 from stages.defects.segment import Region
 from stages.defects.surface import MeasuredWall
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _TRIES = 40
 _CLEAR_MM = 3.0
@@ -33,7 +30,7 @@ class CleanWall:
     """
 
     local_mm: Float
-    clean: Mask
+    clean: Bool
     scale: float
 
     def draw(self, shape: tuple[int, int], random: np.random.Generator) -> Float:
@@ -52,7 +49,7 @@ class CleanWall:
         return np.asarray(best * self.scale * (1 if random.random() < 0.5 else -1))
 
 
-def _reflected(i: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def _reflected(i: Int, count: int) -> Int:
     period = max(1, 2 * count - 2)
     return np.asarray(np.minimum(i % period, period - i % period), np.int64)
 
@@ -64,7 +61,7 @@ def clean_wall(wall: MeasuredWall, regions: tuple[Region, ...]) -> CleanWall:
     return CleanWall(local, clean, _noise_share(wall.relief.typical, local[clean]))
 
 
-def _sampled(wall: MeasuredWall, rows: slice, regions: tuple[Region, ...]) -> tuple[Float, Mask]:
+def _sampled(wall: MeasuredWall, rows: slice, regions: tuple[Region, ...]) -> tuple[Float, Bool]:
     part = wall.with_margin(rows)
     wanted = np.zeros((part.wide.stop - part.wide.start, wall.relief.shape[1]), bool)
     wanted[part.inner] = True

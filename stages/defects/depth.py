@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from stages.defects.bell import fit_bell
@@ -14,8 +13,6 @@ from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
-
-Float = NDArray[np.float64]
 
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from pipeline.arrays import Byte, Float, Int
 from pipeline.artefacts.findings import Defect, DefectKind, clock_of_azimuth
 from pipeline.artefacts.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
 from pipeline.artefacts.measured import PointCloud, WallTexture
@@ -17,10 +17,6 @@ from stages.defects.depth import Depth
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Byte = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from pipeline.arrays import Bool, Float
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
 from stages.defects.relief import Relief, WallRelief
 from stages.defects.stretch import stretches, widened
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
@@ -49,7 +46,7 @@ class Weighed:
 
     signal: Float
     weight: Float
-    seen: Mask
+    seen: Bool
 
 
 @dataclass(frozen=True)
@@ -92,8 +89,8 @@ class Detection:
         Typical 1 σ of the height of a bump of 3 mm × 3 mm.
     """
 
-    into: Mask
-    inward: Mask
+    into: Bool
+    inward: Bool
     threshold: float
     small_sigma_mm: float
 

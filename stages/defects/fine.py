@@ -6,14 +6,10 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PointCloud
 from stages.defects.relief import Relief
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 _AROUND_MM = 0.45  # 1 σ of the kernel around the pipe: within a ring, samples lie close
 _LEAST = 12
@@ -45,7 +41,7 @@ class DeviationPoints:
         return max(0.4, 0.55 * self.spacing_mm), _AROUND_MM
 
 
-def fine_surface(relief: Relief, points: DeviationPoints, wanted: Mask, coarse_mm: Float) -> Float:
+def fine_surface(relief: Relief, points: DeviationPoints, wanted: Bool, coarse_mm: Float) -> Float:
     """Return the 1 mm mean (S, A) of ``relief.all_mm`` by local quadratic regression on the points.
 
     A local quadratic has no bias from a peak's curvature (Fan & Gijbels, Local polynomial modelling and its

@@ -6,19 +6,15 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import label
 
+from pipeline.arrays import Bool, Float, Float32
 from pipeline.machine.scratch import Scratch
 from stages.defects.detect import Detection
 from stages.defects.harmonics import MAD
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import WallRelief
 from stages.defects.stretch import stretches, widened
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Mask = NDArray[np.bool_]
 
 _EIGHT = np.ones((3, 3), int)
 _REACH_MM = 80.0
@@ -30,8 +26,8 @@ _BLOCK = 64
 class Grown:
     """Cells (S, A) of all defects into the wall, and of all inward ones."""
 
-    into: Mask
-    inward: Mask
+    into: Bool
+    inward: Bool
 
 
 def grown(relief: WallRelief, seeds: Detection, parameters: DefectParameters, scratch: Scratch) -> Grown:
@@ -54,7 +50,7 @@ def grown(relief: WallRelief, seeds: Detection, parameters: DefectParameters, sc
     return Grown(into, inward)
 
 
-def footprint(relief: WallRelief, cells: Grown, scratch: Scratch) -> Mask:
+def footprint(relief: WallRelief, cells: Grown, scratch: Scratch) -> Bool:
     """Return the cells (S, A) of all local defects with a margin for their feet."""
     out = scratch.zeros(relief.shape, bool)
     for part in stretches(relief.shape[0], relief.rows_in(_FOOT_MM)):
@@ -63,7 +59,7 @@ def footprint(relief: WallRelief, cells: Grown, scratch: Scratch) -> Mask:
     return out
 
 
-def joined(mask: Mask, cell_mm: tuple[float, float], gap_mm: float) -> Mask:
+def joined(mask: Bool, cell_mm: tuple[float, float], gap_mm: float) -> Bool:
     """Return the mask closed over gaps of ``gap_mm``, by which cells are told to be of one defect."""
     reach = [max(0, round(gap_mm / 2 / c)) for c in cell_mm]
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach[1] + 1, 2 * reach[0] + 1))
@@ -97,7 +93,7 @@ class Hills:
         """Return the height of some rows (rows, A); −1 where nothing was measured."""
         return np.nan_to_num(self.sign * self.smooth_mm[rows].astype(float), nan=-1.0)
 
-    def grown(self, seeds: Mask, parameters: DefectParameters, scratch: Scratch) -> Mask:
+    def grown(self, seeds: Bool, parameters: DefectParameters, scratch: Scratch) -> Bool:
         """Return all cells (S, A) of the hills on which some of ``seeds`` stand, from the highest down."""
         out, left = (scratch.zeros(seeds.shape, bool) for _ in range(2))
         least = max(self.foot_mm, 0.75 * parameters.min_depth_mm)
@@ -110,18 +106,18 @@ class Hills:
                 tops[k] = self._top(left, k)
         return out
 
-    def _top(self, left: Mask, block: int) -> float:
+    def _top(self, left: Bool, block: int) -> float:
         """Return the greatest height of a block's cells that are left, 0 when none is."""
         rows = slice(block * _BLOCK, min((block + 1) * _BLOCK, len(left)))
         return float(np.where(left[rows], self.height(rows), 0.0).max()) if left[rows].any() else 0.0
 
-    def _place(self, left: Mask, block: int) -> tuple[int, int]:
+    def _place(self, left: Bool, block: int) -> tuple[int, int]:
         """Return where in a block the highest cell is that is left."""
         rows = slice(block * _BLOCK, min((block + 1) * _BLOCK, len(left)))
         i, j = divmod(int(np.argmax(np.where(left[rows], self.height(rows), 0.0))), left.shape[1])
         return rows.start + i, j
 
-    def _grow(self, top: tuple[int, int], out: Mask, left: Mask, parameters: DefectParameters) -> slice:
+    def _grow(self, top: tuple[int, int], out: Bool, left: Bool, parameters: DefectParameters) -> slice:
         """Add the hill below a top to ``out``, take it and its skirt from ``left``; return the rows seen."""
         i, j = top
         window = widened(slice(i, i + 1), len(left), self.reach).wide
@@ -136,7 +132,7 @@ class Hills:
         return window
 
 
-def _component(mask: Mask, cell: tuple[int, int]) -> Mask:
+def _component(mask: Bool, cell: tuple[int, int]) -> Bool:
     labels, _ = label(mask, _EIGHT)
     return np.asarray(labels == labels[cell])
 

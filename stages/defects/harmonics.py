@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.ndimage import median_filter
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
 
 MAD = 1.4826
 _HARMONICS = 2

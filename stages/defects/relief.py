@@ -6,16 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RadiusMap
 from stages.defects.harmonics import MAD, basis_of, ring_harmonics, row_median, slow_along
 from stages.defects.parameters import DefectParameters
 from stages.defects.stretch import sample, stretches
 from stages.defects.welds import weld_rows
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ class Relief:
         return along, float(self.azimuth_rad[1] - self.azimuth_rad[0]) * self.radius_mm
 
     @property
-    def seen(self) -> Mask:
+    def seen(self) -> Bool:
         """(S, A) true where the wall was measured."""
         return np.isfinite(self.sigma_mm)
 
@@ -137,7 +134,7 @@ class WallRelief:
 
 
 def smooth_shape_removed(
-    radius_map: RadiusMap, parameters: DefectParameters, known: Mask | None = None
+    radius_map: RadiusMap, parameters: DefectParameters, known: Bool | None = None
 ) -> WallRelief:
     """Return the relief of a wall; ``known`` (S, A) marks defects that are known and kept out of all fits.
 
@@ -209,7 +206,7 @@ def _sigma(local: Float, noise: Float, roughness_mm2: float) -> Float:
     return np.asarray(sigma * excess)
 
 
-def _in_bands(bands: tuple[slice, ...], count: int) -> Mask:
+def _in_bands(bands: tuple[slice, ...], count: int) -> Bool:
     out = np.zeros(count, bool)
     for band in bands:
         out[band] = True

@@ -11,15 +11,13 @@ from scipy.ndimage import find_objects, label
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.machine.scratch import Scratch
 from stages.defects.grow import Grown, joined
 from stages.defects.relief import WallRelief
 from stages.defects.stretch import stretches
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 Labels = NDArray[np.int32]
-Mask = NDArray[np.bool_]
 
 _EIGHT = np.ones((3, 3), int)
 _LONGEST_ROWS = 2000
@@ -42,7 +40,7 @@ class Region:
 
     row: int
     column: int
-    mask: Mask
+    mask: Bool
     sign: float
     all_round: bool = False
 
@@ -74,7 +72,7 @@ def _weld(relief: WallRelief, band: slice) -> Region:
 
 
 def _instances(
-    mask: Mask, sign: float, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch
+    mask: Bool, sign: float, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch
 ) -> list[Region]:
     patches = _patches(mask, cell_mm, gap_mm, scratch)
     out: list[Region] = []
@@ -85,7 +83,7 @@ def _instances(
     return out
 
 
-def _region(cells: Mask, first_row: int, sign: float) -> Iterator[Region]:
+def _region(cells: Bool, first_row: int, sign: float) -> Iterator[Region]:
     """Yield the region of ``cells`` (rows, A), none where there is no cell."""
     if cells.any():
         first = _widest_gap_end(np.asarray(cells.any(0)))
@@ -95,7 +93,7 @@ def _region(cells: Mask, first_row: int, sign: float) -> Iterator[Region]:
         yield Region(first_row + int(rows[0]), first + int(columns[0]), window, sign)
 
 
-def _widest_gap_end(columns: Mask) -> int:
+def _widest_gap_end(columns: Bool) -> int:
     """Return the column after the widest empty stretch of a periodic row, 0 when none is empty."""
     filled = np.flatnonzero(columns)
     gaps = np.diff(np.concatenate([filled, filled[:1] + len(columns)]))
@@ -125,7 +123,7 @@ class Patches:
         return self.patch[self.label[rows]]
 
 
-def _patches(mask: Mask, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch) -> Patches:
+def _patches(mask: Bool, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch) -> Patches:
     """Label what is connected stretch by stretch, and join what meets at the cuts and over the seam."""
     labels = scratch.zeros(mask.shape, np.int32)
     rows_of: list[slice] = []

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from pipeline.arrays import Bool
 
 _ROWS = 1000
 _SAMPLED_ROWS, _BLOCKS = 2048, 16
@@ -34,7 +35,7 @@ def widened(own: slice, rows: int, overlap: int) -> Stretch:
     return Stretch(own, slice(max(0, own.start - overlap), min(rows, own.stop + overlap)))
 
 
-def sample(usable: NDArray[np.bool_]) -> tuple[slice, ...]:
+def sample(usable: Bool) -> tuple[slice, ...]:
     """Return what medians are taken of: a short map, or blocks spread over its ``usable`` rows (S,)."""
     rows, at = len(usable), np.flatnonzero(usable)
     size = _SAMPLED_ROWS // _BLOCKS

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.cloud_along import CloudAlong
 from pipeline.artefacts.measured import PointCloud
 from stages.defects.fine import DeviationPoints, deviation_points, fine_surface
@@ -14,9 +14,6 @@ from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief, WallRelief
 from stages.defects.segment import Region
 from stages.defects.stretch import Stretch, widened
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _MARGIN_MM, _MARGIN_IN_RINGS = 10.0, 3.0
 
@@ -59,7 +56,7 @@ class MeasuredWall:
         margin = self.relief.rows_in(max(_MARGIN_MM, _MARGIN_IN_RINGS * self.spacing_mm))
         return widened(rows, self.relief.shape[0], margin)
 
-    def surface(self, rows: slice, wanted: Mask) -> Surface:
+    def surface(self, rows: slice, wanted: Bool) -> Surface:
         """Return the surface of some rows; where not ``wanted`` (rows, A), the map's own mean stands in."""
         relief = self.relief.rows(rows)
         half = relief.cell_mm[0] / 2

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import find_objects, gaussian_filter1d, label
 
+from pipeline.arrays import Bool, Float
 from stages.defects.harmonics import MAD
 from stages.defects.parameters import DefectParameters
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def weld_rows(
@@ -47,7 +44,7 @@ def _run_around(height: Float, peak: int, level: float, longest: int) -> slice |
     return slice(bead.start + first, bead.stop + first) if bead.stop - bead.start <= longest else None
 
 
-def _runs(mask: Mask) -> list[slice]:
+def _runs(mask: Bool) -> list[slice]:
     labels, _ = label(mask)
     return [rows for (rows,) in find_objects(labels)]
 

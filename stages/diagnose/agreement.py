@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from pipeline.arrays import Float
 from stages.diagnose.inference import DEGREES
 from stages.diagnose.result import Confirmation
 
-Float = NDArray[np.float64]
 # They agree when their difference is no rarer than this.
 AGREE = 1e-3
 # Predictions are good to this part of an effect's size.

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, Part, agreement
@@ -20,7 +20,6 @@ from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
 
-Float = NDArray[np.float64]
 # Below this chance, motion against encoder shows an effect: of 300 recordings without any, with three smooth
 # effects each, a hundredth of one would.
 TRAVEL_FOUND = 1e-5

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from pipeline.arrays import Float
 from stages.diagnose.correct import Correction
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.field.against import floor_px, rings_against_texture
@@ -18,7 +18,6 @@ from stages.diagnose.residual import RingResidual, azimuths_rad, wall_distances_
 from stages.diagnose.result import Diagnosis, FitQuality, Picture, WallPicture
 from stages.diagnose.seen import Seen
 
-Float = NDArray[np.float64]
 Linear = tuple[tuple[EffectModel, Shape, Float], ...]
 
 

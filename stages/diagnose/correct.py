@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import Amplitude, Shape
 from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
@@ -18,7 +18,6 @@ from stages.diagnose.gauge.judge import prior_sigma
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.inference import Stated, estimate
 
-Float = NDArray[np.float64]
 Change = Callable[[dict[str, float], Float, Shape], None]
 
 

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.effects.base import Shape, Travel
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.result import EffectFound
 
-Float = NDArray[np.float64]
 _OF_ENCODER = {
     "encoder_scale": "relative", "encoder_slip": "slip_mm", "encoder_backlash": "backlash_mm",
     "time_offset": "delay_s",

@@ -10,11 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.physics.effect import Channel
 
-Float = NDArray[np.float64]
 INSTRUMENT = "instrument"
 
 

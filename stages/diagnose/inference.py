@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 # Scores are sums over so many independent cells that χ² has heavier tails: those of F.
 DEGREES = 60.0
 _TIED = 1e-6

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from pipeline.arrays import Bool, Float, Int
+
 AZIMUTHS = 72
 WALL_STEP_MM = 2.0
 
@@ -40,7 +39,7 @@ class RingResidual:
     uv: Float
     residual_mm: Float
     residual_px: Float
-    usable: NDArray[np.bool_]
+    usable: Bool
 
     @property
     def rms_px(self) -> float:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float, Int
+
 FORMAT = 1
 
 
@@ -130,7 +130,7 @@ class Candidate:
 class Picture:
     """Residuals over azimuth and frame, mm of radius: (F, A) before and after; NaN where nothing was seen."""
 
-    frame: NDArray[np.int64]
+    frame: Int
     azimuth_rad: Float
     before_mm: Float
     after_mm: Float

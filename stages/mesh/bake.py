@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float, Float32
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
 from pipeline.machine.native import open3d
 from stages.mesh.charts import PADDING_PX, Atlas, Chart, Unrolled
-from stages.mesh.surface import Float, Surface
-
-Byte = NDArray[np.uint8]
+from stages.mesh.surface import Surface
 
 _ERROR_COARSER = 3
 _UNTEXTURED = 55  # linear grey, 128 as sRGB
@@ -24,8 +22,8 @@ _UNTEXTURED = 55  # linear grey, 128 as sRGB
 class TexelPlaces:
     """Pipe coordinates of texels (H, W): distance, mm, and azimuth, rad; NaN where there is no wall."""
 
-    distance_mm: NDArray[np.float32]
-    azimuth_rad: NDArray[np.float32]
+    distance_mm: Float32
+    azimuth_rad: Float32
 
 
 def bake_tile(

@@ -8,9 +8,10 @@ import numpy as np
 import xatlas
 from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import frames_at, to_pipe
-from stages.mesh.surface import Face, Float, Index, Surface
+from stages.mesh.surface import Face, Index, Surface
 
 PADDING_PX = 8
 _LEAST_SECTORS = 4
@@ -34,7 +35,7 @@ class Unrolled:
 
     distance_mm: Float
     azimuth_rad: Float
-    folded: NDArray[np.bool_]
+    folded: Bool
     reference_mm: float
 
 
@@ -141,7 +142,7 @@ def pack(charts: list[Chart], texel_mm: float) -> Atlas:
     return Atlas(tuple(charts), px, (int(width), int(height)))
 
 
-def _box(size: Float) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+def _box(size: Float) -> tuple[Float32, NDArray[np.uint32]]:
     """Return corners and triangles of a rectangle."""
     corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * size
     return corner.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.uint32)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.mesh.surface import Float, Index
+from pipeline.arrays import Bool, Float
+from stages.mesh.surface import Index
 
 Face = NDArray[np.int64]
 
@@ -31,7 +32,7 @@ class OpenMesh:
     vertex_p: Float
     gap_mm: Float
     face: Face
-    joined: NDArray[np.bool_]
+    joined: Bool
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def clip(mesh: OpenMesh, origin_p: Float, normal: Float) -> tuple[OpenMesh, Cut]
     return clipped, cut
 
 
-def _turned(face: Face, chosen: NDArray[np.bool_]) -> Face:
+def _turned(face: Face, chosen: Bool) -> Face:
     """Return triangles (T, 3) turned so that the corner that is ``chosen``, one of each, comes first."""
     first = np.argmax(chosen, axis=1)
     return np.asarray(np.take_along_axis(face, (first[:, None] + np.arange(3)) % 3, axis=1))

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyfqmr
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from pipeline.machine.native import open3d
-from stages.mesh.surface import Float, Surface
+from stages.mesh.surface import Surface
 
 _WORTHWHILE = 0.9
 _AGGRESSIVENESS = 5.0  # how fast dearer collapses are allowed: 7 errs 7 % more, 3 does not reach its goal
@@ -78,7 +78,7 @@ def _collapse(surface: Surface, goal: int) -> Surface:
     return Surface(vertex, face, np.zeros(len(vertex)), _those_of(vertex, surface.vertex_p[surface.locked]))
 
 
-def _those_of(vertex_p: Float, locked_p: Float) -> NDArray[np.bool_]:
+def _those_of(vertex_p: Float, locked_p: Float) -> Bool:
     """Return which vertices (V,) are among the locked ones (L, 3): they have not moved at all."""
     locked = {tuple(v) for v in locked_p}
     return np.array([tuple(v) in locked for v in vertex_p], bool)

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.arrays import Float
 from stages.mesh.clip import Cut, OpenMesh
-from stages.mesh.surface import Float, Index
+from stages.mesh.surface import Index
 
 _SAME_MM = 0.02  # vertices closer than this along a border become one
 _CLOSED = 0.5

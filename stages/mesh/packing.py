@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte
 from pipeline.artefacts.model import MeshTile, PackedTiles
 from pipeline.machine.scratch import Scratch, Spool
 
@@ -26,7 +26,7 @@ class TilePacker:
     _tiles: list[tuple[int, ...]] = field(default_factory=list)
     _distance: list[tuple[float, float]] = field(default_factory=list)
     _variants: tuple[str, ...] = ()
-    _palettes: list[NDArray[np.uint8]] = field(default_factory=list)
+    _palettes: list[Byte] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self._spools = {name: self.scratch.spool(*kind) for name, kind in _ARRAYS.items()}

@@ -10,16 +10,16 @@ from itertools import pairwise
 
 import numpy as np
 import pymeshlab
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.cloud_along import CloudAlong
 from pipeline.artefacts.measured import PipeAxis, PointCloud
 from pipeline.geometry.axis import frames_at
 from pipeline.machine.native import open3d
 from stages.mesh.clip import NO_CUT, NOTHING, OpenMesh, clip
 from stages.mesh.join import join
-from stages.mesh.surface import Float, Surface
+from stages.mesh.surface import Surface
 
 _NEIGHBOURS = 20
 _OUTLIER_SIGMA = 3.0
@@ -115,7 +115,7 @@ def poisson_surface(xyz_p: Float, normal_p: Float, cell_mm: float, reach_mm: flo
     return OpenMesh(vertex, gap, mesh.face_matrix().astype(np.int64), np.zeros(len(vertex), bool))
 
 
-def _without_outliers(xyz_p: Float) -> NDArray[np.int64]:
+def _without_outliers(xyz_p: Float) -> Int:
     o3d = open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz_p))
     _, kept = cloud.remove_statistical_outlier(_NEIGHBOURS, _OUTLIER_SIGMA)

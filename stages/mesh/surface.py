@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import Wall
 from pipeline.geometry.axis import from_pipe
 from pipeline.machine.native import open3d
 
-Float = NDArray[np.float64]
 Face = NDArray[np.int32]
 Index = NDArray[np.int64]
 
@@ -37,7 +37,7 @@ class Surface:
     vertex_p: Float
     face: Face
     allowance_mm: Float
-    locked: NDArray[np.bool_]
+    locked: Bool
 
 
 def row_pieces(rows: int, pieces: int) -> list[slice]:

@@ -6,8 +6,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along
@@ -34,7 +34,6 @@ from stages.motion.windows import MeasuredRun
 
 __all__ = ["MOTION", "MotionParameters", "estimate_motion"]
 
-Float = NDArray[np.float64]
 _LARGEST_CHANGE = 0.1
 _AT_ONCE = 1 << 16
 
@@ -107,7 +106,7 @@ def _strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:
     return StripGrid(radius_mm, columns, near, far)
 
 
-def _index_of(recording: Recording, frame: NDArray[np.int64]) -> NDArray[np.int64]:
+def _index_of(recording: Recording, frame: Int) -> Int:
     """Return the positions of frame numbers in the recording's frame table."""
     return np.asarray(np.searchsorted(recording.frames.frame, frame))
 

@@ -9,15 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import Step
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.equations import Equations, Measurements, Scales, linearised, rescaled, scales_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.state import State
 
-Float = NDArray[np.float64]
 _DOUBTFUL = 0.5  # one σ of any combination of unknowns; derivatives leave out what may be as much
 _LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-12, 1e-7, 1e6
 _FIRST = Scales(3.0, 1.0)
@@ -125,7 +124,7 @@ def _judged_anew(
     return rescaled(equations, measured.tracks, scales), scales
 
 
-def third_difference_sigma(state: State, lit: NDArray[np.int64]) -> Float:
+def third_difference_sigma(state: State, lit: Int) -> Float:
     """Return the robust size (6,) of the pose's third differences, scaled from lit frames to all frames."""
     floor = np.array([1e-4] * 3 + [1e-6] * 3)
     if len(lit) < 8:

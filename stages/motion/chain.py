@@ -12,12 +12,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.stats import chi2
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from pipeline.arrays import Float, Int
 
 
 @dataclass(frozen=True)

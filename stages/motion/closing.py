@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import inverse, transform
 from stages.motion.chain import Chain, Conditioned, interpolated
 from stages.motion.joining import Joined, Laid, one_axis
 from stages.motion.state import moved
 
-Float = NDArray[np.float64]
 _STRETCH_MM = 20.0
 
 

@@ -13,17 +13,13 @@ from enum import Enum
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft2, rfft2
 
+from pipeline.arrays import Bool, Float, Float32, Int
 from stages.motion.matching import cut, match
 from stages.motion.parameters import MotionParameters
 from stages.motion.strip import Strip
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 _LEAST_OVERLAP = 0.3
 _MOST_RIVAL = 0.75
 _FEWEST_SPOTS = 30
@@ -53,7 +49,7 @@ class Piece:
     contrast: Float32
 
     @property
-    def usable(self) -> Mask:
+    def usable(self) -> Bool:
         """Return where (H, W) the wall is seen."""
         return np.isfinite(self.contrast)
 
@@ -213,7 +209,7 @@ def _matched(peak: _Peak, later: Strip, row: Int, column: Int, parameters: Motio
     return Comparison(Verdict.SAME, peak.shift + value, np.hypot(sigma, _LEAST_SIGMA_PX))
 
 
-def _inside(piece: Piece, row: Float, column: Float, parameters: MotionParameters) -> Mask:
+def _inside(piece: Piece, row: Float, column: Float, parameters: MotionParameters) -> Bool:
     """Return whether patches at positions (n,) are seen whole."""
     whole = cv2.erode(piece.usable.astype(np.uint8), np.ones((2 * parameters.patch_half_px + 3,) * 2)) > 0
     i, j = np.rint(row).astype(int), np.mod(np.rint(column).astype(int), whole.shape[1])

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.motion.state import EncoderReadings
 from stages.motion.tracks import Course
 
-Float = NDArray[np.float64]
 _JUMP_MM = 3.0
 _JUMP_TIMES = 5.0
 _LEAST_COVERED = 0.2

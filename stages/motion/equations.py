@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
 from pipeline.adjustment.elimination import by_point_and_pose
 from pipeline.adjustment.robust import Cauchy, GemanMcClure
+from pipeline.arrays import Float
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
@@ -20,7 +20,6 @@ from stages.motion.state import EncoderReadings, State
 from stages.motion.terms import RingBins
 from stages.motion.tracks import Tracks
 
-Float = NDArray[np.float64]
 MATCH_BIASES = 2
 _FINEST_WALL_MM = 0.02
 _REDESCENT = 2.5

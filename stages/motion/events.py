@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
 from pipeline.recording.base import FrameTable
 from stages.motion.tracks import Course
 
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _STOP_SHARE = 0.03
 _SHORTEST_STOP_S = 0.3
 _SLIP_MM = 0.3
@@ -35,20 +33,20 @@ def find_events(
     return tuple(sorted(found, key=lambda e: (e.frame_from, e.kind)))
 
 
-def _runs(mask: Mask) -> Iterator[tuple[int, int]]:
+def _runs(mask: Bool) -> Iterator[tuple[int, int]]:
     """Yield first and last index of each run of true."""
     edge = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     for a, b in zip(edge[::2], edge[1::2], strict=True):
         yield int(a), int(b) - 1
 
 
-def _stops(f: NDArray[np.int64], t: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
+def _stops(f: Int, t: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
     for a, b in _runs(np.abs(speed) < max(_STOP_SHARE * cruise, 0.05)):
         if t[b] - t[a] >= _SHORTEST_STOP_S:
             yield MotionEvent("stop", int(f[a]), int(f[b]), float(t[b] - t[a]), "s", "the probe stood still")
 
 
-def _reversals(f: NDArray[np.int64], z: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
+def _reversals(f: Int, z: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
     moving = np.where(np.abs(speed) > 0.05 * cruise, np.sign(speed), 0)
     main = 1 if z[-1] >= z[0] else -1
     for a, b in _runs(moving == -main):
@@ -57,7 +55,7 @@ def _reversals(f: NDArray[np.int64], z: Float, speed: Float, cruise: float) -> I
             yield MotionEvent("reversal", int(f[a]), int(f[b]), back, "mm", "the probe moved back")
 
 
-def _gaps(f: NDArray[np.int64], t: Float) -> Iterator[MotionEvent]:
+def _gaps(f: Int, t: Float) -> Iterator[MotionEvent]:
     step = np.diff(t)
     usual = float(np.median(step))
     for k in np.flatnonzero(step > 1.6 * usual):
@@ -65,7 +63,7 @@ def _gaps(f: NDArray[np.int64], t: Float) -> Iterator[MotionEvent]:
         yield MotionEvent("dropped_frames", int(f[k]), int(f[k + 1]), lost, "frames", "the clock jumps")
 
 
-def _duplicates(f: NDArray[np.int64], z: Float, tracks: Course) -> Iterator[MotionEvent]:
+def _duplicates(f: Int, z: Float, tracks: Course) -> Iterator[MotionEvent]:
     step = np.abs(np.diff(z[tracks.frames]))
     if len(step) < 3:
         return
@@ -76,13 +74,13 @@ def _duplicates(f: NDArray[np.int64], z: Float, tracks: Course) -> Iterator[Moti
             yield MotionEvent("duplicated_frame", int(f[a]), int(f[b]), 1.0, "frames", "no motion between")
 
 
-def _lost(f: NDArray[np.int64], tracks: Course) -> Iterator[MotionEvent]:
+def _lost(f: Int, tracks: Course) -> Iterator[MotionEvent]:
     for a, b in _runs(tracks.lost & (np.arange(len(tracks.lost)) > 0)):
         first, last = int(f[tracks.frames[a]]), int(f[tracks.frames[b]])
         yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", "too little texture")
 
 
-def _slips(f: NDArray[np.int64], slip: Float) -> Iterator[MotionEvent]:
+def _slips(f: Int, slip: Float) -> Iterator[MotionEvent]:
     step = np.diff(slip)
     usual = 1.4826 * float(np.median(np.abs(step))) + 1e-6
     for a, b in _runs(np.abs(step) > max(6 * usual, 0.02)):

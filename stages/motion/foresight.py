@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from stages.motion.comparing import Comparison, Expected, Verdict
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _REACH_SIGMA = 5.0
 _LEAST_REACH_PX = 4.0
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
@@ -17,8 +17,6 @@ from stages.motion.submaps import Settled, Submap, carried
 from stages.motion.terms import ORIGIN_SIGMA
 from stages.motion.windows import Window
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _SEAM_SHARE = 0.5
 _LEAST_WEIGHT = 1e-3
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from stages.motion.matching import Patches
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 _FEWEST_DROPPED = 256
 
 
@@ -47,7 +44,7 @@ class LandmarkMap:
     column: Float = field(default_factory=lambda: np.zeros(0))
     offset: Float = field(default_factory=lambda: np.zeros((0, 2)))
     born: Int = field(default_factory=lambda: np.zeros(0, np.int64))
-    retired: Mask = field(default_factory=lambda: np.zeros(0, bool))
+    retired: Bool = field(default_factory=lambda: np.zeros(0, bool))
     misses: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     patches: list[Patches] = field(default_factory=list)
     found: int = 0
@@ -78,7 +75,7 @@ class LandmarkMap:
         """Whether so many landmarks are retired that it pays to drop them."""
         return int(self.retired.sum()) > max(len(self.retired) // 2, _FEWEST_DROPPED)
 
-    def drop(self, gone: Mask) -> Int:
+    def drop(self, gone: Bool) -> Int:
         """Forget landmarks (L,), so that the work of a frame does not grow; return their numbers."""
         dropped, keep, starts = self.number[gone], ~gone, self._starts()
         kept = [p.of(keep[a:b]) for p, a, b in zip(self.patches, starts[:-1], starts[1:], strict=True)]

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context
 from stages.motion.chain import Chain, Closures, ErrorSums, astray, beside
@@ -27,9 +27,6 @@ from stages.motion.places import Passage, Place, Signs, choose_places, widened
 from stages.motion.sections import CORRELATED_FRAMES
 from stages.motion.strip import Strip, StripGrid
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 _LEAST_PROBABILITY = 1e-6
 _DISTANCE, _ROLL = 2, 5
 _ASIDE = (0, 1, 3, 4)

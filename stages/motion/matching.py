@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import cv2
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Float32, Int, Int32
 from stages.rings.kernels import FAST
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 _STEPS = 30
 _ENOUGH = 0.003  # a step, strip px, after which the next would not matter
 
@@ -31,7 +29,7 @@ class Patches:
     by_column: Float32
     information: Float
 
-    def of(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Patches:
+    def of(self, index: Int | Bool) -> Patches:
         """Return some of the patches."""
         return Patches(*(getattr(self, name)[index] for name in _FIELDS))
 
@@ -59,7 +57,7 @@ class Matches:
     sigma: Float
 
 
-def cut(contrast: Float32, row: NDArray[np.int64], column: NDArray[np.int64], half: int) -> Patches:
+def cut(contrast: Float32, row: Int, column: Int, half: int) -> Patches:
     """Cut patches of side 2 half + 1 around integer positions (N,), columns wrapping round."""
     span = np.arange(-half - 1, half + 2)
     rows = np.clip(row[:, None] + span, 0, contrast.shape[0] - 1)
@@ -75,9 +73,7 @@ def cut(contrast: Float32, row: NDArray[np.int64], column: NDArray[np.int64], ha
     return Patches(value, by_row, by_column, information)
 
 
-def match(
-    contrast: Float32, usable: NDArray[np.bool_], patches: Patches, row: Float, column: Float
-) -> Matches:
+def match(contrast: Float32, usable: Bool, patches: Patches, row: Float, column: Float) -> Matches:
     """Find patches near predicted strip positions (N,); they move by at most half a patch."""
     inverse = np.linalg.inv(patches.information + 1e-9 * np.eye(2))
     offset, correlation, residual = _match(
@@ -88,7 +84,7 @@ def match(
     return Matches(offset, correlation, sigma)
 
 
-def _wrapped(contrast: Float32, usable: NDArray[np.bool_], side: int) -> tuple[Float32, NDArray[np.int32]]:
+def _wrapped(contrast: Float32, usable: Bool, side: int) -> tuple[Float32, Int32]:
     """Return the strip with its first columns again behind the last, and its unusable samples summed up.
 
     The sums (H + 1, W + side + 2) are over all samples above and to the left.

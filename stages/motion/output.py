@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import PipeAxis, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
@@ -15,7 +15,6 @@ from stages.motion.joining import Joined
 from stages.motion.sliding import of_one_window
 from stages.motion.submaps import Estimate
 
-Float = NDArray[np.float64]
 _START_MM = 60.0
 
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from pipeline.arrays import Bool, Float, Int
+
 _BESIDE = 15
 _BAND_SIGMA = 6.0
 _LEAST_BAND_MM = 0.15
@@ -192,14 +191,14 @@ def _nearest(distance_mm: Float, among: Int, of: Int) -> Int:
     return np.asarray(np.where(off[0] <= off[1], order[left], order[right]))
 
 
-def _in_view(passage: Passage, index: Int, bands_mm: Float) -> Mask:
+def _in_view(passage: Passage, index: Int, bands_mm: Float) -> Bool:
     """Return whether a band lies in the middle half of what frames (n,) show."""
     first = passage.distance_mm[index] + passage.near_mm + passage.view_mm / 4
     low, high = (np.searchsorted(bands_mm, first + x) for x in (0.0, passage.view_mm / 2))
     return np.asarray(high > low)
 
 
-def _apart(chosen: Int, distance_mm: Float, shows_band: Mask, least_mm: float) -> Int:
+def _apart(chosen: Int, distance_mm: Float, shows_band: Bool, least_mm: float) -> Int:
     """Return the pairs chosen but one of any two nearer to each other than so much: bands before others."""
     kept: list[int] = []
     for k in chosen.tolist():

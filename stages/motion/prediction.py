@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion.state import EncoderReadings
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 
 class Predictor:

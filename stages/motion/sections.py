@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import interp1d
 
-from pipeline.artefacts.measured import Float32, RingPoints, RingSamples
+from pipeline.arrays import Float, Float32, Int
+from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.instrument.probe import Probe
 from stages.motion.terms import RingBins
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _FEWEST = 0.3
 CORRELATED_FRAMES = 4.0
 _AT_ONCE = 256

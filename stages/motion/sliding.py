@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.arrays import Float
 from stages.motion.joining import Joined, join, seam
 from stages.motion.parameters import MotionParameters
 from stages.motion.state import GLOBALS, State
 from stages.motion.submaps import (
     Estimate,
-    Float,
     Say,
     Settled,
     Submap,

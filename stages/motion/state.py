@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import axis_through, frames_at, from_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 
-Float = NDArray[np.float64]
 GLOBALS = 4
 _DEGREE = 3
 AXIS_STEP_MM = 2.0
@@ -108,7 +107,7 @@ class EncoderReadings:
 
     distance_mm: Float
     sigma_mm: float
-    known: NDArray[np.bool_]
+    known: Bool
 
 
 def straight_start(

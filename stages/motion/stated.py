@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.instrument.probe import Probe
 from pipeline.machine.outcome import WARNING
 from pipeline.machine.stage import Context
 
-Float = NDArray[np.float64]
 # A right probe moves further than this along one of its ten or so directions once in 10^5 recordings.
 _TOO_FAR = 5.0
 

@@ -12,18 +12,14 @@ from dataclasses import dataclass
 import cv2
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from pipeline.arrays import Bool, Float, Float32, Image
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from stages.rings.kernels import FAST
 from stages.texture.light import irradiance
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Mask = NDArray[np.bool_]
-Image = NDArray[np.uint8]
 _COARSE = 4
 _BLUR_PX = 1.2
 _SMOOTH_PX = 0.7
@@ -94,7 +90,7 @@ class Strip:
 
     first_row: int
     contrast: Float32
-    usable: Mask
+    usable: Bool
     coarse_uv: Float32
     noise: Float32
 
@@ -132,7 +128,7 @@ def unroll(
     return Strip(first_row, contrast, usable, coarse_uv, _noise_of(contrast, usable))
 
 
-def _without_light(grey: Float32, usable: Mask) -> Float32:
+def _without_light(grey: Float32, usable: Bool) -> Float32:
     """Return grey over the light that fell there, minus 1; 0 where unusable.
 
     A slope of the light within a patch shifts its match by half the slope times the squared length of the
@@ -226,7 +222,7 @@ def _coarse_view(probe: Probe, T_pc: Float, grid: StripGrid, first_row: int) -> 
     return probe.camera.project(xyz_c).uv.astype(np.float32), light.astype(np.float32)
 
 
-def _noise_of(contrast: Float32, usable: Mask) -> Float32:
+def _noise_of(contrast: Float32, usable: Bool) -> Float32:
     """Return each row's noise (H,), 1 σ, from second differences around, which texture hardly reaches."""
     power, share = _second_differences(contrast, usable)
     known = gaussian_filter1d(share, 2 * _COURSE_PX)

@@ -13,10 +13,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from pipeline.adjustment.bordered import Factor
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import skew
@@ -26,8 +26,6 @@ from stages.motion.parameters import MotionParameters
 from stages.motion.state import GLOBALS, State
 from stages.motion.windows import Window
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _ROUGHLY, _CLOSELY = 1e-2, 1e-5
 _COVARIANCES, _FEWEST_COVARIANCES = 60, 12
 _SCALE = GLOBALS - 1

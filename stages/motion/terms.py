@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.robust import Cauchy, Loss, Squares
 from pipeline.adjustment.sums import BLOCK
+from pipeline.arrays import Float, Int
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation
 from stages.motion.state import GLOBALS, EncoderReadings, State
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 ORIGIN_SIGMA = np.array([1e-4] * 3 + [1e-6] * 3)  # mm and rad
 _SETTLED = 1e-3  # of the stated σ: what is held is not held exactly, so that the equations stay regular
 _VIEW_RAD = 0.2  # 1 σ of the angle between the first camera and the pipe

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Float32, Image, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
@@ -19,11 +19,6 @@ from stages.motion.prediction import Predictor
 from stages.motion.strip import Strip, StripGrid, unroll
 from stages.motion.tracks import Tracks, TrackStore
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-Image = NDArray[np.uint8]
 _FEWEST = 12
 _FEWEST_ALIKE = 0.4
 _ALIKE_PX = 1.5
@@ -36,7 +31,7 @@ class _Found:
     """Landmarks (N,) looked for; which were found (N,), at what strip position, offset (N, 2) and σ (N,)."""
 
     landmark: Int
-    good: NDArray[np.bool_]
+    good: Bool
     at: Float
     offset: Float
     sigma: Float
@@ -74,7 +69,7 @@ class Followed:
     grid: StripGrid
     frames: Int
     T_pc: Float
-    lost: Mask
+    lost: Bool
 
     def between(self, first: int, last: int) -> Tracks:
         """Return the tracks through frames ``first`` to ``last`` (exclusive), counted from ``first``."""
@@ -150,7 +145,7 @@ class TextureTracker:
         good &= found.sigma < 3 * self._parameters.landmark_sigma_px
         return _Found(near, good, at, found.offset, found.sigma)
 
-    def _in_view(self, strip: Strip, guess: Float) -> Mask:
+    def _in_view(self, strip: Strip, guess: Float) -> Bool:
         """Return whether patches at strip positions (L, 2) may err by some σ and still be seen whole.
 
         At a border only those would be found that err inward, and all of them together would pull.
@@ -237,7 +232,7 @@ def _displacement(before: Strip, now: Strip) -> Float:
     return np.array([2 * dy, 2 * dx]) if response > 0.05 else np.zeros(2)
 
 
-def _best_of_cells(corner: Float32, taken: NDArray[np.bool_], offset: int, cell: int) -> tuple[Int, Int]:
+def _best_of_cells(corner: Float32, taken: Bool, offset: int, cell: int) -> tuple[Int, Int]:
     rows, columns = [], []
     for i, j in zip(*np.nonzero(~taken), strict=True):
         r0 = max(i * cell + offset, 0)

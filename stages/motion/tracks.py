@@ -8,11 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.machine.scratch import Scratch, Spool
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 _FEWEST_SEEN = 3
 _SEEN = np.dtype([("landmark", "i8"), ("frame", "i8"), ("uv", "f8", 2), ("sigma", "f8"), ("at", "f8", 2)])
 
@@ -46,7 +44,7 @@ class Tracks:
     xyz: Float
     frames: Int
     T_pc: Float
-    lost: Mask
+    lost: Bool
 
 
 class Course(Protocol):
@@ -61,7 +59,7 @@ class Course(Protocol):
         """(K, 4, 4) first guess of their poses in the straightened pipe."""
 
     @property
-    def lost(self) -> Mask:
+    def lost(self) -> Bool:
         """(K,) frames in which too little texture was found to move the pose."""
 
 

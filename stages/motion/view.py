@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Image, Int
 from pipeline.instrument.probe import Probe
 from pipeline.recording.background import in_background
-from pipeline.recording.base import Illumination, Image, Recording
+from pipeline.recording.base import Illumination, Recording
 from stages.motion.strip import Strip, StripGrid, softened, unroll
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _BLUE, _RED = 0, 2
 _YELLOW_NM = 575.0
 _AHEAD = 4

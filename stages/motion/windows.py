@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from stages.motion.equations import MATCH_BIASES, Measurements
@@ -16,8 +16,6 @@ from stages.motion.state import EncoderReadings, State, straight_start
 from stages.motion.tracking import Followed
 from stages.motion.tracks import Tracks
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
 _MARGIN_MM = 20.0
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Float
+from pipeline.arrays import Byte, Float, Float32
 from stages.rings.noise import QUANTISATION_VARIANCE
 from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors
@@ -23,14 +22,12 @@ def excess_weights(wavelength_nm: float) -> Float:
     return weights
 
 
-def mix(bgr: NDArray[np.uint8], weights: Float) -> NDArray[np.float32]:
+def mix(bgr: Byte, weights: Float) -> Float32:
     """Return the (H, W) mixture of an image (H, W, 3)."""
     return np.asarray(bgr @ weights.astype(np.float32), np.float32)
 
 
-def discriminant_weights(
-    bgr: NDArray[np.uint8], sectors: Sectors, trace: RingTrace, otherwise: Float
-) -> Float:
+def discriminant_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float) -> Float:
     """Return (3,) Fisher discriminant weights between line and wall beside it.
 
     The wall's colour covariance holds both its reflectance and the sensor's noise, so the mixture has the

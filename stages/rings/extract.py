@@ -7,15 +7,15 @@ from dataclasses import replace
 from itertools import chain, islice
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from pipeline.artefacts.measured import Float, Int, RingSamples, RingValidity
+from pipeline.arrays import Byte, Float, Image, Int
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
-from pipeline.recording.base import Illumination, Image, Recording
+from pipeline.recording.base import Illumination, Recording
 from stages.rings.colour import discriminant_weights, excess_weights, mix
 from stages.rings.noise import clip_level_of, noise_response
 from stages.rings.sectors import Sectors, cut_sectors
@@ -105,7 +105,7 @@ def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
             trace = replace(trace, response=noise_response(image, sectors, trace.fit, trace.response))
 
 
-def _first_weights(bgr: NDArray[np.uint8], sectors: Sectors, probe: Probe) -> Float:
+def _first_weights(bgr: Byte, sectors: Sectors, probe: Probe) -> Float:
     """Return weights learned from an image in which the ring is found by the laser's colour alone."""
     weights = excess_weights(probe.laser.wavelength_nm)
     trace = trace_ring(mix(bgr, weights), sectors, np.inf)

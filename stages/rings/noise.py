@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from pipeline.arrays import Byte, Int32
 from stages.rings.kernels import first_at_least
 from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response
 from stages.rings.search import Image
@@ -67,7 +67,7 @@ def _residuals_by_level(  # type: ignore[no-untyped-def]
             k += 1
 
 
-def clip_level_of(grey: NDArray[np.uint8], bgr: NDArray[np.uint8], line: NDArray[np.int32]) -> float:
+def clip_level_of(grey: Byte, bgr: Byte, line: Int32) -> float:
     """Return the grey level at which the line's strongest channel clips.
 
     Grey is a fixed linear mixture of the channels, and a laser line keeps its colour: both are read off the

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Float
+from pipeline.arrays import Byte, Float, Float32
 from stages.rings.kernels import FAST, bell, factor, first_at_least, inverse_diagonal, solve
 from stages.rings.sectors import Sectors
 
@@ -78,7 +77,7 @@ class ProfileFit(NamedTuple):
 
 
 def fit_line(
-    image: NDArray[np.uint8] | NDArray[np.float32],
+    image: Byte | Float32,
     sectors: Sectors,
     seed_px: Float,
     width_px: float,

@@ -7,13 +7,12 @@ from typing import NamedTuple
 import cv2
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Float
+from pipeline.arrays import Byte, Float, Float32, Int
 from stages.rings.kernels import FAST, first_at_least
 from stages.rings.sectors import Sectors
 
-Image = NDArray[np.uint8] | NDArray[np.float32]
+Image = Byte | Float32
 BAND_WIDTHS = 10.0
 _BELT_WIDTHS = 16.0
 _REACH_WIDTHS = 4.0
@@ -163,7 +162,7 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
     return best
 
 
-def _texture_noise(response: NDArray[np.float32], width_px: float) -> NDArray[np.float32]:
+def _texture_noise(response: Float32, width_px: float) -> Float32:
     """Robust spread (R,) of a filter's response (A, R) over all azimuths in a belt about each radius.
 
     The belt is wide against the line, so that a well centred ring does not pass for noise.
@@ -175,7 +174,7 @@ def _texture_noise(response: NDArray[np.float32], width_px: float) -> NDArray[np
     return np.asarray(1.4826 * every, np.float32)
 
 
-def _polar_image(image: Image, sectors: Sectors, ray: NDArray[np.int64]) -> NDArray[np.float32]:
+def _polar_image(image: Image, sectors: Sectors, ray: Int) -> Float32:
     width, height = sectors.image_size
     u, v = sectors.centre_px
     corners = np.hypot(np.array([u, u, width - u, width - u]), np.array([v, height - v, v, height - v]))

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Float
+from pipeline.arrays import Float, Float32, Int, Int32
 from stages.rings.kernels import first_at_least
 
 
@@ -38,17 +37,17 @@ class Sectors:
     azimuth_rad: Float
     centre_px: Float
     image_size: tuple[int, int]
-    start: NDArray[np.int64]
-    pixel: NDArray[np.int32]
-    radius_px: NDArray[np.float32]
-    offset_rad: NDArray[np.float32]
+    start: Int
+    pixel: Int32
+    radius_px: Float32
+    offset_rad: Float32
 
     @property
     def outermost_px(self) -> Float:
         """(A,) radius of each sector's outermost pixel."""
         return self.radius_px[self.start[1:] - 1].astype(float)
 
-    def pixels_near(self, radius_px: Float, least_px: float, most_px: float) -> NDArray[np.int32]:
+    def pixels_near(self, radius_px: Float, least_px: float, most_px: float) -> Int32:
         """Return flat indices of the pixels whose distance to the ring (A,) is in [least, most), px."""
         ring = radius_px.astype(np.float32)
         out = np.empty(_count_near(self.start, self.radius_px, ring, most_px), np.int32)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Byte, Float, RingValidity
+from pipeline.arrays import Bool, Byte, Float
+from pipeline.artefacts.measured import RingValidity
 from stages.rings.noise import dark_response, noise_response
 from stages.rings.profile import ProfileFit, Response, fit_line
 from stages.rings.search import BAND_WIDTHS, Image, Peaks, detection_limit, find_ring, search_band
@@ -112,7 +112,7 @@ def _limit(sectors: Sectors, positions: float) -> float:
 
 
 def _search_rays(
-    image: Image, sectors: Sectors, peaks: Peaks, missing: NDArray[np.bool_], width_px: float, noise: float
+    image: Image, sectors: Sectors, peaks: Peaks, missing: Bool, width_px: float, noise: float
 ) -> Peaks:
     """Return ``peaks`` with the ``missing`` looked for along their whole ray; NaN where none is found."""
     far = float(sectors.radius_px.max())

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from pipeline.artefacts.measured import Byte, Float32, RingSamples, RingValidity
+from pipeline.arrays import Bool, Byte, Float32
+from pipeline.artefacts.measured import RingSamples, RingValidity
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0
@@ -97,7 +97,7 @@ def _running_median(values, sectors):  # type: ignore[no-untyped-def]
     return out
 
 
-def _bridged(radius_px: Float32, valid: NDArray[np.bool_]) -> Float32:
+def _bridged(radius_px: Float32, valid: Bool) -> Float32:
     """Return ``radius_px`` (F, A) with gaps bridged around the circle; 0 in frames without a sample."""
     out = radius_px.copy()
     sectors = np.arange(radius_px.shape[1])

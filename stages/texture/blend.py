@@ -7,8 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Byte
-from pipeline.recording.base import Image
+from pipeline.arrays import Byte, Image
 from stages.texture.project import TileProjection
 
 Short = NDArray[np.uint16]

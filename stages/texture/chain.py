@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.artefacts.measured import Float, Int
+from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.texture.light import LightField
 from stages.texture.photometry import Light, solve_light

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.artefacts.measured import Float
+from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.texture.surface import SurfacePatch, WallSurface
 

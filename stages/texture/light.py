@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import map_coordinates
 
-from pipeline.artefacts.measured import Float
+from pipeline.arrays import Float
 from pipeline.instrument.probe import Lighting
 
 

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Byte
+from pipeline.arrays import Byte, Image
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
-from pipeline.recording.base import Image
 from stages.texture.blend import TileStack
 from stages.texture.grid import FlatGrid
 from stages.texture.photometry import Light

@@ -13,7 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from pipeline.artefacts.measured import Float, Int
+from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.texture.light import LightField
 from stages.texture.sampling import LightSamples

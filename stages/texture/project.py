@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pipeline.artefacts.measured import Float, Float32
+from pipeline.arrays import Float, Float32
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from stages.texture.grid import NODE_PX

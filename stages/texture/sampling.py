@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Float, Int
+from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
-from pipeline.recording.base import Image
 from stages.texture.light import irradiance
 from stages.texture.surface import WallSurface
 from stages.texture.views import LitViews, sheet_distance_mm
@@ -105,7 +103,7 @@ class LightSampler:
         start, stop = np.searchsorted(self._distance, [middle - reach, middle + reach])
         return slice(int(start), int(stop))
 
-    def _usable(self, view: int, xyz_c: Float) -> NDArray[np.bool_]:
+    def _usable(self, view: int, xyz_c: Float) -> Bool:
         from_sheet = np.abs(sheet_distance_mm(self._probe.laser, xyz_c))
         near = from_sheet < self._reach
         return near & (from_sheet > 2 * self._band) if self._views.laser_on[view] else near

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from pipeline.artefacts.measured import Float, PipeAxis, RadiusMap, Wall
+from pipeline.arrays import Float, Float32
+from pipeline.artefacts.measured import PipeAxis, RadiusMap, Wall
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import frames_at
 from pipeline.machine.scratch import Scratch
@@ -45,9 +45,9 @@ class WallSurface:
 
     axis: PipeAxis
     distance_mm: Float
-    radius_mm: NDArray[np.float32]
-    along: NDArray[np.float32]
-    around: NDArray[np.float32]
+    radius_mm: Float32
+    along: Float32
+    around: Float32
     seen_mm: tuple[float, float]
 
     @property
@@ -78,7 +78,7 @@ class WallSurface:
         return np.stack(np.meshgrid(np.clip(row, 0, last), column, indexing="ij"))
 
     @staticmethod
-    def _sample(values: NDArray[np.float32], where: Float) -> Float:
+    def _sample(values: Float32, where: Float) -> Float:
         return np.asarray(map_coordinates(values, where, np.float64, order=1, mode="grid-wrap"))
 
 
@@ -123,7 +123,7 @@ def wall_surface(
     return WallSurface(wall.axis, distance, radius, along, around, (float(distance[0]), float(distance[-1])))
 
 
-def _blocks(radius_mm: NDArray[np.float32]) -> Iterator[tuple[slice, slice, slice]]:
+def _blocks(radius_mm: Float32) -> Iterator[tuple[slice, slice, slice]]:
     """Yield rows, the same with more on both sides that hold some radii, and the rows within these."""
     rows = len(radius_mm)
     for first in range(0, rows, _BLOCK_ROWS):
@@ -136,7 +136,7 @@ def _blocks(radius_mm: NDArray[np.float32]) -> Iterator[tuple[slice, slice, slic
         yield slice(first, last), wide, slice(first - wide.start, last - wide.start)
 
 
-def smoothed(radius_mm: NDArray[np.float32], sigma_px: tuple[float, ...]) -> NDArray[np.float32]:
+def smoothed(radius_mm: Float32, sigma_px: tuple[float, ...]) -> Float32:
     """Return radii (S, A) smoothed by a Gaussian, NaN filled from ever farther neighbours.
 
     Normalised convolution (H. Knutsson, C.-F. Westin, CVPR 1993), wrapped around the pipe.

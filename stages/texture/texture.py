@@ -8,10 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from pydantic import Field
 
-from pipeline.artefacts.measured import Int, Trajectory, Wall, WallTexture
+from pipeline.arrays import Image, Int
+from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters
-from pipeline.recording.base import Image, Recording
+from pipeline.recording.base import Recording
 from stages.texture.chain import LightChain, cut_plan
 from stages.texture.grid import FlatGrid, flat_grid
 from stages.texture.mosaic import Blended, Mosaic

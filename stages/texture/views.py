@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.artefacts.measured import Float, Int, Trajectory
+from pipeline.arrays import Bool, Float, Int
+from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import inverse
 from pipeline.instrument.laser import LaserSheet
@@ -33,7 +33,7 @@ class LitViews:
     """
 
     frame: Int
-    laser_on: NDArray[np.bool_]
+    laser_on: Bool
     T_cp: Float
     distance_mm: Float
     lean: Float

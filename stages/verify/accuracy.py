@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.reference import WallMap
 from pipeline.errors import UnusableError
 
-Float = NDArray[np.float64]
 _NORMAL_95 = 1.959964
 
 

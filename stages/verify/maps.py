@@ -11,16 +11,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import least_squares
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.reference import WallMap
 from pipeline.errors import UnusableError
 from stages.verify.accuracy import Differences
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _FIT_POINTS, _SEARCH_POINTS = 10_000, 2000
 _SMOOTH_MM, _SMOOTH_CELLS = 1.0, 1.5
 

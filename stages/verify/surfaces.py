@@ -6,16 +6,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays import Float
 from pipeline.artefacts.reference import Surface, WallPoints
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
 from pipeline.machine.native import open3d
 from stages.verify.accuracy import Differences
 
-Float = NDArray[np.float64]
 _FIT_POINTS = 5000
 _ROLLS = 12
 _NEIGHBOURS = 12

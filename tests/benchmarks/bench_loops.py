@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.probe import Probe
@@ -36,7 +36,6 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.benchmarks.loop_scenes import SCENES_BY_NAME, WELD_SPACING_MM
 from tests.truth_comparison import compare_wall
 
-Float = NDArray[np.float64]
 _WINDOWS = {"window_frames": 150, "overlap_frames": 40}
 _CONTROL = Expected(np.zeros(2), np.array([60.0, 30.0]))
 
@@ -151,7 +150,7 @@ def _errors(found: Trajectory, true_T_pc: Float) -> tuple[Float, Float, Float]:
     return s - s[0] - true_s + true_s[0], roll - roll[0] - true_roll + true_roll[0], off
 
 
-def _pairs(true_s: Float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _pairs(true_s: Float) -> tuple[Int, Int]:
     """Return frames out and back, all lit, at the same place; the last few frames are left out."""
     lit, turn = np.arange(1, len(true_s) - 4, 2), int(np.argmax(true_s))
     here = lit[lit > turn + 30]
@@ -202,7 +201,7 @@ def _control(measured: Measured) -> None:
     )
 
 
-def _strips(view: WallView, T_pc: Float, frames: NDArray[np.int64]) -> dict[int, Strip]:
+def _strips(view: WallView, T_pc: Float, frames: Int) -> dict[int, Strip]:
     return {
         int(k): strip
         for k, strip in zip(frames, view.strips(frames, T_pc[frames]), strict=True)

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from scipy import stats
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.probe import Probe
 from stages.diagnose.classes import classes_of
@@ -28,8 +28,6 @@ from stages.diagnose.effects.predict import columns
 from tests.benchmarks.pipeblaser_rings import BINS, Fitted, Rings, fitted, probe_of, rings_of
 from tests.shared_data import shared
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 CELL = 3
 SEEN = 1e-8
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Image, Int
 from pipeline.recording import open_recording
 from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.render import renderer_of
@@ -32,8 +32,6 @@ from tests.resimulation import fitted_probe, truth_of_recording, with_probe
 from tests.resimulation_compare import lights_of, line_radii, matched, psnr_db
 from tests.shared_data import shared
 
-Float = NDArray[np.float64]
-Image = NDArray[np.uint8]
 _FIT_FRAMES, _FRAMES, _LIT_FRAMES = 8, 8, 3
 _AZIMUTHS, _BIN = 720, 10
 _OUTLIER_PX, _GRAIN_SHIFT_PX, _GRAIN_SIGMA_PX = 1.5, 24, 4.0
@@ -137,7 +135,7 @@ def _gained(light: Float, recorded: Image) -> Image:
     return np.clip(gain * light + 0.5, 0, 255).astype(np.uint8)
 
 
-def spread(numbers: NDArray[np.int64], many: int) -> list[int]:
+def spread(numbers: Int, many: int) -> list[int]:
     """Return so many of some numbers, evenly spread and away from the ends."""
     return [int(numbers[int(k)]) for k in np.linspace(0.06, 0.94, many) * (len(numbers) - 1)]
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.arrays import Image, Int
 from pipeline.artefacts.measured import PipeAxis, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.machine.scratch import Scratch
-from pipeline.recording.base import Image, Planes, Recording
+from pipeline.recording.base import Planes, Recording
 
 
 def repeated_rings(rings: RingSamples, times: int, coarser: int, scratch: Scratch) -> RingSamples:
@@ -66,9 +67,7 @@ class RepeatedFrames:
     def image_size(self) -> tuple[int, int]:
         return self._recording.source.image_size
 
-    def read(
-        self, frames: Sequence[int] | NDArray[np.int64], planes: Planes
-    ) -> Iterator[tuple[int, Image | None]]:
+    def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         wanted = np.asarray(frames)
         for k in np.unique(wanted // self._count):
             first = int(k) * self._count

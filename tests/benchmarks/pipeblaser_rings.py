@@ -8,9 +8,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingValidity
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.instrument.camera.base import Camera
@@ -21,8 +21,6 @@ from stages.rings.colour import excess_weights, mix
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 RED_NM = 650.0
 PLANE = (-0.228405, 0.61683, -100.0, 17.1103)
 PIXELS = 1.35

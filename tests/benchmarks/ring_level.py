@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.recording.base import Illumination, Recording
@@ -35,7 +35,6 @@ from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.smooth import LOOSE
 from stages.calibrate.gauge.solve import RingSource, first_unknowns
 
-Float = NDArray[np.float64]
 _AZIMUTHS = 360
 _NEWTON = 5
 _BISECTIONS, _FALSE_POSITIONS = 9, 4

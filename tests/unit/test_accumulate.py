@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, Wall
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import straight_axis
@@ -19,7 +19,6 @@ from stages.accumulate.grid import _regress
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
 
-Float = NDArray[np.float64]
 RINGS, STEP = 40, 0.5
 SIGMA_PX = 0.05
 PARAMETERS = AccumulateParameters(azimuth_samples=180)

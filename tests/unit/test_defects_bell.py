@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from pipeline.artefacts.measured import PointCloud
 from stages.defects import _is_measured
@@ -14,7 +13,6 @@ from stages.defects.relief import Relief, Typical
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
 
-Float = NDArray[np.float64]
 _ROWS, _COLUMNS, _RADIUS_MM = 40, 720, 50.0
 
 

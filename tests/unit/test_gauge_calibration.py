@@ -11,9 +11,10 @@ import pytest
 from scipy.special import erf
 from threadpoolctl import threadpool_limits
 
+from pipeline.arrays import Image
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import inverse, transform
-from pipeline.recording.base import BoreSection, Illumination, Image, Planes, Recording
+from pipeline.recording.base import BoreSection, Illumination, Planes, Recording
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.detect import Sighting, find_fiducials
 from stages.calibrate.gauge.edges import fit_steps

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.motion.chain import Chain, Closures, ErrorSums, Link, astray, interpolated
 
-Float = NDArray[np.float64]
 KNOTS, WINDOWS, SHARED = 4, 5, 2
 
 

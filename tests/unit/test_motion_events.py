@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import MotionEvent, PipeAxis, Trajectory
 from pipeline.geometry.axis import axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events
 from stages.motion.tracks import Tracks
 
-Float = NDArray[np.float64]
 FRAMES, RATE, STEP = 120, 30.0, 0.6
 
 

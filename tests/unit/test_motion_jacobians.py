@@ -7,17 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.robust import GemanMcClure
+from pipeline.arrays import Float
 from stages.motion import terms
 from stages.motion.equations import landmark_rows
 from stages.motion.parameters import MotionParameters
 from stages.motion.state import GLOBALS, State
 from tests.motion_scene import displaced, scene
 
-Float = NDArray[np.float64]
 H = 1e-5
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import quiet_context
 from stages.motion import estimate_motion
@@ -20,7 +20,6 @@ from stages.motion.places import Passage, Place, Signs, bands_in_rings, choose_p
 from tests.drawn_run import drawn_run, without_encoder
 from tests.looped_run import FRAMES, GRID, DrawnView, LoopedRun, looped_run, rough_wall
 
-Float = NDArray[np.float64]
 PARAMETERS = MotionParameters.model_validate({"max_track_frames": 40})
 WALL = rough_wall()
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float32
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion import MotionParameters
 from stages.motion.matching import _match, _wrapped, cut, match
@@ -16,7 +16,6 @@ from stages.motion.strip import Strip, StripGrid, _sample, _without_light, softe
 from stages.motion.tracking import TextureTracker
 from tests.unit.drawn_pipe import RADIUS, draw, led_light, reflectance, small_probe, wall_hits
 
-Float32 = NDArray[np.float32]
 HALF = 8
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.bordered import BorderedSystem, LandmarkRows, Rows, Step, landmark_steps
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.adjustment.sums import BLOCK
+from pipeline.arrays import Float
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.adjustment import Damping, adjust
 from stages.motion.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
@@ -18,7 +18,6 @@ from stages.motion.parameters import MotionParameters
 from stages.motion.state import State
 from tests.motion_scene import displaced, scene
 
-Float = NDArray[np.float64]
 FRAMES, BORDER, OWN = 9, 6, 3
 
 

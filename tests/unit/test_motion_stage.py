@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import quiet_context
 from stages.motion import MotionParameters, estimate_motion
 from tests.drawn_run import DrawnRun, drawn_run, without_encoder
 
-Float = NDArray[np.float64]
 STEP = 0.8
 PARAMETERS = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
 

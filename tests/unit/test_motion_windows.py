@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
@@ -21,7 +21,6 @@ from stages.motion.tracks import TrackStore
 from stages.motion.windows import Window, cut_windows
 from tests.long_motion import LongMotion, long_motion
 
-Float = NDArray[np.float64]
 FRAMES, SHARED = 240, 3
 
 

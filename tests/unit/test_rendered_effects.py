@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.recording.base import FrameTable
 from pipeline.simulator.effects.catalogue import switch_on
@@ -19,7 +19,6 @@ from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import through_lens
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
 FOCAL_PX, SIZE = 100.0, (256, 256)
 TIME_S = 0.0472  # a crest of 5.3 Hz
 AROUND = 48

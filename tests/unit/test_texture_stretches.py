@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import WallTexture
 from pipeline.machine.stage import quiet_context
 from stages.texture.chain import LightChain, cut_plan
@@ -18,7 +18,6 @@ from tests.unit.drawn_pipe import draw, poses, recording_of, seen_wall, small_pr
 from tests.unit.test_texture_parts import straight_wall, views_at
 
 FRAMES = 24
-Float = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("views_at_once", [20, 1500])

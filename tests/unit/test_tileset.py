@@ -15,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from pipeline.arrays import Int
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import VARIANTS, TexturedMesh
@@ -104,14 +105,14 @@ class Content:
         shown = Image.open(io.BytesIO(self.view(image["bufferView"])))
         return shown.width * shown.height
 
-    def ids(self, number: int) -> NDArray[np.int64]:
+    def ids(self, number: int) -> Int:
         """Return the feature of each vertex."""
         attribute = self.primitive["extensions"]["EXT_mesh_features"]["featureIds"][number]["attribute"]
         values = self.array(self.primitive["attributes"][f"_FEATURE_ID_{attribute}"]).ravel()
         assert np.all(values == np.rint(values))
         return values.astype(np.int64)
 
-    def faces(self) -> NDArray[np.int64]:
+    def faces(self) -> Int:
         return self.array(self.primitive["indices"]).ravel().reshape(-1, 3).astype(np.int64)
 
     def table(self, number: int) -> tuple[str, list[Json]]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.travel.lines import find_lines
 
-Float = NDArray[np.float64]
 RATE = 30.0
 TIME_S = np.arange(240) / RATE
 LIT = np.arange(240) % 4 == 3

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.events import steps_found, with_events
 from stages.diagnose.travel.jump import jump_of_reading, reading_jump
@@ -16,7 +16,6 @@ from stages.diagnose.travel.swings import swings_again
 from stages.diagnose.travel.turns import turns_between
 from tests.travel_cases import read, seen, way
 
-Float = NDArray[np.float64]
 TIME_S = np.arange(240) / 30
 EARLY = TIME_S < 4
 LIT = np.arange(240) % 4 == 3

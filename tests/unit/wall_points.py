@@ -6,14 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.equidistant import Equidistant
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import ImagePoints
 
-Float = NDArray[np.float64]
 FOCAL_PX, BASELINE_MM, CENTRE = 360.0, 22.0, (800.0, 600.0)
 
 

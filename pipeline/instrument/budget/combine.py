@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget.disturbance import DISTURBANCE_NAMES
 from pipeline.instrument.budget.line import LinePhotometry, line_sigma_px
@@ -28,8 +28,6 @@ from pipeline.instrument.budget.sources import (
     stated_sources,
 )
 from pipeline.instrument.probe import Probe
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

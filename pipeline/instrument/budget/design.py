@@ -7,15 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget.combine import Budget, Row, error_budget
 from pipeline.instrument.budget.line import LinePhotometry
 from pipeline.instrument.budget.scan import Pose, RingScan, at_baseline
 from pipeline.instrument.budget.sources import Kind
 
-Float = NDArray[np.float64]
 INCH_MM = 25.4
 
 

@@ -8,11 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.base import Camera
 
-Float = NDArray[np.float64]
 TUBE_INDEX = 1.51
 TUBE_RADIUS_MM = 14.0
 # (n − 1) t / (n ρ²) of an acrylic dome 1.5 mm thick with a radius of 12 mm, 1/mm

@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.budget.scan import RingScan
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from pipeline.arrays import Float
 from pipeline.instrument.budget.combine import Budget, Row, parameter_names
 from pipeline.instrument.budget.disturbance import Disturbance
 from pipeline.instrument.budget.scan import Pose, RingScan, radius_error
 from pipeline.instrument.budget.sources import Kind
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

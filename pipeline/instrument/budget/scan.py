@@ -8,16 +8,14 @@ from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget.disturbance import Disturbance, observe, observe_jacobian
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.misalignment import fit_circle, in_image, sheet_on_wall
 from pipeline.instrument.probe import Probe
-
-Float = NDArray[np.float64]
 
 
 class Pose(StrEnum):

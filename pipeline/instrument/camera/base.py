@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol, Self, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from pipeline.arrays import Bool, Float
 
 
 class Projection(NamedTuple):
     """Pixels ``uv`` (..., 2) and ``valid`` (...): inside the model's domain (not: inside the image)."""
 
     uv: Float
-    valid: Mask
+    valid: Bool
 
 
 class Rays(NamedTuple):
     """Unit viewing directions ``ray`` (..., 3) in C and ``valid`` (...)."""
 
     ray: Float
-    valid: Mask
+    valid: Bool
 
 
 class ProjectionJacobian(NamedTuple):

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.base import ProjectionJacobian, RaysJacobian
 
-Float = NDArray[np.float64]
 _MOST_STEPS = 40
 _RELATIVE_STEP = 1e-13
 _NEGLIGIBLE = 1e-100

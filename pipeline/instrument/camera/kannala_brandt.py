@@ -10,12 +10,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.inverse import invert_increasing, smallest_positive_root
 from pipeline.instrument.camera.radial import Polar, RadialCamera
 
-Float = NDArray[np.float64]
 _NODES = 256
 
 

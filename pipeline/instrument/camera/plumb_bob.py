@@ -11,13 +11,11 @@ from abc import ABC, abstractmethod
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from pipeline.instrument.camera.base import Projection, ProjectionJacobian, Rays, RaysJacobian
 from pipeline.instrument.camera.inverse import invert_increasing, rays_jacobian, smallest_positive_root
 
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _NODES = 256
 _FARTHEST = 1e3
 _NEWTON_STEPS = 12
@@ -90,7 +88,7 @@ class PlumbBobCamera(ABC):
         """Return d ray / d uv (..., 3, 2) and d ray / d parameters (..., 3, P); NaN where invalid."""
         return rays_jacobian(self.project_jacobian(self.unproject(uv).ray))
 
-    def _plane(self, p: Float) -> tuple[Float, Mask]:
+    def _plane(self, p: Float) -> tuple[Float, Bool]:
         """Return plane points (..., 2); NaN behind the horizon, past which two rays would share a point."""
         xi, length = self._mirror, np.linalg.norm(p, axis=-1)
         horizon = -xi if xi <= 1 else -1 / xi
@@ -129,7 +127,7 @@ class PlumbBobCamera(ABC):
         yy = growth + y * y * twice_slope + 6 * p1 * y + 2 * p2 * x
         return np.stack([np.stack([xx, cross], -1), np.stack([cross, yy], -1)], -2)
 
-    def _undistort(self, distorted: Float) -> tuple[Float, Mask]:
+    def _undistort(self, distorted: Float) -> tuple[Float, Bool]:
         """Invert the distortion: the radial part by itself, then Newton steps with the tangential one."""
         radius = np.hypot(distorted[..., 0], distorted[..., 1])
         nodes = np.tan(np.linspace(0, np.arctan(self.plane_radius_max), _NODES))

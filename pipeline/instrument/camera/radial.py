@@ -6,12 +6,11 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from pipeline.instrument.camera.base import Projection, ProjectionJacobian, Rays, RaysJacobian
 from pipeline.instrument.camera.inverse import rays_jacobian
 
-Float = NDArray[np.float64]
 _ON_AXIS = 1e-12
 
 
@@ -97,7 +96,7 @@ class RadialCamera(ABC):
         """Return d ray / d uv (..., 3, 2) and d ray / d parameters (..., 3, P); NaN where invalid."""
         return rays_jacobian(self.project_jacobian(self.unproject(uv).ray))
 
-    def _polar(self, xyz_c: Float) -> tuple[Polar, NDArray[np.bool_]]:
+    def _polar(self, xyz_c: Float) -> tuple[Polar, Bool]:
         p = np.asarray(xyz_c, float)
         r = np.hypot(p[..., 0], p[..., 1])
         on_axis = r < _ON_AXIS * np.abs(p[..., 2])

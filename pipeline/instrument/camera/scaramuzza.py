@@ -14,12 +14,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import polynomial
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.inverse import invert_increasing, smallest_positive_root
 from pipeline.instrument.camera.radial import Polar, RadialCamera
 
-Float = NDArray[np.float64]
 _NODES = 256
 # The polynomial is an interpolation: twice as far out as the image's farthest corner it says nothing.
 _REACH = 2.0

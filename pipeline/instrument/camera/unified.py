@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.camera.plumb_bob import PlumbBobCamera
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.review.comparison.coarse import Course, best_place
 from pipeline.review.comparison.surface import CELLS_PER_RADIUS, COLUMNS, Surface
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 _BLOCK_RADII = 0.5
 _QUARTERS = 4
 _MOST_STATIONS = 400

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from pipeline.artefacts.findings import DefectKind
@@ -16,7 +15,6 @@ from pipeline.review.comparison.paired import PairedWalls
 from pipeline.review.comparison.patch import Cutter, Patch, outline_mask
 from pipeline.review.comparison.places import Place
 
-Float = NDArray[np.float64]
 # Probability that any one of all changes is declared where nothing changed.
 FAMILY_ERROR = 0.01
 

@@ -7,14 +7,10 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.review.comparison.surface import CELLS_PER_RADIUS, COLUMNS, Surface
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
-Int = NDArray[np.int64]
 _COARSER = 2
 _STRETCH_RADII = 0.8
 # Stretches that are looked for everywhere, and all that are then looked for near where those lie.

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, shift
 
+from pipeline.arrays import Bool, Float
 from pipeline.review.comparison.patch import Patch, at_its_peak, smoothed
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 # Where one wall is no deeper than this share of the other, it shows no defect of its own.
 _ALIKE = 0.5
 # The common level at which extents are read, as a share of the lesser depth.

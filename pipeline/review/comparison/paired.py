@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from pipeline.arrays import Float
 from pipeline.review.comparison.registration import Registration
 from pipeline.review.measuring.wall import MeasuredWall
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 _SECTORS = 90
 _ROUNDS = 8
 _TUKEY = 4.685

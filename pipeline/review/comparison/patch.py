@@ -6,15 +6,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, label
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.review.comparison.paired import PairedWalls, Stretch, ring_values
 from pipeline.review.measuring.outline import filled
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
-Int = NDArray[np.int64]
 _MARGIN_MM = 6.0
 # Heights are read on surfaces smoothed this much, 1 σ.
 _SMOOTHING_MM = 0.3

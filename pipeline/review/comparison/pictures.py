@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.review.comparison.paired import PairedWalls
 
-Float = NDArray[np.float64]
-Byte = NDArray[np.uint8]
 _ROWS_AT_ONCE = 512
 _SAMPLED_ROWS = 2000
 # The colours end at so many median σ of the difference.

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from pipeline.arrays import Float
 from pipeline.artefacts.findings import DefectKind
 from pipeline.review.comparison.registration import Registration
 from pipeline.review.decisions.replay import Finding
 
-Float = NDArray[np.float64]
 # Outlines of one defect differ by a cell or two and by the registration, σ of which counts so often.
 _SIGMAS = 3.0
 _CELLS_MM = 1.0

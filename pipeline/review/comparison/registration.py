@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binom
 
+from pipeline.arrays import Float, Int
 from pipeline.errors import UnusableError
 from pipeline.review.comparison.blocks import AGREE, Matches, matched_blocks
 from pipeline.review.comparison.coarse import coarse_course
 from pipeline.review.comparison.surface import Surface
 from pipeline.review.comparison.welds import weld_place
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 # Two walls are taken for the same when chance would have made their blocks agree so often at most.
 _LARGEST_CHANCE = 1e-4
 _LEAST_SHARE = 0.4
@@ -180,7 +178,7 @@ def _stations(matches: Matches) -> _Stations:
     return _Stations(at, shift, np.full(len(at), shift_sigma), roll, np.full(len(at), roll_sigma))
 
 
-def _grouped(values: Float, group: NDArray[np.int64], number: NDArray[np.int64]) -> tuple[Float, float]:
+def _grouped(values: Float, group: Int, number: Int) -> tuple[Float, float]:
     """Return the mean of each group and the 1 σ of a single value about a line between the means."""
     mean = np.bincount(group, values) / number
     within = float(((values - mean[group]) ** 2).sum()) / max(len(values) - len(mean), 1)

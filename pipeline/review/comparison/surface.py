@@ -9,13 +9,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import WallTexture
 from pipeline.review.measuring.wall import MeasuredWall
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 COLUMNS = 640
 # Cells are about square on the wall, whatever the bore.
 CELLS_PER_RADIUS = 100

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float32
 from pipeline.review.comparison.coarse import best_place
 from pipeline.review.comparison.surface import Surface, sampled
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 _HALF_RADII = 0.2
 _ROOM_RADII = 0.06
 _SAMPLES_PER_CELL = 2

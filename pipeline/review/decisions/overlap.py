@@ -6,11 +6,8 @@ from collections.abc import Iterable
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.review.decisions.replay import Finding, Outline, beside
-
-Float = NDArray[np.float64]
 
 
 def covered(finding: Finding, others: Iterable[Finding]) -> tuple[str, ...]:

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.review.decisions.replay import Measured, Outline
 from pipeline.review.measuring.wall import MeasuredWall
 
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 _AROUND_MM = 6.0
 _LEAST_AROUND = 20
 # Depth is the extreme of the mean over this length, so that one noisy cell is no depth.
@@ -40,7 +38,7 @@ class OutlineGauge:
             float(last - first), float(min(a1 - a0, 2 * np.pi) * middle), depth, sigma,
         )  # fmt: skip
 
-    def _cells(self, point: Float) -> tuple[NDArray[np.int64], NDArray[np.int64], Bool, Bool]:
+    def _cells(self, point: Float) -> tuple[Int, Int, Bool, Bool]:
         """Return rows and columns about the outline, and which of their cells are in it or around it."""
         wall = self.wall
         rows = wall.rows(point[:, 0].min() - _AROUND_MM, point[:, 0].max() + _AROUND_MM)
@@ -58,9 +56,7 @@ class OutlineGauge:
         columns = (first + np.arange(count)) % len(wall.azimuth_rad)
         return rows, columns, inside, grown.astype(bool) & ~inside
 
-    def _depth(
-        self, radius: Float, sigma: NDArray[np.float32], inside: Bool, around: Bool
-    ) -> tuple[float, float]:
+    def _depth(self, radius: Float, sigma: Float32, inside: Bool, around: Bool) -> tuple[float, float]:
         """Return the extreme of the smoothed radius within, less the median around, and its 1 σ."""
         known = around & np.isfinite(radius)
         seen = inside & np.isfinite(radius)

@@ -7,15 +7,14 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.errors import BoresightError
 from pipeline.review.decisions.replay import Outline
 from pipeline.review.measuring.outline import OutlineGauge
 from pipeline.review.measuring.wall import MeasuredWall
 
-Float = NDArray[np.float64]
 Tool = Literal["point", "distance", "area", "depth", "diameter"]
 _STEPS_PER_CELL = 2
 _NEEDED: dict[Tool, int] = {"point": 1, "distance": 2, "area": 3, "depth": 3, "diameter": 1}

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.measured import RadiusMap
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class MeasuredWall:
         """Angle between columns."""
         return float(2 * np.pi / len(self.azimuth_rad))
 
-    def rows(self, from_mm: float, to_mm: float) -> NDArray[np.int64]:
+    def rows(self, from_mm: float, to_mm: float) -> Int:
         """Return the rows from one distance to another; at least the nearest."""
         inside = np.flatnonzero((self.distance_mm >= from_mm) & (self.distance_mm <= to_mm))
         return inside if len(inside) else np.array([self.row(from_mm)])

@@ -9,16 +9,14 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float
 from pipeline.artefacts.model import Overlays
 from pipeline.review.decisions.replay import Finding
 from pipeline.review.flat_tiles import PHOTO, FlatPicture, picture_of
 from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.run_files import RunFiles
 
-Byte = NDArray[np.uint8]
-Float = NDArray[np.float64]
 _SIZE_PX, _QUALITY = 480, 90
 _LEAST_HALF_MM = 8.0
 _OUTLINE_BGR, _HALO_BGR = (0, 71, 179), (255, 255, 255)

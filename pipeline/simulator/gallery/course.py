@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.effects.catalogue import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.laws.bench import RADII_MM, bench_truth
@@ -16,7 +16,6 @@ from pipeline.simulator.laws.trace import trace_ring
 from pipeline.simulator.motion import Motion, Odometer, Signal
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
 _RADIUS_MM = max(RADII_MM)
 _MOMENTS, _AZIMUTHS = 61, 24
 _SPEED_MM_S, _LEG_S = 15.0, 4.0

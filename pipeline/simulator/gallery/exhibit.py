@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.gallery.course import Course, course_of
 from pipeline.simulator.gallery.line import SeenLine, read_radii, seen_line
@@ -17,8 +17,6 @@ from pipeline.simulator.laws.harmonics import exponent, harmonic, strongest
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 AZIMUTHS = 180
 # Less than a third of a micrometre around the ring is the rendering's own error.
 NOTHING_MM = 3e-4

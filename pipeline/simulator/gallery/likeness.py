@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.gallery.exhibit import Exhibit
 
-Float = NDArray[np.float64]
 # States that a run does not know beforehand, by the harmonic that they take up in every bore by itself.
 STATES = {"off-centre probe": 1, "pipe of another radius": 0}
 # Typical 1 σ of a frame's light, width and skewness along one azimuth, in which they are weighed together.

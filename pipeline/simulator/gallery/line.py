@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, spline_filter
 
+from pipeline.arrays import Float, Float32
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 # A centroid's window, the steps along a radius in which it is taken, and how far about the line it is sought.
 WINDOW_PX, _STEP_PX, _REACH_PX = 6.0, 0.25, 30.0
 _CENTRINGS = 3

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
@@ -16,8 +15,6 @@ from pipeline.simulator.profile import LineProfile
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.base import Wall, WallGrid
-
-Float = NDArray[np.float64]
 
 # The instrument of the notes: baseline 22 mm, equidistant lens of 360 px/rad, 2 MP.
 BASELINE_MM, FOCAL_PX = 22.0, 360.0

@@ -10,13 +10,12 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.physics.window import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
 from pipeline.simulator.effects.window import TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
 from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX
 
-Float = NDArray[np.float64]
 Law = Callable[..., Float]
 _DOME_POWER = (GLASS_INDEX - 1) * DOME_THICKNESS_MM / (GLASS_INDEX * DOME_RADIUS_MM**2)
 

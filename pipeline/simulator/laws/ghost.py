@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.effects.catalogue import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.laws.bench import FOCAL_PX, RADII_MM, bench_truth
@@ -16,7 +16,6 @@ from pipeline.simulator.laws.closed_form import lever_of
 from pipeline.simulator.laws.harmonics import exponent, harmonic, strongest
 from pipeline.simulator.sheet import sheet_rays
 
-Float = NDArray[np.float64]
 _R = 50.8
 _RAYS = 720
 _DIRECTION_DEG = 40.0

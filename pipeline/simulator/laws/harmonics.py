@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
 
 
 def harmonic(azimuth_rad: Float, value: Float, order: int) -> complex:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
@@ -22,7 +21,6 @@ from pipeline.simulator.motion import Motion, Signal, constant
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.base import Wall, WallGrid
 
-Float = NDArray[np.float64]
 _R = 50.8
 _MM_PER_PX = lever_of(_R) / FOCAL_PX
 _GRADIENT = 0.2

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.simulator.effects.catalogue import switch_on
 from pipeline.simulator.effects.switch import Switch, typical_switch
@@ -20,7 +19,6 @@ from pipeline.simulator.laws.trace import TracedRing, trace_ring
 from pipeline.simulator.motion import Motion, Signal, constant
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
 _RADIUS_MM = 50.8
 _OFF_CENTRE_MM, _YAW_DEG = 2.0, 5.0
 _SPEED_MM_S, _ALIASED_HZ = 15.0, 26.0

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32
 from pipeline.simulator.effects.catalogue import switch_on
 from pipeline.simulator.effects.parts import with_sensor
 from pipeline.simulator.effects.switch import Switch
@@ -17,8 +17,6 @@ from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import shade_of, through_lens
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 _SIZE, _CENTRE = (480, 65), (20.0, 32.0)
 _ROWS = 24
 _GREEN = 1

@@ -8,15 +8,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.geometry.rigid import transform
 from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.sheet import sheet_table
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
 _AZIMUTHS, _BISECTIONS, _WALL_STEPS = 144, 50, 8
 _SEARCH_PX = (60.0, 560.0)
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.recording.base import Illumination
 from pipeline.simulator.effects.catalogue import switch_on
 from pipeline.simulator.effects.switch import Switch
@@ -17,7 +17,6 @@ from pipeline.simulator.premises.base import Premise
 from pipeline.simulator.render import Renderer, renderer_of
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
 # Errors of a stored picture that do not average out over frames: interpolation, rounding, codec.
 _FIXED_PX = 0.005
 _FIXED_SHAPE = 0.003

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Image
 from pipeline.recording.base import Illumination
 from pipeline.simulator.premises.base import Premise
 from pipeline.simulator.truth import SceneTruth
 
-Float = NDArray[np.float64]
-Image = NDArray[np.uint8]
 _LEAST_PEAK, _LEAST_SHARE = 25.0, 0.85
 _MOST_CLIPPED_LINE, _MOST_CLIPPED_WALL = 0.9, 0.05
 _LEAST_WALL, _LEAST_TEXTURE = 8.0, 1.0
@@ -110,7 +108,7 @@ def _peaks(truth: SceneTruth, picture: Image) -> Float:
     return np.asarray(polar.max((1, 2)), float)
 
 
-def _annulus(truth: SceneTruth) -> NDArray[np.bool_]:
+def _annulus(truth: SceneTruth) -> Bool:
     """Return the pixels (H, W) that look at the wall near the laser's ring, as stated."""
     camera = truth.stated.camera
     ring = np.arctan2(truth.facts.nominal_diameter_mm / 2, truth.stated.laser.baseline_mm)
@@ -122,7 +120,7 @@ def _annulus(truth: SceneTruth) -> NDArray[np.bool_]:
     return np.asarray((away >= inner) & (away <= outer))
 
 
-def _texture(picture: Image, ring: NDArray[np.bool_]) -> float:
+def _texture(picture: Image, ring: Bool) -> float:
     grey = picture[..., 1].astype(np.float32)
     fine = grey - cv2.blur(grey, (_TEXTURE_PX, _TEXTURE_PX))
     return float(fine[ring].std())

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Int
 from pipeline.simulator.wall.defects import imprint, reach_mm
 from pipeline.simulator.wall.description import Pipe, Surface, Tint, Weld
 from pipeline.simulator.wall.grid import Grid, window, wrapped
-from pipeline.simulator.wall.noise import Float32, above_share, field
+from pipeline.simulator.wall.noise import above_share, field
 from pipeline.simulator.wall.relief import branch_cover, coarse_field, rust_field, weld_across, weld_rows
 from pipeline.simulator.wall.seeds import Seeds
 
-Float = NDArray[np.float64]
 _RUST: Tint = (0.40, 0.19, 0.09)
 _LIME: Tint = (0.66, 0.64, 0.58)
 _BLOT: Tint = (0.11, 0.11, 0.12)
@@ -105,7 +104,7 @@ def _cover(albedo: Float32, share: Float | Float32, colour: Tint, texture: Float
         albedo[..., channel] += share * (np.float32(value) * texture - albedo[..., channel])
 
 
-def _cover_window(albedo: Float32, place: tuple[NDArray[np.int64], ...], share: Float, colour: Tint) -> None:
+def _cover_window(albedo: Float32, place: tuple[Int, ...], share: Float, colour: Tint) -> None:
     part = albedo[place]
     if part.size == 0:
         return

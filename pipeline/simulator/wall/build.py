@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import rotation_from_vector
@@ -16,13 +16,11 @@ from pipeline.simulator.wall.base import Wall
 from pipeline.simulator.wall.description import Bend, Pipe
 from pipeline.simulator.wall.fiducials import paint_fiducials, require_room
 from pipeline.simulator.wall.grid import Grid, grid_over
-from pipeline.simulator.wall.noise import Float32
 from pipeline.simulator.wall.photograph import lay_photograph
 from pipeline.simulator.wall.relief import add_relief
 from pipeline.simulator.wall.seeds import Seeds
 from pipeline.simulator.wall.shape import axis_curvature, base_radius
 
-Float = NDArray[np.float64]
 _AXIS_STEP_MM = 0.25
 
 

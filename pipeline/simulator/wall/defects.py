@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.wall.description import Defect, Tint
 from pipeline.simulator.wall.noise import plane_waves
 
-Float = NDArray[np.float64]
 _RUST: Tint = (0.34, 0.13, 0.05)
 _DARK: Tint = (0.06, 0.06, 0.06)
 _BRIGHT: Tint = (0.62, 0.62, 0.60)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Byte, Float, Float32
 from pipeline.errors import InputError
 from pipeline.recording.base import Marker
 from pipeline.simulator.wall.description import Fiducials, Pipe
 from pipeline.simulator.wall.grid import Grid, window
-from pipeline.simulator.wall.noise import Float32
 from pipeline.simulator.wall.shape import bore_radius, step_distances
 
-Float = NDArray[np.float64]
 _BLACK, _WHITE = 0.055, 0.68
 _SAMPLES = 4
 
@@ -89,7 +87,7 @@ def _marker_cells(
     return np.asarray(cover / _SAMPLES**2, np.float32), np.asarray(paint, np.float32)
 
 
-def _pattern(dictionary: str, number: int) -> NDArray[np.uint8]:
+def _pattern(dictionary: str, number: int) -> Byte:
     """Return the bits (n, n) of a marker with its black border, 0 black."""
     known = _dictionary(dictionary)
     cells = known.markerSize + 2

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft2, next_fast_len, rfft2
 
+from pipeline.arrays import Float, Float32
 from pipeline.simulator.wall.grid import Grid
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 _PLANE_WAVES = 48
 
 

@@ -6,14 +6,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32
 from pipeline.errors import InputError
 from pipeline.simulator.wall.description import Photograph
 from pipeline.simulator.wall.grid import Grid
-from pipeline.simulator.wall.noise import Float32
 
-Float = NDArray[np.float64]
 _SRGB_GAMMA = 2.2
 _DARKEST, _BRIGHTEST = 0.01, 0.95
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Int
 from pipeline.simulator.wall.defects import imprint, reach_mm
 from pipeline.simulator.wall.description import Branch, Pipe, Weld
 from pipeline.simulator.wall.grid import Grid, grid_over, window
-from pipeline.simulator.wall.noise import Float32, above_share, field
+from pipeline.simulator.wall.noise import above_share, field
 from pipeline.simulator.wall.seeds import Seeds
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _FORM_LONGEST_MM = 80.0
 _BRANCH_CHAMFER_MM = 0.6
 # OpenCV interpolates pictures of less than 32767 rows.

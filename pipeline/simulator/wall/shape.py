@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.simulator.wall.description import Bend, Joint, Pipe
 from pipeline.simulator.wall.grid import Grid
-
-Float = NDArray[np.float64]
 
 
 def base_radius(grid: Grid, pipe: Pipe) -> Float:

@@ -13,14 +13,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, skew
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 POSE = 6
 _OUT_OF_MODEL_PX = 1e4

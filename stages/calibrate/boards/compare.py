@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import rotation_from_vector, skew
 from pipeline.instrument.camera.base import Camera
@@ -24,7 +24,6 @@ from stages.calibrate.boards.fit import fit, held_out_residuals
 from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
 from stages.calibrate.boards.parts import Part
 
-Float = NDArray[np.float64]
 _GRID_COLUMNS = 41
 _TURNING_STEPS = 20
 
@@ -113,7 +112,7 @@ def _held_out(part: Part, model: ModelName, parameters: BoardCalibrationParamete
     return np.concatenate(held_out_residuals(fitted, part.outside, parameters.huber_px))
 
 
-def _grid_rays(camera: Camera) -> tuple[Float, Float, NDArray[np.bool_]]:
+def _grid_rays(camera: Camera) -> tuple[Float, Float, Bool]:
     width, height = camera.image_size
     rows = max(round(_GRID_COLUMNS * height / width), 2)
     u, v = np.meshgrid(np.linspace(0, width - 1, _GRID_COLUMNS), np.linspace(0, height - 1, rows))

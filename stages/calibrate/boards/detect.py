@@ -12,14 +12,11 @@ from itertools import product
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays import Float, Image
 from pipeline.instrument.camera.calibration import BoardView
 from stages.calibrate.boards.targets import Board, Charuco, Chessboard, grid
-
-Image = NDArray[np.uint8]
-Float = NDArray[np.float64]
 
 LEAST_CORNERS = 12
 _SHORTEST_SIDE = 4

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, CameraCalibration
@@ -25,8 +25,6 @@ from stages.calibrate.boards.bundle import (
 from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
 from stages.calibrate.boards.start import model_start, pose
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 NAME = "calibrate-camera"
 
 

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool
 from pipeline.instrument.camera.calibration import BoardSurvey, BoardView
 from stages.calibrate.boards.bundle import Estimate
 from stages.calibrate.boards.parameters import BoardCalibrationParameters
 from stages.calibrate.boards.survey import applied, placed, survey_board
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ def deal(
 
 
 def _part(
-    views: Sequence[BoardView], first: Estimate, out: Mask, parameters: BoardCalibrationParameters
+    views: Sequence[BoardView], first: Estimate, out: Bool, parameters: BoardCalibrationParameters
 ) -> Part:
     inside = [view for view, left in zip(views, out, strict=True) if not left]
     outside = [view for view, left in zip(views, out, strict=True) if left]

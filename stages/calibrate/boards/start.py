@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView
@@ -18,7 +18,6 @@ from pipeline.instrument.camera.scaramuzza import Scaramuzza
 from pipeline.instrument.camera.unified import Unified
 from stages.calibrate.boards.bundle import FLAT, POSES_ONLY, Corners, Estimate, Free, cost, solve
 
-Float = NDArray[np.float64]
 _HALF_FIELDS_RAD = np.geomspace(0.15, 2.6, 14)
 _SAMPLE_CORNERS = 24
 _START_HUBER_PX = 5.0

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.arrays import Float, Int
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardSurvey, BoardView
 from stages.calibrate.boards.bundle import (
@@ -30,8 +30,6 @@ from stages.calibrate.boards.bundle import (
 from stages.calibrate.boards.parameters import BoardCalibrationParameters
 from stages.calibrate.boards.start import model_start, pose
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _SAME_MM = 1e-3
 _TURNS = 6
 _PLACINGS = 2

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor
+from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.parameters import GaugeParameters
@@ -23,7 +23,6 @@ from stages.calibrate.gauge.terms import (
     slip_origin,
 )
 
-Float = NDArray[np.float64]
 _CONVERGED_SIGMA = 0.02
 # Frames that third differences of the motion tie together.
 _REACH = 3

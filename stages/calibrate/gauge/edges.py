@@ -10,17 +10,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
+from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
-from pipeline.recording.base import Image
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _PROFILE = 21
 _SIDES = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
 _SPAN = 0.7
@@ -60,7 +57,7 @@ class Edges:
     outward_mm: Float
     sigma_px: Float
 
-    def select(self, keep: NDArray[np.bool_]) -> Edges:
+    def select(self, keep: Bool) -> Edges:
         """Return the edges where ``keep`` (M,) is true."""
         return Edges(**{k: v[keep] for k, v in vars(self).items()})
 
@@ -176,7 +173,7 @@ def _cells(gauge: Gauge) -> int:
     return int(dictionary.markerSize) + _BORDER_CELLS
 
 
-def _inside(uv: Float, shape: tuple[int, ...], margin: Float) -> NDArray[np.bool_]:
+def _inside(uv: Float, shape: tuple[int, ...], margin: Float) -> Bool:
     size = np.array([shape[1], shape[0]])
     with np.errstate(invalid="ignore"):
         inside = (uv > margin[:, None] + 2) & (uv < size - 3 - margin[:, None])

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.recording.base import Fiducials, PipeFacts
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 # Corners as ArUco numbers them, clockwise from the pattern's top left: (column, row) from -1 to 1.
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 

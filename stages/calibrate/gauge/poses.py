@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import from_parts
 from pipeline.instrument.probe import Probe
@@ -17,8 +17,6 @@ from pipeline.recording.base import Recording
 from stages.calibrate.gauge.detect import Sighting
 from stages.calibrate.gauge.start import FirstPose
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _LEAST_SAMPLES = 90
 
 
@@ -68,7 +66,7 @@ def poses_of_all_frames(recording: Recording, posed: PosedFrames, rings: RingSam
     return _centred(T_pc, beyond, frame_index(recording, rings.frame), rings, probe)
 
 
-def _centred(T_pc: Float, beyond: NDArray[np.bool_], index: Int, rings: RingSamples, probe: Probe) -> Float:
+def _centred(T_pc: Float, beyond: Bool, index: Int, rings: RingSamples, probe: Probe) -> Float:
     """Move poses ``beyond`` the fiducials across, so that the axis passes the middle of their rings."""
     out = T_pc.copy()
     rows = np.flatnonzero(beyond[index] & (rings.valid.sum(1) >= _LEAST_SAMPLES))

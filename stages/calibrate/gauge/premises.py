@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
@@ -18,7 +18,6 @@ from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import PosedFrames
 from stages.calibrate.gauge.start import disagreeing
 
-Float = NDArray[np.float64]
 STAGE = "calibrate"
 _LOOKED_AT = 6
 _SIZE_TOLERANCE = 0.05
@@ -92,7 +91,7 @@ def require_poses(
         )  # fmt: skip
 
 
-def outvoted_fiducials(posed: PosedFrames, gauge: Gauge) -> NDArray[np.int64]:
+def outvoted_fiducials(posed: PosedFrames, gauge: Gauge) -> Int:
     """Return the places of fiducials that most frames outvote; refuse when they are many."""
     seen, wrong = disagreeing(list(zip(posed.sightings, posed.poses, strict=True)), len(gauge.ids))
     if wrong.sum() > max(_WRONG_SHARE * (seen > 0).sum(), 1):
@@ -103,7 +102,7 @@ def outvoted_fiducials(posed: PosedFrames, gauge: Gauge) -> NDArray[np.int64]:
     return np.flatnonzero(wrong)
 
 
-def require_bores(gauge: Gauge, section: NDArray[np.int64], radius_error_mm: Float) -> None:
+def require_bores(gauge: Gauge, section: Int, radius_error_mm: Float) -> None:
     """Refuse rings whose radius, by the stated probe, belongs to another bore."""
     for k, radius in enumerate(gauge.radius_mm):
         here = radius_error_mm[section == k]

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.adjust import Measurements, Solution, instrument_covariance, spread
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import ENCODER, SheetModel
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _AZIMUTHS = 72
 
 

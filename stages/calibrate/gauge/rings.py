@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _LEAST_SHARE = 0.5
 
 
@@ -49,7 +47,7 @@ class BoreRings:
     wall_mm: Float
     left_out: dict[str, int]
 
-    def select(self, keep: NDArray[np.bool_]) -> BoreRings:
+    def select(self, keep: Bool) -> BoreRings:
         """Return the bins where ``keep`` (M,) is true."""
         parts = {k: v[keep] for k, v in vars(self).items() if k != "left_out"}
         return BoreRings(**parts, left_out=self.left_out)
@@ -76,7 +74,7 @@ def bore_rings(
 
 
 def _condensed(
-    rings: RingSamples, index: Int, use: NDArray[np.bool_], distance_mm: Float, azimuth_rad: Float,
+    rings: RingSamples, index: Int, use: Bool, distance_mm: Float, azimuth_rad: Float,
     gauge: Gauge, bins: int, left_out: dict[str, int],
 ) -> BoreRings:  # fmt: skip
     frames, azimuths = use.shape

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.robust import Cauchy
 from pipeline.adjustment.sums import BLOCK
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.calibrate.gauge.state import Unknowns
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
 _FLOOR = np.array([1e-4] * 3 + [1e-6] * 3)
 _SOFT = 5.0

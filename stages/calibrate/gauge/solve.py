@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.adjust import (
@@ -24,8 +24,6 @@ from stages.calibrate.gauge.smooth import learned_sigma
 from stages.calibrate.gauge.state import SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _WRONG_RING = 4.0
 _WRONG_EDGE_MM = 0.25
 

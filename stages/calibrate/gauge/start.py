@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, skew, transform
 from pipeline.instrument.camera.base import Camera
 from stages.calibrate.gauge.detect import Sighting
 from stages.calibrate.gauge.geometry import Gauge
 
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 LEAST_MARKERS = 3
 _DRAWS = 12
 _FITS_PX = 6.0
@@ -28,7 +26,7 @@ class FirstPose:
     """Pose ``T_pc`` (4, 4) of a frame, and which of its sighting's fiducials fit it (M,)."""
 
     T_pc: Float
-    fits: Mask
+    fits: Bool
 
 
 def first_pose(
@@ -70,7 +68,7 @@ def refined_pose(camera: Camera, uv: Float, xyz_p: Float, T_pc: Float) -> Float:
     return T_pc
 
 
-def disagreeing(poses: Sequence[tuple[Sighting, FirstPose]], markers: int) -> tuple[NDArray[np.int64], Mask]:
+def disagreeing(poses: Sequence[tuple[Sighting, FirstPose]], markers: int) -> tuple[Int, Bool]:
     """Return how often each fiducial was seen in posed frames, and which were outvoted in most of them."""
     seen, outvoted = np.zeros(markers, np.int64), np.zeros(markers, np.int64)
     for sighting, pose in poses:
@@ -79,7 +77,7 @@ def disagreeing(poses: Sequence[tuple[Sighting, FirstPose]], markers: int) -> tu
     return seen, outvoted * 2 > seen
 
 
-def _tried(camera: Camera, uv: Float, xyz_p: Float, draw: NDArray[np.int64]) -> FirstPose | None:
+def _tried(camera: Camera, uv: Float, xyz_p: Float, draw: Int) -> FirstPose | None:
     ray = camera.unproject(uv[draw].reshape(-1, 2)).ray
     ok = ray[:, 2] > np.cos(_WIDEST)
     if ok.sum() < 6:
@@ -95,6 +93,6 @@ def _tried(camera: Camera, uv: Float, xyz_p: Float, draw: NDArray[np.int64]) -> 
     return FirstPose(T_pc, _fits(camera, uv, xyz_p, T_pc))
 
 
-def _fits(camera: Camera, uv: Float, xyz_p: Float, T_pc: Float) -> Mask:
+def _fits(camera: Camera, uv: Float, xyz_p: Float, T_pc: Float) -> Bool:
     error = np.linalg.norm(camera.project(transform(inverse(T_pc), xyz_p)).uv - uv, axis=-1)
     return np.asarray(np.nan_to_num(error, nan=np.inf).mean(1) < _FITS_PX)

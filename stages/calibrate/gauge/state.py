@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.parameters import GaugeParameters
 
-Float = NDArray[np.float64]
 ENCODER = 3
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.robust import Cauchy
 from pipeline.adjustment.sums import BLOCK
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, skew, transform
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
@@ -17,8 +17,6 @@ from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _STEP_S = 1e-3
 _ORIGIN_SIGMA_MM = 1e-3
 

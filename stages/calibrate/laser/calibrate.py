@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Image
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera.base import Camera
@@ -20,9 +20,6 @@ from stages.calibrate.laser.line import measure_line, patch_around
 from stages.calibrate.laser.parameters import LaserPlaneParameters
 from stages.calibrate.laser.plane import fit_plane_robustly
 from stages.rings.colour import excess_weights, mix
-
-Float = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)

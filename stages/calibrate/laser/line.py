@@ -11,15 +11,12 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Float32
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera.base import Camera
 from stages.calibrate.laser.parameters import LaserPlaneParameters
 from stages.calibrate.laser.peaks import fit_peaks
-
-Float = NDArray[np.float64]
-Image32 = NDArray[np.float32]
 
 _MOST_CANDIDATES, _DRAWS = 4000, 400
 _LINE_PX, _STATION_PX, _PROFILE_STEP_PX = 2.0, 1.0, 0.5
@@ -63,7 +60,7 @@ def patch_around(xyz_b: Float, uv: Float, T_cb: Float, margin_mm: float) -> Boar
 
 
 def measure_line(
-    excess: Image32, camera: Camera, patch: BoardPatch, parameters: LaserPlaneParameters
+    excess: Float32, camera: Camera, patch: BoardPatch, parameters: LaserPlaneParameters
 ) -> Float:
     """Return the laser line's points (N, 2), mm in the board's plane; N is 0 where no line is seen.
 
@@ -86,7 +83,7 @@ def measure_line(
 
 
 def _candidates(
-    excess: Image32, camera: Camera, patch: BoardPatch, parameters: LaserPlaneParameters
+    excess: Float32, camera: Camera, patch: BoardPatch, parameters: LaserPlaneParameters
 ) -> tuple[Float, Float]:
     """Return the board points (K, 2) that stand out most from around them, and their heights (K,)."""
     step = max(patch.mm_per_px, float(np.max(patch.high_mm - patch.low_mm)) / _LARGEST_GRID)
@@ -111,7 +108,7 @@ def _raised(face: Float, window_px: float) -> Float:
     return np.asarray(fine - coarse, np.float64)
 
 
-def _ridge(raised: Float) -> NDArray[np.bool_]:
+def _ridge(raised: Float) -> Bool:
     """Return where a picture is highest along its row or its column among neighbours."""
     highest = np.zeros(raised.shape, bool)
     for kernel in (np.ones((1, 3), np.uint8), np.ones((3, 1), np.uint8)):
@@ -156,7 +153,7 @@ def _window(parameters: LaserPlaneParameters) -> Float:
     return np.arange(-half, half + 1, dtype=float)
 
 
-def _sample(excess: Image32, camera: Camera, patch: BoardPatch, xy_b: Float) -> Float:
+def _sample(excess: Float32, camera: Camera, patch: BoardPatch, xy_b: Float) -> Float:
     """Return the picture's values at board points (..., 2), NaN outside of the picture."""
     xyz_b = np.concatenate([xy_b, np.zeros_like(xy_b[..., :1])], -1)
     uv, valid = camera.project(transform(patch.T_cb, xyz_b.reshape(-1, 3)))

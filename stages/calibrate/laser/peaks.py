@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
+
 _STEPS = 12
 _LARGEST_STEP = np.array([2.0, 0.3])
 _LEAST_WIDTH, _WIDEST_SHARE = 0.8, 0.4

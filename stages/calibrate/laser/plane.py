@@ -8,12 +8,10 @@ down after Tukey by iterated reweighting.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.instrument.laser_plane import LaserPlane
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _TUKEY, _MAD_TO_SIGMA = 4.685, 1.4826
 _MOST_STEPS, _SETTLED = 50, 1e-9
 # A straight line in a picture has two numbers; the plane takes three of all of them.

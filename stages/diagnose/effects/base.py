@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from stages.diagnose.effects.ring_geometry import RingGeometry, ring_geometry
 
-Float = NDArray[np.float64]
 Shape = tuple[float, ...]
 
 
@@ -58,7 +57,7 @@ class ImagePoints:
     """
 
     probe: Probe
-    frame: NDArray[np.int64]
+    frame: Int
     time_s: Float
     uv: Float
     xyz_c: Float

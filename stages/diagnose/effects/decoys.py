@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
+from pipeline.arrays import Float
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
 from stages.diagnose.effects.nameless import Nameless, growth, two_parts
 

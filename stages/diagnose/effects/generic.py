@@ -7,8 +7,9 @@ from enum import StrEnum
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
 from stages.diagnose.effects.nameless import Nameless, growth, two_parts
 from stages.diagnose.effects.predict import columns, texture_columns

@@ -6,9 +6,10 @@ from abc import abstractmethod
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Quantity
-from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 
 
 class Worded(EffectModel):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
+from pipeline.arrays import Float
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.kinds import (
     Directed,
     Periodic,

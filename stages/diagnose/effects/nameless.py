@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, EffectModel, Float, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 
 _REFERENCE_MM = 50.0
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.diagnose.effects.base import EffectModel, Float, ImagePoints, Shape, Travel
+from pipeline.arrays import Float
+from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.camera import image_shift
 from stages.diagnose.effects.kinds import (
     Directed,

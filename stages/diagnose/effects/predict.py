@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from stages.diagnose.effects.base import EffectModel, Float, ImagePoints, Shape, Travel
+from pipeline.arrays import Float
+from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 
 _ROUNDS = 3
 

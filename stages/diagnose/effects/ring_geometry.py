@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 
-Float = NDArray[np.float64]
 _STEP_RAD = 1e-5
 
 

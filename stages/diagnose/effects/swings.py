@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, Float, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
 from stages.diagnose.effects.nameless import Nameless, growth
 

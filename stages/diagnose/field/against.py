@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Illumination
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.predict import columns
@@ -17,7 +17,6 @@ from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.system import field_system
 from stages.diagnose.residual import RingResidual
 
-Float = NDArray[np.float64]
 # Rings count so little less that poses and wall are those of the texture.
 _RELAXED = 1e3
 _OUTLIER = 0.1
@@ -73,6 +72,6 @@ def floor_px(run: FieldRun, left: RingResidual, terms: Sequence[tuple[EffectMode
     return float(np.sqrt(np.mean((left.residual_px[keep] - design[keep] @ found) ** 2)))
 
 
-def _between_lit(run: FieldRun, frame: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _between_lit(run: FieldRun, frame: Int) -> Bool:
     lit = run.recording.frames.of(Illumination.LED, Illumination.BOTH)
     return np.asarray((frame >= lit[0]) & (frame <= lit[-1]))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.predict import columns
@@ -18,7 +18,6 @@ from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
-Float = NDArray[np.float64]
 # The field tells something only when it knows the effect to this part of its size.
 _TELLING = 0.33
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import to_pipe
@@ -28,8 +28,6 @@ from stages.diagnose.field.system import OWN, Asked, field_system
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_trajectory
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 # More shapes than this are searched in the motion's spectrum or in the readings, not one by one.
 _FEW_SHAPES = 12
 _CELL_MM, _CELL_RAD = 10.0, np.radians(30.0)

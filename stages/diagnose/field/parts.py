@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import LandmarkRows, Rows
+from pipeline.arrays import Bool, Int
 from stages.diagnose.field.run import FieldRun
 from stages.motion.equations import Equations
 from stages.motion.state import EncoderReadings
 from stages.motion.terms import RingBins
 from stages.motion.tracks import Tracks
 
-Mask = NDArray[np.bool_]
-Int = NDArray[np.int64]
 _SEEN_OFTEN = 3
 
 
@@ -43,7 +41,7 @@ def part_of(run: FieldRun, first: int, end: int) -> FieldRun:
     )  # fmt: skip
 
 
-def _tracks(tracks: Tracks, seen: Mask, kept: Mask, first: int) -> Tracks:
+def _tracks(tracks: Tracks, seen: Bool, kept: Bool, first: int) -> Tracks:
     number = np.cumsum(kept) - 1
     return replace(
         tracks, landmark=number[tracks.landmark[seen]], frame=tracks.frame[seen] - first, uv=tracks.uv[seen],
@@ -51,7 +49,7 @@ def _tracks(tracks: Tracks, seen: Mask, kept: Mask, first: int) -> Tracks:
     )  # fmt: skip
 
 
-def _bins(rings: RingBins, of_ring: Mask, first: int) -> RingBins:
+def _bins(rings: RingBins, of_ring: Bool, first: int) -> RingBins:
     return RingBins(
         rings.frame[of_ring] - first,
         rings.xyz_c[of_ring],
@@ -60,14 +58,14 @@ def _bins(rings: RingBins, of_ring: Mask, first: int) -> RingBins:
     )
 
 
-def _ring_rows(rows: Rows, keep: Mask, first: int) -> Rows:
+def _ring_rows(rows: Rows, keep: Bool, first: int) -> Rows:
     return replace(
         rows, frame=rows.frame[keep] - first, by_frame=rows.by_frame[keep], by_border=rows.by_border[keep],
         residual=rows.residual[keep], sigma=rows.sigma[keep],
     )  # fmt: skip
 
 
-def _landmark_rows(rows: LandmarkRows, seen: Mask, kept: Mask, landmark: Int, first: int) -> LandmarkRows:
+def _landmark_rows(rows: LandmarkRows, seen: Bool, kept: Bool, landmark: Int, first: int) -> LandmarkRows:
     count = np.bincount(landmark[seen], minlength=len(kept))[kept]
     return replace(
         rows, start=np.concatenate([[0], np.cumsum(count)]), frame=rows.frame[seen] - first,

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.field.run import FieldRun
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 
 
 def ring_points(run: FieldRun) -> ImagePoints:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from threadpoolctl import threadpool_limits
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor, Rows
 from pipeline.adjustment.sums import BLOCK
+from pipeline.arrays import Float, Int
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.field.system import FieldSystem
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _LEAST_REACH = 4
 
 

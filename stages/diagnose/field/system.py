@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.adjustment.bordered import LandmarkRows, Rows
 from pipeline.adjustment.robust import Squares
 from pipeline.adjustment.sums import BLOCK
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, transform
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.predict import columns, reading_columns, texture_columns
@@ -21,8 +21,6 @@ from stages.motion import terms
 from stages.motion.equations import MATCH_BIASES
 from stages.motion.state import EncoderReadings, State
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 Asked = Sequence[tuple[EffectModel, Shape]]
 _RADIUS_SHARE = 0.1
 _SLIPPED_MM = 1e3

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Int
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.fit import Fit, fit
@@ -15,7 +15,6 @@ from stages.diagnose.gauge.points import ring_points
 from stages.diagnose.gauge.run import GaugeRun, Term, ring_mm_per_px
 from stages.diagnose.residual import RingResidual
 
-Float = NDArray[np.float64]
 # Rings weigh so little that fiducials place the probe, and enough that they size the effects.
 _RELAXED = 1e-4
 _OUTLIER = 0.1
@@ -33,7 +32,7 @@ class GaugeResiduals:
 
 
 def rings_against_fiducials(
-    run: GaugeRun, start: Unknowns, terms: Sequence[Term], frames: NDArray[np.int64]
+    run: GaugeRun, start: Unknowns, terms: Sequence[Term], frames: Int
 ) -> GaugeResiduals:
     """Return the rings' residuals, poses by fiducials and encoder.
 
@@ -63,7 +62,7 @@ def rings_against_fiducials(
     return GaugeResiduals(before, after, replace(after, residual_mm=heldout[0], residual_px=heldout[1]))
 
 
-def _residual(run: GaugeRun, found: Fit, frames: NDArray[np.int64]) -> RingResidual:
+def _residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:
     equations = found.linearised.equations
     residual = equations.residual[equations.kind == RING]
     points = ring_points(found.state, run.rings, run.time_s, run.width_px)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.examine import ADEQUATE, Examined
 from stages.diagnose.gauge.sizes import quantities
 from stages.diagnose.result import Candidate, EffectFound, Picture, Verdict
 
-Float = NDArray[np.float64]
 # Likelihoods know nothing of laws that are a little off, or of how an image forms: odds of 1000 to 1 are
 # asked where 30 to 1 would do (a drawn focal length was called a cone at 0.99).
 CONFIDENT = 0.999

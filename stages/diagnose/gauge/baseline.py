@@ -7,11 +7,10 @@ on the recordings). They are unknowns of the recording, so that no effect is see
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.effects.base import ImagePoints
 
-Float = NDArray[np.float64]
 SIGMA_PX = 0.01
 _RING_HARMONICS = (0, 1, 2, 3, 4)
 _EDGE_HARMONICS = (0, 1, 2)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.agreement import TELLING, same
 from stages.diagnose.evidence import Evidence
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
@@ -18,7 +18,6 @@ from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.inference import Stated, estimate
 from stages.diagnose.result import Confirmation
 
-Float = NDArray[np.float64]
 # Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is
 # compared some five times over, and noise is to contradict it once in a thousand.
 _AGREE = 2e-4

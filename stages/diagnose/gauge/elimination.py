@@ -13,12 +13,11 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
 from scipy.sparse import csr_matrix
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
+from pipeline.arrays import Bool, Float, Int
+
 POSE = 6
 RING, EDGE, ENCODER = 0, 1, 2
 _REACH = 4
@@ -30,7 +29,7 @@ _HOLD = 1e-10
 class Part:
     """Some frames (N,) of a run, and some kinds of its measurements."""
 
-    frames: NDArray[np.bool_]
+    frames: Bool
     kinds: tuple[int, ...] = (RING, EDGE, ENCODER)
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.physics.catalogue import effect
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.evidence import Evidence
@@ -20,8 +20,6 @@ from stages.diagnose.gauge.scan import span
 from stages.diagnose.inference import Stated, eliminated, instrument_places, places_of
 from stages.diagnose.result import Feasible
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _SIGMAS = 5.0
 # Twice the log of the expected Bayes factor above which two effects are told apart.
 APART = 14.0

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
@@ -27,7 +27,6 @@ from stages.diagnose.gauge.elimination import (
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
 from stages.diagnose.inference import instrument_information
 
-Float = NDArray[np.float64]
 _CONVERGED = 0.5
 # mm and rad: a pose's step squared, over the distance of the wall, is far below what a ring shows.
 _STILL = 1e-3
@@ -149,7 +148,7 @@ def _reduced(
     )  # fmt: skip
 
 
-def _by_effect(names: Sequence[Column | None]) -> NDArray[np.int64]:
+def _by_effect(names: Sequence[Column | None]) -> Int:
     """Return (K,) a number for the columns of each effect and shape, −1 for the instrument's."""
     keys = [(c.effect, c.shape) if c is not None and c.effect != INSTRUMENT else None for c in names]
     number = {key: k for k, key in enumerate(dict.fromkeys(k for k in keys if k is not None))}

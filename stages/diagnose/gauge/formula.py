@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
+from pipeline.arrays import Int
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.swings import SWINGS
@@ -30,8 +30,6 @@ from stages.diagnose.inference import (
     score,
 )
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _MOST_TERMS = 4
 # A further term must be rarer than this by chance, corrected for all that were tried.
 _NEEDED = 1e-4

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.evidence import INSTRUMENT, Column, Evidence, total
@@ -20,7 +20,6 @@ from stages.diagnose.gauge.run import GaugeRun, linearise, ring_mm_per_px
 from stages.diagnose.inference import Stated, estimate
 from stages.diagnose.result import FitQuality
 
-Float = NDArray[np.float64]
 _RIDGE = 1e-9
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.decoys import DECOYS
 from stages.diagnose.effects.generic import VOCABULARY
@@ -22,8 +22,6 @@ from stages.diagnose.gauge.search import Search, refits
 from stages.diagnose.gauge.shapes import refined
 from stages.diagnose.inference import PRIOR_PLAUSIBLE, Stated, estimate
 
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _STRETCHES = 2
 _LEAST_FRAMES = 8
 # Beforehand: each effect of the library is as likely as any other. A pattern without a cause that fits as
@@ -146,7 +144,7 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike)
 
 
-def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Mask:
+def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Bool:
     """Return (H,) True for the formula where the likeliest named effects make its very pattern."""
     out = np.zeros(len(judged), bool)
     named = [k for k, j in enumerate(judged) if j.named]

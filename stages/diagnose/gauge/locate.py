@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.effects.generic import GenericTerm, Moves
 from stages.diagnose.effects.nameless import Nameless
@@ -16,8 +16,6 @@ from stages.diagnose.gauge.judge import Judged, Regime
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.inference import Stated
 from stages.diagnose.result import Location
-
-Float = NDArray[np.float64]
 
 
 def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated: Stated) -> Location | None:
@@ -84,6 +82,6 @@ def _own_exponent(judged: Judged, term: Term) -> float | None:
     return known.radial_exponent if known is not None else None
 
 
-def _radius(run: GaugeRun, judged: Judged, frames: NDArray[np.bool_]) -> float:
+def _radius(run: GaugeRun, judged: Judged, frames: Bool) -> float:
     inside = frames[run.rings.frame]
     return float(np.median(judged.fit.linearised.rings.radius_mm[inside])) if inside.any() else np.nan

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from stages.calibrate.gauge.edges import Edges
@@ -13,8 +13,6 @@ from stages.calibrate.gauge.rings import BoreRings
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import ImagePoints
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _SMOOTHING = 9
 
 

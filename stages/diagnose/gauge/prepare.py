@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.adjust import adjust
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.parameters import GaugeParameters
@@ -19,7 +19,6 @@ from stages.diagnose.gauge.fit import own_parameters
 from stages.diagnose.gauge.points import bin_widths
 from stages.diagnose.gauge.run import GaugeRun, Term, linearise
 
-Float = NDArray[np.float64]
 _CAUCHY = 2.5
 # Jerk is not the same all along a run: what is learned as typical must not hold poses where it is larger.
 _LOOSER = 5.0
@@ -77,7 +76,7 @@ def weighed(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> GaugeRun:
     )
 
 
-def _between(rings: BoreRings, posed: NDArray[np.int64]) -> BoreRings:
+def _between(rings: BoreRings, posed: Int) -> BoreRings:
     return rings.select((rings.frame >= posed.min()) & (rings.frame <= posed.max()))
 
 
@@ -92,7 +91,7 @@ def _ring_sigma_mm(rings: BoreRings, state: Unknowns) -> Float:
     return np.asarray(rings.sigma_px * np.linalg.norm(way, axis=1))
 
 
-def _weight(frame: NDArray[np.int64], residual: Float, sigma: Float) -> Float:
+def _weight(frame: Int, residual: Float, sigma: Float) -> Float:
     in_sigma = residual / sigma
     spread = frame_spread(frame, in_sigma)
     return np.asarray(1 / (1 + (in_sigma / spread / _CAUCHY) ** 2) / (sigma * spread) ** 2)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from pipeline.adjustment.bordered import Rows
+from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.rings import BoreRings
@@ -30,8 +30,6 @@ from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations, Motio
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import edge_points, ring_points, speed_along
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
 _ROUNDS = 2
 _FAR_PX = 1.0
 _ENCODER_SIGMA_MM = 1.0

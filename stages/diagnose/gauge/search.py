@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.predict import ring_shift_px, texture_shift_px
@@ -17,7 +16,6 @@ from stages.diagnose.gauge.scan import Scored, scan
 from stages.diagnose.gauge.shapes import refined
 from stages.diagnose.inference import Stated
 
-Float = NDArray[np.float64]
 # Below this chance, corrected for all that was tried, something is there.
 DETECTED = 1e-4
 _REFITTED = 4

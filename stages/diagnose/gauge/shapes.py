@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import span
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged
@@ -15,7 +15,6 @@ from stages.diagnose.gauge.shapes import freed
 from stages.diagnose.inference import Stated
 from stages.diagnose.result import Value
 
-Float = NDArray[np.float64]
 _DRAWS = 400
 
 

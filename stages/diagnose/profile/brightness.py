@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.stats import norm
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
@@ -14,7 +14,6 @@ from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.measure import LineProfiles
 from stages.diagnose.profile.regression import regress, tested
 
-Float = NDArray[np.float64]
 # Of the line's height: light beside the line that black offsets and compression leave.
 STRAY_FLOOR = 2e-4
 # Of ln brightness: paint, gloss and markers that a recording happens to keep at one azimuth.
@@ -125,7 +124,7 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
     )  # fmt: skip
 
 
-def _course(rings: RingSamples, rows: NDArray[np.int64]) -> Float:
+def _course(rings: RingSamples, rows: Int) -> Float:
     """Return ln brightness (A,) of the block, its slow change around the ring taken out; NaN where unseen."""
     height = np.where(rings.valid[rows], rings.amplitude[rows], np.nan).astype(float)
     log = np.log(np.maximum(height, 1e-3))

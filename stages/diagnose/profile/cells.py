@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.measure import LineProfiles
 
-Float = NDArray[np.float64]
 BLOCK_FRAMES, LEAST_FRAMES = 12, 6
 CORE_REACH = 3.5
 _LEAST_HEIGHT = 600.0
@@ -43,18 +42,18 @@ class Cells:
     """
 
     offset_px: Float
-    block: NDArray[np.int64]
-    sector: NDArray[np.int64]
+    block: Int
+    sector: Int
     profile: Float
     centre_px: Float
     width_px: Float
     rest: Float
-    whole: NDArray[np.bool_]
+    whole: Bool
     azimuth_rad: Float
     px_per_mm: Float
     radius_mm: Float
     height: Float
-    frames: tuple[NDArray[np.int64], ...]
+    frames: tuple[Int, ...]
 
     def of_blocks(self, first: int, end: int) -> Cells:
         """Return the cells of blocks ``first`` to before ``end`` alone."""
@@ -75,7 +74,7 @@ def make_cells(profiles: LineProfiles, geometry: LineGeometry) -> Cells:
     height = np.array([profiles.height[b].sum(0) for b in blocks], float).reshape(-1, bins)
     with np.errstate(invalid="ignore", divide="ignore"):
         profile = np.where(height > 0, light / height, np.nan)
-    whole: NDArray[np.bool_] = np.all(height[:, np.abs(profiles.offset_px) < 5] > _LEAST_HEIGHT, axis=1)
+    whole: Bool = np.all(height[:, np.abs(profiles.offset_px) < 5] > _LEAST_HEIGHT, axis=1)
     centre, width, peak = fit_gaussians(np.where(whole[:, None], profile, 0.0), profiles.offset_px)
     gauss = np.exp(-0.5 * ((profiles.offset_px - centre[:, None]) / width[:, None]) ** 2)
     return Cells(
@@ -110,7 +109,7 @@ def fit_gaussians(profile: Float, offset_px: Float, start_px: float = 1.2) -> tu
     return centre, np.exp(log_width), np.where(np.abs(peak) > 1e-3, peak, 1.0)
 
 
-def _second_lines(profiles: LineProfiles) -> NDArray[np.bool_]:
+def _second_lines(profiles: LineProfiles) -> Bool:
     """Return (F,) whether more light is beside the line than in nearly all frames: an edge of the bore."""
     far = np.abs(profiles.offset_px) > 8
     light, height = profiles.light[..., far].sum((1, 2)), profiles.height[..., far].sum((1, 2))
@@ -121,7 +120,7 @@ def _second_lines(profiles: LineProfiles) -> NDArray[np.bool_]:
     return np.asarray(share - usual > limit)
 
 
-def _blocks(good: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+def _blocks(good: Bool) -> list[Int]:
     """Return runs of neighbouring good frames, of about `BLOCK_FRAMES` each, none below `LEAST_FRAMES`."""
     index = np.flatnonzero(good)
     if not len(index):
@@ -131,7 +130,7 @@ def _blocks(good: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
     return [p for p in parts if len(p) >= LEAST_FRAMES]
 
 
-def _block_means(values: Float, blocks: list[NDArray[np.int64]]) -> Float:
+def _block_means(values: Float, blocks: list[Int]) -> Float:
     """Return (N,) means over each block of values (F, S)."""
     seen = np.isfinite(values)
     filled = np.where(seen, values, 0.0)

@@ -6,8 +6,8 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
@@ -26,7 +26,6 @@ from stages.diagnose.profile.sensor import locking_finding, pattern_finding
 from stages.diagnose.profile.shape import skew_findings
 from stages.diagnose.profile.width import blur_finding, width_findings
 
-Float = NDArray[np.float64]
 _LEAST_BLOCKS = 4
 
 
@@ -51,7 +50,7 @@ class ProfileEvidence:
     """
 
     source: str
-    frame: NDArray[np.int64]
+    frame: Int
     azimuth_rad: Float
     findings: tuple[Finding, ...]
     offset_px: Float

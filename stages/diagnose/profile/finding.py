@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.agreement import Agreement
 
-Float = NDArray[np.float64]
 # One in ten million by the estimate's own σ, and never less than this many σ of what image formation does.
 FOUND_P, FOUND_Z = 1e-7, 6.0
 # Looked for at the same pixels or azimuths of the image, while the pipe goes by.

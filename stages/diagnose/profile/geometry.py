@@ -6,13 +6,12 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 
-Float = NDArray[np.float64]
 _JUMP, _BEFORE, _AFTER = 0.006, 2, 3
 _MOTION_ORDER = 3
 _CLIPPED_SHARE = 0.2
@@ -45,12 +44,12 @@ class LineGeometry:
     theta_rad: Float
     px_per_mm: Float
     speed_px_s: Float
-    steady: NDArray[np.bool_]
+    steady: Bool
 
 
 def line_geometry(
     rings: RingSamples,
-    rows: NDArray[np.int64],
+    rows: Int,
     time_s: Float,
     azimuth_rad: Float,
     clipped: Float,
@@ -75,7 +74,7 @@ def line_geometry(
     )  # fmt: skip
 
 
-def _medians(values: NDArray[np.float32], valid: NDArray[np.bool_], sectors: int) -> Float:
+def _medians(values: Float32, valid: Bool, sectors: int) -> Float:
     """Return medians (F, S) of the valid ones of values (F, A), A a multiple of S."""
     parts = np.where(valid, values, np.nan).astype(float).reshape(len(values), sectors, -1)
     with warnings.catch_warnings():
@@ -83,7 +82,7 @@ def _medians(values: NDArray[np.float32], valid: NDArray[np.bool_], sectors: int
         return np.asarray(np.nanmedian(parts, axis=2))
 
 
-def _steady(middle: Float) -> NDArray[np.bool_]:
+def _steady(middle: Float) -> Bool:
     """Return (F,) false about frames between which the ring's median radius (F,) jumps."""
     steady = np.isfinite(middle)
     for k in np.flatnonzero(np.abs(np.diff(middle)) > _JUMP * middle[:-1]):
@@ -91,7 +90,7 @@ def _steady(middle: Float) -> NDArray[np.bool_]:
     return steady
 
 
-def _speed(radius: Float, time_s: Float, azimuth_rad: Float, steady: NDArray[np.bool_]) -> Float:
+def _speed(radius: Float, time_s: Float, azimuth_rad: Float, steady: Bool) -> Float:
     """Return (F, S) px/s: splines through the low harmonics of every run of steady frames."""
     orders = np.arange(1, _MOTION_ORDER + 1)
     waves = np.outer(azimuth_rad, orders)
@@ -107,7 +106,7 @@ def _speed(radius: Float, time_s: Float, azimuth_rad: Float, steady: NDArray[np.
     return out
 
 
-def _runs(good: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+def _runs(good: Bool) -> list[Int]:
     """Return the indices of every run of neighbours that are all good."""
     index = np.flatnonzero(good)
     return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.regression import Tested, tested
 
-Float = NDArray[np.float64]
 REACH_PX, STEP_PX = 45.0, 0.5
 NOISE_FLOOR = 3e-4
 _LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.04), np.radians(0.08)
@@ -156,7 +155,7 @@ def copied(found: Responses, cells: Cells, floor: float) -> SecondLine:
 
 
 def _best(
-    found: Responses, design: Float, grid: Float, steps: Float, block: NDArray[np.int64], width_px: Float,
+    found: Responses, design: Float, grid: Float, steps: Float, block: Int, width_px: Float,
     floor: float,
 ) -> SecondLine:  # fmt: skip
     """Search the grid of parameters, then refine by ever smaller steps; σ by leaving out blocks."""
@@ -216,9 +215,7 @@ def _rate(score, information, design, parameters, block, clear):  # type: ignore
     return out
 
 
-def _sized(
-    found: Responses, design: Float, best: Float, block: NDArray[np.int64], floor: float
-) -> SecondLine:
+def _sized(found: Responses, design: Float, best: Float, block: Int, floor: float) -> SecondLine:
     """Return height, σ and the parameters' covariance at the best place."""
     at = design @ best
     score, information = _at(found, at)
@@ -245,9 +242,7 @@ def _at(found: Responses, distance_px: Float) -> tuple[Float, Float]:
     return np.where(inside, both[0], 0.0), np.where(inside, both[1], 0.0)
 
 
-def _place_covariance(
-    found: Responses, design: Float, at: Float, height: float, block: NDArray[np.int64]
-) -> Float:
+def _place_covariance(found: Responses, design: Float, at: Float, height: float, block: Int) -> Float:
     """Covariance of the parameters from the curvature of the fit and its slopes' scatter over blocks."""
 
     def gain(d: Float) -> Float:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.regression import Regression, regress, tested
 from stages.texture.light import irradiance
 
-Float = NDArray[np.float64]
 # The pipe's reflectance may change along it, and LEDs are no perfect Lambert sources.
 EXPONENT_FLOOR, FALLOFF_FLOOR = 0.05, 0.10
 _LOW_DEG, _HIGH_DEG, _STEP_DEG = 24.0, 64.0, 1.0
@@ -52,7 +51,7 @@ def vignetting_finding(recording: Recording, probe: Probe) -> Finding:
     )  # fmt: skip
 
 
-def _grey_by_theta(recording: Recording, probe: Probe, frames: NDArray[np.int64], theta: Float) -> Float:
+def _grey_by_theta(recording: Recording, probe: Probe, frames: Int, theta: Float) -> Float:
     """Return mean grey above black (F, T) in rings of polar angle; NaN where much of a ring clips."""
     width, height = recording.source.image_size
     u, v = np.meshgrid(np.arange(0, width, _EVERY_PX), np.arange(0, height, _EVERY_PX))

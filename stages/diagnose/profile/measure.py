@@ -6,16 +6,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Float32, Image, Int
 from pipeline.artefacts.measured import RingSamples
-from pipeline.recording.base import Illumination, Image, Planes, Recording
+from pipeline.recording.base import Illumination, Planes, Recording
 from stages.diagnose.profile.kernels import stack_frame
 from stages.rings.noise import clip_level_of
 from stages.rings.sectors import Sectors, cut_sectors
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 SECTORS = 72
 REACH_PX, STEP_PX = 60.0, 0.5
 FIT_WIDTHS, CORE_WIDTHS = 5.0, 4.5
@@ -57,8 +55,8 @@ class LineProfiles:
         For two halves of the frames in turns: sums of residual × model and of model² in every pixel.
     """
 
-    frame: NDArray[np.int64]
-    row: NDArray[np.int64]
+    frame: Int
+    row: Int
     time_s: Float
     azimuth_rad: Float
     offset_px: Float
@@ -128,7 +126,7 @@ def _far_level(image: Image, sectors: Sectors, line: Float) -> float:
     return float(image.ravel()[sectors.pixels_near(line, 40.0, REACH_PX)].mean())
 
 
-def _clip_level(recording: Recording, rings: RingSamples, rows: NDArray[np.int64], sectors: Sectors) -> float:
+def _clip_level(recording: Recording, rings: RingSamples, rows: Int, sectors: Sectors) -> float:
     """Return the grey level at which the line's strongest channel clips."""
     for row in rows[rings.valid[rows].mean(1) > _MOST][:1]:
         frame = rings.frame[row : row + 1]
@@ -139,6 +137,6 @@ def _clip_level(recording: Recording, rings: RingSamples, rows: NDArray[np.int64
     return np.inf
 
 
-def _times(recording: Recording, frames: NDArray[np.int64]) -> Float:
+def _times(recording: Recording, frames: Int) -> Float:
     place = np.searchsorted(recording.frames.frame, frames)
     return np.asarray(recording.frames.time_s[place] - recording.frames.time_s[0])

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float, Int
+
 _TUNING = 4.685
 _STEPS = 8
 
@@ -27,7 +27,7 @@ class Regression:
         return np.asarray(np.sqrt(np.diagonal(self.covariance)))
 
 
-def regress(design: Float, value: Float, group: NDArray[np.int64]) -> Regression:
+def regress(design: Float, value: Float, group: Int) -> Regression:
     """Fit ``value`` (M,) by ``design`` (M, K) with biweights; σ by the jackknife over ``group`` (M,).
 
     The groups must be far enough apart to err independently. Rows that are not finite, or of a negative

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from stages.diagnose.profile.cells import Cells, fit_gaussians
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.profile.skewed import cell_skewness, exponential_gaussian, skew_table
 
-Float = NDArray[np.float64]
 _REACH_WIDTHS, _STEP_WIDTHS = 7.0, 0.25
 _OVERLAP_WIDTHS = 5.0
 _SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.ghost import Responses, SecondLine, bounced, copied, responses
 
-Float = NDArray[np.float64]
 # Of the line's height: what compression leaves on one side and not on the other, in places and everywhere.
 BOUNCED_FLOOR, COPIED_FLOOR = 1e-3, 5e-4
 # px: by how much a faint line's place may be off; and relative, the radius being that of the stated sheet.

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.measure import LineProfiles
 from stages.diagnose.profile.regression import regress, tested
 
-Float = NDArray[np.float64]
 # px: by how much pixel integration, rounding and compression lock a line to pixels.
 LOCKING_FLOOR_PX = 1.5e-3
 # Variance of gains that speckle of a still wall or compression may fake.
@@ -77,7 +76,7 @@ def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Find
     )  # fmt: skip
 
 
-def _smoothed(values: Float, valid: NDArray[np.bool_]) -> Float:
+def _smoothed(values: Float, valid: Bool) -> Float:
     """Return running means around the ring of what is valid."""
     some = np.where(valid, values, 0.0)
     total = uniform_filter1d(some, _SMOOTH_AZIMUTHS, axis=1, mode="wrap")
@@ -100,9 +99,7 @@ def _phase_curve(rough: Float, smooth: Float, coefficient: Float) -> Curve:
     )  # fmt: skip
 
 
-def _gains(
-    profiles: LineProfiles, image_size: tuple[int, int]
-) -> tuple[list[Float], list[NDArray[np.bool_]]]:
+def _gains(profiles: LineProfiles, image_size: tuple[int, int]) -> tuple[list[Float], list[Bool]]:
     """Return for both halves the relative gain less 1 of every pixel (H, W), and where it is seen."""
     gains, seen = [], []
     for residual, square in profiles.gain:
@@ -112,13 +109,13 @@ def _gains(
     return gains, seen
 
 
-def _row_means(values: Float, seen: NDArray[np.bool_]) -> Float:
+def _row_means(values: Float, seen: Bool) -> Float:
     """Return the mean of the two neighbours in the row, as far as they are seen."""
     left, right = np.roll(values, 1, 1), np.roll(values, -1, 1)
     a, b = np.roll(seen, 1, 1), np.roll(seen, -1, 1)
     return np.asarray((left * a + right * b) / np.maximum(a.astype(float) + b, 1.0))
 
 
-def _tiles(image_size: tuple[int, int]) -> NDArray[np.int64]:
+def _tiles(image_size: tuple[int, int]) -> Int:
     v, u = np.mgrid[: image_size[1], : image_size[0]]
     return np.asarray((v // _TILE_PX) * 1000 + u // _TILE_PX)

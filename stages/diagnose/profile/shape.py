@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
@@ -13,7 +13,6 @@ from stages.diagnose.profile.regression import Tested, regress, tested
 from stages.diagnose.profile.skewed import cell_skewness, skew_table
 from stages.diagnose.profile.width import scale_law
 
-Float = NDArray[np.float64]
 # Half a grey level of compression on one flank of a line 100 levels high, over its whole width.
 HERMITE_FLOOR = 1e-3
 # Of (line σ / stated)²: how far image formation may bend the width against the scale.

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erfcx
 
+from pipeline.arrays import Float
 from stages.diagnose.profile.cells import CORE_REACH, Cells, fit_gaussians
 
-Float = NDArray[np.float64]
 _RATIOS = np.linspace(0.0, 3.0, 61)
 _SIGMA_PX, _REACH_PX, _STEP_PX = 1.2, 12.0, 0.05
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.regression import Regression, regress, tested
 
-Float = NDArray[np.float64]
 # Of (line σ / stated)², and of exposure², s²: what compression and clipped neighbours may do to a width.
 SCALE_FLOOR, EXPOSURE2_FLOOR = 0.03, 2e-5
 _LEAST_SCALE_SPREAD = 0.05
@@ -94,7 +93,7 @@ def _fixed_patterns(geometry: LineGeometry) -> list[Float]:
     return [f(order * psi) for order in (1, 2, 4) for f in (np.cos, np.sin)]
 
 
-def _groups(cells: Cells, geometry: LineGeometry) -> NDArray[np.int64]:
+def _groups(cells: Cells, geometry: LineGeometry) -> Int:
     """Return the block (F · S,) of every sector of every frame; −1 for frames of no block."""
     group = np.full(len(geometry.steady), -1)
     for k, rows in enumerate(cells.frames):
@@ -102,7 +101,7 @@ def _groups(cells: Cells, geometry: LineGeometry) -> NDArray[np.int64]:
     return np.repeat(group, len(geometry.azimuth_rad))
 
 
-def _without_frame_means(values: Float, known: NDArray[np.bool_]) -> Float:
+def _without_frame_means(values: Float, known: Bool) -> Float:
     """Return values (F, S, K) less each frame's mean over what is known; NaN elsewhere."""
     some = np.where(known[..., None], values, 0.0)
     mean = some.sum(1, keepdims=True) / np.maximum(known.sum(1), 1)[:, None, None]

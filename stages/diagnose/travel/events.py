@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
@@ -22,7 +21,6 @@ from stages.diagnose.travel.model import (
 )
 from stages.diagnose.travel.sight import Sight
 
-Float = NDArray[np.float64]
 _MOST = 8
 _ENTERS = 1e-4
 # A step needs pictures on both of its sides, else it is one stray picture.

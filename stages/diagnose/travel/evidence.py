@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
+from pipeline.arrays import Bool, Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel
 from pipeline.recording.base import Encoder, Recording
@@ -20,7 +20,6 @@ from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, EventKind, 
 from stages.diagnose.travel.parts import second_predictions
 from stages.diagnose.travel.sight import Sight, quantum_mm
 
-Float = NDArray[np.float64]
 _LEAST_FRAMES = 16
 _DETECTED = 5.0
 _INSEPARABLE = 0.95
@@ -118,7 +117,7 @@ class TravelEvidence:
 
 def travel_evidence(
     source: str, recording: Recording, sight: Sight, T_pc: Float, scale_sigma_stated: float,
-    shown: NDArray[np.bool_] | None = None,
+    shown: Bool | None = None,
 ) -> TravelEvidence:  # fmt: skip
     """Compare the way seen with the encoder, and look for lines in the way across the pipe.
 

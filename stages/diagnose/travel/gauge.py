@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool
 from pipeline.recording.base import Recording
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.state import Unknowns
@@ -39,7 +39,7 @@ def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> Tra
     )
 
 
-def _shown(run: MeasuredRun) -> NDArray[np.bool_]:
+def _shown(run: MeasuredRun) -> Bool:
     """Return the frames (N,) placed by fiducials or most of a ring; others only lie between neighbours."""
     count = np.bincount(run.measured.rings.frame, minlength=len(run.measured.time_s))
     shown = count > _MOST_OF_RING * np.max(count, initial=1)

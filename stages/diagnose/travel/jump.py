@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
 
-Float = NDArray[np.float64]
 # A wheel slips within so long; its speed is that of so many steps around.
 SLIPS_WITHIN_S = 0.03
 _AROUND = 8

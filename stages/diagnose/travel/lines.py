@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal.windows import dpss
 from scipy.stats import f as fisher
 
+from pipeline.arrays import Bool, Float
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.travel.swings import swings_again
 from stages.diagnose.travel.wave import LEAST_SAMPLES, SLOWEST_HZ, amplitudes, shows_apart, wander
 
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 _BANDWIDTH = 3.0
 _TAPERS = 5
 _PADDING = 4
@@ -75,7 +73,7 @@ class Line:
         return ("probe_vibration", "laser_rocking")
 
 
-def find_lines(time_s: Float, xy_mm: Float, lit: Mask, shown: Mask | None = None) -> tuple[Line, ...]:
+def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None) -> tuple[Line, ...]:
     """Return the lines in places (N, 2) at times (N,), the strongest first.
 
     ``lit`` (N,) tells the pictures in which the wall shows, with the laser or without it; ``shown`` (N,)
@@ -128,7 +126,7 @@ def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
     return float(frequency[best]), float(chance[best])
 
 
-def _measured(time_s: Float, xy_mm: Float, lit: Mask, frequency: float, p_value: float) -> Line:
+def _measured(time_s: Float, xy_mm: Float, lit: Bool, frequency: float, p_value: float) -> Line:
     laser_only = ~lit
     frequency = _refined(time_s, xy_mm, frequency)
     both, sigma = amplitudes(time_s, xy_mm, frequency)
@@ -155,7 +153,7 @@ def _refined(time_s: Float, xy_mm: Float, frequency: float) -> float:
     return float(trial[np.argmax([np.linalg.norm(amplitudes(time_s, xy_mm, f)[0]) for f in trial])])
 
 
-def _without(time_s: Float, xy_mm: Float, lit: Mask, line: Line) -> Float:
+def _without(time_s: Float, xy_mm: Float, lit: Bool, line: Line) -> Float:
     """Return the places less the line, as lit and as laser pictures show it where both tell."""
     out = xy_mm.copy()
     whole = np.ones(len(time_s), bool)

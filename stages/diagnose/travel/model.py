@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.noise import (
     DriftNoise,
@@ -20,7 +20,6 @@ from stages.diagnose.travel.noise import (
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 from stages.diagnose.travel.turns import lag_mm, turns_between
 
-Float = NDArray[np.float64]
 OFFSET, SCALE, DELAY, PLAY = range(4)
 SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
 _ROUNDS = 6
@@ -142,7 +141,7 @@ class _End:
         return float(fit.residual @ fit.weighted)
 
 
-def _free(columns: Float, held: tuple[int, ...]) -> NDArray[np.int64]:
+def _free(columns: Float, held: tuple[int, ...]) -> Int:
     return np.setdiff1d(np.arange(columns.shape[1]), held)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
+
 _LEAST_WHITE_MM = 0.002
 _LAGS = (2, 4, 8, 16, 32)
 # Of so many increments one step spoils no more than medians bear, nor do two.

@@ -7,15 +7,12 @@ what it has gained. Everything else stays shared, and the difference of the part
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.physics.catalogue import effect
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, TravelFit
 from stages.diagnose.travel.noise import whitened_fit
-
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def second_predictions(fit: TravelFit, column: int, allowed: float = 0.0) -> tuple[Agreement, ...]:
@@ -27,7 +24,7 @@ def second_predictions(fit: TravelFit, column: int, allowed: float = 0.0) -> tup
     return tuple(a for a in each if a is not None)
 
 
-def _splits(fit: TravelFit, column: int) -> list[tuple[tuple[str, str], Mask]]:
+def _splits(fit: TravelFit, column: int) -> list[tuple[tuple[str, str], Bool]]:
     """Return names of two parts, and which steps (N − 1,) from picture to picture belong to the first."""
     if column == SCALE:
         path = fit.sight.path_mm
@@ -41,7 +38,7 @@ def _splits(fit: TravelFit, column: int) -> list[tuple[tuple[str, str], Mask]]:
     return [(("first reversal", "later reversals"), turn == 0)] if turn.max(initial=0) > 0 else []
 
 
-def _turn(step: Float) -> NDArray[np.int64]:
+def _turn(step: Float) -> Int:
     """Return the number (N − 1,) of the reversal to which each step of the play's column belongs."""
     moved = np.flatnonzero(np.abs(step) > 1e-9)
     if not len(moved):
@@ -52,7 +49,7 @@ def _turn(step: Float) -> NDArray[np.int64]:
 
 
 def _compared(
-    fit: TravelFit, column: int, where: tuple[str, str], first: Mask, allowed: float
+    fit: TravelFit, column: int, where: tuple[str, str], first: Bool, allowed: float
 ) -> Agreement | None:
     value, covariance = split(fit, column, first)
     covariance = covariance + allowed**2 * np.eye(2)
@@ -67,7 +64,7 @@ def _compared(
     return agreement(parts[0], parts[1], own, np.array([[gap]]))
 
 
-def split(fit: TravelFit, column: int, first: Mask) -> tuple[Float, Float]:
+def split(fit: TravelFit, column: int, first: Bool) -> tuple[Float, Float]:
     """Return a column's size (2,) in two parts with its covariance (2, 2), all others shared."""
     step = np.diff(fit.columns[:, column])
     halves = [np.concatenate([[0.0], np.cumsum(np.where(mask, step, 0.0))]) for mask in (first, ~first)]

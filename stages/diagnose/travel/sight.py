@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import Trajectory
 from pipeline.recording.base import Encoder, Illumination, Recording
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 _END_READINGS = 20
 _ROUNDING_MM, _WHOLE = 2e-4, 0.02
 
@@ -57,7 +54,7 @@ class Sight:
         """Whether the probe moves both ways."""
         return len(np.unique(self.direction)) > 1
 
-    def select(self, keep: Mask) -> Sight:
+    def select(self, keep: Bool) -> Sight:
         """Return the frames where ``keep`` (N,) is true."""
         return replace(
             self, frame=self.frame[keep], time_s=self.time_s[keep],
@@ -108,7 +105,7 @@ def quantum_mm(encoder: Encoder) -> float:
     return unit if np.all(np.abs(sizes / unit - np.round(sizes / unit)) < _WHOLE) else 0.0
 
 
-def _sight(recording: Recording, frame: Int, distance_mm: Float, use: Mask, scale_sigma: float) -> Sight:
+def _sight(recording: Recording, frame: Int, distance_mm: Float, use: Bool, scale_sigma: float) -> Sight:
     place = np.searchsorted(recording.frames.frame, frame)
     time_s = recording.frames.time_s[place]
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(distance_mm[use])))]) if use.any() else np.zeros(0)

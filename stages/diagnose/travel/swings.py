@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Bool, Float
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.wave import LEAST_SAMPLES, amplitudes, shows_apart
 
-Float = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
-
-def swings_again(time_s: Float, xy_mm: Float, lit: Mask, frequency_hz: float) -> tuple[Agreement, ...]:
+def swings_again(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float) -> tuple[Agreement, ...]:
     """Return whether disjoint pictures show one swing: size, direction and phase at its frequency."""
     early = time_s <= (time_s[0] + time_s[-1]) / 2
     pairs = (
@@ -25,7 +22,7 @@ def swings_again(time_s: Float, xy_mm: Float, lit: Mask, frequency_hz: float) ->
 
 
 def _part(
-    time_s: Float, xy_mm: Float, frequency_hz: float, where: str, use: Mask
+    time_s: Float, xy_mm: Float, frequency_hz: float, where: str, use: Bool
 ) -> tuple[Part, Float] | None:
     """Return what these pictures say, with its covariance (4, 4); None where they do not show the line."""
     t = time_s[use]

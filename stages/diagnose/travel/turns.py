@@ -5,21 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.travel.sight import Sight, readings_at
-
-Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Turns:
     """Where the probe turned between two pictures: before picture ``place`` (K,), at ``distance_mm`` (K,)."""
 
-    place: NDArray[np.int64]
+    place: Int
     distance_mm: Float
 
 

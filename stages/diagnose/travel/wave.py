@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from pipeline.arrays import Float
+
 # Below this the way a towed probe wanders is made of lines itself.
 SLOWEST_HZ = 1.5
 _WANDER_HZ = 1.2

@@ -12,15 +12,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import polynomial
-from numpy.typing import NDArray
 
+from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat, cannot_hold
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem
 from pipeline.instrument.camera.section_values import LARGEST_SIDE_PX
 
-Float = NDArray[np.float64]
 _LINES = ("direct polynomial", "inverse polynomial", "centre (row column)", "affine (c d e)", "image size")
 _MOST_TERMS = 60
 _LARGEST_DISAGREEMENT_PX = 5.0

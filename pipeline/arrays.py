@@ -1,0 +1,13 @@
+"""Names of the array types used in annotations: the name tells the element type, the docstring the shape."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+Int32 = NDArray[np.int32]
+Bool = NDArray[np.bool_]
+Byte = NDArray[np.uint8]
+Image = Byte
+"""A camera image: (rows, columns) grey or (rows, columns, 3) colour."""
