@@ -10,12 +10,12 @@ from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import EncoderReadings
-from stages.motion.strip import StripGrid
-from stages.motion.tracking import Followed
-from stages.motion.tracks import _SEEN, TrackStore
-from stages.motion.windows import MeasuredRun
+from stages.motion.tracking.observations import _SEEN, TrackStore
+from stages.motion.tracking.strips import StripGrid
+from stages.motion.tracking.tracker import Followed
+from stages.motion.windows.measured_run import MeasuredRun
 from tests.drawn_run import RADIUS, rings_on_wall, small_probe
 
 SCALE, SIGMA_PX, ENCODER_SIGMA_MM = 1.001, 0.1, 0.005

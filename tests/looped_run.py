@@ -11,11 +11,11 @@ import numpy as np
 from pipeline.arrays import Float, Float32, Int
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
-from stages.motion.joining import Joined, join, seam
-from stages.motion.places import Passage
-from stages.motion.strip import Strip, StripGrid
-from stages.motion.submaps import Settled, Submap
-from stages.motion.windows import Window, cut_windows
+from stages.motion.loops.revisits import Passage
+from stages.motion.tracking.strips import Strip, StripGrid
+from stages.motion.windows.measured_run import Window, cut_windows
+from stages.motion.windows.submap_joining import Joined, join, seam
+from stages.motion.windows.submaps import Settled, Submap
 
 STEP_MM, FRAMES, LENGTH, OVERLAP, SHARED = 4.0, 400, 80, 30, 2
 GRID = StripGrid(50.0, 720, 10.5, 64.0)

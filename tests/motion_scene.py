@@ -12,10 +12,10 @@ from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, t
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from stages.motion.equations import MATCH_BIASES, Measurements
-from stages.motion.state import GLOBALS, EncoderReadings, State, straight_start
-from stages.motion.terms import RingBins
-from stages.motion.tracks import Tracks
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
+from stages.motion.bundle_adjustment.residuals import RingBins
+from stages.motion.bundle_adjustment.unknowns import GLOBALS, EncoderReadings, State, straight_start
+from stages.motion.tracking.observations import Tracks
 
 RADIUS = 50.0
 ENCODER_SIGMA_MM = 0.05

@@ -182,7 +182,7 @@ def _subtract_pair(solved, cross, block):  # type: ignore[no-untyped-def]
 def by_point_and_pose(by_c, T_pc, xyz_c):  # type: ignore[no-untyped-def]
     """Return derivatives by the point in P (M, 2, 3) and by the pose (M, 2, 6) from those by the point in C.
 
-    The pose moves by T = [R exp(w), t + d], (d, w), as in `stages.motion.state.moved`.
+    The pose moves by T = [R exp(w), t + d], (d, w), as in `stages.motion.bundle_adjustment.unknowns.moved`.
     """
     by_point, by_pose = np.empty((len(by_c), 2, 3)), np.empty((len(by_c), 2, 6))
     for m in range(len(by_c)):

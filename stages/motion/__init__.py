@@ -14,23 +14,23 @@ from pipeline.geometry.axis import distance_along
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings
 from stages.motion.encoder import contradicted, encoder_at_frames
 from stages.motion.events import find_events
-from stages.motion.loops import close_loops
-from stages.motion.output import trajectory_of
+from stages.motion.loops.loop_closure import close_loops
+from stages.motion.loops.revisits import Passage, Signs, bands_in_rings, texture_at
 from stages.motion.parameters import MotionParameters
-from stages.motion.places import Passage, Signs, bands_in_rings, texture_at
-from stages.motion.prediction import Predictor
-from stages.motion.sections import at_all_frames, ring_centres
-from stages.motion.sliding import RunEstimate, adjust_run
-from stages.motion.state import EncoderReadings
+from stages.motion.rings import at_all_frames, ring_centres
 from stages.motion.stated import report_instrument
-from stages.motion.strip import StripGrid
-from stages.motion.submaps import Estimate
-from stages.motion.tracking import Followed, TextureTracker, track_texture
-from stages.motion.tracks import Course, Tracks
-from stages.motion.view import WallView
-from stages.motion.windows import MeasuredRun
+from stages.motion.tracking.observations import Course, Tracks
+from stages.motion.tracking.prediction import Predictor
+from stages.motion.tracking.strips import StripGrid
+from stages.motion.tracking.tracker import Followed, TextureTracker, track_texture
+from stages.motion.tracking.wall_view import WallView
+from stages.motion.trajectory import trajectory_of
+from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.sliding_window import RunEstimate, adjust_run
+from stages.motion.windows.submaps import Estimate
 
 __all__ = ["MOTION", "MotionParameters", "estimate_motion"]
 

@@ -7,8 +7,8 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
-from stages.motion.state import EncoderReadings
-from stages.motion.tracks import Course
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings
+from stages.motion.tracking.observations import Course
 
 _JUMP_MM = 3.0
 _JUMP_TIMES = 5.0

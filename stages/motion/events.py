@@ -10,7 +10,7 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
 from pipeline.recording.base import FrameTable
-from stages.motion.tracks import Course
+from stages.motion.tracking.observations import Course
 
 _STOP_SHARE = 0.03
 _SHORTEST_STOP_S = 0.3

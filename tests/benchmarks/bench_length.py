@@ -50,8 +50,8 @@ from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.defects import DefectParameters, find_defects
 from stages.mesh import MeshParameters, make_mesh
 from stages.motion.parameters import MotionParameters
-from stages.motion.sliding import adjust_run
-from stages.motion.submaps import Estimate
+from stages.motion.windows.sliding_window import adjust_run
+from stages.motion.windows.submaps import Estimate
 from stages.overlays import OverlayParameters, draw_overlays
 from stages.rings import RingParameters, extract_rings
 from stages.sections import SectionParameters, measure_sections

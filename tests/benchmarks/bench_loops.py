@@ -28,9 +28,9 @@ from pipeline.recording.base import Recording
 from pipeline.simulator.produce import Order, Places, produce
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
-from stages.motion.comparing import Expected, Piece, Verdict, compare
-from stages.motion.strip import Strip, StripGrid
-from stages.motion.view import WallView
+from stages.motion.loops.strip_registration import Expected, Piece, Verdict, compare
+from stages.motion.tracking.strips import Strip, StripGrid
+from stages.motion.tracking.wall_view import WallView
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.benchmarks.loop_scenes import SCENES_BY_NAME, WELD_SPACING_MM

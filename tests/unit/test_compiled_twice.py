@@ -17,7 +17,7 @@ _MATCHED = """
 import hashlib
 import cv2
 import numpy as np
-from stages.motion.matching import cut, match
+from stages.motion.tracking.patches import cut, match
 
 random = np.random.default_rng(0)
 wall = cv2.GaussianBlur(random.standard_normal((120, 400)).astype(np.float32), (0, 0), 2)

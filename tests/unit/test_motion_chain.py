@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from stages.motion.chain import Chain, Closures, ErrorSums, Link, astray, interpolated
+from stages.motion.windows.error_chain import Chain, Closures, ErrorSums, Link, astray, interpolated
 
 KNOTS, WINDOWS, SHARED = 4, 5, 2
 

@@ -7,9 +7,9 @@ import pytest
 
 from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import Encoder, FrameTable
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings
 from stages.motion.encoder import contradicted, encoder_at_frames
-from stages.motion.state import EncoderReadings
-from stages.motion.tracks import Tracks
+from stages.motion.tracking.observations import Tracks
 
 RATE = 30.0
 SPEED = 18.0

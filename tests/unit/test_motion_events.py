@@ -10,7 +10,7 @@ from pipeline.artefacts.measured import MotionEvent, PipeAxis, Trajectory
 from pipeline.geometry.axis import axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events
-from stages.motion.tracks import Tracks
+from stages.motion.tracking.observations import Tracks
 
 FRAMES, RATE, STEP = 120, 30.0, 0.6
 

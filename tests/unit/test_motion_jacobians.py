@@ -11,10 +11,10 @@ import pytest
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.robust import GemanMcClure
 from pipeline.arrays import Float
-from stages.motion import terms
-from stages.motion.equations import landmark_rows
+from stages.motion.bundle_adjustment import residuals
+from stages.motion.bundle_adjustment.equations import landmark_rows
+from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import GLOBALS, State
 from tests.motion_scene import displaced, scene
 
 H = 1e-5
@@ -59,32 +59,32 @@ def check_rows(
 def test_ring_rows(given) -> None:
     measured, state = given
     # The axis' frames turn a little with its deflection, which the derivative leaves out.
-    check_rows(lambda s: terms.ring_rows(s, measured.rings, GemanMcClure(0.1)), state, 0.02, 2e-4)
+    check_rows(lambda s: residuals.ring_rows(s, measured.rings, GemanMcClure(0.1)), state, 0.02, 2e-4)
 
 
 def test_encoder_rows(given) -> None:
     measured, state = given
-    reading, slip = (lambda s, k=k: terms.encoder_rows(s, measured.encoder, 0.01)[k] for k in (0, 1))
+    reading, slip = (lambda s, k=k: residuals.encoder_rows(s, measured.encoder, 0.01)[k] for k in (0, 1))
     check_rows(slip, state, 1e-6)
     check_rows(reading, state, 0.05, 1e-4)
 
 
 def test_no_slip_rows(given) -> None:
-    check_rows(terms.no_slip_rows, given[1], 1e-6)
+    check_rows(residuals.no_slip_rows, given[1], 1e-6)
 
 
 def test_turn_rows(given) -> None:
-    check_rows(lambda s: terms.turn_rows(s, 0.1), given[1], 1e-9, frame_atol=0.1 / 60)
+    check_rows(lambda s: residuals.turn_rows(s, 0.1), given[1], 1e-9, frame_atol=0.1 / 60)
 
 
 def test_axis_and_prior_rows(given) -> None:
-    check_rows(lambda s: terms.axis_rows(s, 2e-3), given[1], 1e-5)
-    check_rows(lambda s: terms.prior_rows(s, 0.002, 5.0), given[1], 1e-5)
+    check_rows(lambda s: residuals.axis_rows(s, 2e-3), given[1], 1e-5)
+    check_rows(lambda s: residuals.prior_rows(s, 0.002, 5.0), given[1], 1e-5)
 
 
 def test_smooth_rows(given) -> None:
     measured, state = given
-    make = lambda s: terms.smooth_rows(s, measured.time_s, measured.smooth_sigma)  # noqa: E731
+    make = lambda s: residuals.smooth_rows(s, measured.time_s, measured.smooth_sigma)  # noqa: E731
     # Rotations are taken as a vector space here: exact to the rotation between neighbours, about 0.03 rad.
     check_rows(make, state, 1e-9, frame_atol=0.1 / 60)
     rows = make(state)
@@ -96,7 +96,7 @@ def test_smooth_rows(given) -> None:
 
 def test_third_difference_is_blind_to_parabolas_at_any_spacing() -> None:
     t = np.array([[0.0, 0.1, 0.25, 0.3], [1.0, 2.0, 3.0, 4.0]])
-    coefficient = terms._third_difference(t)
+    coefficient = residuals._third_difference(t)
     np.testing.assert_allclose(coefficient[1], [-1, 3, -3, 1], atol=1e-12)
     for power in range(3):
         np.testing.assert_allclose(np.sum(coefficient * (t - t[:, :1]) ** power, 1), 0, atol=1e-12)
@@ -108,13 +108,13 @@ def test_surface_by_point_and_border(given) -> None:
     _, state = given
     random = np.random.default_rng(0)
     xyz = state.xyz_p + random.standard_normal(state.xyz_p.shape)
-    _, gradient, by_border = terms.surface(state, xyz)
+    _, gradient, by_border = residuals.surface(state, xyz)
     for i in range(3):
         d = H * np.eye(3)[i]
-        wanted = (terms.surface(state, xyz + d)[0] - terms.surface(state, xyz - d)[0]) / (2 * H)
+        wanted = (residuals.surface(state, xyz + d)[0] - residuals.surface(state, xyz - d)[0]) / (2 * H)
         np.testing.assert_allclose(gradient[:, i], wanted, atol=1e-4)
     for b in range(GLOBALS):
-        wanted = slope(lambda s: terms.surface(s, xyz)[0], state, border=b)
+        wanted = slope(lambda s: residuals.surface(s, xyz)[0], state, border=b)
         np.testing.assert_allclose(by_border[:, b], wanted, atol=1e-6)
 
 

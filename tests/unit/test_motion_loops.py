@@ -11,12 +11,20 @@ from pipeline.arrays import Float
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import quiet_context
 from stages.motion import estimate_motion
-from stages.motion.comparing import Comparison, Expected, Piece, Verdict, compare
-from stages.motion.foresight import Foresight
-from stages.motion.joining import Joined
-from stages.motion.loops import Loops, close_loops
+from stages.motion.loops.foresight import Foresight
+from stages.motion.loops.loop_closure import Loops, close_loops
+from stages.motion.loops.revisits import (
+    Passage,
+    Place,
+    Signs,
+    bands_in_rings,
+    choose_places,
+    texture_at,
+    widened,
+)
+from stages.motion.loops.strip_registration import Comparison, Expected, Piece, Verdict, compare
 from stages.motion.parameters import MotionParameters
-from stages.motion.places import Passage, Place, Signs, bands_in_rings, choose_places, texture_at, widened
+from stages.motion.windows.submap_joining import Joined
 from tests.drawn_run import drawn_run, without_encoder
 from tests.looped_run import FRAMES, GRID, DrawnView, LoopedRun, looped_run, rough_wall
 

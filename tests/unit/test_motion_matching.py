@@ -11,9 +11,9 @@ import pytest
 from pipeline.arrays import Float32
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion import MotionParameters
-from stages.motion.matching import _match, _wrapped, cut, match
-from stages.motion.strip import Strip, StripGrid, _sample, _without_light, softened, unroll
-from stages.motion.tracking import TextureTracker
+from stages.motion.tracking.patches import _match, _wrapped, cut, match
+from stages.motion.tracking.strips import Strip, StripGrid, _sample, _without_light, softened, unroll
+from stages.motion.tracking.tracker import TextureTracker
 from tests.unit.drawn_pipe import RADIUS, draw, led_light, reflectance, small_probe, wall_hits
 
 HALF = 8

@@ -12,10 +12,10 @@ from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import vector_from_rotation
-from stages.motion.adjustment import Damping, adjust
-from stages.motion.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
+from stages.motion.bundle_adjustment.solver import Damping, adjust
+from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import State
 from tests.motion_scene import displaced, scene
 
 FRAMES, BORDER, OWN = 9, 6, 3

@@ -13,12 +13,12 @@ from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from pipeline.machine.scratch import Scratch
-from stages.motion.joining import Joined, join, seam
 from stages.motion.parameters import MotionParameters
-from stages.motion.sliding import RunEstimate, adjust_run
-from stages.motion.submaps import Say, Settled, Submap, carried, settle
-from stages.motion.tracks import TrackStore
-from stages.motion.windows import Window, cut_windows
+from stages.motion.tracking.observations import TrackStore
+from stages.motion.windows.measured_run import Window, cut_windows
+from stages.motion.windows.sliding_window import RunEstimate, adjust_run
+from stages.motion.windows.submap_joining import Joined, join, seam
+from stages.motion.windows.submaps import Say, Settled, Submap, carried, settle
 from tests.long_motion import LongMotion, long_motion
 
 FRAMES, SHARED = 240, 3

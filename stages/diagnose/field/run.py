@@ -14,15 +14,15 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages import motion
 from stages.motion import MotionParameters
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Measurements
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State
 from stages.motion.encoder import encoder_at_frames
-from stages.motion.equations import MATCH_BIASES, Equations, Measurements
 from stages.motion.events import find_events
-from stages.motion.output import in_pipe_frame
-from stages.motion.prediction import Predictor
-from stages.motion.sections import at_all_frames, ring_bins
-from stages.motion.state import EncoderReadings, State
-from stages.motion.submaps import estimated
-from stages.motion.windows import LOOSE, first_guess
+from stages.motion.rings import at_all_frames, ring_bins
+from stages.motion.tracking.prediction import Predictor
+from stages.motion.trajectory import in_pipe_frame
+from stages.motion.windows.measured_run import LOOSE, first_guess
+from stages.motion.windows.submaps import estimated
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 

@@ -17,9 +17,9 @@ from stages.diagnose.effects.predict import columns, reading_columns, texture_co
 from stages.diagnose.evidence import INSTRUMENT, Column
 from stages.diagnose.field.points import distance_mm, ring_points, speed_mm_s, texture_points
 from stages.diagnose.field.run import FieldRun
-from stages.motion import terms
-from stages.motion.equations import MATCH_BIASES
-from stages.motion.state import EncoderReadings, State
+from stages.motion.bundle_adjustment import residuals
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State
 
 Asked = Sequence[tuple[EffectModel, Shape]]
 _RADIUS_SHARE = 0.1
@@ -83,7 +83,7 @@ def field_system(run: FieldRun, asked: Asked, slips: Int) -> FieldSystem:
     if run.encoder is not None:
         rows += _encoder_rows(run, run.encoder, len(known), asked, size, slips)
     else:
-        rows.append(_widened(terms.no_slip_rows(state), state, size))
+        rows.append(_widened(residuals.no_slip_rows(state), state, size))
     rows.append(_own_priors(state, size))
     plausible = [a.plausible for model, _ in asked for a in model.amplitudes]
     sigma = np.sqrt(np.diag(run.probe.covariance))[known]
@@ -95,10 +95,10 @@ def field_system(run: FieldRun, asked: Asked, slips: Int) -> FieldSystem:
 def _pose_rows(run: FieldRun) -> list[Rows]:
     state = run.state
     return [
-        terms.origin_rows(state),
-        terms.smooth_rows(state, run.measured.time_s, run.measured.smooth_sigma),
-        terms.turn_rows(state, run.parameters.turn_sigma_rad),
-        terms.axis_rows(state, run.parameters.axis_bend_sigma),
+        residuals.origin_rows(state),
+        residuals.smooth_rows(state, run.measured.time_s, run.measured.smooth_sigma),
+        residuals.turn_rows(state, run.parameters.turn_sigma_rad),
+        residuals.axis_rows(state, run.parameters.axis_bend_sigma),
     ]
 
 
@@ -107,7 +107,7 @@ def _ring_rows(run: FieldRun, known: Int, asked: Asked, size: int) -> Rows:
     rows, points = run.equations.rings, ring_points(run)
     T = run.state.T_pc[run.measured.rings.frame]
     by_pixel, by_parameters = run.probe.triangulate_jacobian(points.uv)
-    normal = terms.surface(run.state, transform(T, points.xyz_c))[1]
+    normal = residuals.surface(run.state, transform(T, points.xyz_c))[1]
     normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
     by_shift = -np.einsum("mi,mij,mj->m", normal_c, by_pixel, points.outward)
     named = np.zeros((len(rows.residual), size))
@@ -162,7 +162,7 @@ def _encoder_rows(
     """Return: distance seen = reading less what effects add to it + slip, and slip creeps."""
     state = run.state
     steady = replace(state, globals=np.append(state.globals[:3], 1.0), slip=np.zeros(len(state.slip)))
-    reading, creep = terms.encoder_rows(steady, encoder, run.parameters.encoder_slip_sigma_mm)
+    reading, creep = residuals.encoder_rows(steady, encoder, run.parameters.encoder_slip_sigma_mm)
     named = np.zeros((len(reading.residual), size))
     named[:, scale_at] = encoder.distance_mm
     travel = Travel(run.measured.time_s, distance_mm(run), speed_mm_s(run), encoder.distance_mm)

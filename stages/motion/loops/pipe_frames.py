@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
-from stages.motion.joining import Joined, Laid
+from stages.motion.windows.submap_joining import Joined, Laid
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from scipy.interpolate import interp1d
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.instrument.probe import Probe
-from stages.motion.terms import RingBins
+from stages.motion.bundle_adjustment.residuals import RingBins
 
 _FEWEST = 0.3
 CORRELATED_FRAMES = 4.0

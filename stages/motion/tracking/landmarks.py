@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
-from stages.motion.matching import Patches
+from stages.motion.tracking.patches import Patches
 
 _FEWEST_DROPPED = 256
 

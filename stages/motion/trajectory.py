@@ -10,10 +10,10 @@ from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import FrameTable
-from stages.motion.equations import MATCH_BIASES, Measurements
-from stages.motion.joining import Joined
-from stages.motion.sliding import of_one_window
-from stages.motion.submaps import Estimate
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
+from stages.motion.windows.sliding_window import of_one_window
+from stages.motion.windows.submap_joining import Joined
+from stages.motion.windows.submaps import Estimate
 
 _START_MM = 60.0
 

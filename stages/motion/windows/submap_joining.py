@@ -11,11 +11,11 @@ from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
-from stages.motion.chain import Chain, Link, interpolated
-from stages.motion.state import AXIS_STEP_MM
-from stages.motion.submaps import Settled, Submap, carried
-from stages.motion.terms import ORIGIN_SIGMA
-from stages.motion.windows import Window
+from stages.motion.bundle_adjustment.residuals import ORIGIN_SIGMA
+from stages.motion.bundle_adjustment.unknowns import AXIS_STEP_MM
+from stages.motion.windows.error_chain import Chain, Link, interpolated
+from stages.motion.windows.measured_run import Window
+from stages.motion.windows.submaps import Settled, Submap, carried
 
 _SEAM_SHARE = 0.5
 _LEAST_WEIGHT = 1e-3

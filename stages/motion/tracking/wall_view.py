@@ -11,7 +11,7 @@ from pipeline.arrays import Float, Image, Int
 from pipeline.instrument.probe import Probe
 from pipeline.recording.background import in_background
 from pipeline.recording.base import Illumination, Recording
-from stages.motion.strip import Strip, StripGrid, softened, unroll
+from stages.motion.tracking.strips import Strip, StripGrid, softened, unroll
 
 _BLUE, _RED = 0, 2
 _YELLOW_NM = 575.0

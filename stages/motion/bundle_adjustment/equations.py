@@ -14,11 +14,11 @@ from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.machine.threads import in_threads
-from stages.motion import terms
+from stages.motion.bundle_adjustment import residuals
+from stages.motion.bundle_adjustment.residuals import RingBins
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import EncoderReadings, State
-from stages.motion.terms import RingBins
-from stages.motion.tracks import Tracks
+from stages.motion.tracking.observations import Tracks
 
 MATCH_BIASES = 2
 _FINEST_WALL_MM = 0.02
@@ -154,16 +154,19 @@ def linearised(
     state: State, measured: Measurements, parameters: MotionParameters, scales: Scales
 ) -> Equations:
     """Return all equations at a state, judged by given scales."""
-    rows = [terms.origin_rows(state), terms.smooth_rows(state, measured.time_s, measured.smooth_sigma)]
-    rows.append(terms.turn_rows(state, parameters.turn_sigma_rad))
+    rows = [
+        residuals.origin_rows(state),
+        residuals.smooth_rows(state, measured.time_s, measured.smooth_sigma),
+    ]
+    rows.append(residuals.turn_rows(state, parameters.turn_sigma_rad))
     if measured.encoder is None:
-        rows.append(terms.no_slip_rows(state))
+        rows.append(residuals.no_slip_rows(state))
     else:
-        rows.extend(terms.encoder_rows(state, measured.encoder, parameters.encoder_slip_sigma_mm))
-    rows.append(terms.axis_rows(state, parameters.axis_bend_sigma))
+        rows.extend(residuals.encoder_rows(state, measured.encoder, parameters.encoder_slip_sigma_mm))
+    rows.append(residuals.axis_rows(state, parameters.axis_bend_sigma))
     scale_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm
-    rows.append(terms.prior_rows(state, scale_sigma, radius_sigma_mm, measured.settled))
-    rings = terms.ring_rows(state, measured.rings, GemanMcClure(_REDESCENT * scales.wall_mm))
+    rows.append(residuals.prior_rows(state, scale_sigma, radius_sigma_mm, measured.settled))
+    rings = residuals.ring_rows(state, measured.rings, GemanMcClure(_REDESCENT * scales.wall_mm))
     texture = landmark_rows(state, measured, parameters)
     return rescaled(Equations(len(state.T_pc), tuple(rows), rings, texture), measured.tracks, scales)
 
@@ -203,7 +206,7 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     for _ in in_threads(fill, parts, _THREADS):
         pass
     start = np.searchsorted(tracks.landmark, np.arange(len(state.xyz_p) + 1))
-    relief, normal, by_border = terms.surface(state, state.xyz_p)
+    relief, normal, by_border = residuals.surface(state, state.xyz_p)
     return LandmarkRows(
         start, tracks.frame, by_pose, by_point, by_instrument, residual, tracks.sigma_px,
         normal, by_border, relief, np.full(len(relief), parameters.surface_sigma_mm), Cauchy(),

@@ -13,9 +13,16 @@ import numpy as np
 from pipeline.adjustment.bordered import Step
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import vector_from_rotation
-from stages.motion.equations import Equations, Measurements, Scales, linearised, rescaled, scales_of
+from stages.motion.bundle_adjustment.equations import (
+    Equations,
+    Measurements,
+    Scales,
+    linearised,
+    rescaled,
+    scales_of,
+)
+from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import State
 
 _DOUBTFUL = 0.5  # one σ of any combination of unknowns; derivatives leave out what may be as much
 _LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-12, 1e-7, 1e6

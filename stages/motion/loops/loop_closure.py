@@ -16,16 +16,16 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context
-from stages.motion.chain import Chain, Closures, ErrorSums, astray, beside
-from stages.motion.closing import closed
-from stages.motion.comparing import Comparison, Piece, Verdict, compare
-from stages.motion.foresight import Foresight
-from stages.motion.joining import Joined, Laid, chain_of, lay
+from stages.motion.loops.closing import closed
+from stages.motion.loops.foresight import Foresight
+from stages.motion.loops.pipe_frames import PipeFrames, pipe_frames
+from stages.motion.loops.revisits import Passage, Place, Signs, choose_places, widened
+from stages.motion.loops.strip_registration import Comparison, Piece, Verdict, compare
 from stages.motion.parameters import MotionParameters
-from stages.motion.pipe_frames import PipeFrames, pipe_frames
-from stages.motion.places import Passage, Place, Signs, choose_places, widened
-from stages.motion.sections import CORRELATED_FRAMES
-from stages.motion.strip import Strip, StripGrid
+from stages.motion.rings import CORRELATED_FRAMES
+from stages.motion.tracking.strips import Strip, StripGrid
+from stages.motion.windows.error_chain import Chain, Closures, ErrorSums, astray, beside
+from stages.motion.windows.submap_joining import Joined, Laid, chain_of, lay
 
 _LEAST_PROBABILITY = 1e-6
 _DISTANCE, _ROLL = 2, 5

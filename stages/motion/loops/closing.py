@@ -10,9 +10,9 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import inverse, transform
-from stages.motion.chain import Chain, Conditioned, interpolated
-from stages.motion.joining import Joined, Laid, one_axis
-from stages.motion.state import moved
+from stages.motion.bundle_adjustment.unknowns import moved
+from stages.motion.windows.error_chain import Chain, Conditioned, interpolated
+from stages.motion.windows.submap_joining import Joined, Laid, one_axis
 
 _STRETCH_MM = 20.0
 

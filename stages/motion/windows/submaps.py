@@ -20,11 +20,11 @@ from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import skew
-from stages.motion.adjustment import Adjusted, adjust, third_difference_sigma
-from stages.motion.equations import Measurements
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.solver import Adjusted, adjust, third_difference_sigma
+from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import GLOBALS, State
-from stages.motion.windows import Window
+from stages.motion.windows.measured_run import Window
 
 _ROUGHLY, _CLOSELY = 1e-2, 1e-5
 _COVARIANCES, _FEWEST_COVARIANCES = 60, 12

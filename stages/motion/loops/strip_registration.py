@@ -16,9 +16,9 @@ import numpy as np
 from scipy.fft import irfft2, rfft2
 
 from pipeline.arrays import Bool, Float, Float32, Int
-from stages.motion.matching import cut, match
 from stages.motion.parameters import MotionParameters
-from stages.motion.strip import Strip
+from stages.motion.tracking.patches import cut, match
+from stages.motion.tracking.strips import Strip
 
 _LEAST_OVERLAP = 0.3
 _MOST_RIVAL = 0.75

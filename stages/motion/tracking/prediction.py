@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
-from stages.motion.state import EncoderReadings
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings
 
 
 class Predictor:

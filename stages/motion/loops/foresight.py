@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from stages.motion.comparing import Comparison, Expected, Verdict
+from stages.motion.loops.strip_registration import Comparison, Expected, Verdict
 
 _REACH_SIGMA = 5.0
 _LEAST_REACH_PX = 4.0

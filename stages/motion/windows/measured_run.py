@@ -9,12 +9,12 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
-from stages.motion.equations import MATCH_BIASES, Measurements
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
+from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State, straight_start
 from stages.motion.parameters import MotionParameters
-from stages.motion.sections import ring_bins
-from stages.motion.state import EncoderReadings, State, straight_start
-from stages.motion.tracking import Followed
-from stages.motion.tracks import Tracks
+from stages.motion.rings import ring_bins
+from stages.motion.tracking.observations import Tracks
+from stages.motion.tracking.tracker import Followed
 
 LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
 _MARGIN_MM = 20.0

@@ -12,7 +12,7 @@ from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float, Int
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation
-from stages.motion.state import GLOBALS, EncoderReadings, State
+from stages.motion.bundle_adjustment.unknowns import GLOBALS, EncoderReadings, State
 
 ORIGIN_SIGMA = np.array([1e-4] * 3 + [1e-6] * 3)  # mm and rad
 _SETTLED = 1e-3  # of the stated σ: what is held is not held exactly, so that the equations stay regular

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float
-from stages.motion.joining import Joined, join, seam
+from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
-from stages.motion.state import GLOBALS, State
-from stages.motion.submaps import (
+from stages.motion.windows.measured_run import MeasuredRun, Window, cut_windows
+from stages.motion.windows.submap_joining import Joined, join, seam
+from stages.motion.windows.submaps import (
     Estimate,
     Say,
     Settled,
@@ -23,7 +24,6 @@ from stages.motion.submaps import (
     shared_numbers,
     submap_of,
 )
-from stages.motion.windows import MeasuredRun, Window, cut_windows
 
 
 @dataclass(frozen=True)

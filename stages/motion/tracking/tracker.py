@@ -12,12 +12,12 @@ from pipeline.arrays import Bool, Float, Float32, Image, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
-from stages.motion.landmarks import LandmarkMap
-from stages.motion.matching import cut, match
 from stages.motion.parameters import MotionParameters
-from stages.motion.prediction import Predictor
-from stages.motion.strip import Strip, StripGrid, unroll
-from stages.motion.tracks import Tracks, TrackStore
+from stages.motion.tracking.landmarks import LandmarkMap
+from stages.motion.tracking.observations import Tracks, TrackStore
+from stages.motion.tracking.patches import cut, match
+from stages.motion.tracking.prediction import Predictor
+from stages.motion.tracking.strips import Strip, StripGrid, unroll
 
 _FEWEST = 12
 _FEWEST_ALIKE = 0.4

@@ -1,0 +1,1 @@
+"""Bundle adjustment: poses, landmarks, pipe axis and instrument from everything that a window measured."""
