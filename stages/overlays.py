@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Byte, Float
 from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.artefacts.model import Overlay, Overlays
@@ -95,7 +96,7 @@ def fitted_pipe(radius_map: RadiusMap) -> Float:
         root = np.sqrt(weight)
         coefficients = np.linalg.lstsq(basis[seen] * root[:, None], profile * root, rcond=None)[0]
         size = np.abs(profile - basis[seen] @ coefficients)
-        scale = max(float(1.4826 * np.median(size)), 1e-9)
+        scale = max(robust_spread(size), 1e-9)
         weight = np.minimum(1, _HUBER * scale / np.maximum(size, 1e-12))
     return np.asarray(basis @ coefficients)
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.instrument.misalignment import fit_circle
@@ -21,7 +22,6 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 _LEAST_POINTS = 90
 # A line's errors are alike over this many of 360 degrees.
 _ALIKE = 8.0
-_MAD_SIGMA = 1.4826
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def _section(frame: int, time_s: float, distance_mm: float, xyz_c: Float) -> Pre
     xy = xyz_c[np.isfinite(xyz_c).all(-1), :2]
     centre, radius = fit_circle(xy)
     off = np.linalg.norm(xy - centre, axis=-1) - radius
-    spread = _MAD_SIGMA * float(np.median(np.abs(off - np.median(off))))
+    spread = spread_about_median(off)
     near = np.abs(off - np.median(off)) <= 3 * spread
     _, radius = fit_circle(xy[near])
     seen = len(xy) / len(xyz_c)

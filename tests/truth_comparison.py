@@ -16,6 +16,7 @@ import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import least_squares
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RadiusMap, Trajectory
 
@@ -30,7 +31,7 @@ class WallComparison:
 
     @property
     def robust_sigma_mm(self) -> float:
-        return float(1.4826 * np.median(np.abs(self.error_mm - np.median(self.error_mm))))
+        return spread_about_median(self.error_mm)
 
     @property
     def inside_95(self) -> float:

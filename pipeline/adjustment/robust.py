@@ -1,4 +1,4 @@
-"""Losses of residuals with their σ: the weight of an equation, and what it costs, which belong together.
+"""Robust spread of residuals, and robust losses: the weight of an equation and the cost that goes with it.
 
 The cost of a loss ρ is what its weight minimises when the equations are solved anew: w = ρ′(r) / r.
 P. Huber, "Robust statistics", 1981, § 7.8; S. Geman, D. McClure, "Statistical methods for tomographic image
@@ -12,7 +12,29 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Float32
+
+MAD_TO_SIGMA = 1.4826
+"""1/Φ⁻¹(3/4): half of all normal errors are smaller than Φ⁻¹(3/4) σ = 0.67449 σ (Huber 1981, § 5.1)."""
+
+
+def robust_spread(residual: Float | Float32) -> float:
+    """Return 1 σ of residuals of any shape about zero, from their median size; NaN entries do not count."""
+    size = np.abs(residual)
+    middle = np.nanmedian(size) if np.isnan(size).any() else np.median(size)
+    return MAD_TO_SIGMA * float(middle)
+
+
+def robust_spreads(residual: Float | Float32, axis: int) -> Float:
+    """Return 1 σ about zero along ``axis``, from the median size; NaN entries do not count."""
+    size = np.abs(residual)
+    middle = np.nanmedian(size, axis) if np.isnan(size).any() else np.median(size, axis)
+    return np.asarray(MAD_TO_SIGMA * middle)
+
+
+def spread_about_median(values: Float | Float32) -> float:
+    """Return 1 σ of values about their median: 1.4826 times the median absolute deviation."""
+    return robust_spread(values - np.median(values))
 
 
 class Loss(Protocol):

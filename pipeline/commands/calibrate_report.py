@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
 from pipeline.commands.calibrate_figures import (
     correlation_figure,
@@ -147,4 +148,4 @@ def _weak(weak: WeakDirection) -> dict[str, Any]:
 
 
 def _robust(values: Float) -> float:
-    return float(1.4826 * np.median(np.abs(values))) if len(values) else 0.0
+    return robust_spread(values) if len(values) else 0.0

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.files.disk import replace_json
@@ -81,7 +82,7 @@ def _errors(field: Path, corrected: Probe, truth: SceneTruth) -> WallErrors:
     oracle = np.stack([-room_mm(truth, int(frame), uv[k]) for k, frame in enumerate(rings.frame)])
     each = [oracle, *(_by_probe(truth, rings.frame, uv, probe) for probe in (truth.stated, corrected))]
     usable = rings.valid[:, ::_EVERY] & np.all(np.isfinite(each), axis=0)
-    spread = 1.4826 * np.median(np.abs(oracle[usable] - np.median(oracle[usable])))
+    spread = spread_about_median(oracle[usable])
     usable &= np.abs(oracle) < _OUTLYING * spread
     oracle_mm, stated_mm, corrected_mm = (float(np.sqrt(np.mean(e[usable] ** 2))) for e in each)
     return WallErrors(stated_mm, corrected_mm, oracle_mm)

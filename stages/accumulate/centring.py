@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float
 from stages.accumulate.samples import WallSamples
 
@@ -52,7 +53,7 @@ def first_harmonic(samples: WallSamples) -> Float:
         right = np.einsum("fai,fa->fi", weighted, radius)
         shape[usable] = np.linalg.solve(normal[usable] + ridge, right[usable][..., None])[..., 0]
         error = radius - np.einsum("fai,fi->fa", design, shape)
-        spread = 1.4826 * np.nanmedian(np.where(samples.valid, np.abs(error), np.nan)[usable], axis=1)
+        spread = robust_spreads(np.where(samples.valid, error, np.nan)[usable], axis=1)
         scale = np.full(len(psi), np.inf)
         scale[usable] = _REDESCENT * np.maximum(spread, 1e-6)
         weight = samples.valid / (1 + (error / scale[:, None]) ** 2) ** 2

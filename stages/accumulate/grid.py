@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from scipy.ndimage import median_filter
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
 from pipeline.machine.threads import in_threads
 from stages.accumulate.samples import WallSamples
@@ -143,7 +144,7 @@ def _excess(halves: list[tuple[Float32, Float32]]) -> np.float32:
     (a, sigma_a), (b, sigma_b) = halves
     ratio = np.abs(a - b) / np.hypot(sigma_a, sigma_b)
     ratio = ratio[np.isfinite(ratio)]
-    return np.float32(max(1.0, 1.4826 * np.median(ratio))) if ratio.size else np.float32(1)
+    return np.float32(max(1.0, robust_spread(ratio))) if ratio.size else np.float32(1)
 
 
 def _roughness(radius: Float32, sigma: Float32) -> np.float32:
@@ -156,7 +157,7 @@ def _roughness(radius: Float32, sigma: Float32) -> np.float32:
     fine = radius - median_filter(filled, size=_FINE_CELLS, mode="nearest")
     ratio = np.abs(fine) / sigma
     ratio = ratio[np.isfinite(ratio)]
-    return np.float32(max(1.0, 1.4826 * np.median(ratio))) if ratio.size else np.float32(1)
+    return np.float32(max(1.0, robust_spread(ratio))) if ratio.size else np.float32(1)
 
 
 def _usual_spacing(columns: RingColumns) -> float:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
-from stages.defects.harmonics import MAD
 from stages.defects.relief import Typical
 from stages.defects.segment import Region
 from stages.defects.surface import MeasuredWall
@@ -80,5 +80,5 @@ def _sampled(wall: MeasuredWall, rows: slice, regions: tuple[Region, ...]) -> tu
 def _noise_share(typical: Typical, clean_mm: Float) -> float:
     """Return noise over scatter of the clean wall: what exceeds the roughness that the map shows."""
     roughness = typical.sigma_mm**2 - typical.noise_mm**2
-    scatter = (MAD * float(np.median(np.abs(clean_mm)))) ** 2 if clean_mm.size else 0.0
+    scatter = robust_spread(clean_mm) ** 2 if clean_mm.size else 0.0
     return float(np.sqrt(np.clip(1 - roughness / scatter, 0.1, 1.0))) if scatter > 0 else 1.0

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from scipy.optimize import brentq
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
@@ -165,7 +166,7 @@ def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
         least = 0.4 * float(np.median(power[seen]))
         enough = power > least
         size = np.abs(response[enough])
-        scale = max(1.4826 * float(np.median(size)), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
+        scale = max(robust_spread(size), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
         filters.append(Filter(kernel, scale, least, scale / float(np.sqrt(np.median(power[enough])))))
     return filters
 

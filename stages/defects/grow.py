@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from scipy.ndimage import label
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.machine.scratch import Scratch
 from stages.defects.detect import Detection
-from stages.defects.harmonics import MAD
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import WallRelief
 from stages.defects.stretch import stretches, widened
@@ -39,7 +39,7 @@ def grown(relief: WallRelief, seeds: Detection, parameters: DefectParameters, sc
     smooth = scratch.zeros(relief.shape, np.float32)
     for part in stretches(relief.shape[0], relief.rows_in(1.0)):
         smooth[part.own] = millimetre_mean(relief.rows(part.wide).local_mm, relief.cell_mm)[part.inner]
-    spread = MAD * float(np.nanmedian(np.concatenate([np.abs(smooth[rows]) for rows in relief.sampled])))
+    spread = robust_spread(np.concatenate([smooth[rows] for rows in relief.sampled]))
     foot = max(2.5 * spread, 0.5 * parameters.min_depth_mm)
     reach = round(_REACH_MM / relief.cell_mm[0])
     hills = (Hills(sign, smooth, foot, reach) for sign in (1.0, -1.0))

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.ndimage import median_filter
 
+from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spread
 from pipeline.arrays import Float
 
-MAD = 1.4826
 _HARMONICS = 2
 _TUKEY = 4.685
 _SECTORS = 240
@@ -32,7 +32,7 @@ def ring_harmonics(radius: Float, basis: Float) -> Float:
     products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
     for _ in range(12):
         residual = np.where(weight, values - found @ basis.T, np.nan)
-        scale = MAD * row_median(np.abs(residual))
+        scale = MAD_TO_SIGMA * row_median(np.abs(residual))
         u = np.nan_to_num(residual / (_TUKEY * np.maximum(scale, 1e-6))[:, None], nan=2.0)
         w = np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
         normal = (w @ products).reshape(-1, basis.shape[1], basis.shape[1])
@@ -78,7 +78,7 @@ def _robust_spline(s: Float, value: Float, knots: Float, smooth_mm: float) -> BS
     fitted = median_filter(value, window, mode="nearest")
     for _ in range(12):
         residual = value - fitted
-        scale = max(MAD * float(np.median(np.abs(residual))), 1e-6)
+        scale = max(robust_spread(residual), 1e-6)
         u = residual / (_TUKEY * scale)
         weight = np.where(np.abs(u) < 1, 1 - u * u, 0.0) + 1e-4
         spline = make_lsq_spline(s, value, knots, k=3, w=weight)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.robust import MAD_TO_SIGMA
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RadiusMap
-from stages.defects.harmonics import MAD, basis_of, ring_harmonics, row_median, slow_along
+from stages.defects.harmonics import basis_of, ring_harmonics, row_median, slow_along
 from stages.defects.parameters import DefectParameters
 from stages.defects.stretch import sample, stretches
 from stages.defects.welds import weld_rows
@@ -181,7 +182,7 @@ def _with_spread(
     rest = [m - local[rows] @ basis.T for m, rows in zip(measured, sampled, strict=True)]
     noise = [_noise(radius_map, rows, r) for rows, r in zip(sampled, rest, strict=True)]
     noise_mm = _median(noise)
-    roughness = max(0.0, (MAD * _median([np.abs(r) for r in rest])) ** 2 - noise_mm**2)
+    roughness = max(0.0, (MAD_TO_SIGMA * _median([np.abs(r) for r in rest])) ** 2 - noise_mm**2)
     sigma_mm = _median([_sigma(r, n, roughness) for r, n in zip(rest, noise, strict=True)])
     typical = Typical(sigma_mm, noise_mm)
     return WallRelief(radius_map, _median(measured), local, whole, welds, roughness, typical, sampled)
@@ -201,7 +202,7 @@ def _sigma(local: Float, noise: Float, roughness_mm2: float) -> Float:
     sigma = np.sqrt(noise**2 + roughness_mm2)
     measured = np.isfinite(local).any(1)
     excess = np.ones((len(local), 1))
-    row = MAD * row_median(np.abs(local[measured]))
+    row = MAD_TO_SIGMA * row_median(np.abs(local[measured]))
     excess[measured, 0] = np.maximum(row / np.sqrt(np.nanmean(sigma[measured] ** 2, 1)), 1.0)
     return np.asarray(sigma * excess)
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.ndimage import find_objects, gaussian_filter1d, label
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float
-from stages.defects.harmonics import MAD
 from stages.defects.parameters import DefectParameters
 
 
@@ -21,7 +21,7 @@ def weld_rows(
     the mean of every row of it.
     """
     mean = gaussian_filter1d(np.nan_to_num(mean_mm), 0.5 / step)
-    limit = max(parameters.min_depth_mm / 2, 6 * MAD * float(np.median(np.abs(mean))))
+    limit = max(parameters.min_depth_mm / 2, 6 * robust_spread(mean))
     longest = int(parameters.max_weld_mm / step)
     out: list[slice] = []
     for sign in (-1.0, 1.0):

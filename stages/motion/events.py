@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
@@ -82,7 +83,7 @@ def _lost(f: Int, tracks: Course) -> Iterator[MotionEvent]:
 
 def _slips(f: Int, slip: Float) -> Iterator[MotionEvent]:
     step = np.diff(slip)
-    usual = 1.4826 * float(np.median(np.abs(step))) + 1e-6
+    usual = robust_spread(step) + 1e-6
     for a, b in _runs(np.abs(step) > max(6 * usual, 0.02)):
         size = float(slip[b + 1] - slip[a])
         if abs(size) > _SLIP_MM:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import interp1d
 
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.instrument.probe import Probe
@@ -43,7 +44,7 @@ def _circles(xy_c: Float32) -> tuple[Float, Float, Float]:
         error = target - np.einsum("fai,fi->fa", design, np.nan_to_num(out))
         size = np.where(seen & usable[:, None], np.abs(error), np.nan)
         scale = np.ones(len(xy))
-        scale[usable] = 1.4826 * np.nanmedian(size[usable], axis=1)
+        scale[usable] = robust_spreads(size[usable], axis=1)
         weight = seen / (1 + (error / (3 * np.maximum(scale, 1e-6))[:, None]) ** 2)
     centre = out[:, :2] / 2
     return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1)), coverage

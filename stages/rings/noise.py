@@ -6,6 +6,7 @@ import numba
 import numpy as np
 from scipy.optimize import nnls
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Byte, Int32
 from stages.rings.kernels import first_at_least
 from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response
@@ -22,7 +23,7 @@ _SURELY_UNCLIPPED = 0.95
 def dark_response(image: Image, clip_level: float) -> Response:
     """Return a first guess from the image alone: median level and robust noise of neighbouring pixels."""
     step = np.diff(image.astype(np.float32), axis=1)
-    variance = (1.4826 * float(np.median(np.abs(step)))) ** 2 / 2
+    variance = robust_spread(step) ** 2 / 2
     return Response(float(np.median(image)), variance + QUANTISATION_VARIANCE, 0.0, clip_level)
 
 

@@ -8,6 +8,7 @@ import cv2
 import numba
 import numpy as np
 
+from pipeline.adjustment.robust import MAD_TO_SIGMA
 from pipeline.arrays import Byte, Float, Float32, Int
 from stages.rings.kernels import FAST, first_at_least
 from stages.rings.sectors import Sectors
@@ -171,7 +172,7 @@ def _texture_noise(response: Float32, width_px: float) -> Float32:
     size = np.nan_to_num(np.abs(response)).T
     spread = [np.median(size[max(0, r - belt) : r + belt + 1]) for r in range(0, len(size), belt)]
     every = np.interp(np.arange(len(size)), np.arange(0, len(size), belt), spread)
-    return np.asarray(1.4826 * every, np.float32)
+    return np.asarray(MAD_TO_SIGMA * every, np.float32)
 
 
 def _polar_image(image: Image, sectors: Sectors, ray: Int) -> Float32:

@@ -6,6 +6,7 @@ import numba
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spread, robust_spreads
 from pipeline.arrays import Bool, Byte, Float32
 from pipeline.artefacts.measured import RingSamples, RingValidity
 
@@ -54,23 +55,23 @@ def wander_px(samples: RingSamples) -> float:
         return 0.0
     variance = np.where(known, samples.sigma_px, 0.0).astype(float) ** 2
     expected = (np.roll(variance, lag, 1) + 4 * variance + np.roll(variance, -lag, 1))[known]
-    total = (1.4826 * np.median(np.abs(bend[known]))) ** 2
+    total = robust_spread(bend[known]) ** 2
     return float(np.sqrt(max(total - np.median(expected), 0.0) / 6))
 
 
 @numba.njit(cache=True, nogil=True)
 def middle_and_spread(values):  # type: ignore[no-untyped-def]
-    """Median and 1.4826 × median absolute deviation of the finite ``values`` (N,); 0, 0 without any."""
+    """Median, and 1 σ about it as `spread_about_median`, of the finite ``values`` (N,); 0, 0 without any."""
     finite = values[np.isfinite(values)]
     if finite.size == 0:
         return 0.0, 0.0
     middle = np.median(finite)
-    return middle, 1.4826 * np.median(np.abs(finite - middle))
+    return middle, MAD_TO_SIGMA * np.median(np.abs(finite - middle))
 
 
 def _local_spread(away: Float32) -> Float32:
     """Robust 1 σ (F, A) of ``away`` in the neighbourhood, values limited to three of the whole frame's."""
-    frame = 1.4826 * np.median(np.abs(away), axis=1, keepdims=True)
+    frame = robust_spreads(away, axis=1)[:, None]
     limited = np.minimum(np.abs(away), 3 * frame)
     return np.asarray(
         np.sqrt(np.pi / 2) * uniform_filter1d(limited, 8 * _NEIGHBOURS + 1, axis=1, mode="wrap")

@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.adjustment.robust import MAD_TO_SIGMA
 from pipeline.arrays import Byte, Image
 from stages.texture.project import TileProjection
 
@@ -110,7 +111,7 @@ def _middle_and_spread(grey, weight, n):  # type: ignore[no-untyped-def]
 def _biweight_mean(values, grey, weight, where, n, out):  # type: ignore[no-untyped-def]
     """Write the robust mean colour of one pixel's n samples to ``out`` (3,)."""
     middle, spread = _middle_and_spread(grey, weight, n)
-    limit = 4.685 * max(1.4826 * spread, 0.03 * middle + 1.0)
+    limit = 4.685 * max(MAD_TO_SIGMA * spread, 0.03 * middle + 1.0)
     total, blue, green, red = 0.0, 0.0, 0.0, 0.0
     for m in range(n):
         x = (grey[m] - middle) / limit

@@ -13,6 +13,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.texture.light import LightField
@@ -145,6 +146,6 @@ def _solve_robust(
         solution = spsolve(bordered, np.append(design.T @ (weight * value) - shrunk @ mean, 0.0))[:-1]
         rest = value - design @ solution
         rest -= ((weighted @ rest) / total)[cell]
-        residual = 1.4826 * float(np.median(np.abs(rest)))
+        residual = robust_spread(rest)
         weight = np.minimum(1, (1.345 * residual + 1e-6) / np.maximum(np.abs(rest), 1e-12))
     return np.asarray(solution), residual

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float
 from pipeline.artefacts.reference import WallMap
 from pipeline.errors import UnusableError
@@ -71,7 +72,7 @@ def accuracy(differences: Differences) -> Accuracy:
             "verify", f"only {len(error)} points of the run lie on the reference", limit="at least 100",
             hint="check that both show the same stretch of pipe, and --max-shift-mm",
         )  # fmt: skip
-    spread = 1.4826 * np.median(np.abs(error - np.median(error)))
+    spread = spread_about_median(error)
     return Accuracy(
         len(error),
         float(error.mean()),

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import least_squares
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.reference import WallMap
 from pipeline.errors import UnusableError
@@ -57,7 +58,7 @@ def align_maps(run: WallMap, reference: WallMap, max_shift_mm: float, max_roll_d
     """
     samples, reference = _samples(_smoothed(run), _FIT_POINTS), _smoothed(reference)
     start = _search(samples, reference, max_shift_mm, math.radians(max_roll_deg))
-    spread = _spread(_residual(start, samples, reference))
+    spread = spread_about_median(_residual(start, samples, reference))
     found = least_squares(
         _residual, start, args=(samples, reference), loss="cauchy", f_scale=max(2 * spread, 1e-6),
         x_scale=np.array([0.1, 0.01, 1e-3] + [0.1] * 7),
@@ -182,7 +183,3 @@ def _smoothed(wall: WallMap) -> WallMap:
     )
     radius = np.where(known, middle + filled / np.maximum(weight, 1e-12), np.nan)
     return replace(wall, radius_mm=radius)
-
-
-def _spread(values: Float) -> float:
-    return float(1.4826 * np.median(np.abs(values - np.median(values))))

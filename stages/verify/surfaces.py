@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
 from pipeline.artefacts.reference import Surface, WallPoints
 from pipeline.errors import UnusableError
@@ -150,7 +151,7 @@ def _refined(xyz: Float, outward: Float, nearest: NearestPoints, start: Float, s
     for _ in range(steps):
         here, normal = transform(T, xyz), outward @ T[:3, :3].T
         error = np.sum((here - nearest(here)) * normal, -1)
-        spread = 1.4826 * float(np.median(np.abs(error))) + 1e-9
+        spread = robust_spread(error) + 1e-9
         weight = 1 / (1 + (error / (2 * spread)) ** 2)
         pivot = here.mean(0)
         design = np.concatenate([np.cross(here - pivot, normal), normal], -1)

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Image, Int
 from pipeline.recording import open_recording
 from pipeline.simulator.exact import exact_rings
@@ -89,7 +90,7 @@ def difference(one: Float, other: Float) -> Difference:
         np.isfinite(full).sum(2) > _BIN // 2, np.nansum(full, 2) / np.isfinite(full).sum(2), np.nan
     )
     median = float(np.nanmedian(binned))
-    typical = 1.4826 * float(np.nanmedian(np.abs(binned - median)))
+    typical = robust_spread(binned - median)
     steady = float(np.nanstd(np.nanmean(binned, axis=0)))
     return Difference(float(np.nanmean(binned)), float(np.nanstd(binned)), median, typical, steady)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
@@ -71,7 +72,7 @@ def smooth_part_removed(error, psi):
         good = np.isfinite(row)
         for _ in range(4):
             rest = row - basis @ np.linalg.lstsq(basis[good], row[good], rcond=None)[0]
-            good = np.abs(rest) < 4 * 1.4826 * np.nanmedian(np.abs(rest))
+            good = np.abs(rest) < 4 * robust_spread(rest)
         row[:] = rest
     return out
 
@@ -101,10 +102,10 @@ def test_sigma_is_true_on_an_independent_rendering(name, noise_px):
     z = np.abs(error / samples.sigma_px)[np.isfinite(error)]
     assert samples.valid.mean() > 0.99
     assert 0.93 < np.mean(z < 1.96) < 0.97
-    assert 1.4826 * np.nanmedian(np.abs(error)) < noise_px
+    assert robust_spread(error) < noise_px
 
 
 def test_clipped_rings_of_a_gauge_are_used():
     samples, error = judged("open-1-gauge", 2, 12)
     assert samples.valid.mean() > 0.95
-    assert 1.4826 * np.nanmedian(np.abs(error)) < 0.1
+    assert robust_spread(error) < 0.1

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float
 from pipeline.review.comparison.registration import Registration
 from pipeline.review.measuring.wall import MeasuredWall
@@ -100,7 +101,7 @@ def ring_shape(rows: Float, azimuth_rad: Float) -> Float:
     products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
     for _ in range(_ROUNDS):
         left = np.where(known, y - found @ basis.T, np.nan)
-        scale = 1.4826 * np.nanmedian(np.abs(left), axis=1)
+        scale = robust_spreads(left, axis=1)
         u = np.nan_to_num(left / (_TUKEY * np.maximum(scale, 1e-6))[:, None], nan=2.0)
         weight = np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
         normal = (weight @ products).reshape(-1, basis.shape[1], basis.shape[1])

@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import WallTexture
 from pipeline.review.measuring.wall import MeasuredWall
@@ -127,7 +128,7 @@ def _standing_out(values: Float32, reach: int) -> Float32:
     along_ring = (size[0], 1)
     away -= _around(away, along_ring) / np.maximum(_around(known, along_ring), 1e-6) * known
     smooth = _periodic(away, lambda a: cv2.GaussianBlur(a, (0, 0), _BLUR_CELLS), 8)
-    spread = 1.4826 * float(np.median(np.abs(smooth[known > 0])))
+    spread = robust_spread(smooth[known > 0])
     return np.asarray(np.clip(smooth / max(spread, 1e-9), -_CLIP, _CLIP) * known, np.float32)
 
 

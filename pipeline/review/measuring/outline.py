@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.review.decisions.replay import Measured, Outline
@@ -69,7 +70,7 @@ class OutlineGauge:
         mean = cv2.blur(away, cells) / np.maximum(cv2.blur(weight, cells), 1e-9)
         extreme = float(mean[seen][np.argmax(np.abs(mean[seen]))])
         noise = float(np.median(sigma[seen & np.isfinite(sigma)])) / np.sqrt(cells[0] * cells[1])
-        spread = 1.4826 * float(np.median(np.abs(away[known])))
+        spread = robust_spread(away[known])
         return extreme, float(np.hypot(noise, spread / np.sqrt(cells[0] * cells[1])))
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
 from pipeline.recording.base import Illumination
 from pipeline.simulator.effects.catalogue import switch_on
@@ -114,7 +115,7 @@ def _times_counted(full: SceneTruth, others: SceneTruth) -> float:
 def _typical(change: Float) -> float:
     """Return the size of a change as a robust 1 σ: where two lines lie near, a peak may jump to the other."""
     finite = change[np.isfinite(change)]
-    return float(1.4826 * np.median(np.abs(finite))) if len(finite) else 0.0
+    return robust_spread(finite) if len(finite) else 0.0
 
 
 def _rings(truth: SceneTruth, frames: Sequence[int]) -> list[SeenRing]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
@@ -106,7 +107,7 @@ def _linearised(state: Unknowns, measured: Measurements, parameters: GaugeParame
 def spread(equations: Equations) -> float:
     """Return the robust spread of residuals in σ."""
     used = equations.in_sigma[equations.rows.weight > 0]
-    return float(1.4826 * np.median(np.abs(used))) if len(used) else 1.0
+    return robust_spread(used) if len(used) else 1.0
 
 
 def instrument_covariance(solution: Solution) -> Float:

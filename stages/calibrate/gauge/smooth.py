@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.adjustment.bordered import Rows
-from pipeline.adjustment.robust import Cauchy
+from pipeline.adjustment.robust import Cauchy, robust_spreads
 from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import vector_from_rotation
@@ -42,7 +42,7 @@ def learned_sigma(T_pc: Float, known: Int) -> Float:
     window = known[np.arange(len(known) - 3)[:, None] + np.arange(4)]
     third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _poses(T_pc[window]))
     stride = float(np.median(np.diff(known)))
-    return np.asarray(np.maximum(1.4826 * np.median(np.abs(third), 0) / stride**2.5, _FLOOR))
+    return np.asarray(np.maximum(robust_spreads(third, axis=0) / stride**2.5, _FLOOR))
 
 
 def _poses(T_pc: Float) -> Float:

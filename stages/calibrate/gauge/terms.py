@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.adjustment.bordered import Rows
-from pipeline.adjustment.robust import Cauchy
+from pipeline.adjustment.robust import Cauchy, robust_spread
 from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, skew, transform
@@ -152,6 +152,6 @@ def _weighted(
 def frame_spread(frame: Int, in_sigma: Float) -> Float:
     """Return (M,) the robust spread of each equation's frame, in σ, not below that of the typical frame."""
     numbers, place = np.unique(frame, return_inverse=True)
-    spread = np.array([1.4826 * np.median(np.abs(in_sigma[place == k])) for k in range(len(numbers))])
+    spread = np.array([robust_spread(in_sigma[place == k]) for k in range(len(numbers))])
     typical = np.median(spread) if len(spread) else 1.0
     return np.asarray(np.maximum(np.maximum(spread, typical), 1e-3)[place])

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera.base import Camera
@@ -20,7 +21,7 @@ from stages.calibrate.laser.peaks import fit_peaks
 
 _MOST_CANDIDATES, _DRAWS = 4000, 400
 _LINE_PX, _STATION_PX, _PROFILE_STEP_PX = 2.0, 1.0, 0.5
-_OUTLIER_SIGMAS, _MAD_TO_SIGMA = 3.0, 1.4826
+_OUTLIER_SIGMAS = 3.0
 _LARGEST_GRID = 4000
 _OUTSIDE = -1e3
 
@@ -94,7 +95,7 @@ def _candidates(
     if not seen.any():
         return np.zeros((0, 2)), np.zeros(0)
     raised = _raised(np.where(seen, face, np.median(face[seen])), parameters.window_px)
-    noise = _MAD_TO_SIGMA * float(np.median(np.abs(raised[seen])))
+    noise = robust_spread(raised[seen])
     stands_out = seen & (raised > max(parameters.least_contrast * noise, 1.0)) & _ridge(raised)
     height = raised[stands_out]
     best = np.argsort(-height, kind="stable")[:_MOST_CANDIDATES]
@@ -171,6 +172,6 @@ def _straight(points: Float) -> Float:
             return points
         line = _line_through(points, np.ones(len(points)))
         distance = np.abs((points - line.origin) @ line.across)
-        limit = _OUTLIER_SIGMAS * _MAD_TO_SIGMA * float(np.median(distance))
+        limit = _OUTLIER_SIGMAS * robust_spread(distance)
         points = points[distance <= max(limit, 1e-9)]
     return points

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.instrument.laser_plane import LaserPlane
 
-_TUKEY, _MAD_TO_SIGMA = 4.685, 1.4826
+_TUKEY = 4.685
 _MOST_STEPS, _SETTLED = 50, 1e-9
 # A straight line in a picture has two numbers; the plane takes three of all of them.
 _NUMBERS_PER_LINE, _UNKNOWNS = 2, 3
@@ -34,7 +35,7 @@ def fit_plane_robustly(xyz_c: Float, group: Int) -> LaserPlane:
     weight = np.ones(len(xyz_c))
     for _ in range(_MOST_STEPS):
         distance = np.abs(_weighted(xyz_c, group, weight).distances(xyz_c))
-        following = _tukey(distance / max(_MAD_TO_SIGMA * float(np.median(distance)), 1e-12))
+        following = _tukey(distance / max(robust_spread(distance), 1e-12))
         moved = float(np.abs(following - weight).max())
         weight = following
         if moved < _SETTLED:

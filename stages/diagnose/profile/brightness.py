@@ -6,6 +6,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.stats import norm
 
+from pipeline.adjustment.robust import robust_spread, robust_spreads
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
@@ -32,7 +33,7 @@ def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Fi
     courses = np.array([_course(rings, profiles.row[rows]) for rows in cells.frames])
     known = np.isfinite(courses)
     middle = np.nanmedian(courses, axis=0)
-    sigma = 1.4826 * np.nanmedian(np.abs(courses - middle), axis=0) / np.sqrt(np.maximum(known.sum(0), 1))
+    sigma = robust_spreads(courses - middle, axis=0) / np.sqrt(np.maximum(known.sum(0), 1))
     depth, width, at = _deepest(middle)
     azimuth = float(np.degrees(rings.azimuth_rad[at]))
     around = np.abs((np.arange(len(middle)) - at + len(middle) // 2) % len(middle) - len(middle) // 2)
@@ -137,7 +138,7 @@ def _course(rings: RingSamples, rows: Int) -> Float:
     for _ in range(6):
         fit = np.linalg.lstsq(basis * weight[:, None], np.where(good, median, 0) * weight, rcond=None)[0]
         rest = np.where(good, median - basis @ fit, 0.0)
-        scale = 1.4826 * np.median(np.abs(rest[good])) if good.any() else 1.0
+        scale = robust_spread(rest[good]) if good.any() else 1.0
         weight = good * np.maximum(1 - (rest / (3 * max(scale, 1e-3))) ** 2, 0.0)
     return np.where(good, rest, np.nan)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.measure import LineProfiles
@@ -115,7 +116,7 @@ def _second_lines(profiles: LineProfiles) -> Bool:
     light, height = profiles.light[..., far].sum((1, 2)), profiles.height[..., far].sum((1, 2))
     share = light / np.maximum(height, 1e-9)
     usual = np.median(share)
-    spread = 1.4826 * np.median(np.abs(share - usual))
+    spread = robust_spread(share - usual)
     limit = max((_SECOND_LINE - 1) * usual, _ODD * spread) + _SECOND_LINE_FLOOR
     return np.asarray(share - usual > limit)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float, Int
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.regression import Tested, tested
@@ -90,7 +91,7 @@ def responses(cells: Cells) -> Responses:
     """
     distance = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
     rest = cells.rest[cells.whole]
-    noise = np.hypot(1.4826 * np.median(np.abs(rest - np.median(rest, axis=0)), axis=0), NOISE_FLOOR)
+    noise = np.hypot(robust_spreads(rest - np.median(rest, axis=0), axis=0), NOISE_FLOOR)
     score, information = np.zeros((len(rest), len(distance))), np.zeros((len(rest), len(distance)))
     _match(
         rest, cells.offset_px, cells.centre_px[cells.whole], cells.width_px[cells.whole], 1 / noise**2,

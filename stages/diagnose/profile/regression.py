@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 
 _TUNING = 4.685
@@ -74,7 +75,7 @@ def _biweights(x: Float, y: Float) -> Float:
     weight = np.ones(len(y))
     for _ in range(_STEPS):
         rest = y - x @ _solve(x.T @ (weight[:, None] * x), x.T @ (weight * y))
-        scale = max(1.4826 * float(np.median(np.abs(rest))), 1e-12)
+        scale = max(robust_spread(rest), 1e-12)
         weight = np.maximum(1 - (rest / (_TUNING * scale)) ** 2, 0.0) ** 2
     return weight
 

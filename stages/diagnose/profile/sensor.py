@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
@@ -94,7 +95,7 @@ def _phase_curve(rough: Float, smooth: Float, coefficient: Float) -> Curve:
     return Curve(
         "Radius against the pixels' phase", "fraction of a pixel", "px", x,
         np.array([np.median(p) if len(p) else np.nan for p in parts]),
-        np.array([1.4826 * np.median(np.abs(p)) / np.sqrt(len(p)) if len(p) else np.nan for p in parts]),
+        np.array([robust_spread(p) / np.sqrt(len(p)) if len(p) else np.nan for p in parts]),
         coefficient[0] * np.sin(turn) + coefficient[1] * np.cos(turn),
     )  # fmt: skip
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
@@ -127,7 +128,7 @@ def _curve(cells: Cells, coefficient: Float) -> Curve:
     place = (cells.offset_px - cells.centre_px[w, None]) / cells.width_px[w, None]
     rest = np.array([np.interp(x, p, r) for p, r in zip(place, cells.rest[w], strict=True)])
     mean = np.median(rest, axis=0)
-    sigma = 1.4826 * np.median(np.abs(rest - mean), axis=0) / np.sqrt(max(len(rest), 1))
+    sigma = robust_spreads(rest - mean, axis=0) / np.sqrt(max(len(rest), 1))
     predicted = np.nanmedian(coefficient) * (x**3 - 3 * x) * np.exp(-0.5 * x * x)
     return Curve(
         "What a Gaussian leaves of the line", "distance from the line, line widths", "share of the height",

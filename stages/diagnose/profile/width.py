@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
@@ -116,7 +117,7 @@ def _scale_curve(cells: Cells, geometry: LineGeometry, stated: Float, fit: Regre
         [np.nanmedian(width2[rows]) if np.isfinite(width2[rows]).any() else np.nan for rows in cells.frames]
     )
     sigma = np.array([
-        1.4826 * np.nanmedian(np.abs(width2[rows] - m)) / np.sqrt(max(np.isfinite(width2[rows]).sum(), 1))
+        robust_spread(width2[rows] - m) / np.sqrt(max(np.isfinite(width2[rows]).sum(), 1))
         if np.isfinite(m) else np.nan for rows, m in zip(cells.frames, y, strict=True)
     ])  # fmt: skip
     return Curve(

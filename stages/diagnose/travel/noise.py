@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float
 
 _LEAST_WHITE_MM = 0.002
 _LAGS = (2, 4, 8, 16, 32)
 # Of so many increments one step spoils no more than medians bear, nor do two.
 _PER_LAG = 12
-_MAD = 1.4826
 _ROUNDS = 30
 
 
@@ -51,7 +51,7 @@ def estimated_noise(difference_mm: Float, columns: Float, path_mm: Float, least_
 
 def _increment_variance(values: Float, lag: int) -> float:
     step = values[lag:] - values[:-lag]
-    return float((_MAD * np.median(np.abs(step - np.median(step)))) ** 2) if len(step) else 0.0
+    return spread_about_median(step) ** 2 if len(step) else 0.0
 
 
 def robust_coefficients(values: Float, columns: Float, rounds: int = _ROUNDS) -> Float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
 from pipeline.adjustment.elimination import by_point_and_pose
-from pipeline.adjustment.robust import Cauchy, GemanMcClure
+from pipeline.adjustment.robust import Cauchy, GemanMcClure, robust_spread
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
@@ -183,7 +183,7 @@ def scales_of(equations: Equations, tracks: Tracks, alike: float) -> Scales:
     size = np.linalg.norm(equations.texture.residual, axis=1)
     excess = _excess_of(size, tracks.sigma_px) * np.sqrt(alike)
     relief = np.abs(equations.rings.residual)
-    wall_mm = 1.4826 * float(np.median(relief)) if relief.size else 1.0
+    wall_mm = robust_spread(relief) if relief.size else 1.0
     return Scales(excess, max(wall_mm, _FINEST_WALL_MM))
 
 

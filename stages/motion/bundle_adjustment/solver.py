@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.adjustment.bordered import Step
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.bundle_adjustment.equations import (
@@ -142,4 +143,4 @@ def third_difference_sigma(state: State, lit: Int) -> Float:
     pose = np.concatenate([T[..., :3, 3], turn], -1)
     third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), pose)
     stride = float(np.median(np.diff(lit)))
-    return np.asarray(np.maximum(1.4826 * np.median(np.abs(third), 0) / stride**2, floor))
+    return np.asarray(np.maximum(robust_spreads(third, axis=0) / stride**2, floor))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 
 _BESIDE = 15
@@ -154,7 +155,7 @@ def bands_in_rings(distance_mm: Float, radius_mm: Float) -> Float:
     if ok.sum() <= 2 * _BESIDE:
         return np.zeros(0)
     off = radius_mm[ok] - median_filter(radius_mm[ok], 2 * _BESIDE + 1, mode="nearest")
-    usual = 1.4826 * float(np.median(np.abs(off)))
+    usual = robust_spread(off)
     return np.sort(distance_mm[ok][np.abs(off) > max(_BAND_SIGMA * usual, _LEAST_BAND_MM)])
 
 

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from scipy.fft import irfft2, rfft2
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32, Int
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.patches import cut, match
@@ -226,7 +227,7 @@ def _fit(psi: Float, value: Float) -> tuple[float, float, Float]:
     known = np.diag([0.0, _LEAN_PX**-2, _LEAN_PX**-2])
     residual, scale = value - np.median(value), 1.0
     for _ in range(8):
-        scale = max(1.4826 * float(np.median(np.abs(residual))), 0.02)
+        scale = max(robust_spread(residual), 0.02)
         weight = 1 / (scale**2 + residual**2 / 4)
         information = (design * weight[:, None]).T @ design + known
         found = np.linalg.solve(information, design.T @ (weight * value))
