@@ -16,14 +16,20 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from pipeline.simulator.exact import room_mm
-from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueLaser, TrueSensor
-from pipeline.simulator.path import motion_through
-from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.instrument import (
+    LedRing,
+    LineProfile,
+    TrueCamera,
+    TrueInstrument,
+    TrueLaser,
+    TrueSensor,
+)
+from pipeline.simulator.motion import motion_through
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall, WallGrid
 from pipeline.simulator.wall.build import bent_axis
 from pipeline.simulator.wall.description import Bend
+from pipeline.simulator.wall.grid import Wall, WallGrid
 
 
 def truth_of_recording(folder: Path) -> SceneTruth:

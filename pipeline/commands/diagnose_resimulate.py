@@ -15,16 +15,21 @@ from pipeline.errors import InputError
 from pipeline.geometry.axis import straight_axis
 from pipeline.physics.catalogue import EFFECTS, effect
 from pipeline.recording.base import Recording
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.exact import room_mm
-from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueLaser, TrueSensor
-from pipeline.simulator.motion import Odometer
-from pipeline.simulator.path import motion_through
-from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.instrument import (
+    LedRing,
+    LineProfile,
+    TrueCamera,
+    TrueInstrument,
+    TrueLaser,
+    TrueSensor,
+)
+from pipeline.simulator.motion import Odometer, motion_through
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall, WallGrid
+from pipeline.simulator.wall.grid import Wall, WallGrid
 from stages.calibrate.gauge.geometry import gauge_of
 from stages.diagnose.diagnose import Examination
 from stages.diagnose.gauge.fit import Fit, fit

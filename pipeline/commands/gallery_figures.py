@@ -11,9 +11,8 @@ import numpy as np
 
 from pipeline.arrays import Byte, Float
 from pipeline.physics.effect import Channel
-from pipeline.simulator.gallery.course import Course
-from pipeline.simulator.gallery.exhibit import Exhibit
-from pipeline.simulator.gallery.line import unrolled
+from pipeline.simulator.gallery.exhibit import Exhibit, unrolled
+from pipeline.simulator.gallery.scenes import Course
 
 # Size of a plot's field; the page adds the margins.
 WIDTH, HEIGHT = 360.0, 130.0

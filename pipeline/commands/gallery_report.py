@@ -17,12 +17,10 @@ from pipeline.commands.gallery_figures import (
     ring_plots,
 )
 from pipeline.pages import page_template
-from pipeline.simulator.gallery.exhibit import Exhibit
+from pipeline.simulator.gallery.exhibit import WINDOW_PX, Exhibit
 from pipeline.simulator.gallery.likeness import STATES, Likeness, likenesses
-from pipeline.simulator.gallery.line import WINDOW_PX
-from pipeline.simulator.gallery.stage_set import surroundings
-from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM
-from pipeline.simulator.laws.check import Check
+from pipeline.simulator.gallery.scenes import surroundings
+from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, Check
 from pipeline.simulator.laws.closed_form import lever_of
 from pipeline.simulator.laws.table import verdict
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from pipeline.errors import InputError
-from pipeline.simulator.seal import open_seal as compare
+from pipeline.simulator.truth_files import open_seal as compare
 
 
 def open_seal(

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from pipeline.errors import InputError
 from pipeline.simulator.effects.switch import parse_switches
-from pipeline.simulator.premises.base import Premise
+from pipeline.simulator.premises import Premise
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.produce import Order, Places, beside, produce
 from pipeline.simulator.scene import Scene, read_scene

@@ -11,18 +11,22 @@ from pipeline.files.yaml_file import Section
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import probe_from
 from pipeline.recording.base import FrameTable
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import switches_from_mapping
-from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueLaser, TrueSensor
-from pipeline.simulator.light import REFERENCE_MM
-from pipeline.simulator.motion import Odometer
-from pipeline.simulator.path import motion_of
-from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.instrument import (
+    LedRing,
+    LineProfile,
+    TrueCamera,
+    TrueInstrument,
+    TrueLaser,
+    TrueSensor,
+)
+from pipeline.simulator.line_light import REFERENCE_MM
+from pipeline.simulator.motion import Odometer, motion_of
 from pipeline.simulator.scene import LightScene, Scene, SensorScene
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall
-from pipeline.simulator.wall.build import build_wall
-from pipeline.simulator.wall.facts import facts_of
+from pipeline.simulator.wall.build import build_wall, facts_of
+from pipeline.simulator.wall.grid import Wall
 
 _INSTRUMENT_STREAM = 1
 

@@ -14,7 +14,7 @@ from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.sheet import sheet_rays
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall
+from pipeline.simulator.wall.grid import Wall
 
 _SEARCH_PX = (20.0, 900.0)
 _SEARCH_STEP_PX = 4.0

@@ -1,8 +1,9 @@
-"""How the renderer's kernels are compiled: without the interpreter's lock, kept on disk."""
+"""How the renderer's kernels are compiled, and two threads that run them over the rows of an image."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from numba import njit
@@ -21,3 +22,15 @@ def kernel(function: Function) -> Function:
         cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False
     )(function)  # fmt: skip
     return compiled
+
+
+_THREADS = 2
+_BAND_ROWS = 64
+
+
+def in_bands(work: Callable[[int, int], None], rows: int) -> None:
+    """Call ``work(first, last)`` for bands of rows; each writes to its own rows, so order does not matter."""
+    bands = [(first, min(first + _BAND_ROWS, rows)) for first in range(0, rows, _BAND_ROWS)]
+    with ThreadPoolExecutor(_THREADS) as pool:
+        for _ in pool.map(lambda band: work(*band), bands):
+            pass

@@ -12,16 +12,15 @@ import numpy as np
 from pipeline.arrays import Float, Float32, Image
 from pipeline.recording.base import Illumination
 from pipeline.simulator.instrument import TrueCamera, TrueInstrument, TrueSensor
-from pipeline.simulator.lamps import Lamps, add_wall_light, lamps_of, stray_light
-from pipeline.simulator.light import add_line
+from pipeline.simulator.kernel import in_bands
+from pipeline.simulator.line_light import add_line
 from pipeline.simulator.rays import RayTable, focal_px, ray_table
 from pipeline.simulator.sensor import exposed, shade_of, through_lens
 from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
-from pipeline.simulator.surface import Surface, surface_of
-from pipeline.simulator.texture import Texture, texture_of
+from pipeline.simulator.surface import Surface, Texture, surface_of, texture_of
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.view import Line, View, line_of, line_tiles
-from pipeline.simulator.workers import in_bands
+from pipeline.simulator.wall_light import Lamps, add_wall_light, lamps_of, stray_light
 
 _SHEET_MOMENTS = 5
 

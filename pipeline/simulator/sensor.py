@@ -10,9 +10,8 @@ from scipy.special import ndtri
 
 from pipeline.arrays import Float32, Image
 from pipeline.simulator.instrument import TrueSensor
-from pipeline.simulator.kernel import kernel
-from pipeline.simulator.light import hashed
-from pipeline.simulator.workers import in_bands
+from pipeline.simulator.kernel import in_bands, kernel
+from pipeline.simulator.line_light import hashed
 
 _VEIL_SHRINK = 8
 _QUANTILES = 1 << 16

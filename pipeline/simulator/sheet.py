@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.simulator.instrument import TrueLaser
+from pipeline.simulator.instrument import LineProfile, TrueLaser
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.meet import meet, normal_at
-from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.raycast import meet, normal_at
 from pipeline.simulator.surface import Surface
 from pipeline.simulator.window import through
 

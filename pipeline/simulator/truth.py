@@ -1,16 +1,19 @@
-"""The truth of a scene: all that a recording is rendered from, and what it is told apart from."""
+"""The truth of a scene: everything a recording is rendered from."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import Any
 
 from pipeline.arrays import Float
+from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from pipeline.simulator.instrument import Change, TrueInstrument
 from pipeline.simulator.motion import Motion, Odometer
 from pipeline.simulator.scene import Rendering
-from pipeline.simulator.wall.base import Wall
+from pipeline.simulator.wall.grid import Wall
 
 
 @dataclass(frozen=True)
@@ -68,3 +71,46 @@ class SceneTruth:
         if self.odometer is None:
             return None
         return self.odometer.readings(self.motion, float(self.frames.time_s[-1]) + 2.0 / self.frame_rate)
+
+
+def cartesian(size: float, direction_deg: float) -> tuple[float, float]:
+    """Return size · (cos, sin) of a direction."""
+    direction = math.radians(direction_deg)
+    return size * math.cos(direction), size * math.sin(direction)
+
+
+def with_laser(truth: SceneTruth, **fields: Any) -> SceneTruth:
+    """Return the truth with fields of its laser replaced."""
+    instrument = truth.instrument
+    return replace(truth, instrument=replace(instrument, laser=replace(instrument.laser, **fields)))
+
+
+def with_camera(truth: SceneTruth, **fields: Any) -> SceneTruth:
+    """Return the truth with fields of its camera replaced."""
+    instrument = truth.instrument
+    return replace(truth, instrument=replace(instrument, camera=replace(instrument.camera, **fields)))
+
+
+def with_sensor(truth: SceneTruth, **fields: Any) -> SceneTruth:
+    """Return the truth with fields of its sensor replaced."""
+    instrument = truth.instrument
+    return replace(truth, instrument=replace(instrument, sensor=replace(instrument.sensor, **fields)))
+
+
+def with_odometer(truth: SceneTruth, effect: str, **fields: Any) -> SceneTruth:
+    """Return the truth with fields of its odometer replaced.
+
+    Raises
+    ------
+    InputError
+        When the scene has no odometer.
+    """
+    odometer = require_odometer(truth, effect)
+    return replace(truth, odometer=replace(odometer, **fields))
+
+
+def require_odometer(truth: SceneTruth, effect: str) -> Odometer:
+    """Return the scene's odometer, or refuse the effect."""
+    if truth.odometer is None:
+        raise InputError("scene", f"{effect} acts on an encoder, and there is none", place="odometer")
+    return truth.odometer

@@ -9,11 +9,10 @@ from scipy.ndimage import binary_dilation
 
 from pipeline.arrays import Bool, Float
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.meet import meet
+from pipeline.simulator.raycast import meet
 from pipeline.simulator.rays import RayTable, ray_at
 from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
-from pipeline.simulator.surface import Surface
-from pipeline.simulator.texture import Texture
+from pipeline.simulator.surface import Surface, Texture
 
 TILE_PX = 8
 _CLOSE_MM = 1e-3

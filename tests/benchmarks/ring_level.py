@@ -20,7 +20,7 @@ from pipeline.geometry.rigid import inverse, transform
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.base import Image as GreyImage
 from pipeline.simulator.build import plain_truth
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.rays import viewing_rays

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from pipeline.physics.catalogue import effect
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.laws.bench import bench_truth
-from pipeline.simulator.laws.trace import trace_ring
+from pipeline.simulator.laws.bench import bench_truth, trace_ring
 from pipeline.simulator.motion import Motion, Odometer, Signal, Slip, Wave, constant
 from pipeline.simulator.rays import viewing_rays
 from stages.diagnose.effects.base import Travel

@@ -15,9 +15,9 @@ from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.switch import Switch, typical_switch
 from pipeline.simulator.gallery.exhibit import Exhibit, exhibit
 from pipeline.simulator.gallery.likeness import likenesses
-from pipeline.simulator.gallery.stage_set import moment_s, scene_pair
+from pipeline.simulator.gallery.scenes import moment_s, scene_pair
+from pipeline.simulator.laws.bench import harmonic
 from pipeline.simulator.laws.closed_form import LAWS
-from pipeline.simulator.laws.harmonics import harmonic
 from pipeline.simulator.laws.radius import radius_check
 
 SHOWN = ("laser_tilt", "principal_point", "sheet_waviness", "pixel_aspect", "dust")

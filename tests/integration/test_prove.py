@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from pipeline.cli import app
 from pipeline.commands.prove_cases import NotRenderedError, require_seal
 from pipeline.errors import InputError
-from pipeline.simulator.seal import seal_truth
+from pipeline.simulator.truth_files import seal_truth
 from stages.diagnose.drill.cases import Case, DiagnosisFailedError, diagnose_apart, find_cases
 
 TILT = {"name": "laser_tilt", "probability": 0.99, "parameters": {"tilt_deg": {"value": 0.61, "sd": 0.01}}}

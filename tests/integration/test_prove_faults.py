@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from pipeline.cli import app
 from pipeline.commands.prove_geometry import wall_errors
 from pipeline.errors import InputError
-from pipeline.simulator.seal import seal_truth
+from pipeline.simulator.truth_files import seal_truth
 from stages.diagnose.drill.cases import Case
 from tests.faults import obeying_permissions
 from tests.shared_data import PROJECT_ROOT

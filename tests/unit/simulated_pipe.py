@@ -9,12 +9,18 @@ from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import FrameTable, PipeFacts
-from pipeline.simulator.instrument import LedRing, TrueCamera, TrueInstrument, TrueLaser, TrueSensor
+from pipeline.simulator.instrument import (
+    LedRing,
+    LineProfile,
+    TrueCamera,
+    TrueInstrument,
+    TrueLaser,
+    TrueSensor,
+)
 from pipeline.simulator.motion import Motion, Signal, constant
-from pipeline.simulator.profile import LineProfile
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall, WallGrid
+from pipeline.simulator.wall.grid import Wall, WallGrid
 
 RADIUS = 50.0
 

@@ -8,15 +8,11 @@ import pytest
 
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.switch import Switch, typical_switch
-from pipeline.simulator.laws.bench import bench_truth
-from pipeline.simulator.laws.check import Check
-from pipeline.simulator.laws.ghost import ghost_checks
+from pipeline.simulator.laws.bench import Check, bench_truth, trace_ring
 from pipeline.simulator.laws.light import light_checks
-from pipeline.simulator.laws.moving import moving_checks
-from pipeline.simulator.laws.odometry import odometry_checks
-from pipeline.simulator.laws.radius import effect_ring, radius_check, radius_checks
+from pipeline.simulator.laws.moving import moving_checks, odometry_checks
+from pipeline.simulator.laws.radius import effect_ring, ghost_checks, radius_check, radius_checks
 from pipeline.simulator.laws.table import table_text
-from pipeline.simulator.laws.trace import trace_ring
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import EFFECTS
-from pipeline.simulator.effects.catalogue import EFFECT_FUNCTIONS, switch_on
+from pipeline.simulator.effects import EFFECT_FUNCTIONS, switch_on
 from pipeline.simulator.effects.photometric import line_peak
 from pipeline.simulator.effects.switch import (
     Switch,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.simulator.path import motion_of
+from pipeline.simulator.motion import motion_of
 from pipeline.simulator.scene import read_scene
 from tests.benchmarks.bench_long_run import TEMPLATE
 from tests.benchmarks.long_scene import lengthened

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.simulator.premises import pictures
+from pipeline.simulator.premises import check
 from tests.unit.simulated_pipe import small_truth
 
 
@@ -13,12 +13,12 @@ def test_beyond_the_edge_a_picture_is_dark_whatever_the_memory_held():
     held = [np.full((360, 250, 3), 255, np.uint8) for _ in range(200)]
     del held[::2]
     for _ in range(20):
-        assert pictures._peaks(truth, black).max() == 0
+        assert check._peaks(truth, black).max() == 0
 
 
 def test_a_dark_recording_is_refused_with_what_to_change():
     truth = small_truth()
-    premises = pictures.picture_premises(truth, {n: np.zeros((300, 400, 3), np.uint8) for n in (0, 1)})
+    premises = check.picture_premises(truth, {n: np.zeros((300, 400, 3), np.uint8) for n in (0, 1)})
     broken = {p.name: p.hint for p in premises if not p.holds}
     assert "laser.peak" in broken["azimuths at which the line is seen"]
     assert "light.level" in broken["median grey of the lit wall"]

@@ -9,12 +9,11 @@ from scipy.ndimage import map_coordinates
 from pipeline.arrays import Float
 from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.recording.base import FrameTable
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch, parse_switch, parse_switches, typical_switch
-from pipeline.simulator.laws.bench import bench_truth
-from pipeline.simulator.laws.trace import trace_ring
+from pipeline.simulator.instrument import LineProfile
+from pipeline.simulator.laws.bench import bench_truth, trace_ring
 from pipeline.simulator.motion import Motion, Signal, constant
-from pipeline.simulator.profile import LineProfile
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import through_lens
 from pipeline.simulator.truth import SceneTruth

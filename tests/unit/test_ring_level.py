@@ -6,7 +6,7 @@ import pytest
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.physics.catalogue import effect
 from pipeline.simulator.build import plain_truth
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch
 from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.prior import read_prior

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.simulator.premises.base import require
-from pipeline.simulator.premises.sampling import line_premise, line_px_per_mm
-from pipeline.simulator.profile import LineProfile
+from pipeline.simulator.instrument import LineProfile
+from pipeline.simulator.premises import require
+from pipeline.simulator.premises.check import line_premise, line_px_per_mm
 from pipeline.simulator.render import renderer_of
 from tests.unit.simulated_pipe import RADIUS, small_truth
 

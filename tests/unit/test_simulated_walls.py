@@ -13,16 +13,12 @@ import pytest
 
 from pipeline.errors import InputError
 from pipeline.geometry.axis import from_pipe
-from pipeline.simulator.wall import relief
-from pipeline.simulator.wall.base import Wall
-from pipeline.simulator.wall.build import build_wall
+from pipeline.simulator.wall import shape as wall_shape
+from pipeline.simulator.wall.build import build_wall, facts_of
 from pipeline.simulator.wall.description import Bend, Pipe
-from pipeline.simulator.wall.facts import facts_of
-from pipeline.simulator.wall.grid import grid_over
-from pipeline.simulator.wall.noise import above_share, field
-from pipeline.simulator.wall.relief import coarse_field
-from pipeline.simulator.wall.seeds import Seeds
-from pipeline.simulator.wall.shape import bore_radius
+from pipeline.simulator.wall.grid import Wall, grid_over
+from pipeline.simulator.wall.noise import Seeds, above_share, field
+from pipeline.simulator.wall.shape import bore_radius, coarse_field
 
 HERE = Path()
 SMOOTH = {"roughness_mm": 0.0}
@@ -271,7 +267,7 @@ def test_stains_of_a_pipe_longer_than_a_picture_may_be_are_those_of_its_parts(
 ) -> None:
     grid, seeds = grid_over((-20.0, 180.0), 20.0, 0.1), Seeds(3)
     whole = coarse_field(grid, seeds.of("rust"), 30.0)
-    monkeypatch.setattr(relief, "_MOST_ROWS", 170)
+    monkeypatch.setattr(wall_shape, "_MOST_ROWS", 170)
     parts = coarse_field(grid, seeds.of("rust"), 30.0)
     # OpenCV interpolates at 32nds of a cell
     assert np.abs(parts - whole).max() < np.abs(np.diff(whole, axis=0)).max() / 10

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 from pipeline.errors import InputError
 from pipeline.instrument.camera.base import Camera
-from pipeline.simulator.effects.parts import cartesian, with_camera
 from pipeline.simulator.instrument import TrueInstrument
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, cartesian, with_camera
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.instrument.laser import LaserSheet
-from pipeline.simulator.effects.parts import cartesian, with_laser
 from pipeline.simulator.instrument import SheetWave, TrueInstrument
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, cartesian, with_laser
 
 # 1/e² radius of the beam on the cone mirror that spreads it: sets how decentring makes the ring uneven.
 BEAM_RADIUS_MM = 1.0

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.simulator.effects.parts import with_laser, with_sensor
 from pipeline.simulator.instrument import Dust
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, with_laser, with_sensor
 
 # Distance at which `TrueLaser.power_mm` counts.
 _LINE_REFERENCE_MM = 50.0

@@ -9,10 +9,9 @@ import numpy as np
 
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.errors import InputError
-from pipeline.simulator.effects.parts import cartesian, require_odometer, with_odometer
 from pipeline.simulator.motion import Signal, Slip, Wave
-from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall
+from pipeline.simulator.truth import SceneTruth, cartesian, require_odometer, with_odometer
+from pipeline.simulator.wall.grid import Wall
 
 # Sagitta by which the axis' polyline may cut its arc, mm.
 _SAGITTA_MM = 1e-4

@@ -12,8 +12,7 @@ import math
 from dataclasses import replace
 
 from pipeline.physics.window import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
-from pipeline.simulator.effects.parts import cartesian, with_camera
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, cartesian, with_camera
 from pipeline.simulator.window import CylinderWindow, SphereWindow, Window
 
 # Outer radius of the sealed probe, and the glass of the tube that tilts (catalogue, PHYSICS notes).

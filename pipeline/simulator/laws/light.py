@@ -10,16 +10,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.photometric import line_peak
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.laws.bench import ALBEDO, BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, bench_wall
-from pipeline.simulator.laws.check import Check
+from pipeline.simulator.laws.bench import ALBEDO, BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, Check, bench_wall
 from pipeline.simulator.laws.closed_form import lever_of, theta_of
 from pipeline.simulator.laws.strip import Profiles, exposed_profiles, profiles, strip_truth
 from pipeline.simulator.motion import Motion, Signal, constant
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall, WallGrid
+from pipeline.simulator.wall.grid import Wall, WallGrid
 
 _R = 50.8
 _MM_PER_PX = lever_of(_R) / FOCAL_PX

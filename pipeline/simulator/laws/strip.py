@@ -8,14 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.arrays import Float, Float32
-from pipeline.simulator.effects.catalogue import switch_on
-from pipeline.simulator.effects.parts import with_sensor
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueSensor
 from pipeline.simulator.laws.bench import FOCAL_PX, bench_truth
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import shade_of, through_lens
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, with_sensor
 
 _SIZE, _CENTRE = (480, 65), (20.0, 32.0)
 _ROWS = 24

@@ -1,25 +1,28 @@
-"""The table of agreement between the notes' laws and what was traced or rendered."""
+"""Table of agreement between the laws of the physics notes and what was traced or rendered.
+
+``python -m pipeline.simulator.laws.table [FILE]`` writes it.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
-from pipeline.simulator.laws.check import EXPONENT_TOLERANCE, Check
-from pipeline.simulator.laws.ghost import ghost_checks
+from pipeline.simulator.laws.bench import EXPONENT_TOLERANCE, Check
 from pipeline.simulator.laws.light import light_checks
-from pipeline.simulator.laws.moving import moving_checks
-from pipeline.simulator.laws.odometry import odometry_checks
-from pipeline.simulator.laws.radius import radius_checks
+from pipeline.simulator.laws.moving import moving_checks, odometry_checks
+from pipeline.simulator.laws.radius import ghost_checks, radius_checks
 
 _HEAD = """# Laws of the known effects against traced and rendered rings
 
-Made by `python -m pipeline.simulator.laws`; nothing here is written by hand. The bench is the instrument of
-the physics notes: baseline 22 mm, equidistant lens of 360 px/rad, line of 0.15 mm, in a smooth round pipe.
-Radius errors are apparent less true, along the effect's crest. Rays are traced one by one through the true
-camera, its windows by Snell's law, to the wall and the sheet; light is taken from the render engine. ✓ and ○
-are the notes' own marks: checked there against a ray trace, or derived only. The tolerance is what the terms
-of second order, which a law leaves out, may make at this size. The exponent is the slope of ln |δr| over ln r
-from 25.4 to 50.8 mm, and agrees within {exponent:g}.
+Made by `python -m pipeline.simulator.laws.table`; nothing here is written by hand. The bench is the
+instrument of the physics notes: baseline 22 mm, equidistant lens of 360 px/rad, line of 0.15 mm, in a
+smooth round pipe. Radius errors are apparent less true, along the effect's crest. Rays are traced one by
+one through the true camera, its windows by Snell's law, to the wall and the sheet; light is taken from the
+render engine. ✓ and ○ are the notes' own marks: checked there against a ray trace, or derived only. The
+tolerance is what the terms of second order, which a law leaves out, may make at this size. The exponent is
+the slope of ln |δr| over ln r from 25.4 to 50.8 mm, and agrees within {exponent:g}.
 
 {summary}
 
@@ -71,3 +74,9 @@ def verdict(check: Check) -> str:
 
 def _size(value: float, check: Check) -> str:
     return f"{value:.4g} {check.unit}".strip()
+
+
+if __name__ == "__main__":
+    file = Path(sys.argv[1]) if len(sys.argv) > 1 else Path("data/effects/laws.md")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(table_text(list(all_checks())), "utf-8")

@@ -11,10 +11,10 @@ import numpy as np
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
 from pipeline.recording.base import Illumination
-from pipeline.simulator.effects.catalogue import switch_on
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueSensor
-from pipeline.simulator.premises.base import Premise
+from pipeline.simulator.premises import Premise
 from pipeline.simulator.render import Renderer, renderer_of
 from pipeline.simulator.truth import SceneTruth
 

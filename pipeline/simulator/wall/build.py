@@ -1,4 +1,4 @@
-"""The wall of a scene: shape, relief, reflectance and axis put together."""
+"""The wall of a scene from its description, and what a recording states of the pipe."""
 
 from __future__ import annotations
 
@@ -11,15 +11,35 @@ from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import PipeAxis
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import rotation_from_vector
-from pipeline.simulator.wall.albedo import FINEST_OVER_RADIUS, paint, stain
-from pipeline.simulator.wall.base import Wall
-from pipeline.simulator.wall.description import Bend, Pipe
-from pipeline.simulator.wall.fiducials import paint_fiducials, require_room
-from pipeline.simulator.wall.grid import Grid, grid_over
-from pipeline.simulator.wall.photograph import lay_photograph
-from pipeline.simulator.wall.relief import add_relief
-from pipeline.simulator.wall.seeds import Seeds
-from pipeline.simulator.wall.shape import axis_curvature, base_radius
+from pipeline.recording.base import BoreSection, PipeFacts
+from pipeline.recording.base import Fiducials as StatedFiducials
+from pipeline.simulator.wall.albedo import FINEST_OVER_RADIUS, lay_photograph, paint, stain
+from pipeline.simulator.wall.description import Bend, Fiducials, Pipe
+from pipeline.simulator.wall.fiducials import markers_of, paint_fiducials, require_room
+from pipeline.simulator.wall.grid import Grid, Wall, grid_over
+from pipeline.simulator.wall.noise import Seeds
+from pipeline.simulator.wall.shape import add_relief, axis_curvature, base_radius
+
+
+def facts_of(pipe: Pipe) -> PipeFacts:
+    """Return the section ``pipe`` of recording.yaml: the nominal bore, and of a gauge also its fiducials."""
+    return PipeFacts(
+        nominal_diameter_mm=pipe.nominal_diameter_mm or pipe.diameter_mm,
+        bore=tuple(BoreSection(b.length_mm, b.diameter_mm) for b in pipe.bore),
+        bore_tolerance_mm=pipe.bore_tolerance_mm if pipe.bore else 0.0,
+        fiducials=None if pipe.fiducials is None else _stated(pipe.fiducials),
+    )
+
+
+def _stated(fiducials: Fiducials) -> StatedFiducials:
+    return StatedFiducials(
+        dictionary=fiducials.dictionary,
+        size_mm=fiducials.size_mm,
+        columns_along="+azimuth",
+        rows_along="+distance",
+        markers=markers_of(fiducials),
+    )
+
 
 _AXIS_STEP_MM = 0.25
 

@@ -1,7 +1,8 @@
-"""Random fields on a wall, periodic around it."""
+"""Random fields on a wall, periodic around it, and the random generators they are drawn from."""
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,18 @@ from scipy.fft import irfft2, next_fast_len, rfft2
 
 from pipeline.arrays import Float, Float32
 from pipeline.simulator.wall.grid import Grid
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Hands out generators; ``seed`` is the scene's."""
+
+    seed: int
+
+    def of(self, purpose: str, index: int = 0) -> np.random.Generator:
+        """Return the generator of a purpose; the same every time it is asked for."""
+        return np.random.default_rng([self.seed, zlib.crc32(purpose.encode()), index])
+
 
 _PLANE_WAVES = 48
 

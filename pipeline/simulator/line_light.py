@@ -1,4 +1,4 @@
-"""Light of the laser's line that reaches each pixel."""
+"""Light of the laser line that reaches each pixel."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.meet import meet, normal_at
+from pipeline.simulator.raycast import meet, normal_at
 from pipeline.simulator.rays import part_ray_at, ray_at
 from pipeline.simulator.sheet import density_at, sheet_at
-from pipeline.simulator.texture import Texture, albedo_at, sheen_at
+from pipeline.simulator.surface import Texture, albedo_at, sheen_at
 from pipeline.simulator.view import TILE_PX, Line, View, Work, new_work, to_wall
 
 Speckle = tuple[float, float, int]

@@ -1,4 +1,4 @@
-"""Where rays meet the wall, and how the wall faces there: kernels on a wall's grid."""
+"""Where rays first hit the wall, and the wall's normal there: kernels on the wall's grid."""
 
 from __future__ import annotations
 

@@ -9,11 +9,10 @@ import numpy as np
 from pipeline.arrays import Float, Float32
 from pipeline.simulator.instrument import LedRing
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.light import REFERENCE_MM
-from pipeline.simulator.meet import meet, normal_at, radius_at
+from pipeline.simulator.line_light import REFERENCE_MM
+from pipeline.simulator.raycast import meet, normal_at, radius_at
 from pipeline.simulator.rays import part_ray_at
-from pipeline.simulator.surface import Surface
-from pipeline.simulator.texture import albedo_at, sheen_at
+from pipeline.simulator.surface import Surface, albedo_at, sheen_at
 from pipeline.simulator.view import View, Work, new_work, to_wall
 
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.

@@ -1,24 +1,24 @@
-"""The scenes in which effects are shown: the bench, dressed where an effect needs something to act on."""
+"""The scenes in which the gallery shows an effect, and how the effect goes with time."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.recording.base import FrameTable
-from pipeline.simulator.effects.catalogue import switch_on
-from pipeline.simulator.effects.parts import with_laser
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.photometric import line_peak
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.laws.bench import BASELINE_MM, bench_truth
-from pipeline.simulator.motion import Motion, Signal, constant
-from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.base import Wall
+from pipeline.simulator.laws.bench import BASELINE_MM, RADII_MM, bench_truth, harmonic, trace_ring
+from pipeline.simulator.motion import Motion, Odometer, Signal, constant
+from pipeline.simulator.truth import SceneTruth, with_laser
 from pipeline.simulator.wall.build import build_wall
 from pipeline.simulator.wall.description import Pipe
+from pipeline.simulator.wall.grid import Wall
 
 # The smallest square picture in which the ring of a 4 inch pipe fits at 360 px/rad.
 SIDE_PX = 880
@@ -85,3 +85,59 @@ def _rough_wall(radius_mm: float) -> Wall:
         {"diameter_mm": 2 * radius_mm, "from_mm": 0.0, "to_mm": 60.0, "welds": (weld,)}
     )
     return build_wall(pipe, 1, Path())
+
+
+_RADIUS_MM = max(RADII_MM)
+_MOMENTS, _AZIMUTHS = 61, 24
+_SPEED_MM_S, _LEG_S = 15.0, 4.0
+
+
+@dataclass(frozen=True)
+class Course:
+    """Something over time: ``time_s`` (N,), ``value_mm`` (N,) and what it is."""
+
+    time_s: Float
+    value_mm: Float
+    of: str
+
+
+def course_of(switch: Switch) -> Course | None:
+    """Return the course of an effect that has one."""
+    if switch.name.startswith("encoder") or switch.name == "time_offset":
+        return _against_encoder(switch)
+    sizes = switch.quantities
+    if "frequency_hz" in sizes:
+        return _of_ring(switch, np.linspace(0, 3 / sizes["frequency_hz"], _MOMENTS))
+    if switch.effect.time == "drift":
+        return _of_ring(switch, np.linspace(0, 4 * sizes["time_s"], _MOMENTS))
+    return None
+
+
+def _of_ring(switch: Switch, time_s: Float) -> Course:
+    """Return the ring's harmonic along the effect's crest, 4 inch."""
+    truth, order = switch_on(bench_truth(_RADIUS_MM), [switch]), switch.effect.harmonic or 0
+    crest = np.exp(1j * order * math.radians(switch.quantities.get("direction_deg", 0.0)))
+    rings = [trace_ring(truth, float(t), _AZIMUTHS) for t in time_s]
+    size = [(harmonic(r.azimuth_rad, r.error_mm, order) * crest.conjugate()).real for r in rings]
+    return Course(time_s, np.array(size), "radius error at the crest, 4 inch")
+
+
+def _against_encoder(switch: Switch) -> Course:
+    """Return true less read distance on a way forth, at rest, forth faster and back."""
+    truth = switch_on(_driven(), [switch])
+    encoder = truth.encoder()
+    if encoder is None:
+        raise ValueError("the bench has an odometer")
+    way = truth.motion.distance_mm.at(encoder.time_s)
+    return Course(encoder.time_s, way - way[0] - encoder.distance_mm, "motion less encoder")
+
+
+def _driven() -> SceneTruth:
+    speeds = _SPEED_MM_S * np.array([1.0, 0.0, 2.0, -1.0])
+    knots = np.arange(len(speeds) + 1) * _LEG_S
+    time = np.arange(0.0, knots[-1] + 0.05, 0.05)
+    rate = speeds[np.clip((time / _LEG_S).astype(int), 0, len(speeds) - 1)]
+    way = np.concatenate([[0.0], np.cumsum(rate[:-1] * np.diff(time))])
+    frames = round(knots[-1] * 30)
+    truth = bench_truth(_RADIUS_MM, Motion(Signal(time, way)), frames=frames)
+    return replace(truth, odometer=Odometer(quantum_mm=0.0))
