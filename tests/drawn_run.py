@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.arrays import Byte, Float, Float32, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import quiet_context

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.arrays import Float, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import (

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.geometry.axis import from_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements

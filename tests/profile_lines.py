@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import exponnorm
 
-from pipeline.instrument.camera.equidistant import Equidistant
+from pipeline.instrument.camera.fisheye import Equidistant
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from tests.ring_images import memory_recording

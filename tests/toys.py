@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.arrays import Image, Int
 from pipeline.export.exporter import Exporter
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource

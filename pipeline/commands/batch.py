@@ -9,11 +9,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from pipeline.batch.cluster import endings, workers
-from pipeline.batch.find import find_recordings
-from pipeline.batch.kinds import Cluster, LocalWorkers, RunningScheduler, read_cluster
-from pipeline.batch.summary import write_summary
-from pipeline.batch.work import Ending, Work
+from pipeline.batch.cluster import Cluster, LocalWorkers, RunningScheduler, endings, read_cluster, workers
+from pipeline.batch.runs import Ending, Work, find_recordings, write_summary
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named
 from pipeline.machine.configuration import resolve

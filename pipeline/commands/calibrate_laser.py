@@ -20,8 +20,7 @@ from pipeline.files.disk import disk_errors_named, require_writable, written_tog
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.formats import read_camera
-from pipeline.instrument.laser import LaserSheet
-from pipeline.instrument.laser_plane import LaserPlane
+from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.machine.provenance import MadeBy

@@ -16,7 +16,7 @@ from pipeline.instrument.budget.combine import error_budget as analytic_budget
 from pipeline.instrument.budget.design import baseline_study, tolerances
 from pipeline.instrument.budget.monte_carlo import monte_carlo
 from pipeline.instrument.budget.scan import RingScan
-from pipeline.instrument.budget.typical import typical_probe
+from pipeline.instrument.budget.sources import typical_probe
 from pipeline.instrument.probe_file import read_probe
 
 ACCURACIES_MM = (0.1, 0.02)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from pipeline.export.cloud import write_cloud
+from pipeline.export.arrays import write_cloud, write_radius_map, write_rings
 from pipeline.export.exporter import Exporter
-from pipeline.export.findings import write_defects, write_sections
 from pipeline.export.glb import write_model
-from pipeline.export.overlays import write_overlays
-from pipeline.export.radius_map import write_radius_map
+from pipeline.export.pictures import write_overlays, write_unrolled
 from pipeline.export.report import write_report_page
-from pipeline.export.rings import write_rings
+from pipeline.export.tables import write_defects, write_sections, write_trajectory
 from pipeline.export.tileset import write_tileset
-from pipeline.export.trajectory import write_trajectory
-from pipeline.export.unrolled import write_unrolled
 
 EXPORTERS = (
     Exporter("rings.zarr", write_rings),

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.arrays import Byte, Float, Float32, Int
 from pipeline.artefacts.measured import PipeAxis, RadiusMap, WallTexture
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
-from pipeline.export.unrolled import display_colours
+from pipeline.export.pictures import display_colours
 from pipeline.geometry.axis import from_pipe
 
 _LEAST_COLUMNS = 36

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import RadiusMap
-from pipeline.export.glb_builder import GlbBuilder
+from pipeline.export.glb import GlbBuilder
 
 Json = dict[str, Any]
 FEATURES, METADATA = "EXT_mesh_features", "EXT_structural_metadata"

@@ -22,8 +22,7 @@ from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import PipeAxis, RadiusMap, Wall, WallTexture
 from pipeline.artefacts.model import MeshTile, Overlays, TexturedMesh
 from pipeline.export import tile_metadata as metadata
-from pipeline.export.glb import complete, tile_primitive
-from pipeline.export.glb_builder import GlbBuilder
+from pipeline.export.glb import GlbBuilder, complete, tile_primitive
 from pipeline.export.tile_levels import Flat, coarse_tile, flat_of, joined, shrunk
 from pipeline.geometry.axis import to_pipe
 from pipeline.recording.base import Recording

@@ -19,7 +19,7 @@ from pipeline.errors import InputError
 from pipeline.files.yaml_file import read_yaml
 from pipeline.machine.stage import Parameters, Stage
 
-# The section that says where a batch is worked on: of no stage, read by `pipeline.batch.kinds`.
+# The section that says where a batch is worked on: of no stage, read by `pipeline.batch.cluster`.
 CLUSTER = "cluster"
 _COMMAND_LINE = "--set"
 _WIDTH = 110

@@ -14,8 +14,7 @@ import numpy as np
 
 from pipeline.artefacts.headline import headline
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
-from pipeline.export.exporter import Exporter, published_key, withdraw
-from pipeline.export.writer import Writer
+from pipeline.export.exporter import Exporter, Writer, published_key, withdraw
 from pipeline.machine.display import Display
 from pipeline.machine.native import give_back_memory
 from pipeline.machine.outcome import Number, Results, RunOutcome, StageOutcome, State

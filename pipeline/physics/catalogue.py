@@ -6,12 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from pipeline.errors import InputError
-from pipeline.physics.camera import CAMERA_EFFECTS
 from pipeline.physics.effect import Effect
-from pipeline.physics.laser import LASER_EFFECTS
-from pipeline.physics.photometric import PHOTOMETRIC_EFFECTS
-from pipeline.physics.pose import POSE_EFFECTS
-from pipeline.physics.window import WINDOW_EFFECTS
+from pipeline.physics.instrument import CAMERA_EFFECTS, LASER_EFFECTS, WINDOW_EFFECTS
+from pipeline.physics.surroundings import PHOTOMETRIC_EFFECTS, POSE_EFFECTS
 
 EFFECTS: Mapping[str, Effect] = MappingProxyType({
     effect.name: effect

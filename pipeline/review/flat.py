@@ -13,7 +13,7 @@ from pipeline.arrays import Byte, Float
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
-from pipeline.export.unrolled import display_colours
+from pipeline.export.pictures import display_colours
 
 TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
 _PAPER = 235

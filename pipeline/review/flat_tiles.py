@@ -12,7 +12,7 @@ from pipeline.arrays import Byte
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import InputError
-from pipeline.export.unrolled import display_colours
+from pipeline.export.pictures import display_colours
 from pipeline.review.run_files import RunFiles
 
 TILE_PX = 512

@@ -33,12 +33,10 @@ import numpy as np
 from pipeline.artefacts.findings import Defects, Sections
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays, TexturedMesh
-from pipeline.export.cloud import write_cloud
+from pipeline.export.arrays import write_cloud, write_radius_map
 from pipeline.export.glb import write_model
-from pipeline.export.overlays import write_overlays
-from pipeline.export.radius_map import write_radius_map
+from pipeline.export.pictures import write_overlays, write_unrolled
 from pipeline.export.tileset import write_tileset
-from pipeline.export.unrolled import write_unrolled
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, quiet_context

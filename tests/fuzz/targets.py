@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.artefacts.reference import read_wall_map, read_wall_points
-from pipeline.batch.kinds import read_cluster
+from pipeline.batch.cluster import read_cluster
 from pipeline.errors import InputError
 from pipeline.instrument.camera.formats import read_camera, write_camera
 from pipeline.instrument.probe_file import read_probe

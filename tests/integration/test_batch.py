@@ -11,11 +11,8 @@ import time
 import pytest
 from typer.testing import CliRunner
 
-from pipeline.batch.cluster import endings, workers
-from pipeline.batch.find import find_recordings
-from pipeline.batch.kinds import LocalWorkers, RunningScheduler
-from pipeline.batch.summary import write_summary
-from pipeline.batch.work import Ending, Work, ending_of
+from pipeline.batch.cluster import LocalWorkers, RunningScheduler, endings, workers
+from pipeline.batch.runs import Ending, Work, ending_of, find_recordings, write_summary
 from pipeline.cli import app
 from pipeline.errors import InputError
 from tests.bad_recordings import cut_sample

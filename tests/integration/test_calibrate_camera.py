@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from pipeline.commands.calibrate_camera import calibrate_camera
 from pipeline.errors import InputError, UnusableError
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.camera.formats import read_camera, write_camera
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.camera.mapping import camera_from_mapping
 from stages.calibrate.boards.targets import Charuco
 from tests.board_scene import chessboard_picture, facing_pose, render

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.export.findings import write_defects
+from pipeline.export.tables import write_defects
 from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
 from tests.shared_data import shared

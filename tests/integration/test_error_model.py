@@ -15,7 +15,7 @@ import typer
 from typer.testing import CliRunner
 
 from pipeline.commands.error_model import error_model, error_model_page, page_camera
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.misalignment import MisalignedScan, allowed_tilt_deg, misalignment_error
 from tests.shared_data import shared
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import Trajectory, Wall
-from pipeline.export.radius_map import write_radius_map
-from pipeline.export.trajectory import write_trajectory
+from pipeline.export.arrays import write_radius_map
+from pipeline.export.tables import write_trajectory
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.stage import quiet_context
 from pipeline.recording.folder import open_folder

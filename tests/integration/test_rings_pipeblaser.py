@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import RingValidity
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from stages.rings.colour import excess_weights, mix
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.export.unrolled import write_unrolled
+from pipeline.export.pictures import write_unrolled
 from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import FrameTable
 from stages.texture.texture import TextureParameters, photograph_wall

@@ -3,11 +3,9 @@
 import numpy as np
 
 from pipeline.instrument.camera.base import Camera
-from pipeline.instrument.camera.equidistant import Equidistant
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
-from pipeline.instrument.camera.pinhole import Pinhole
+from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
+from pipeline.instrument.camera.plumb_bob import Pinhole, Unified
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
-from pipeline.instrument.camera.unified import Unified
 
 KANNALA_BRANDT = KannalaBrandt(
     (1600, 1200), (366.1, 365.2), (796.9, 591.8), (-0.011789, 0.000796, -0.000835, 0.0001)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import FrameTable, PipeFacts, Recording

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from tests.benchmarks.page.__main__ import write
 from tests.benchmarks.page.odometry import odometry
 from tests.benchmarks.page.section import Method, Quantity, Section

@@ -8,7 +8,7 @@ import pytest
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.calibration import BoardView
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.compare import displacement_map, uncertainty_map

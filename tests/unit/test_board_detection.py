@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.camera.calibration import BoardView
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from stages.calibrate.boards.detect import detect
 from stages.calibrate.boards.targets import Charuco, Chessboard
 from tests.board_scene import board_points, chessboard_picture, facing_pose, render

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.camera.calibration import BoardView
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.parameters import BoardCalibrationParameters

@@ -8,15 +8,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import InputError
-from pipeline.instrument.camera.equidistant import Equidistant
+from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.formats import FORMATS, WRITTEN, read_camera, write_camera
 from pipeline.instrument.camera.formats.document import CameraDocument
 from pipeline.instrument.camera.formats.ocamcalib import inverse_disagreement_px, read_polynomials
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
-from pipeline.instrument.camera.pinhole import Pinhole
+from pipeline.instrument.camera.plumb_bob import Pinhole, Unified
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
-from pipeline.instrument.camera.unified import Unified
 from tests.shared_data import shared
 from tests.unit.camera_samples import CAMERAS, sample_directions
 

@@ -6,10 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.instrument.camera.base import Camera
-from pipeline.instrument.camera.equidistant import Equidistant
-from pipeline.instrument.camera.inverse import invert_increasing
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.base import Camera, invert_increasing
+from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from tests.unit.camera_samples import (
     BEYOND_90,
     CAMERAS,

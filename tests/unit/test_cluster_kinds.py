@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.batch.cluster import workers
-from pipeline.batch.kinds import LocalWorkers, QueuedJobs, RunningScheduler, read_cluster
+from pipeline.batch.cluster import LocalWorkers, QueuedJobs, RunningScheduler, read_cluster, workers
 from pipeline.errors import InputError
 from pipeline.machine.configuration import resolve
 from stages.catalogue import PIPELINE

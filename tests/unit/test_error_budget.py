@@ -10,19 +10,19 @@ from pipeline.errors import InputError
 from pipeline.instrument.budget.combine import error_budget, parameter_names
 from pipeline.instrument.budget.design import baseline_study, dominant_rows, tolerances
 from pipeline.instrument.budget.disturbance import Disturbance
-from pipeline.instrument.budget.line import LinePhotometry, line_sigma_px
 from pipeline.instrument.budget.monte_carlo import monte_carlo
 from pipeline.instrument.budget.scan import (
+    LinePhotometry,
     Pose,
     RingScan,
     disturbance_jacobian,
+    line_sigma_px,
     radius_covariance,
     radius_error,
     radius_jacobian,
 )
-from pipeline.instrument.budget.sources import Kind
-from pipeline.instrument.budget.typical import typical_probe
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.budget.sources import Kind, typical_probe
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 
 PROBE = typical_probe()
 INCH = 25.4

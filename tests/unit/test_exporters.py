@@ -10,9 +10,8 @@ import pytest
 import zarr
 
 from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
-from pipeline.export.radius_map import write_radius_map
-from pipeline.export.rings import write_rings
-from pipeline.export.trajectory import write_trajectory
+from pipeline.export.arrays import write_radius_map, write_rings
+from pipeline.export.tables import write_trajectory
 from pipeline.geometry.rigid import from_parts, rotation_from_quaternion, rotation_from_vector
 
 

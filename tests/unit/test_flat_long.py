@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import WallTexture
-from pipeline.export.unrolled import display_colours, write_unrolled
+from pipeline.export.pictures import display_colours, write_unrolled
 from pipeline.review.flat import TOP_RAD, Window, photo, seen_through
 
 ROWS, COLUMNS = 40000, 48
@@ -44,7 +44,7 @@ def test_a_near_look_shows_every_row(long_photo: WallTexture) -> None:
 
 
 def test_sheets_hold_every_row_and_say_where_they_lie(long_photo, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("pipeline.export.unrolled._MOST_ROWS", 16000)
+    monkeypatch.setattr("pipeline.export.pictures._MOST_ROWS", 16000)
     write_unrolled(long_photo, tmp_path)
     place = json.loads((tmp_path / "unrolled.json").read_text())
     assert len(place["sheets"]) == 3

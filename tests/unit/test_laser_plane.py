@@ -6,9 +6,8 @@ import pytest
 
 from pipeline.commands.calibrate_laser import with_plane
 from pipeline.errors import UnusableError
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
-from pipeline.instrument.laser import LaserSheet
-from pipeline.instrument.laser_plane import LaserPlane
+from pipeline.instrument.camera.fisheye import KannalaBrandt
+from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.machine.stage import quiet_context

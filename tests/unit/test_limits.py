@@ -17,7 +17,7 @@ from pipeline.artefacts.reference import read_wall_map
 from pipeline.errors import InputError
 from pipeline.files import json_file, yaml_file
 from pipeline.instrument.camera.formats import read_camera
-from pipeline.instrument.camera.section_values import LARGEST_SIDE_PX
+from pipeline.instrument.camera.mapping import LARGEST_SIDE_PX
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.reproduce import read_run_record
 from pipeline.recording import tables

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.errors import InputError
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.misalignment import (
     MisalignedScan,
     allowed_tilt_deg,

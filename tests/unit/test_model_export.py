@@ -12,9 +12,9 @@ from plyfile import PlyData
 
 from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import VARIANTS, TexturedMesh
-from pipeline.export.cloud import write_cloud
+from pipeline.export.arrays import write_cloud
 from pipeline.export.glb import write_model
-from pipeline.export.overlays import write_overlays
+from pipeline.export.pictures import write_overlays
 from pipeline.machine.stage import quiet_context
 from pipeline.review.picture import inside_view, render
 from stages.mesh import MeshParameters, make_mesh

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from pipeline.arrays import Float
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.recording.base import FrameTable
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch, parse_switch, parse_switches, typical_switch

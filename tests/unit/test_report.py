@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import MotionEvent, PipeAxis, RingSamples, RingValidity, Trajectory
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import quiet_context

@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import quiet_context

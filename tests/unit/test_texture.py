@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.artefacts.measured import WallTexture
 from pipeline.errors import UnusableError
-from pipeline.export.unrolled import write_unrolled
+from pipeline.export.pictures import write_unrolled
 from pipeline.machine.stage import quiet_context
 from stages.texture import TEXTURE
 from stages.texture.texture import TextureParameters, photograph_wall

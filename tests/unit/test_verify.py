@@ -11,7 +11,7 @@ from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall, W
 from pipeline.artefacts.reference import WallMap, read_surface, read_wall_map, read_wall_points
 from pipeline.commands.verify import verify
 from pipeline.errors import InputError, UnusableError
-from pipeline.export.cloud import write_cloud
+from pipeline.export.arrays import write_cloud
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
 from pipeline.machine.native import open3d
 from pipeline.recording.input_file import files_sha256

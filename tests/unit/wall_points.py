@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.instrument.camera.equidistant import Equidistant
+from pipeline.instrument.camera.fisheye import Equidistant
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import ImagePoints

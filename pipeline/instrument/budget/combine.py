@@ -11,11 +11,12 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget.disturbance import DISTURBANCE_NAMES
-from pipeline.instrument.budget.line import LinePhotometry, line_sigma_px
 from pipeline.instrument.budget.scan import (
+    LinePhotometry,
     Pose,
     RingScan,
     disturbance_jacobian,
+    line_sigma_px,
     radius_by_pixel,
     radius_jacobian,
     without_centre,

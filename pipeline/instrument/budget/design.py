@@ -11,8 +11,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget.combine import Budget, Row, error_budget
-from pipeline.instrument.budget.line import LinePhotometry
-from pipeline.instrument.budget.scan import Pose, RingScan, at_baseline
+from pipeline.instrument.budget.scan import LinePhotometry, Pose, RingScan, at_baseline
 from pipeline.instrument.budget.sources import Kind
 
 INCH_MM = 25.4

@@ -1,4 +1,4 @@
-"""The error sources: the paper's Table I and the further effects of the shared PHYSICS notes.
+"""The error sources: the paper's Table I, the further effects of the shared PHYSICS notes, a typical probe.
 
 A systematic source moves parameters of the probe or of `Disturbance`; it is the same in every frame. A random
 source moves every sample of the line on its own, and is averaged away over frames.
@@ -10,6 +10,9 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 
@@ -130,3 +133,19 @@ NOT_IN_RADIUS = {
     "tube_tilt": "only known to first order on one side; needs a window",
 }
 """Effects of the PHYSICS notes without a row, and why."""
+
+
+def typical_probe(baseline_mm: float = 22.0) -> Probe:
+    """Return an uncalibrated probe: equidistant 360 px/rad, σ as "typical" in the shared PHYSICS notes.
+
+    Its σ: focal length 10⁻³, principal point 0.5 px, k1 10⁻³, tilt 0.05° per axis, opening angle 0.1°,
+    baseline 0.05 mm.
+    """
+    camera = KannalaBrandt((1600, 1200), (360.0, 360.0), (799.5, 599.5))
+    laser = LaserSheet(baseline_mm)
+    names = (*camera.parameter_names, *LaserSheet.PARAMETER_NAMES)
+    sigma = {"cx": 0.5, "cy": 0.5, "k1": 1e-3, "tilt_x": np.radians(0.05), "tilt_y": np.radians(0.05),
+             "cone_rad": np.radians(0.05), "baseline_mm": 0.05}  # fmt: skip
+    covariance = np.diag([sigma.get(n, 0.0) ** 2 for n in names])
+    covariance[:2, :2] = 0.36**2
+    return Probe(camera, laser, covariance)

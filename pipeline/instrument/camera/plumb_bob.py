@@ -1,20 +1,28 @@
-"""What the unified and the pinhole camera share: a plane reached through ξ, and plumb-bob distortion.
+"""Cameras with plumb-bob distortion on a plane: pinhole, and the unified camera of Mei and Rives.
 
 m = (x, y) / (z + ξ |p|); m' = m (1 + k1 r² + k2 r⁴ + k3 r⁶) + tangential(p1, p2); uv = f m' + centre.
 C. Mei, P. Rives, "Single view point omnidirectional camera calibration from planar grids", ICRA 2007;
-distortion of D. C. Brown, "Close-range camera calibration", 1971, in OpenCV's order.
+distortion of D. C. Brown, "Close-range camera calibration", 1971, in OpenCV's order. A pinhole has ξ = 0.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from pipeline.arrays import Bool, Float
-from pipeline.instrument.camera.base import Projection, ProjectionJacobian, Rays, RaysJacobian
-from pipeline.instrument.camera.inverse import invert_increasing, rays_jacobian, smallest_positive_root
+from pipeline.instrument.camera.base import (
+    Projection,
+    ProjectionJacobian,
+    Rays,
+    RaysJacobian,
+    invert_increasing,
+    rays_jacobian,
+    smallest_positive_root,
+)
 
 _NODES = 256
 _FARTHEST = 1e3
@@ -158,3 +166,96 @@ class PlumbBobCamera(ABC):
         out[..., 0, 7], out[..., 1, 7] = fx * 2 * x * y, fy * (r2 + 2 * y * y)
         out[..., 0, 8], out[..., 1, 8] = fx * (r2 + 2 * x * x), fy * 2 * x * y
         return np.where(np.isnan(x)[..., None, None], np.nan, out)[..., self._columns]
+
+
+@dataclass(frozen=True)
+class Pinhole(PlumbBobCamera):
+    """Pinhole camera.
+
+    Attributes
+    ----------
+    image_size : (int, int)
+        Width and height, px.
+    focal_px, centre : (float, float)
+        (fx, fy) and (cx, cy).
+    distortion : (float, float, float, float, float)
+        k1, k2, p1, p2, k3.
+    """
+
+    image_size: tuple[int, int]
+    focal_px: tuple[float, float]
+    centre: tuple[float, float]
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+    model = "pinhole"
+    parameter_names = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+
+    @property
+    def parameters(self) -> Float:
+        """(9,) fx, fy, cx, cy, k1, k2, p1, p2, k3."""
+        return np.array([*self.focal_px, *self.centre, *self.distortion], float)
+
+    def with_parameters(self, parameters: Float) -> Pinhole:
+        """Return the same camera with other parameters (9,)."""
+        fx, fy, cx, cy, k1, k2, p1, p2, k3 = (float(p) for p in parameters)
+        return replace(self, focal_px=(fx, fy), centre=(cx, cy), distortion=(k1, k2, p1, p2, k3))
+
+    @property
+    def _mirror(self) -> float:
+        return 0.0
+
+    @property
+    def _coefficients(self) -> tuple[float, float, float, float, float]:
+        return self.distortion
+
+    @property
+    def _columns(self) -> slice:
+        return slice(1, 10)
+
+
+@dataclass(frozen=True)
+class Unified(PlumbBobCamera):
+    """Unified camera of Mei and Rives (Kalibr's omni-radtan, camodocal's MEI).
+
+    Attributes
+    ----------
+    image_size : (int, int)
+        Width and height, px.
+    xi : float
+        Mirror parameter ξ ≥ 0.
+    focal_px, centre : (float, float)
+        Generalised focal lengths (γ1, γ2) and principal point.
+    distortion : (float, float, float, float)
+        k1, k2, p1, p2.
+    """
+
+    image_size: tuple[int, int]
+    xi: float
+    focal_px: tuple[float, float]
+    centre: tuple[float, float]
+    distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+    model = "unified"
+    parameter_names = ("xi", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
+
+    @property
+    def parameters(self) -> Float:
+        """(9,) xi, fx, fy, cx, cy, k1, k2, p1, p2."""
+        return np.array([self.xi, *self.focal_px, *self.centre, *self.distortion], float)
+
+    def with_parameters(self, parameters: Float) -> Unified:
+        """Return the same camera with other parameters (9,)."""
+        xi, fx, fy, cx, cy, k1, k2, p1, p2 = (float(p) for p in parameters)
+        return replace(self, xi=xi, focal_px=(fx, fy), centre=(cx, cy), distortion=(k1, k2, p1, p2))
+
+    @property
+    def _mirror(self) -> float:
+        return self.xi
+
+    @property
+    def _coefficients(self) -> tuple[float, float, float, float, float]:
+        return (*self.distortion, 0.0)
+
+    @property
+    def _columns(self) -> slice:
+        return slice(0, 9)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from pipeline.arrays import Float
-from pipeline.instrument.camera.inverse import invert_increasing, smallest_positive_root
-from pipeline.instrument.camera.radial import Polar, RadialCamera
+from pipeline.instrument.camera.base import invert_increasing, smallest_positive_root
+from pipeline.instrument.camera.fisheye import Polar, RadialCamera
 
 _NODES = 256
 # The polynomial is an interpolation: twice as far out as the image's farthest corner it says nothing.

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from pipeline.physics.window import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
+from pipeline.physics.instrument import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
 from pipeline.simulator.truth import SceneTruth, cartesian, with_camera
 from pipeline.simulator.window import CylinderWindow, SphereWindow, Window
 

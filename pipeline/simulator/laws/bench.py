@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import transform
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
+from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe, Shutter
 from pipeline.recording.base import FrameTable, PipeFacts

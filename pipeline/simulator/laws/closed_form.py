@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.window import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
+from pipeline.physics.instrument import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
 from pipeline.simulator.effects.window import TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
 from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX
 

@@ -11,11 +11,9 @@ from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView
-from pipeline.instrument.camera.equidistant import Equidistant
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
-from pipeline.instrument.camera.pinhole import Pinhole
+from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
+from pipeline.instrument.camera.plumb_bob import Pinhole, Unified
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
-from pipeline.instrument.camera.unified import Unified
 from stages.calibrate.boards.bundle import FLAT, POSES_ONLY, Corners, Estimate, Free, cost, solve
 
 _HALF_FIELDS_RAD = np.geomspace(0.15, 2.6, 14)

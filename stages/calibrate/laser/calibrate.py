@@ -12,7 +12,7 @@ from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, rms
-from pipeline.instrument.laser_plane import NAME, LaserPlane
+from pipeline.instrument.laser import NAME, LaserPlane
 from pipeline.machine.stage import Context
 from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
 from stages.calibrate.boards.start import pose

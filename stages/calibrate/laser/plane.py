@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
-from pipeline.instrument.laser_plane import LaserPlane
+from pipeline.instrument.laser import LaserPlane
 
 _TUKEY = 4.685
 _MOST_STEPS, _SETTLED = 50, 1e-9

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.window import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
+from pipeline.physics.instrument import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.camera import image_shift
 from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, cosine, one

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from pipeline.artefacts.measured import WallTexture
-from pipeline.export.unrolled import write_unrolled
+from pipeline.export.pictures import write_unrolled
 from pipeline.geometry.axis import from_pipe
 from pipeline.geometry.rigid import inverse
 from pipeline.machine.native import open3d

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.instrument.camera.base import Camera
-from pipeline.instrument.camera.formats import camodocal, kalibr, native, ocamcalib, opencv
-from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat
+from pipeline.instrument.camera.formats import kalibr, ocamcalib, opencv
+from pipeline.instrument.camera.formats.document import NATIVE_FORMAT, CameraDocument, CameraFormat
 
 FORMATS: tuple[CameraFormat, ...] = (
-    native.FORMAT, opencv.FORMAT, kalibr.FORMAT, camodocal.FORMAT, ocamcalib.FORMAT,
+    NATIVE_FORMAT, opencv.FORMAT, kalibr.KALIBR_FORMAT, kalibr.CAMODOCAL_FORMAT, ocamcalib.FORMAT,
 )  # fmt: skip
 WRITTEN = tuple(format_.name for format_ in FORMATS if format_.write is not None)
 

@@ -1,4 +1,7 @@
-"""A calibration file opened once for all formats to look at, and what a format is."""
+"""A calibration file opened once for all formats, what a format is, and the program's own format.
+
+The program's own camera file is the ``camera:`` section of probe.yaml, alone or with the rest.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import yaml
+
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import LARGEST_BYTES, Section, parse_yaml
 from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 
 
 @dataclass(frozen=True)
@@ -95,3 +101,18 @@ def cannot_hold(camera: Camera, path: Path, format_name: str, holds: str) -> Inp
         expected=holds,
         hint="write another format, or calibrate a model that this one has",
     )
+
+
+def _refusal(document: CameraDocument) -> str:
+    return document.lacks("camera")
+
+
+def _read(document: CameraDocument) -> Camera:
+    return camera_from_mapping(document.section.section("camera").values, document.file)
+
+
+def _write(camera: Camera, path: Path) -> str:
+    return yaml.safe_dump({"camera": camera_to_mapping(camera)}, sort_keys=False)
+
+
+NATIVE_FORMAT = CameraFormat("boresight", _refusal, _read, _write)

@@ -17,8 +17,8 @@ from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat, cannot_hold
+from pipeline.instrument.camera.mapping import LARGEST_SIDE_PX
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem
-from pipeline.instrument.camera.section_values import LARGEST_SIDE_PX
 
 _LINES = ("direct polynomial", "inverse polynomial", "centre (row column)", "affine (c d e)", "image size")
 _MOST_TERMS = 60

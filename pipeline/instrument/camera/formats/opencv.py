@@ -9,11 +9,10 @@ import numpy as np
 
 from pipeline.files.yaml_file import Section
 from pipeline.instrument.camera.base import Camera
-from pipeline.instrument.camera.equidistant import Equidistant
+from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat, cannot_hold
-from pipeline.instrument.camera.kannala_brandt import KannalaBrandt
-from pipeline.instrument.camera.pinhole import Pinhole
-from pipeline.instrument.camera.section_values import number_list, positive, side
+from pipeline.instrument.camera.mapping import number_list, positive, side
+from pipeline.instrument.camera.plumb_bob import Pinhole
 
 _MATRIX_KEYS = ("camera_matrix", "K", "cameraMatrix")
 _DISTORTION_KEYS = ("distortion_coefficients", "D", "distCoeffs", "dist_coeffs")

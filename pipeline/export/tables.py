@@ -1,4 +1,4 @@
-"""Sections and defects as tables and JSON."""
+"""Tables for people: sections, defects and the trajectory as CSV and JSON."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artefacts.findings import Defect, Defects, Sections
+from pipeline.artefacts.measured import Trajectory
+from pipeline.geometry.rigid import quaternion_from_rotation
 
 _DEGREES = {"major_axis_rad": "major_axis_deg"}
 _TABLE = (
@@ -64,3 +66,20 @@ def _cell(value: object) -> str:
     if isinstance(value, list):
         return " ".join(str(v) for v in value)
     return "" if value is None else str(value)
+
+
+_POSE = ("frame", "time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+_SIGMA = ("sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "sigma_rx_rad", "sigma_ry_rad", "sigma_rz_rad")
+
+
+def write_trajectory(trajectory: Trajectory, folder: Path) -> None:
+    """Write ``trajectory.csv``: the camera in P; rotation sigmas are those of a rotation vector in C."""
+    sigma = np.sqrt(np.diagonal(trajectory.covariance, axis1=-2, axis2=-1))
+    quaternion = quaternion_from_rotation(trajectory.T_pc[:, :3, :3])
+    values = np.column_stack([trajectory.time_s, trajectory.T_pc[:, :3, 3], quaternion, sigma])
+    with (folder / "trajectory.csv").open("w", newline="", encoding="utf-8") as stream:
+        rows = csv.writer(stream, lineterminator="\n")
+        rows.writerow([*_POSE, *_SIGMA])
+        rows.writerows(
+            [int(f), *(f"{v:.9g}" for v in row)] for f, row in zip(trajectory.frame, values, strict=True)
+        )

@@ -1,4 +1,4 @@
-"""One recording of a batch, run in a process of its own by whichever worker takes it."""
+"""The recordings of a batch, the run of each in a process of its own, and the summary of all runs."""
 
 from __future__ import annotations
 
@@ -6,13 +6,45 @@ import os
 import subprocess
 import sys
 import time
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pipeline
+from pipeline.errors import InputError
+from pipeline.files.disk import disk_errors_named, replace_json, replace_text
 from pipeline.files.json_file import read_json
+from pipeline.machine.codec import Json
 from pipeline.machine.stopping import end_with_parent
+from pipeline.pages import page_template
+
+_BAGS = (".bag", ".mcap")
+
+
+def find_recordings(folder: Path) -> dict[str, Path]:
+    """Return all recordings below a folder by a name that is also fit for a folder.
+
+    Raises
+    ------
+    InputError
+        When there is none, or the folder cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError(folder, "is not a folder", expected="a folder of recordings")
+    found = sorted({p.parent for p in folder.rglob("recording.yaml")})
+    found += sorted(p for p in folder.rglob("*") if p.suffix in _BAGS and p.is_file())
+    found += sorted({p.parent for p in folder.rglob("metadata.yaml")} - set(found))
+    if not found:
+        raise InputError(folder, "holds no recordings", expected="recording folders, ROS bags or MCAP files")
+    return {_name(p, folder): p for p in found}
+
+
+def _name(path: Path, folder: Path) -> str:
+    parts = path.relative_to(folder).parts
+    return "-".join(parts) if parts else folder.name
+
 
 _REFUSED = 2
 _BUSY = "is at work in this run folder"
@@ -94,3 +126,38 @@ def _record(folder: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     return record
+
+
+SHOWN_METRICS = ("inspected length", "wall seen", "mean diameter", "defects", "deepest defect")
+
+
+def write_summary(endings: Iterable[Ending], folder: Path) -> None:
+    """Write batch.json and batch.html; the order is that of the names, whoever came first.
+
+    Raises
+    ------
+    InputError
+        When the disk is full or cannot be written.
+    """
+    ordered = sorted(endings, key=lambda e: e.name)
+    runs: list[Json] = [_document(e) for e in ordered]
+    rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
+    warned = sum(bool(e.warnings) for e in ordered)
+    text = page_template("pipeline.batch").render(
+        rows=rows, states=_states(ordered), metrics=SHOWN_METRICS, warned=warned
+    )
+    with disk_errors_named(folder):
+        replace_json(folder / "batch.json", {"format": 1, "runs": runs, "states": dict(_states(ordered))})
+        replace_text(folder / "batch.html", text)
+
+
+def _states(endings: list[Ending]) -> Counter[str]:
+    return Counter(e.state for e in endings)
+
+
+def _document(ending: Ending) -> Json:
+    metrics: list[Json] = [{"name": n, "value": v, "unit": u} for n, v, u in ending.metrics]
+    return {
+        "name": ending.name, "state": ending.state, "problem": ending.problem, "metrics": metrics,
+        "warnings": list(ending.warnings),
+    }  # fmt: skip
