@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _GAMMA = 2.2
 # Common viewers and graphics cards refuse pictures with a side of more than 16384 px.
 _MOST_ROWS = 16384
-# Of an overlay's figure: dots per inch, mm of pipe per inch, and the longest figure (12000 px at 120 dpi, which
+# Of an overlay's figure: dots per inch, mm of pipe per inch, the longest figure (12000 px at 120 dpi, which
 # viewers still open).
 _DPI, _MM_PER_INCH, _LONGEST_INCH = 120, 30.0, 100.0
 
