@@ -95,9 +95,9 @@ def run(
     """Turn a recording into a run folder: model, measurements, defects and report."""
     from rich.console import Console
 
+    from pipeline.api.job import open_job, run_job
     from pipeline.export.catalogue import EXPORTERS
     from pipeline.machine.display import ProgressDisplay
-    from pipeline.machine.job import open_job, run_job
     from pipeline.machine.plan import Selection
     from stages.catalogue import PIPELINE
 

@@ -13,7 +13,7 @@ from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
-from pipeline.machine.threads import in_threads
+from pipeline.system.threads import in_threads
 
 _UPPER = np.triu_indices(3)
 _CHUNK_FRAMES = 16

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import Sections
-from pipeline.artefacts.measured import PipeAxis, RadiusMap, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.measured import RadiusMap, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
+from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.run_folder import RunFolder
 from pipeline.machine.store import Provenance
 from pipeline.review.run_files import RunFiles

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.api.job import open_job, run_job
 from pipeline.artefacts.measured import RadiusMap
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
-from pipeline.machine.job import open_job, run_job
 from pipeline.machine.plan import Selection
 from pipeline.simulator.scene import Scene
 from stages.catalogue import PIPELINE

@@ -8,7 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
+from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall, WallTexture
+from pipeline.geometry.axis import PipeAxis
 from pipeline.recording.base import FrameTable, PipeFacts, Recording
 
 

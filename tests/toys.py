@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.api.job import Job, run_job
 from pipeline.arrays import Image, Int
-from pipeline.export.exporter import Exporter
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
-from pipeline.machine.job import Job, run_job
+from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Selection
 from pipeline.recording.base import FrameTable, PipeFacts, Planes, Recording

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Trajectory, Wall
+from pipeline.artefacts.measured import PointCloud, RadiusMap, Trajectory, Wall
+from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe

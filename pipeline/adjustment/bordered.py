@@ -17,7 +17,7 @@ from pipeline.adjustment.elimination import add_landmarks, add_rows
 from pipeline.adjustment.robust import Loss, Squares
 from pipeline.adjustment.sums import BLOCK, Sums
 from pipeline.arrays import Float, Int
-from pipeline.machine.threads import in_threads
+from pipeline.system.threads import in_threads
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
+from pipeline.geometry.axis import PipeAxis
 
 
 class RingValidity(IntEnum):
@@ -96,25 +97,6 @@ class RingPoints:
     xyz_uncorrected_c: Float32
     noise_direction: Float32
     calibration_covariance: Float32
-
-
-@dataclass(frozen=True)
-class PipeAxis:
-    """The pipe's own, possibly curved, axis in P as a polyline with rotation-minimising frames.
-
-    Attributes
-    ----------
-    distance_mm : (K,)
-        Arc length, increasing, extended beyond the seen wall; distance 0 is next to the first camera.
-    origin_p : (K, 3)
-        Points of the axis in P.
-    R_pa : (K, 3, 3)
-        Columns: local x, y (section plane, azimuth atan2(y, x)) and tangent, in P.
-    """
-
-    distance_mm: Float
-    origin_p: Float
-    R_pa: Float
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 
 _MAP_KEYS = ("distance_mm", "azimuth_rad", "radius_mm")
 _POINT_FIELDS = ("x", "y", "z", "nx", "ny", "nz", "sigma_mm", "distance_mm", "azimuth_rad")

@@ -14,11 +14,11 @@ from typing import Any
 
 import pipeline
 from pipeline.errors import InputError
+from pipeline.files.codec import Json
 from pipeline.files.disk import disk_errors_named, replace_json, replace_text
 from pipeline.files.json_file import read_json
-from pipeline.machine.codec import Json
-from pipeline.machine.stopping import end_with_parent
 from pipeline.pages import page_template
+from pipeline.system.stopping import end_with_parent
 
 _BAGS = (".bag", ".mcap")
 

@@ -14,11 +14,11 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.errors import InputError
+from pipeline.files.codec import digest
 from pipeline.files.disk import require_writable, written_together
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.machine.codec import digest
-from pipeline.machine.provenance import MadeBy
 from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording

@@ -19,9 +19,9 @@ from rich.table import Table
 
 from pipeline.errors import InputError, UnusableError
 from pipeline.files.disk import disk_errors_named, require_writable, written_together
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport
 from pipeline.instrument.camera.formats import WRITTEN, read_camera, write_camera
-from pipeline.machine.provenance import MadeBy
 from pipeline.machine.stage import quiet_context
 from pipeline.recording.input_file import content_key, input_file
 from stages.calibrate.boards.calibrate import calibrate_boards

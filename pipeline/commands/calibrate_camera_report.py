@@ -16,9 +16,9 @@ from pipeline.commands.calibrate_camera_figures import (
     residual_figure,
     uncertainty_figure,
 )
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
-from pipeline.machine.provenance import MadeBy
 from pipeline.pages import page_template
 
 

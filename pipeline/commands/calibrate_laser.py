@@ -17,13 +17,13 @@ from rich.table import Table
 from pipeline.commands.calibrate_camera import BoardKind, describe_board, find_boards, list_images
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named, require_writable, written_together
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.machine.provenance import MadeBy
 from pipeline.machine.stage import quiet_context
 from pipeline.recording.input_file import content_key, input_file
 from stages.calibrate.laser.calibrate import LaserCalibration, LaserPicture, calibrate_laser_plane

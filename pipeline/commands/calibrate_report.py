@@ -18,8 +18,8 @@ from pipeline.commands.calibrate_figures import (
     radius_figure,
     run_figure,
 )
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
-from pipeline.machine.provenance import MadeBy
 from pipeline.pages import page_template
 from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
 

@@ -18,12 +18,12 @@ from pipeline.commands.diagnose_image import image_of
 from pipeline.commands.diagnose_report import Shown, write_page
 from pipeline.commands.diagnose_resimulate import resimulate
 from pipeline.errors import InputError
+from pipeline.files.codec import digest
 from pipeline.files.disk import disk_errors_named, require_writable, written_together
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.codec import digest
 from pipeline.machine.configuration import resolve
-from pipeline.machine.provenance import MadeBy
 from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording

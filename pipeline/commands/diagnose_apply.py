@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
+from pipeline.api.job import Job, run_job
 from pipeline.arrays import Float
 from pipeline.export.catalogue import EXPORTERS
+from pipeline.files.codec import digest
 from pipeline.instrument.probe_file import read_with_source
-from pipeline.machine.codec import digest
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.display import ProgressDisplay
-from pipeline.machine.job import Job, run_job
 from pipeline.machine.plan import Selection
 from pipeline.recording.base import Recording
 from stages.catalogue import PIPELINE

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import write_probe
-from pipeline.machine.provenance import MadeBy
 from stages.diagnose.diagnose import Examination
 
 

@@ -13,7 +13,7 @@ from pipeline.follow.watch import Glimpse, glimpses
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.run_folder import claimed
 from pipeline.machine.stage import quiet_context
-from pipeline.machine.stopping import stop_wish
+from pipeline.system.stopping import stop_wish
 from stages.preview import PreliminarySection, preliminary_sections
 from stages.rings import RingParameters
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from pipeline.commands.prove_geometry import WallErrors, wall_errors
 from pipeline.errors import BoresightError, InputError
-from pipeline.machine.stopping import end_with_parent
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.truth_files import SEAL_FILE, open_seal
+from pipeline.system.stopping import end_with_parent
 from stages.diagnose.drill.cases import (
     TIMING,
     Case,

@@ -9,7 +9,7 @@ from statistics import median
 from typing import Any
 
 from pipeline.commands.prove_cases import Worked
-from pipeline.machine.provenance import MadeBy
+from pipeline.files.provenance import MadeBy
 from pipeline.pages import page_template
 from stages.diagnose.drill.figures import Figure, figures
 from stages.diagnose.drill.score import Trial, calibration, confusion

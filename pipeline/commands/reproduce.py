@@ -13,14 +13,14 @@ import typer
 import yaml
 from rich.console import Console
 
+from pipeline.api.job import Job, open_job, run_job
 from pipeline.errors import BoresightError, InputError
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.files.disk import disk_errors_named
+from pipeline.files.provenance import library_versions
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import ProgressDisplay
-from pipeline.machine.job import Job, open_job, run_job
 from pipeline.machine.plan import Selection
-from pipeline.machine.provenance import library_versions
 from pipeline.machine.reproduce import (
     Agreement,
     Compared,

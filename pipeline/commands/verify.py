@@ -21,7 +21,7 @@ from pipeline.artefacts.reference import (
 )
 from pipeline.errors import InputError
 from pipeline.files.disk import written_together
-from pipeline.machine.provenance import MadeBy
+from pipeline.files.provenance import MadeBy
 from pipeline.recording.input_file import files_sha256
 from stages.verify.accuracy import Accuracy, Differences, accuracy, bore_differences, wall_coverage
 from stages.verify.maps import align_maps, map_differences

@@ -9,10 +9,10 @@ from pathlib import Path
 from pipeline.artefacts.findings import Defects, Sections
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
+from pipeline.files.codec import digest
+from pipeline.files.provenance import program_version
 from pipeline.instrument.probe import Probe
-from pipeline.machine.codec import digest
 from pipeline.machine.outcome import Results, StageOutcome
-from pipeline.machine.provenance import program_version
 from pipeline.recording.base import Recording
 from pipeline.review.report import write_report
 from pipeline.review.summary import ReportedNumber, RunSummary, StageRecord

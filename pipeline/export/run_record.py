@@ -7,13 +7,13 @@ import resource
 from collections.abc import Iterable
 from pathlib import Path
 
+from pipeline.files.codec import Json
 from pipeline.files.disk import disk_errors_named, replace_json
+from pipeline.files.provenance import library_versions, program_version
 from pipeline.instrument.probe_file import ProbeSource
-from pipeline.machine.codec import Json
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.machine.plan import Plan
-from pipeline.machine.provenance import library_versions, program_version
 from pipeline.recording.base import Recording
 from pipeline.recording.input_file import content_key
 

@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Byte, Float, Float32, Int
-from pipeline.artefacts.measured import PipeAxis, RadiusMap, WallTexture
+from pipeline.artefacts.measured import RadiusMap, WallTexture
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
 from pipeline.export.pictures import display_colours
-from pipeline.geometry.axis import from_pipe
+from pipeline.geometry.axis import PipeAxis, from_pipe
 
 _LEAST_COLUMNS = 36
 _TESTED = 4

@@ -19,12 +19,12 @@ import pygltflib as gltf
 
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.findings import Defect, Defects
-from pipeline.artefacts.measured import PipeAxis, RadiusMap, Wall, WallTexture
+from pipeline.artefacts.measured import RadiusMap, Wall, WallTexture
 from pipeline.artefacts.model import MeshTile, Overlays, TexturedMesh
 from pipeline.export import tile_metadata as metadata
 from pipeline.export.glb import GlbBuilder, complete, tile_primitive
 from pipeline.export.tile_levels import Flat, coarse_tile, flat_of, joined, shrunk
-from pipeline.geometry.axis import to_pipe
+from pipeline.geometry.axis import PipeAxis, to_pipe
 from pipeline.recording.base import Recording
 
 Json = dict[str, Any]

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from pipeline.errors import InputError
-from pipeline.machine.codec import Json
+from pipeline.files.codec import Json
 
 _CHUNK = 1 << 20
 _UNFINISHED = ".unfinished"

@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numba
 import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import PipeAxis
 
 _STEPS, _NEAR_MM = 6, 1e-7
+
+
+@dataclass(frozen=True)
+class PipeAxis:
+    """The pipe's own, possibly curved, axis in P as a polyline with rotation-minimising frames.
+
+    Attributes
+    ----------
+    distance_mm : (K,)
+        Arc length, increasing, extended beyond the seen wall; distance 0 is next to the first camera.
+    origin_p : (K, 3)
+        Points of the axis in P.
+    R_pa : (K, 3, 3)
+        Columns: local x, y (section plane, azimuth atan2(y, x)) and tangent, in P.
+    """
+
+    distance_mm: Float
+    origin_p: Float
+    R_pa: Float
 
 
 def straight_axis(distance_from_mm: float, distance_to_mm: float) -> PipeAxis:

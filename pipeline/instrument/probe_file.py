@@ -18,12 +18,12 @@ import numpy as np
 import yaml
 
 from pipeline.arrays import Float
+from pipeline.files.codec import Json
+from pipeline.files.provenance import MadeBy
 from pipeline.files.yaml_file import Section, read_yaml
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Lighting, Probe, Shutter
-from pipeline.machine.codec import Json
-from pipeline.machine.provenance import MadeBy
 
 UNCERTAINTY_KEYS = (
     "focal_px", "centre_px", "distortion", "baseline_mm", "tilt_deg", "opening_angle_deg", "decentre_mm",

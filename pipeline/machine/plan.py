@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pipeline.errors import BoresightError
-from pipeline.machine.codec import Json, canonical
+from pipeline.files.codec import Json, canonical
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.source_code import source_digest
 from pipeline.machine.stage import Parameters, Stage

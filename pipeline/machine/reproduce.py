@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import InputError
-from pipeline.export.exporter import Exporter, published_files
 from pipeline.files.json_file import read_json
+from pipeline.machine.exporter import Exporter, published_files
 from pipeline.machine.run_folder import RunFolder
 
 _RECORD = "run.json"

@@ -6,23 +6,22 @@ import hashlib
 import logging
 import threading
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 
 import numpy as np
 
-from pipeline.artefacts.headline import headline
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
-from pipeline.export.exporter import Exporter, Writer, published_key, withdraw
 from pipeline.machine.display import Display
-from pipeline.machine.native import give_back_memory
+from pipeline.machine.exporter import Exporter, Writer, published_key, withdraw
 from pipeline.machine.outcome import Number, Results, RunOutcome, StageOutcome, State
 from pipeline.machine.plan import Plan, Selection, Step
 from pipeline.machine.run_folder import RunFolder
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context
 from pipeline.machine.store import Provenance, Stored
+from pipeline.system.native import give_back_memory
 
 _LONGEST_PROBLEM = 300
 _AT_ONCE = 2  # stages side by side; more would only share memory and cores among them
@@ -46,6 +45,8 @@ class Runner:
         A claimed run folder.
     record
         Called with the outcome at every change; writes run.json.
+    headline
+        Returns the numbers that anyone asks for first of the artefacts it is given, by class.
     display, logger, wish, workers
         Where progress goes, where messages go, the user's wish to stop, and how many threads to use.
     """
@@ -56,12 +57,14 @@ class Runner:
         exporters: Sequence[Exporter],
         folder: RunFolder,
         record: Callable[[RunOutcome], None],
+        headline: Callable[[Mapping[type, object]], tuple[Number, ...]],
         display: Display,
         logger: logging.Logger,
         wish: threading.Event,
         workers: int = 2,
     ) -> None:
-        self._plan, self._exporters, self._folder, self._record = plan, exporters, folder, record
+        self._plan, self._exporters, self._folder = plan, exporters, folder
+        self._record, self._headline = record, headline
         self._display, self._logger, self._wish, self._workers = display, logger, wish, workers
         self._keys = plan.keys() | {Results: _key_of_all(plan)}
         self._outcomes = {
@@ -207,7 +210,7 @@ class Runner:
     def _settle(self, step: Step, stored: Stored, state: State) -> None:
         name, made = step.stage.name, stored.provenance
         self._artefacts[step.output] = stored.artefact
-        self._metrics += headline({step.output: stored.artefact})
+        self._metrics += self._headline({step.output: stored.artefact})
         outcome = replace(self._outcomes[name], state=state, seconds=made.seconds, numbers=made.numbers)
         self._outcomes[name] = outcome
         self._logger.info("stage %s %s, %.1f s", name, state.value, outcome.seconds)

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from pipeline.arrays import Int
-from pipeline.machine.threads import in_threads
+from pipeline.system.threads import in_threads
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import Byte
-from pipeline.artefacts.measured import PipeAxis, Trajectory
+from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import InputError
 from pipeline.files.disk import FileStamp, stamp_of
 from pipeline.files.json_file import parse_json
-from pipeline.geometry.axis import to_pipe
+from pipeline.geometry.axis import PipeAxis, to_pipe
 from pipeline.review.run_files import RunFiles
 
 Json = dict[str, Any]

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Byte, Float, Int
 from pipeline.artefacts.model import MeshTile, TexturedMesh
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 
 _GAMMA = 2.2
 _SUPERSAMPLING = 2

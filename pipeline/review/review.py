@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from pipeline.artefacts.measured import Wall
+from pipeline.files.codec import Json, canonical
 from pipeline.files.disk import FileStamp, stamp_of
-from pipeline.machine.codec import Json, canonical
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.actions import Action
 from pipeline.review.decisions.carry import carried, same_findings

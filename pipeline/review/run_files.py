@@ -14,11 +14,11 @@ from pipeline.artefacts.findings import DefectKind, Sections
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
+from pipeline.files.codec import digest
 from pipeline.files.disk import FileStamp, stamp_of
 from pipeline.files.json_file import parse_json, read_json
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.codec import digest
 from pipeline.machine.run_folder import RunFolder
 from pipeline.recording import open_recording
 from pipeline.recording.base import PipeFacts, Recording

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import PipeAxis
-from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.geometry.axis import PipeAxis, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.recording.base import Encoder
 from pipeline.simulator.scene import MotionScene, SwayScene

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from pipeline.arrays import Float, Float32, Int
-from pipeline.artefacts.measured import PipeAxis
+from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, inverse
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.wall.grid import Wall

@@ -16,7 +16,7 @@ from scipy.ndimage import median_filter
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
-from pipeline.machine.threads import in_threads
+from pipeline.system.threads import in_threads
 from stages.accumulate.samples import WallSamples
 from stages.accumulate.survey import RingSurvey
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
-from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall
+from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
+from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
 from stages.accumulate.calibration import CalibrationSpread
 from stages.accumulate.centring import centred

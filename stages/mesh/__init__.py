@@ -14,8 +14,8 @@ from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.measured import PointCloud, Wall, WallTexture
 from pipeline.artefacts.model import Overlays, PackedTiles, TexturedMesh
 from pipeline.errors import UnusableError
-from pipeline.machine.isolated import CrashError, TimeLimitError, call_isolated
 from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.system.isolated import CrashError, TimeLimitError, call_isolated
 from stages.mesh.bake import bake_tile
 from stages.mesh.charts import cut_charts, pack, tile_count, tile_length, unroll
 from stages.mesh.clip import OpenMesh

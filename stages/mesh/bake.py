@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.arrays import Byte, Float, Float32
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 from stages.mesh.charts import PADDING_PX, Atlas, Chart, Unrolled
 from stages.mesh.surface import Surface
 

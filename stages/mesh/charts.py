@@ -9,8 +9,7 @@ import xatlas
 from numpy.typing import NDArray
 
 from pipeline.arrays import Bool, Float, Float32
-from pipeline.artefacts.measured import PipeAxis
-from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.geometry.axis import PipeAxis, frames_at, to_pipe
 from stages.mesh.surface import Face, Index, Surface
 
 PADDING_PX = 8

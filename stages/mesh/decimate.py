@@ -8,7 +8,7 @@ import numpy as np
 import pyfqmr
 
 from pipeline.arrays import Bool, Float
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 from stages.mesh.surface import Surface
 
 _WORTHWHILE = 0.9

@@ -14,9 +14,9 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.cloud_along import CloudAlong
-from pipeline.artefacts.measured import PipeAxis, PointCloud
-from pipeline.geometry.axis import frames_at
-from pipeline.machine.native import open3d
+from pipeline.artefacts.measured import PointCloud
+from pipeline.geometry.axis import PipeAxis, frames_at
+from pipeline.system.native import open3d
 from stages.mesh.clip import NO_CUT, NOTHING, OpenMesh, clip
 from stages.mesh.join import join
 from stages.mesh.surface import Surface

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import Wall
 from pipeline.geometry.axis import from_pipe
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 
 Face = NDArray[np.int32]
 Index = NDArray[np.int64]

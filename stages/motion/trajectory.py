@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import PipeAxis, Trajectory
-from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.artefacts.measured import Trajectory
+from pipeline.geometry.axis import PipeAxis, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import FrameTable

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from pipeline.arrays import Float, Float32
-from pipeline.artefacts.measured import PipeAxis, RadiusMap, Wall
+from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.errors import UnusableError
-from pipeline.geometry.axis import frames_at
+from pipeline.geometry.axis import PipeAxis, frames_at
 from pipeline.machine.scratch import Scratch
 
 _SEEN_ROW = 0.2

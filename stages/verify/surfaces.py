@@ -13,7 +13,7 @@ from pipeline.arrays import Float
 from pipeline.artefacts.reference import Surface, WallPoints
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 from stages.verify.accuracy import Differences
 
 _FIT_POINTS = 5000

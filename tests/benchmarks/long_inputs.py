@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Image, Int
-from pipeline.artefacts.measured import PipeAxis, RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
 from pipeline.recording.base import Planes, Recording
 

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.api.job import open_job, run_job
 from pipeline.errors import InputError
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
-from pipeline.machine.job import open_job, run_job
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Selection
 from stages.catalogue import PIPELINE

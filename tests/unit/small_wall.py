@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
-from pipeline.geometry.axis import axis_through, from_pipe, straight_axis, to_pipe
+from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall, WallTexture
+from pipeline.geometry.axis import PipeAxis, axis_through, from_pipe, straight_axis, to_pipe
 
 RADIUS = 25.0
 PIT = (22.0, 1.0, 1.2, 2.0)  # distance mm, azimuth rad, depth mm, 1 σ mm

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.artefacts.measured import PipeAxis
-from pipeline.geometry.axis import distance_along, frames_at, from_pipe, to_pipe
+from pipeline.geometry.axis import PipeAxis, distance_along, frames_at, from_pipe, to_pipe
 
 
 def arc_axis(curvature_per_mm: float) -> PipeAxis:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import zarr
 
-from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
+from pipeline.artefacts.measured import PointCloud, RadiusMap, RingSamples, Trajectory, Wall
 from pipeline.export.arrays import write_radius_map, write_rings
 from pipeline.export.tables import write_trajectory
+from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, rotation_from_quaternion, rotation_from_vector
 
 

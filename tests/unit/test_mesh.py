@@ -6,13 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pipeline.artefacts.measured import PipeAxis, Wall
+from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import MeshTile, Overlays, TexturedMesh
 from pipeline.errors import UnusableError
-from pipeline.geometry.axis import from_pipe, straight_axis, to_pipe
-from pipeline.machine.codec import digest
-from pipeline.machine.native import open3d
+from pipeline.files.codec import digest
+from pipeline.geometry.axis import PipeAxis, from_pipe, straight_axis, to_pipe
 from pipeline.machine.stage import quiet_context
+from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.decimate import decimate
 from stages.mesh.surface import grid_surface, row_pieces, vertex_normals, weld, with_normals

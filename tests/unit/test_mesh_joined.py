@@ -8,8 +8,8 @@ import pytest
 
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.measured import Wall
-from pipeline.machine.native import open3d
 from pipeline.machine.stage import quiet_context
+from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.clip import OpenMesh, clip
 from stages.mesh.join import join

@@ -6,8 +6,8 @@ import pytest
 from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import TexturedMesh
 from pipeline.errors import UnusableError
-from pipeline.machine.native import open3d
 from pipeline.machine.stage import quiet_context
+from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.poisson import folded_cells
 from stages.overlays import OverlayParameters, overlays_of

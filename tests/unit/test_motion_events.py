@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import MotionEvent, PipeAxis, Trajectory
-from pipeline.geometry.axis import axis_through, frames_at, straight_axis
+from pipeline.artefacts.measured import MotionEvent, Trajectory
+from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events
 from stages.motion.tracking.observations import Tracks

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.artefacts.measured import PipeAxis, Trajectory
+from pipeline.artefacts.measured import Trajectory
+from pipeline.geometry.axis import PipeAxis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe

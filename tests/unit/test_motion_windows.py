@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import PipeAxis
-from pipeline.geometry.axis import straight_axis
+from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from pipeline.machine.scratch import Scratch
 from stages.motion.parameters import MotionParameters

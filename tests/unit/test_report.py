@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.artefacts.measured import MotionEvent, PipeAxis, RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import MotionEvent, RingSamples, RingValidity, Trajectory
+from pipeline.geometry.axis import PipeAxis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe

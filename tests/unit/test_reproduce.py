@@ -11,8 +11,8 @@ import pytest
 
 from pipeline.commands.reproduce import reproduce
 from pipeline.errors import InputError
-from pipeline.export.exporter import Exporter
 from pipeline.files.disk import record_of
+from pipeline.machine.exporter import Exporter
 from pipeline.machine.reproduce import Agreement, check_inputs_unchanged, compare_runs, read_run_record
 from pipeline.machine.run_folder import RunFolder
 

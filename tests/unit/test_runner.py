@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.api.job import Job, run_job
 from pipeline.errors import Cancelled, InputError, UnusableError
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
-from pipeline.machine.job import Job, run_job
 from pipeline.machine.outcome import RunOutcome, State
 from pipeline.machine.plan import PipelineError, Selection
 from pipeline.machine.runner import FailedError

@@ -16,7 +16,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.machine.codec import digest, encode
+from pipeline.files.codec import digest, encode
 from pipeline.machine.outcome import Number
 from pipeline.machine.store import Provenance, Store
 from tests.disk_limit import file_size_limit

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from pipeline.machine.threads import in_threads
+from pipeline.system.threads import in_threads
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

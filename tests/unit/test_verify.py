@@ -7,14 +7,15 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from pipeline.artefacts.measured import PipeAxis, PointCloud, RadiusMap, Wall, WallTexture
+from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall, WallTexture
 from pipeline.artefacts.reference import WallMap, read_surface, read_wall_map, read_wall_points
 from pipeline.commands.verify import verify
 from pipeline.errors import InputError, UnusableError
 from pipeline.export.arrays import write_cloud
+from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
-from pipeline.machine.native import open3d
 from pipeline.recording.input_file import files_sha256
+from pipeline.system.native import open3d
 from stages.verify.accuracy import accuracy, bore_differences, wall_coverage
 from stages.verify.maps import align_maps, map_differences
 from stages.verify.surfaces import register, surface_differences

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.export.exporter import Exporter, Writer
+from pipeline.machine.exporter import Exporter, Writer
 from pipeline.machine.run_folder import claimed
 
 GATE = threading.Event()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.artefacts.findings import clock_of_azimuth
-from pipeline.machine.provenance import MadeBy
+from pipeline.files.provenance import MadeBy
 from pipeline.review.comparison.changes import FAMILY_ERROR, Change, Fate
 from pipeline.review.comparison.comparison import Comparison
 from pipeline.review.comparison.registration import Registration

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.artefacts.measured import PipeAxis
 from pipeline.errors import InputError
+from pipeline.geometry.axis import PipeAxis
 from pipeline.simulator.motion import Signal, Slip, Wave
 from pipeline.simulator.truth import SceneTruth, cartesian, require_odometer, with_odometer
 from pipeline.simulator.wall.grid import Wall

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays import Float, Float32
-from pipeline.artefacts.measured import PipeAxis
-from pipeline.geometry.axis import straight_axis
+from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.recording.base import BoreSection, PipeFacts
 from pipeline.recording.base import Fiducials as StatedFiducials

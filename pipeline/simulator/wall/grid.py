@@ -9,7 +9,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from pipeline.arrays import Float, Float32, Int
-from pipeline.artefacts.measured import PipeAxis
+from pipeline.geometry.axis import PipeAxis
 
 
 @dataclass(frozen=True)

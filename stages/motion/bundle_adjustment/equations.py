@@ -13,7 +13,7 @@ from pipeline.arrays import Float
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
-from pipeline.machine.threads import in_threads
+from pipeline.system.threads import in_threads
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.residuals import RingBins
 from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from pipeline.arrays import Bool, Float
-from pipeline.artefacts.measured import PipeAxis
-from pipeline.geometry.axis import axis_through, frames_at, from_pipe
+from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, from_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 
 GLOBALS = 4

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import PipeAxis
-from pipeline.geometry.axis import axis_through, frames_at, to_pipe
+from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from stages.motion.bundle_adjustment.residuals import ORIGIN_SIGMA
 from stages.motion.bundle_adjustment.unknowns import AXIS_STEP_MM

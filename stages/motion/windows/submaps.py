@@ -17,8 +17,8 @@ from threadpoolctl import threadpool_limits
 
 from pipeline.adjustment.bordered import Factor
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import PipeAxis
 from pipeline.errors import UnusableError
+from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import skew
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import Adjusted, adjust, third_difference_sigma

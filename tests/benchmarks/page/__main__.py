@@ -20,7 +20,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 import pipeline.pages
-from pipeline.machine.provenance import library_versions
+from pipeline.files.provenance import library_versions
 from tests.benchmarks.page import meshing, motion, rings, texture, whole
 from tests.benchmarks.page.colmap import installed
 from tests.benchmarks.page.inputs import prepare

@@ -13,11 +13,11 @@ from typing import Any
 import cv2
 import numpy as np
 
+from pipeline.api.job import open_job
 from pipeline.artefacts.measured import PointCloud, Trajectory, Wall
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.instrument.probe import Probe
 from pipeline.machine.configuration import resolve
-from pipeline.machine.job import open_job
 from pipeline.machine.run_folder import claimed
 from pipeline.recording.base import Illumination, Recording
 from stages.catalogue import PIPELINE

@@ -9,7 +9,7 @@ import pymeshlab
 
 from pipeline.artefacts.model import TexturedMesh
 from pipeline.geometry.axis import frames_at
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 from tests.benchmarks.page.charts import bars
 from tests.benchmarks.page.inputs import Inputs
 from tests.benchmarks.page.section import TIMES, Method, Quantity, Section, clocked

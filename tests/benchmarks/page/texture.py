@@ -14,7 +14,7 @@ from pipeline.artefacts.measured import WallTexture
 from pipeline.export.pictures import write_unrolled
 from pipeline.geometry.axis import from_pipe
 from pipeline.geometry.rigid import inverse
-from pipeline.machine.native import open3d
+from pipeline.system.native import open3d
 from stages.texture.light import irradiance
 from tests.benchmarks.page.charts import bars
 from tests.benchmarks.page.inputs import Inputs

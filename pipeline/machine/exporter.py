@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, get_type_hints
 
+from pipeline.files.codec import canonical
 from pipeline.files.disk import (
     FileRecord,
     disk_errors_named,
@@ -22,7 +23,6 @@ from pipeline.files.disk import (
     sync_tree,
 )
 from pipeline.files.json_file import read_json
-from pipeline.machine.codec import canonical
 from pipeline.machine.run_folder import RunFolder
 from pipeline.machine.source_code import source_digest
 

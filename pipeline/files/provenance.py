@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 
-from pipeline.machine.codec import Json
+from pipeline.files.codec import Json
 
 # What computes; another version of these may change a result's last digits.
 _LIBRARIES = (

@@ -8,23 +8,24 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from pipeline.artefacts.headline import headline
 from pipeline.errors import InputError
-from pipeline.export.exporter import Exporter
 from pipeline.export.run_record import write_run_record
+from pipeline.files.codec import digest
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource, read_with_source
-from pipeline.machine.codec import digest
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.display import Display
+from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Plan, Selection, Source, make_plan
 from pipeline.machine.run_folder import claimed, logged
 from pipeline.machine.runner import Runner
 from pipeline.machine.stage import Stage
-from pipeline.machine.stopping import stop_wish
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
+from pipeline.system.stopping import stop_wish
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,8 @@ def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
     with claimed(job.folder) as folder, logged(folder) as logger, stop_wish() as wish:
         record = partial(_record, job, plan)
         workers = len(os.sched_getaffinity(0))
-        return Runner(plan, job.exporters, folder, record, display, logger, wish, workers).run(selection)
+        runner = Runner(plan, job.exporters, folder, record, headline, display, logger, wish, workers)
+        return runner.run(selection)
 
 
 def _record(job: Job, plan: Plan, outcome: RunOutcome) -> None:

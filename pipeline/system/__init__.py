@@ -1,0 +1,1 @@
+"""What boresight asks of the operating system: threads, processes, signals, native libraries."""
