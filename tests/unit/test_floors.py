@@ -1,0 +1,104 @@
+"""The rooms of the program stand on floors: imports lead downwards, and private names stay where they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.floors import (
+    IMPORTS_STILL_THERE,
+    PRIVATE_STILL_THERE,
+    against_the_floors,
+    imports_below,
+    private_names,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def program(folder: Path, **texts: str) -> Path:
+    """Write modules, named with two underscores for each dot, with all the packages they lie in."""
+    for name, text in texts.items():
+        file = folder.joinpath(*name.split("__")).with_suffix(".py")
+        file.parent.mkdir(parents=True, exist_ok=True)
+        for package in file.parents[: len(file.relative_to(folder).parts) - 1]:
+            (package / "__init__.py").touch()
+        file.write_text(text, "utf-8")
+    return folder
+
+
+def test_imports_lead_downwards() -> None:
+    assert against_the_floors(imports_below(ROOT), IMPORTS_STILL_THERE) == []
+
+
+def test_private_names_stay_where_they_are() -> None:
+    assert private_names(imports_below(ROOT), PRIVATE_STILL_THERE) == []
+
+
+@pytest.mark.parametrize(
+    ("module", "text", "told"),
+    [
+        ("pipeline__machine__plan", "from stages.rings import RINGS", "line 1: imports stages.rings"),
+        ("pipeline__export__glb", "import stages.mesh.mesh", "imports stages.mesh.mesh"),
+        (
+            "pipeline__geometry__axis",
+            "\nfrom pipeline.artefacts import measured",
+            "line 2: imports",
+        ),
+        (
+            "pipeline__files__disk",
+            "def f():\n    import pipeline.machine.store",
+            "line 2: imports",
+        ),
+        ("pipeline__machine__plan", "import pipeline.simulator.scene", "imports pipeline.simulator.scene"),
+        ("pipeline__machine__plan", "import pipeline.review.review", "imports pipeline.review.review"),
+        ("stages__rings__search", "from stages.texture import wall", "imports stages.texture"),
+        ("pipeline__system__threads", "from pipeline.files.disk import a", "imports pipeline.files.disk"),
+        (
+            "pipeline__attic__old",
+            "from pipeline.errors import InputError",
+            "this room has no floor",
+        ),
+    ],
+)
+def test_an_import_upwards_is_told(tmp_path: Path, module: str, text: str, told: str) -> None:
+    (line,) = against_the_floors(imports_below(program(tmp_path, **{module: text})), {})
+    assert told in line
+
+
+def test_an_import_downwards_is_not_told(tmp_path: Path) -> None:
+    texts = {
+        "pipeline__api__job": "import stages.rings\nfrom pipeline.machine.plan import Plan",
+        "pipeline__machine__plan": "from pipeline.machine import store\nimport numpy, ast",
+        "pipeline__machine__store": "",
+    }
+    assert against_the_floors(imports_below(program(tmp_path, **texts)), {}) == []
+
+
+def test_an_allowance_that_nobody_needs_is_told(tmp_path: Path) -> None:
+    allowed = {("pipeline.files.disk", "pipeline.review.report"): "until it is moved"}
+    folder = program(tmp_path, pipeline__files__disk="import pipeline.review.report")
+    assert against_the_floors(imports_below(folder), allowed) == []
+    (line,) = against_the_floors(imports_below(program(tmp_path, pipeline__files__disk="")), allowed)
+    assert "remove this line" in line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from pipeline.machine.store import _secret",
+        "from pipeline.machine import store\nstore._secret()",
+        "from pipeline.machine import store as kept\nkept._secret()",
+        "import pipeline.machine.store\npipeline.machine.store._secret()",
+        "from pipeline.machine._store import open_secret",
+    ],
+)
+def test_a_private_name_of_another_module_is_told(tmp_path: Path, text: str) -> None:
+    folder = program(tmp_path, pipeline__machine__plan=text, pipeline__machine__store="_secret = 1")
+    assert len(private_names(imports_below(folder), {})) == 1
+
+
+def test_own_private_names_are_not_told(tmp_path: Path) -> None:
+    text = "import numpy as np\nnp._NoValue\ndef f(self):\n    return self._secret + np.__version__"
+    assert private_names(imports_below(program(tmp_path, pipeline__machine__plan=text)), {}) == []
