@@ -17,15 +17,17 @@ from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
 from stages.rings.colour import discriminant_weights, excess_weights, mix
+from stages.rings.lone import SAYING_RINGS
 from stages.rings.noise import clip_level_of, noise_response
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
-from stages.rings.validity import mark_outliers, wander_px
+from stages.rings.validity import contradicted, wander_px
 
 Images = Iterator[tuple[int, Image | None]]
 Found = tuple[int, RingTrace | None]
 _LEARNING_FRAMES = 4
 _AT_ONCE = 512
+_PER_RING = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
 
 
 class RingParameters(Parameters):
@@ -71,7 +73,7 @@ def extract_rings(
             "rings", "no laser ring was found in any frame", frames=frames.tolist(),
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
-    _mark_outliers(samples)
+    _compare_rings(samples)
     wander = wander_px(_some(samples))
     _report(context, samples, wander)
     np.hypot(samples.sigma_px, np.float32(wander), out=samples.sigma_px)
@@ -143,24 +145,37 @@ def _put(samples: RingSamples, row: int, trace: RingTrace) -> None:
         getattr(samples, name)[row] = getattr(trace.fit, name)
 
 
-def _mark_outliers(samples: RingSamples) -> None:
-    """Mark outliers some rings at a time, each seen with the one before and the one after."""
-    count, before = len(samples.frame), samples.validity[:0]
+def _compare_rings(samples: RingSamples) -> None:
+    """Reject samples that their neighbours contradict, some rings at a time, each with those about it.
+
+    What was found in the images is compared, not what was rejected before.
+    """
+    count = len(samples.frame)
+    validity, sigma_px = samples.validity[:0], samples.sigma_px[:0]
     for first in range(0, count, _AT_ONCE):
         rows = slice(first, min(first + _AT_ONCE, count))
-        wide = slice(max(first - 1, 0), min(rows.stop + 1, count))
-        validity = np.concatenate([before, samples.validity[wide.start + len(before) : wide.stop]])
-        marked = mark_outliers(samples.radius_px[wide], samples.sigma_px[wide], validity)
-        # As found in the image: what was marked in it must not tell the next rings otherwise.
-        before = samples.validity[rows][-1:].copy()
-        samples.validity[rows] = marked[first - wide.start : rows.stop - wide.start]
+        wide = slice(max(first - SAYING_RINGS, 0), min(rows.stop + SAYING_RINGS, count))
+        own = slice(first - wide.start, rows.stop - wide.start)
+        found = replace(
+            _rows(samples, wide),
+            validity=np.concatenate([validity, samples.validity[wide.start + len(validity) : wide.stop]]),
+            sigma_px=np.concatenate([sigma_px, samples.sigma_px[wide.start + len(sigma_px) : wide.stop]]),
+        )
+        validity = found.validity[: own.stop][-SAYING_RINGS:]
+        sigma_px = found.sigma_px[: own.stop][-SAYING_RINGS:]
+        told = contradicted(found)
+        samples.validity[rows], samples.sigma_px[rows] = told[0][own], told[1][own]
+
+
+def _rows(samples: RingSamples, rows: slice) -> RingSamples:
+    """Return some of the rings."""
+    return replace(samples, **{name: getattr(samples, name)[rows] for name in _PER_RING})
 
 
 def _some(samples: RingSamples) -> RingSamples:
     """Return some hundred of the rings, which are told apart no better by more of them."""
     some = slice(None, None, max(len(samples.frame) // _AT_ONCE, 1))
-    per_ring = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
-    return replace(samples, **{name: getattr(samples, name)[some] for name in per_ring})
+    return _rows(samples, some)
 
 
 def _report(context: Context, samples: RingSamples, wander: float) -> None:

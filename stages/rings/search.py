@@ -22,19 +22,22 @@ _CREDIT = 6.0
 _JUMP = 18.0
 _TRIAL_WIDTHS_PX = (1.0, 2.0, 4.0)
 _RAYS = 360
+# The line, a glint on either side of it and a reflection.
+_CANDIDATES = 4
 
 
-class Peaks(NamedTuple):
-    """Best line candidate of every sector, and the best other one, (A,) each.
+class Candidates(NamedTuple):
+    """The strongest places of every sector at which the line may be, strongest first; (A, 4) each.
 
-    ``radius_px`` and ``score`` (amplitude over its noise), ``rival_px`` and ``rival_score``: the best
-    candidate at least four line widths away.
+    ``radius_px`` is NaN where there are fewer; ``score`` is the matched filter's response over its noise.
     """
 
     radius_px: Float
     score: Float
-    rival_px: Float
-    rival_score: Float
+
+    def above(self, limit: float) -> Candidates:
+        """Return those whose score exceeds ``limit``."""
+        return Candidates(np.where(self.score > limit, self.radius_px, np.nan), self.score)
 
 
 def matched_template(width_px: float) -> Float:
@@ -53,17 +56,15 @@ def detection_limit(positions: float) -> float:
 
 def search_band(
     image: Image, sectors: Sectors, low_px: Float, high_px: Float, width_px: float, noise: float
-) -> Peaks:
-    """Find the best matched-filter peak of every sector between ``low_px`` and ``high_px`` (A,)."""
-    out = np.full((4, len(low_px)), np.nan)
+) -> Candidates:
+    """Find the matched filter's peaks of every sector between ``low_px`` and ``high_px`` (A,)."""
+    radius, score = np.full((len(low_px), _CANDIDATES), np.nan), np.zeros((len(low_px), _CANDIDATES))
     template = matched_template(width_px)
     _search_sectors(
         image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template,
-        4 * width_px, out,
+        radius, score,
     )  # fmt: skip
-    out[1] /= noise
-    out[3] /= noise
-    return Peaks(*out)
+    return Candidates(radius, score / noise)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -97,21 +98,37 @@ def _radial_profile(image, pixel, radius, low, high, first, bins, total, count):
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _correlate(profile, seen, template, response):  # type: ignore[no-untyped-def]
-    """Write ``profile`` · ``template`` to ``response`` where it fits; return the place of the largest."""
+    """Write ``profile`` · ``template`` to ``response`` where it fits."""
     reach = template.size // 2
-    at = -1
     for b in range(reach, seen - reach):
         s = 0.0
         for j in range(template.size):
             s += template[j] * profile[b - reach + j]
         response[b] = s
-        if s > 0.0 and (at < 0 or s > response[at]):
-            at = b
-    return at
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _search_sectors(image, start, pixel, radius, low_px, high_px, template, apart, out):  # type: ignore[no-untyped-def]
+def _keep_peaks(response, low, high, first, radius, score):  # type: ignore[no-untyped-def]
+    """Write the largest local maxima of ``response[low:high]`` to ``radius`` and ``score``, largest first."""
+    for b in range(low, high):
+        before = response[b - 1] if b > low else -np.inf
+        after = response[b + 1] if b < high - 1 else -np.inf
+        if response[b] <= score[-1] or response[b] < before or response[b] <= after:
+            continue
+        at = score.size - 1
+        while at > 0 and score[at - 1] < response[b]:
+            radius[at], score[at] = radius[at - 1], score[at - 1]
+            at -= 1
+        radius[at], score[at] = first + b, response[b]
+        bend = before - 2 * response[b] + after
+        if -np.inf < bend < 0:
+            radius[at] += 0.5 * (before - after) / bend
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _search_sectors(  # type: ignore[no-untyped-def]
+    image, start, pixel, radius, low_px, high_px, template, found_px, score
+):
     reach = template.size // 2
     size = int(np.nanmax(high_px - low_px)) + 2 * reach + 4
     total, count, response = np.empty(size), np.empty(size, np.int64), np.empty(size)
@@ -121,17 +138,8 @@ def _search_sectors(image, start, pixel, radius, low_px, high_px, template, apar
         first = int(np.floor(low_px[a])) - reach
         bins = int(np.ceil(high_px[a])) + reach + 1 - first
         seen = _radial_profile(image, pixel, radius, start[a], start[a + 1], first, bins, total, count)
-        at = _correlate(total, seen, template, response)
-        if at < 0:
-            continue
-        out[0, a], out[1, a], out[3, a] = first + at, response[at], 0.0
-        if reach < at < seen - reach - 1:
-            bend = response[at - 1] - 2 * response[at] + response[at + 1]
-            if bend < 0:
-                out[0, a] += 0.5 * (response[at - 1] - response[at + 1]) / bend
-        for b in range(reach, seen - reach):
-            if abs(b - at) >= apart and response[b] > out[3, a]:
-                out[2, a], out[3, a] = first + b, response[b]
+        _correlate(total, seen, template, response)
+        _keep_peaks(response, reach, seen - reach, first, found_px[a], score[a])
 
 
 def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, float]:

@@ -8,14 +8,17 @@ import numpy as np
 
 from pipeline.arrays import Bool, Byte, Float
 from pipeline.artefacts.measured import RingValidity
+from stages.rings.chain import Choice, choose_line
 from stages.rings.noise import dark_response, noise_response
 from stages.rings.profile import ProfileFit, Response, fit_line
-from stages.rings.search import BAND_WIDTHS, Image, Peaks, detection_limit, find_ring, search_band
+from stages.rings.search import BAND_WIDTHS, Candidates, Image, detection_limit, find_ring, search_band
 from stages.rings.sectors import Sectors
 from stages.rings.validity import middle_and_spread
 
 _EDGE_WIDTHS = 2.5
-_ODD, _TYPICAL = 6.0, 3.0
+_ODD = 6.0
+# Below this, one in ten of such samples would be of another curve.
+_SURE = 0.9
 _LEAST_SPREAD = 0.02
 # No wall reflects so evenly that a line a fifth fainter could not be the true one.
 _REFLECTANCE_SPREAD = 0.2
@@ -79,13 +82,15 @@ def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace 
     width, noise = before.width_px, before.response.dark_noise
     expected, band = before.radius_everywhere(), BAND_WIDTHS * width
     peaks = search_band(image, sectors, expected - band, expected + band, width, noise)
-    missing = ~(peaks.score > _limit(sectors, 2 * band))
+    peaks = peaks.above(_limit(sectors, 2 * band))
+    missing = np.isnan(peaks.radius_px[:, 0])
     if missing.mean() > _MOST:
         return None
     if missing.any():
         peaks = _search_rays(image, sectors, peaks, missing, width, noise)
-    fit = fit_line(image, sectors, peaks.radius_px, width, before.response)
-    return RingTrace(fit, _judge(fit, peaks, sectors), float(np.nanmedian(fit.width_px)), before.response)
+    choice = choose_line(peaks, expected, width)
+    fit = fit_line(image, sectors, choice.radius_px, width, before.response)
+    return _judged(fit, choice, sectors, float(np.nanmedian(fit.width_px)), before.response)
 
 
 def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrace | None:
@@ -97,14 +102,15 @@ def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrac
         return None
     band = BAND_WIDTHS * width
     peaks = search_band(image, sectors, radius - band, radius + band, width, response.dark_noise)
-    fit = fit_line(image, sectors, peaks.radius_px, width, response)
+    choice = choose_line(peaks, radius, width)
+    fit = fit_line(image, sectors, choice.radius_px, width, response)
     for _ in range(2):
         if not np.isfinite(fit.width_px).any():
             return None
         width = float(np.nanmedian(fit.width_px))
         response = noise_response(image, sectors, fit, response)
-        fit = fit_line(image, sectors, peaks.radius_px, width, response)
-    return RingTrace(fit, _judge(fit, peaks, sectors), width, response)
+        fit = fit_line(image, sectors, choice.radius_px, width, response)
+    return _judged(fit, choice, sectors, width, response)
 
 
 def _limit(sectors: Sectors, positions: float) -> float:
@@ -112,31 +118,37 @@ def _limit(sectors: Sectors, positions: float) -> float:
 
 
 def _search_rays(
-    image: Image, sectors: Sectors, peaks: Peaks, missing: Bool, width_px: float, noise: float
-) -> Peaks:
-    """Return ``peaks`` with the ``missing`` looked for along their whole ray; NaN where none is found."""
+    image: Image, sectors: Sectors, peaks: Candidates, missing: Bool, width_px: float, noise: float
+) -> Candidates:
+    """Return ``peaks`` with the ``missing`` looked for along their whole ray."""
     far = float(sectors.radius_px.max())
     low, high = np.where(missing, 4 * width_px, np.nan), np.where(missing, far, np.nan)
-    wide = search_band(image, sectors, low, high, width_px, noise)
-    found = np.where(wide.score > _limit(sectors, far), 0.0, np.nan)
-    return Peaks(*(np.where(missing, w + found, p) for w, p in zip(wide, peaks, strict=True)))
+    wide = search_band(image, sectors, low, high, width_px, noise).above(_limit(sectors, far))
+    return Candidates(*(np.where(missing[:, None], w, p) for w, p in zip(wide, peaks, strict=True)))
 
 
-def _judge(fit: ProfileFit, peaks: Peaks, sectors: Sectors) -> Byte:
+def _judged(
+    fit: ProfileFit, choice: Choice, sectors: Sectors, width_px: float, response: Response
+) -> RingTrace:
+    """Return the fitted ring with what is wrong with its samples; σ holds the chance of a wrong candidate."""
+    validity = _judge(fit, choice, sectors)
+    fit = fit._replace(sigma_px=np.hypot(fit.sigma_px, choice.spread_px))
+    return RingTrace(fit, validity, width_px, response)
+
+
+def _judge(fit: ProfileFit, choice: Choice, sectors: Sectors) -> Byte:
     """Return `RingValidity` (A,) as far as a single image tells; of several reasons the last named here wins.
 
     Limits come from the ring itself: a sample is odd when it leaves the spread of the ring's own samples.
     """
     v = RingValidity
     brightness, width, misfit = np.log(fit.amplitude), np.log(fit.width_px), np.log(fit.chi2)
-    flicker = middle_and_spread(np.diff(brightness))[1] / np.sqrt(2)
-    ambiguous = peaks.rival_score > np.exp(-_TYPICAL * max(flicker, _REFLECTANCE_SPREAD)) * peaks.score
     thin = ~(np.minimum(fit.unclipped_below, fit.unclipped_above) >= 1)
     out = np.full(len(thin), v.VALID, np.uint8)
     out[np.abs(_oddness(width, width)) > _ODD] = v.WIDTH
     out[_oddness(brightness, brightness, _REFLECTANCE_SPREAD) > _ODD] = v.GLINT
     out[_oddness(misfit, misfit) > _ODD] = v.GHOST
-    out[ambiguous & (peaks.rival_score > detection_limit(peaks.score.size))] = v.GHOST
+    out[choice.probability < _SURE] = v.GHOST
     out[~(fit.amplitude > detection_limit(len(thin)) * fit.amplitude_sigma)] = v.LOW_CONTRAST
     out[thin & (fit.clipped > 0)] = v.SATURATED
     out[fit.radius_px > sectors.outermost_px - _EDGE_WIDTHS * fit.width_px] = v.OUT_OF_VIEW

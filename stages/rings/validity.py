@@ -9,11 +9,21 @@ from scipy.ndimage import uniform_filter1d
 from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spread, robust_spreads
 from pipeline.arrays import Bool, Byte, Float32
 from pipeline.artefacts.measured import RingSamples, RingValidity
+from stages.rings.lone import lone_runs
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0
 _MAJORITY = 0.5
 _LAG_WIDTHS = 6.0
+
+
+def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
+    """Return validity and σ (F, A) of rings when every sample has been held against its neighbours."""
+    validity = mark_outliers(rings.radius_px, rings.sigma_px, rings.validity)
+    radius = np.where(validity == RingValidity.VALID, rings.radius_px, np.float32(np.nan))
+    glint, sigma = lone_runs(radius, rings.sigma_px, rings.width_px, rings.amplitude)
+    validity[glint] = RingValidity.GLINT
+    return validity, sigma
 
 
 def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte:

@@ -13,7 +13,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import quiet_context
 from stages.rings import RINGS, RingParameters, extract, extract_rings
-from stages.rings.validity import mark_outliers
+from stages.rings.validity import contradicted
 from tests.ring_images import exposed, memory_recording, off_centre, ring_light
 
 SIZE, CENTRE = (640, 480), (318.7, 241.3)
@@ -136,10 +136,11 @@ def test_outliers_are_marked_in_batches_as_at_once(monkeypatch: pytest.MonkeyPat
     lost = random.random(shape) < 0.05
     validity = np.where(lost, RingValidity.NO_LINE, RingValidity.VALID).astype(np.uint8)
     full = np.full(shape, 0.1, np.float32)
-    wanted = mark_outliers(radius, full, validity)
     monkeypatch.setattr(extract, "_AT_ONCE", 4)
     azimuth, centre = np.linspace(-3, 3, 60), np.zeros(2)
-    samples = RingSamples(np.arange(23), azimuth, centre, radius, full, full, full, validity.copy())
-    extract._mark_outliers(samples)
+    samples = RingSamples(np.arange(23), azimuth, centre, radius, full.copy(), full, full, validity.copy())
+    wanted, sigma = contradicted(replace(samples, sigma_px=full))
+    extract._compare_rings(samples)
     np.testing.assert_array_equal(samples.validity, wanted)
+    np.testing.assert_array_equal(samples.sigma_px, sigma)
     assert np.sum(wanted == RingValidity.OUTLIER) > 3, "the control"

@@ -1,0 +1,39 @@
+"""What varies slowly around the ring: medians of a few sectors, drawn through to all of them."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+# Fifteen degrees: far wider than a glint, so that it has no say; finer than any move of the probe.
+_BLOCKS = 24
+
+
+@numba.njit(cache=True, nogil=True)
+def slow_around(values):  # type: ignore[no-untyped-def]
+    """Return ``values`` (A,) without whatever is narrower than half a block; 0 when none is finite.
+
+    Medians of 24 blocks of sectors, linear from the middle of one to the next around the circle; blocks of
+    which less than a quarter is finite take the value of the block before.
+    """
+    sectors = values.size
+    level, known = np.zeros(_BLOCKS), np.zeros(_BLOCKS, np.bool_)
+    for b in range(_BLOCKS):
+        block = values[b * sectors // _BLOCKS : (b + 1) * sectors // _BLOCKS]
+        finite = block[np.isfinite(block)]
+        if finite.size > 0 and 4 * finite.size >= block.size:
+            level[b], known[b] = np.median(finite), True
+    out = np.zeros(sectors)
+    if not known.any():
+        return out
+    last = level[np.flatnonzero(known)[-1]]
+    for b in range(_BLOCKS):
+        if known[b]:
+            last = level[b]
+        level[b] = last
+    for a in range(sectors):
+        place = (a + 0.5) * _BLOCKS / sectors - 0.5
+        b = int(np.floor(place))
+        part = place - b
+        out[a] = (1 - part) * level[b % _BLOCKS] + part * level[(b + 1) % _BLOCKS]
+    return out

@@ -1,0 +1,149 @@
+"""What only one ring shows: runs of samples that leave the wall which the rings before and after agree on.
+
+A defect is there when the next ring comes by; a glint has moved on. Rings are laid on one another by what
+varies slowly around them, the median of five rings in a row is the wall, and a run of neighbouring samples
+that leaves it together either is seen by a neighbouring ring too or stands alone. Alone it is no line where
+its profile is that of a glint, brighter or wider than the ring's; where the profile is the line's own, the
+sample stays, with a σ that says that nothing but itself speaks for it.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from pipeline.adjustment.robust import robust_spread, robust_spreads
+from pipeline.arrays import Bool, Float, Float32
+from stages.rings.around import slow_around
+
+# Rings on either side that have a say: two of five may be wrong, and a run is confirmed by a next one, which
+# itself is measured against two more.
+WALL_RINGS = 2
+SAYING_RINGS = WALL_RINGS + 1
+# A run is as wide as its samples leave the wall by 2.5 σ, and counts when one leaves it by 5 σ: of a hundred
+# thousand samples of noise less than one does.
+_RUN_SIGMAS, _SEED_SIGMAS = 2.5, 5.0
+# A ring 0.7 of a defect's half width away still sees a quarter of its depth (a bell of 1.7 half widths).
+_SHARE = 0.25
+_NEAR_SECTORS = 2
+# Root mean square, over a run, of how many robust σ of the ring it is brighter and wider than the ring. The
+# ring's own runs have 1.
+_ODD_RUN = 3.0
+# Nothing is known of a lone sample: it is the wall or not with equal chances.
+_CHANCE = 0.5
+_LEAST_WIDTH_SPREAD, _LEAST_BRIGHTNESS_SPREAD = 0.03, 0.1
+
+
+def lone_runs(
+    radius_px: Float32, sigma_px: Float32, width_px: Float32, amplitude: Float32
+) -> tuple[Bool, Float32]:
+    """Return which samples (F, A) are no line, and σ, px, of all with the chance of it; NaN where no sample.
+
+    Rings in the order of time; NaN in ``radius_px`` where there is no valid sample. ``sigma_px`` is 1 σ.
+    """
+    away = _away_from_wall(radius_px.astype(np.float64))
+    sigma = np.maximum(sigma_px, _spread_of(away))
+    lone = _lone(away, sigma, np.empty(away.shape, np.bool_))
+    odd = _oddness(np.log(width_px), _LEAST_WIDTH_SPREAD) ** 2
+    odd += _oddness(np.log(amplitude), _LEAST_BRIGHTNESS_SPREAD) ** 2
+    glint = _mean_over_runs(lone, np.where(np.isfinite(radius_px), odd, 0.0)) > _ODD_RUN**2
+    unsure = np.hypot(sigma_px, np.sqrt(_CHANCE) * np.where(lone, np.abs(away), 0.0))
+    return lone & glint, np.asarray(unsure, np.float32)
+
+
+def _oddness(value: Float32, least_spread: float) -> Float:
+    """Return by how many σ of its ring each value (F, A) is above what varies slowly around it."""
+    out = np.zeros(value.shape)
+    for row, ring in zip(out, value.astype(float), strict=True):
+        beyond = ring - slow_around(ring)
+        spread = robust_spread(beyond) if np.isfinite(beyond).any() else 0.0
+        row[:] = np.maximum(np.nan_to_num(beyond), 0.0) / max(spread, least_spread)
+    return out
+
+
+def _spread_of(away: Float) -> Float:
+    """Return the robust 1 σ (F, 1) of every ring's distance to the wall."""
+    known = np.isfinite(away).any(1)
+    out = np.zeros((len(away), 1))
+    out[known, 0] = robust_spreads(away[known], 1)
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _away_from_wall(radius):  # type: ignore[no-untyped-def]
+    """Distance (F, A) of rings to the median of themselves and two on either side; NaN where unknown."""
+    rings, sectors = radius.shape
+    move = np.zeros((rings, sectors))
+    for k in range(1, rings):
+        move[k] = move[k - 1] + slow_around(radius[k] - radius[k - 1])
+    out = np.full((rings, sectors), np.nan)
+    window = np.empty(2 * WALL_RINGS + 1)
+    for k in range(rings):
+        for a in range(sectors):
+            count = 0
+            for n in range(max(0, k - WALL_RINGS), min(rings, k + WALL_RINGS + 1)):
+                value = radius[n, a] - move[n, a]
+                if np.isfinite(value):
+                    window[count] = value
+                    count += 1
+            if count > 2:
+                out[k, a] = radius[k, a] - move[k, a] - np.median(window[:count])
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _lone(away, sigma, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` (F, A) with the runs that no neighbouring ring confirms."""
+    rings, sectors = away.shape
+    out[:] = False
+    for k in range(rings):
+        for first in range(sectors):
+            sign = 1.0 if away[k, first] > 0 else -1.0
+            before = sign * away[k, first - 1] > _RUN_SIGMAS * sigma[k, first - 1]
+            if before or not sign * away[k, first] > _RUN_SIGMAS * sigma[k, first]:
+                continue
+            length, confirmed, top = 0, 0, 0.0
+            while length < sectors:
+                a = (first + length) % sectors
+                if not sign * away[k, a] > _RUN_SIGMAS * sigma[k, a]:
+                    break
+                top = max(top, sign * away[k, a] / sigma[k, a])
+                confirmed += _confirmed(away, sigma, k, a, sign)
+                length += 1
+            if top > _SEED_SIGMAS and 2 * confirmed < length:
+                for a in range(first, first + length):
+                    out[k, a % sectors] = True
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _confirmed(away, sigma, k, a, sign):  # type: ignore[no-untyped-def]
+    """Whether the ring before or after leaves the wall near sector ``a`` to the same side as ring ``k``."""
+    rings, sectors = away.shape
+    for n in (k - 1, k + 1):
+        if not 0 <= n < rings:
+            continue
+        for turn in range(-_NEAR_SECTORS, _NEAR_SECTORS + 1):
+            b = (a + turn) % sectors
+            least = max(_SHARE * sign * away[k, a], 2 * sigma[n, b])
+            if sign * away[n, b] > least:
+                return True
+    return False
+
+
+@numba.njit(cache=True, nogil=True)
+def _mean_over_runs(runs, value):  # type: ignore[no-untyped-def]
+    """Mean of ``value`` (F, A) over each run of neighbours in ``runs`` (F, A), 0 elsewhere."""
+    rings, sectors = value.shape
+    out = np.zeros((rings, sectors))
+    for k in range(rings):
+        for first in range(sectors):
+            if not runs[k, first] or runs[k, first - 1]:
+                continue
+            length, total = 0, 0.0
+            while length < sectors and runs[k, (first + length) % sectors]:
+                total += value[k, (first + length) % sectors]
+                length += 1
+            for a in range(first, first + length):
+                out[k, a % sectors] = total / length
+    return out

@@ -1,0 +1,121 @@
+"""What one ring alone shows: glints go, pits that two rings see stay, a lone line is unsure."""
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.measured import RingSamples, RingValidity
+from stages.rings.chain import choose_line
+from stages.rings.lone import lone_runs
+from stages.rings.search import Candidates
+from stages.rings.validity import contradicted
+
+RINGS, SECTORS, NOISE = 12, 720, 0.1
+AZIMUTH = 2 * np.pi / SECTORS * np.arange(SECTORS)
+RUN = slice(200, 216)
+
+
+@pytest.fixture
+def drawn():
+    """Rings of a probe that moves across the pipe: radius, σ, width and amplitude."""
+    random = np.random.default_rng(3)
+    shift = 2.0 * np.sin(0.7 * np.arange(RINGS))[:, None]
+    radius = 300 + shift * np.cos(AZIMUTH - 0.3) + random.normal(0, NOISE, (RINGS, SECTORS))
+    width = 1.2 * np.exp(random.normal(0, 0.05, radius.shape))
+    amplitude = 80 * np.exp(random.normal(0, 0.2, radius.shape))
+    return [x.astype(np.float32) for x in (radius, np.full_like(radius, NOISE), width, amplitude)]
+
+
+def test_noise_and_motion_leave_every_sample_alone(drawn):
+    rejected, sigma = lone_runs(*drawn)
+    assert rejected.sum() == 0
+    assert np.mean(sigma > 1.01 * NOISE) < 1e-3
+
+
+@pytest.mark.parametrize("away", [1.0, 6.0, -6.0])
+def test_a_glint_goes(drawn, away):
+    radius, _, width, amplitude = drawn
+    radius[5, RUN] += away
+    width[5, RUN] *= 1.4
+    amplitude[5, RUN] *= 2
+    rejected, _ = lone_runs(*drawn)
+    assert rejected[5, RUN].mean() > 0.9
+    rejected[5, RUN] = False
+    assert rejected.sum() == 0, "rings beside a glint are not blamed for it"
+
+
+@pytest.mark.parametrize("rings", [2, 3, 6])
+def test_what_two_rings_show_stays_however_bright_it_is(drawn, rings):
+    radius, _, width, amplitude = drawn
+    for row in range(4, 4 + rings):
+        radius[row, RUN] += 3 * np.hanning(16)
+        width[row, RUN] *= 1.4
+        amplitude[row, RUN] *= 2
+    rejected, sigma = lone_runs(*drawn)
+    assert rejected.sum() == 0
+    assert sigma[4 : 4 + rings, RUN].max() < 2 * NOISE
+
+
+def test_a_line_that_one_ring_alone_shows_stays_and_is_unsure(drawn):
+    drawn[0][5, RUN] += 3.0
+    rejected, sigma = lone_runs(*drawn)
+    assert rejected.sum() == 0
+    assert np.allclose(sigma[5, RUN], 3 * np.sqrt(0.5), rtol=0.15)
+
+
+def test_a_step_of_the_bore_is_no_glint(drawn):
+    radius, _, width, _ = drawn
+    radius[6:] += 20.0
+    width[6:] *= 1.3
+    radius[5, : SECTORS // 2] += 20.0
+    assert lone_runs(*drawn)[0].mean() < 0.01
+
+
+def test_gaps_and_lost_rings_are_bridged(drawn):
+    radius, sigma, width, amplitude = drawn
+    validity = np.zeros(radius.shape, np.uint8)
+    validity[4], validity[:, 100:140] = RingValidity.FRAME_REJECTED, RingValidity.NO_LINE
+    for field in (radius, sigma, width, amplitude):
+        field[validity > 0] = np.nan
+    radius[6, RUN] += 6
+    amplitude[6, RUN] *= 3
+    rings = RingSamples(
+        np.arange(RINGS), AZIMUTH - np.pi, np.zeros(2), radius, sigma, width, amplitude, validity
+    )
+    told, _ = contradicted(rings)
+    assert (told[6, RUN] == RingValidity.GLINT).mean() > 0.9
+    assert ((told != validity).sum(1)[[0, 1, 2, 3, 5, 8, 9, 10, 11]] < 8).all()
+
+
+def candidates_of(line, line_score, other, other_score):
+    """Two candidates a sector, the stronger first."""
+    radius, score = (np.stack(x, 1) for x in ((line, other), (line_score, other_score)))
+    order = np.argsort(-score, axis=1)
+    return Candidates(*(np.take_along_axis(x, order, 1) for x in (radius, score)))
+
+
+def test_the_brighter_of_two_is_not_the_line_where_the_curve_goes_on():
+    random = np.random.default_rng(1)
+    line, glint = 300 + random.normal(0, 0.1, SECTORS), np.full(SECTORS, np.nan)
+    glint[RUN] = 307.0
+    score = np.where(np.isfinite(glint), 120.0, 0.0)
+    found = choose_line(
+        candidates_of(line, np.full(SECTORS, 40.0), glint, score), np.full(SECTORS, 300.0), 1.2
+    )
+    assert np.allclose(found.radius_px, line)
+    assert found.probability.min() > 0.99
+
+
+def test_a_jump_of_the_wall_is_followed_and_a_weak_remnant_is_not():
+    line, remnant = np.full(SECTORS, 300.0), np.full(SECTORS, np.nan)
+    line[RUN], remnant[RUN] = 312.0, 300.0
+    weak = candidates_of(line, np.full(SECTORS, 40.0), remnant, np.where(np.isfinite(remnant), 6.0, 0.0))
+    assert np.allclose(choose_line(weak, np.full(SECTORS, 300.0), 1.2).radius_px, line)
+
+
+def test_between_two_equal_lines_the_chain_does_not_decide_with_confidence():
+    """A split curve that both branches close: the σ must hold the distance between them."""
+    line, other = np.full(SECTORS, 296.0), np.full(SECTORS, 304.0)
+    both = candidates_of(line, np.full(SECTORS, 40.0), other, np.full(SECTORS, 39.0))
+    found = choose_line(both, np.full(SECTORS, 296.0), 1.2)
+    unsure = found.probability < 0.9
+    assert unsure.all() or np.allclose(found.radius_px, 296.0)
