@@ -143,7 +143,7 @@ def write_summary(endings: Iterable[Ending], folder: Path) -> None:
     runs: list[Json] = [_document(e) for e in ordered]
     rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
     warned = sum(bool(e.warnings) for e in ordered)
-    text = page_template("pipeline.batch").render(
+    text = page_template("batch").render(
         rows=rows, states=_states(ordered), metrics=SHOWN_METRICS, warned=warned
     )
     with disk_errors_named(folder):

@@ -70,7 +70,7 @@ def report_page(report: CalibrationReport, document: dict[str, Any]) -> str:
     if report.displacement is not None:
         pictures["displacement"] = png(displacement_figure(report))
     encoded = {name: base64.b64encode(data).decode("ascii") for name, data in pictures.items()}
-    return page_template("pipeline.commands.calibrate_camera_page").render(d=document, pictures=encoded)
+    return page_template("calibrate_camera").render(d=document, pictures=encoded)
 
 
 def _board(report: CalibrationReport) -> dict[str, Any]:

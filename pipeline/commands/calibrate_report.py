@@ -88,7 +88,7 @@ def report_page(result: GaugeCalibration, document: dict[str, Any]) -> str:
         "correlations": correlation_figure(document["correlations"]),
     }
     encoded = {name: base64.b64encode(png(figure)).decode("ascii") for name, figure in figures.items()}
-    return page_template("pipeline.commands.calibrate_page").render(d=document, pictures=encoded)
+    return page_template("calibrate").render(d=document, pictures=encoded)
 
 
 def advice(names: tuple[str, ...]) -> str:

@@ -49,7 +49,7 @@ def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
         When it cannot be written.
     """
     change = shown.change
-    text = page_template("pipeline.commands.diagnose_page").render(
+    text = page_template("diagnose").render(
         d=to_json(found), headline=headline(found), simulated=shown.simulated, change=change,
         consequence=consequence(change) if change is not None else "",
         hours=_by_hour(change) if change is not None else (), pictures=_pictures(found, shown),

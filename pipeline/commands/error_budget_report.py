@@ -96,7 +96,7 @@ def write_budget(document: dict[str, Any], budget: Budget, study: BaselineStudy,
 def budget_page(document: dict[str, Any], chart_svg: bytes) -> str:
     """Return the page as one file that needs nothing else."""
     chart = base64.b64encode(chart_svg).decode("ascii")
-    return page_template("pipeline.commands.error_budget_page").render(d=document, chart=chart)
+    return page_template("error_budget").render(d=document, chart=chart)
 
 
 def budget_figure(budget: Budget, study: BaselineStudy) -> Figure:

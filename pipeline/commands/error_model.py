@@ -115,14 +115,14 @@ def error_model_page(
         "camera_name": camera_name,
         "implied_baseline": {"radial_mm": radial, "euclidean_mm": euclidean},
     }
-    parts = files("pipeline.commands.error_model_page")
+    parts = files("pipeline.pages")
     template = Environment(undefined=StrictUndefined, autoescape=False).from_string(
-        (parts / "page.html").read_text("utf-8")
+        (parts / "error_model.html").read_text("utf-8")
     )
     return template.render(
-        style=(parts / "style.css").read_text("utf-8"),
-        model=(parts / "model.js").read_text("utf-8"),
-        view=(parts / "view.js").read_text("utf-8"),
+        style=(parts / "error_model.css").read_text("utf-8"),
+        model=(parts / "error_model.js").read_text("utf-8"),
+        view=(parts / "error_model_view.js").read_text("utf-8"),
         start=json.dumps(start).replace("</", "<\\/"),
     )
 

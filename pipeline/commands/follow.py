@@ -8,8 +8,7 @@ from pathlib import Path
 from rich.console import Console
 
 from pipeline.errors import InputError
-from pipeline.follow.live_page import write_live_page
-from pipeline.follow.watch import Glimpse, glimpses
+from pipeline.follow import Glimpse, glimpses, write_live_page
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.run_folder import claimed
 from pipeline.machine.stage import quiet_context

@@ -20,9 +20,7 @@ def write_report(done: Sequence[Worked], folder: Path) -> None:
     document = report_document(done)
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / "proof.json").write_text(text + "\n", "utf-8")
-    (folder / "proof.html").write_text(
-        page_template("pipeline.commands.prove_page").render(d=document), "utf-8"
-    )
+    (folder / "proof.html").write_text(page_template("prove").render(d=document), "utf-8")
 
 
 def report_document(done: Sequence[Worked]) -> dict[str, Any]:

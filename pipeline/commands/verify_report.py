@@ -32,7 +32,7 @@ def write_certificate(document: dict[str, Any], differences: Differences, folder
 def certificate_page(document: dict[str, Any], picture_png: bytes) -> str:
     """Return the certificate as one file that needs nothing else."""
     picture = base64.b64encode(picture_png).decode("ascii")
-    return page_template("pipeline.commands.verify_page").render(d=document, picture=picture)
+    return page_template("verify").render(d=document, picture=picture)
 
 
 def differences_figure(differences: Differences) -> Figure:

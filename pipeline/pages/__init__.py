@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 
-def page_template(package: str) -> Template:
-    """Return the template ``page.html`` of a package, which may extend ``base.html``.
+def page_template(name: str) -> Template:
+    """Return the template ``{name}.html`` of this package, which may extend ``base.html``.
 
     Numbers in millimetres go through the filters ``um`` and ``um_or_mm``, shares through ``percent``.
 
     Raises
     ------
     jinja2.TemplateNotFound
-        When the package has no ``page.html``.
+        When there is no such template.
     """
-    loader = ChoiceLoader([PackageLoader(package, "."), PackageLoader("pipeline.pages", ".")])
+    loader = PackageLoader("pipeline.pages", ".")
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True)
     environment.filters |= {
         "um": lambda mm: f"{1000 * mm:.1f}",
@@ -23,4 +23,4 @@ def page_template(package: str) -> Template:
         "percent": lambda share: "not stated" if share is None else f"{100 * share:.1f} %",
         "number": lambda value: f"{value:.4g}",
     }
-    return environment.get_template("page.html")
+    return environment.get_template(f"{name}.html")

@@ -12,10 +12,9 @@ from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
 from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
 from stages.accumulate.calibration import CalibrationSpread
-from stages.accumulate.centring import centred
 from stages.accumulate.grid import MapGrid, gridded, rings_on_columns
 from stages.accumulate.samples import RingsOnWall, WallSamples
-from stages.accumulate.survey import RingSurvey, some_at_a_time
+from stages.accumulate.survey import RingSurvey, centred, some_at_a_time
 
 _ROWS = 1000
 _REACHES = 4.0

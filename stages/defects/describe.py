@@ -9,8 +9,14 @@ import numpy as np
 from scipy.special import ndtr
 
 from pipeline.arrays import Byte, Float, Int
-from pipeline.artefacts.findings import Defect, DefectKind, clock_of_azimuth
-from pipeline.artefacts.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
+from pipeline.artefacts.findings import (
+    Defect,
+    DefectKind,
+    clock_of_azimuth,
+    en13508_suggestion,
+    pacp_suggestion,
+    pof_class,
+)
 from pipeline.artefacts.measured import PointCloud, WallTexture
 from stages.defects.classify import Features, features_of, probabilities
 from stages.defects.depth import Depth

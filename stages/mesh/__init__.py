@@ -16,11 +16,10 @@ from pipeline.artefacts.model import Overlays, PackedTiles, TexturedMesh
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.system.isolated import CrashError, TimeLimitError, call_isolated
-from stages.mesh.bake import bake_tile
+from stages.mesh.bake import TilePacker, bake_tile
 from stages.mesh.charts import cut_charts, pack, tile_count, tile_length, unroll
-from stages.mesh.clip import OpenMesh
 from stages.mesh.decimate import Decimated, decimate
-from stages.mesh.packing import TilePacker
+from stages.mesh.join import OpenMesh
 from stages.mesh.poisson import folded_cells, joined_pieces, piece_cuts, poisson_surface, seen_part
 from stages.mesh.surface import Surface, grid_surface, row_pieces, with_normals
 

@@ -17,8 +17,7 @@ from pipeline.artefacts.cloud_along import CloudAlong
 from pipeline.artefacts.measured import PointCloud
 from pipeline.geometry.axis import PipeAxis, frames_at
 from pipeline.system.native import open3d
-from stages.mesh.clip import NO_CUT, NOTHING, OpenMesh, clip
-from stages.mesh.join import join
+from stages.mesh.join import NO_CUT, NOTHING, OpenMesh, clip, join
 from stages.mesh.surface import Surface
 
 _NEIGHBOURS = 20

@@ -114,7 +114,7 @@ def test_page_is_one_file_without_requests():
 
 def test_page_model_in_node_is_python():
     node = shutil.which("node") or pytest.skip("node is not installed")
-    model = files("pipeline.commands.error_model_page") / "model.js"
+    model = files("pipeline.pages") / "error_model.js"
     program = (
         f"const b = require({json.dumps(str(model))});"
         f"console.log(JSON.stringify({page_parameters()}.map((p) => {{"
@@ -156,7 +156,7 @@ def test_page_in_a_browser_is_python(tmp_path):
 def test_page_reads_the_probe_file_as_python_does():
     node = shutil.which("node") or pytest.skip("node is not installed")
     probe = shared("recordings", "open-1-field", "probe.yaml")
-    model = files("pipeline.commands.error_model_page") / "model.js"
+    model = files("pipeline.pages") / "error_model.js"
     program = (
         f"const b = require({json.dumps(str(model))});"
         f"const text = require('fs').readFileSync({json.dumps(str(probe))}, 'utf8');"
@@ -178,7 +178,7 @@ def test_any_other_camera_becomes_a_table_the_page_projects_with():
         model = "other"
 
     camera = page_camera(Other(CAMERA.image_size, (366.0, 364.0), CAMERA.centre, CAMERA.distortion))
-    model = files("pipeline.commands.error_model_page") / "model.js"
+    model = files("pipeline.pages") / "error_model.js"
     program = (
         f"const b = require({json.dumps(str(model))});"
         f"console.log(JSON.stringify(b.project({json.dumps(camera)}, 30.1, -40.3, 21.7)))"

@@ -18,7 +18,7 @@ import pytest
 
 from pipeline.commands.follow import begun_anew, new_sections
 from pipeline.errors import Cancelled, InputError
-from pipeline.follow.watch import Glimpse, glimpses
+from pipeline.follow import Glimpse, glimpses
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.commands import gallery as command
-from pipeline.commands.gallery_report import gallery_page
+from pipeline.commands.gallery import gallery_page
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.switch import Switch, typical_switch
 from pipeline.simulator.gallery.exhibit import Exhibit, exhibit

@@ -7,7 +7,7 @@ an oval and an off-centre residual: what the error budget leaves in an accumulat
 import numpy as np
 import pytest
 
-from pipeline.artefacts.inspection_codes import pof_class
+from pipeline.artefacts.findings import pof_class
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects

@@ -11,8 +11,7 @@ from pipeline.artefacts.measured import Wall
 from pipeline.machine.stage import quiet_context
 from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
-from stages.mesh.clip import OpenMesh, clip
-from stages.mesh.join import join
+from stages.mesh.join import OpenMesh, clip, join
 from stages.mesh.poisson import joined_pieces, piece_cuts, poisson_surface, seen_part
 from stages.mesh.surface import Surface, weld
 from stages.overlays import OverlayParameters, overlays_of

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.artefacts.findings import DefectKind
-from pipeline.artefacts.inspection_codes import en13508_suggestion, pacp_suggestion, pof_class
+from pipeline.artefacts.findings import DefectKind, en13508_suggestion, pacp_suggestion, pof_class
 from pipeline.artefacts.model import Overlays
 from pipeline.review.decisions.replay import GONE, Finding
 from pipeline.review.documents import state_document

@@ -1,1 +1,0 @@
-"""The page of `pipeline.commands.calibrate`."""
