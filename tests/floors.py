@@ -21,7 +21,7 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
         "steps of a run",
         (
             "stages.rings", "stages.triangulate", "stages.accumulate", "stages.texture", "stages.mesh",
-            "stages.sections", "stages.defects", "stages.overlays", "stages.verify",
+            "stages.sections", "stages.defects", "stages.overlays",
         ),
     ),
     ("steps built on others", ("stages.motion", "stages.calibrate", "stages.preview", "stages.compare")),

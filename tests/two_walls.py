@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.artefacts.comparison import OutlinedFinding
+from pipeline.artefacts.findings import DefectKind
 from pipeline.artefacts.measured import WallTexture
-from pipeline.review.comparison.changes import changes
-from pipeline.review.comparison.growth import Resolution
-from pipeline.review.comparison.paired import PairedWalls
-from pipeline.review.comparison.places import put_together
-from pipeline.review.comparison.registration import register
-from pipeline.review.comparison.surface import Surface
-from pipeline.review.decisions.replay import Finding, Measured
-from pipeline.review.measuring.wall import MeasuredWall
+from pipeline.artefacts.wall_map import WallMap
+from stages.compare.changes import changes, put_together
+from stages.compare.growth import Resolution
+from stages.compare.paired import PairedWalls
+from stages.compare.registration.by_marks import RegisterParameters, register
+from stages.compare.registration.marks import Surface
 from tests.synthetic_wall import smooth_noise
 
 RADIUS, LENGTH, STEP, COLUMNS = 50.0, 120.0, 0.5, 720
@@ -20,6 +20,7 @@ NOISE_MM = 0.02
 SHIFT_MM, ROLL_RAD, SCALE = -9.3, 0.9, 1.002
 FINE = Resolution(0.1, 0.1, 1e-3, is_common=True)
 NO_WELDS = np.zeros(0)
+SAME = RegisterParameters()
 
 
 class Pipe:
@@ -54,13 +55,17 @@ class Pipe:
         for m in range(3):
             radius += 0.05 * rng.standard_normal((len(s), 1)) * np.cos(m * psi - rng.uniform(0, 6))
         full = np.full(radius.shape, 0.05, np.float32)
-        wall = MeasuredWall(own, psi, radius.astype(np.float32), full, np.full_like(full, NOISE_MM))
+        wall = WallMap(own, psi, radius.astype(np.float32), full, np.full_like(full, NOISE_MM))
         grey = 120 + 30 * self.at(self.paint, s, azimuth) + 4 * rng.standard_normal(radius.shape)
         bgra = np.dstack([np.clip(grey, 1, 255)] * 3 + [np.full(grey.shape, 255)]).astype(np.uint8)
         return Surface(wall, WallTexture(bgra, 0.0, STEP, -np.pi, 2 * np.pi / COLUMNS))
 
 
 PIPE = Pipe(1)
+
+
+def unseen(done, total):
+    """Take progress without showing it."""
 
 
 PLACES = tuple((s, psi) for s in (35.0, 60.0, 85.0) for psi in (-2.5, -1.0, 0.5, 2.0))
@@ -78,9 +83,7 @@ def family(growth_mm, seed, found_now=12):
 def finding(name, s, psi, half=6.0, kind="pit"):
     turn = half / RADIUS
     outline = ((s - half, psi - turn), (s + half, psi - turn), (s + half, psi + turn), (s - half, psi + turn))
-    return Finding(
-        str(name), kind, outline, Measured(s - half, s + half, 3, 4, 2 * half, 2 * half, 0.5, 0.02)
-    )
+    return OutlinedFinding(str(name), DefectKind(kind), outline, 0.5, 0.02)
 
 
 def moved(found):
@@ -95,6 +98,6 @@ def later(pits, seed, pipe=PIPE):
 
 def compared(earlier_pits, later_pits, earlier_found, later_found, seed=10):
     before, after = PIPE.surface(earlier_pits, seed), later(later_pits, seed + 1)
-    registration = register(before, after, NO_WELDS)
+    registration = register(before, after, NO_WELDS, SAME)
     places = put_together(earlier_found, [moved(f) for f in later_found], registration, RADIUS)
-    return changes(places, PairedWalls(before.wall, after.wall, registration), FINE)
+    return changes(places, PairedWalls(before.wall, after.wall, registration), FINE, unseen)

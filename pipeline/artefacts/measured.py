@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.geometry.axis import PipeAxis
 
 
@@ -159,28 +160,17 @@ class Trajectory:
 
 
 @dataclass(frozen=True)
-class RadiusMap:
-    """The wall's radius over distance and azimuth about the pipe's own axis.
+class RadiusMap(WallMap):
+    """A run's own map of the wall, about the pipe's axis; float32.
 
     Attributes
     ----------
-    distance_mm : (S,)
-        Uniform.
-    azimuth_rad : (A,)
-        Uniform in [−π, π), first −π.
-    radius_mm, sigma_mm, sigma_random_mm : (S, A) float32
-        Radius; total 1 σ (random and calibration); its random part. NaN where nothing was seen.
     count : (S, A) int64
         Ring samples that contributed.
     misalignment_mm : (S, A) float32
         Radius without laser misalignment correction minus ``radius_mm``.
     """
 
-    distance_mm: Float
-    azimuth_rad: Float
-    radius_mm: Float32
-    sigma_mm: Float32
-    sigma_random_mm: Float32
     count: Int
     misalignment_mm: Float32
 

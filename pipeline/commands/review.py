@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import socket
 import webbrowser
+from collections.abc import Sequence
 from contextlib import suppress
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -21,7 +22,7 @@ from pipeline.review.server.app import application
 from pipeline.review.server.guard import Guard
 
 if TYPE_CHECKING:
-    from pipeline.review.comparison.compared import Compared
+    from pipeline.review.compared import Compared
 
 
 def review(
@@ -41,13 +42,22 @@ def review(
         float | None,
         typer.Option(min=0.001, max=200, help="time from the earlier run to this one, for rates"),
     ] = None,
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="parameters of the comparison (YAML)")
+    ] = None,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="STAGE.NAME=VALUE", help="one of them, such as register.least_share=0.5"
+        ),
+    ] = None,
 ) -> None:
     """Go through a run in the browser: decide on each finding, measure, sign, print.
 
     The page is served on this machine only; nothing is sent anywhere. Decisions are kept in RUN/review.
     """
     opened = open_review(RunFiles(run.resolve()))
-    compared = _compared(opened, compare, years)
+    compared = _compared(opened, compare, years, config, assignments or ())
     with as_file(files("pipeline.review").joinpath("page", "dist")) as page:
         if not (page / "index.html").is_file():
             raise InputError(page, "has no page", hint="install boresight whole")
@@ -63,15 +73,23 @@ def review(
         serve(opened, page, port, browser, compared)
 
 
-def _compared(opened: Review, earlier: Path | None, years: float | None) -> Compared | None:
-    """Return the review's run laid on an earlier one, told in a line; None without one."""
+def _compared(
+    opened: Review, earlier: Path | None, years: float | None, config: Path | None, assignments: Sequence[str]
+) -> Compared | None:
+    """Return the review's run beside an earlier one, told in a line; None without one."""
     if earlier is None:
-        if years is not None:
-            raise InputError("--years", "is the time since an earlier run", hint="give it with --compare")
+        for name, given in (("--years", years), ("--config", config), ("--set", assignments or None)):
+            if given is not None:
+                raise InputError(name, "concerns a comparison", hint="give the earlier run with --compare")
         return None
-    from pipeline.review.comparison.compared import laid_on  # a review of one run need not wait for it
+    # a review of one run need not wait for what compares two
+    from pipeline.commands.review_compare import StagedComparison
+    from pipeline.review.compared import Compared, run_pair
 
-    compared = laid_on(opened, RunFiles(earlier.resolve()), years)
+    pair = run_pair(opened, RunFiles(earlier.resolve()))
+    comparison = StagedComparison.configured(config, assignments)
+    comparison.complete(pair)
+    compared = Compared(pair, comparison, years)
     typer.echo(compared.line)
     return compared
 

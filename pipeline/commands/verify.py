@@ -11,21 +11,29 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from pipeline.artefacts.reference import (
+from pipeline.artefacts.wall_map import WallMap
+from pipeline.errors import InputError
+from pipeline.files.disk import written_together
+from pipeline.files.provenance import MadeBy
+from pipeline.recording.input_file import files_sha256
+from stages.compare.reference import (
     SURFACE_SUFFIXES,
-    WallMap,
     map_file,
     read_surface,
     read_wall_map,
     read_wall_points,
 )
-from pipeline.errors import InputError
-from pipeline.files.disk import written_together
-from pipeline.files.provenance import MadeBy
-from pipeline.recording.input_file import files_sha256
-from stages.verify.accuracy import Accuracy, Differences, accuracy, bore_differences, wall_coverage
-from stages.verify.maps import align_maps, map_differences
-from stages.verify.surfaces import register, surface_differences
+from stages.compare.registration.by_points import register_points
+from stages.compare.registration.by_radius import align_maps
+from stages.compare.verification import (
+    Accuracy,
+    Differences,
+    accuracy,
+    bore_differences,
+    map_differences,
+    surface_differences,
+    wall_coverage,
+)
 
 
 @dataclass(frozen=True)
@@ -149,7 +157,7 @@ def _against_surface(run: Path, path: Path, unit: str, reach_mm: float) -> Verif
     if not path.is_file():
         raise InputError(path, "does not exist", expected="a mesh or a cloud")
     surface, points = read_surface(path, units[unit]), read_wall_points(run)
-    pose = register(points, surface)
+    pose = register_points(points, surface)
     differences = surface_differences(points, surface, pose, reach_mm)
     alignment = {"T_rp": pose.T_rp.tolist(), "rms_mm": pose.rms_mm}
     kind = "reference mesh" if len(surface.triangles) else "reference cloud"

@@ -14,7 +14,7 @@ from scipy.stats import binned_statistic_2d
 
 from pipeline.commands.figure import rendered, tidy
 from pipeline.pages import page_template
-from stages.verify.accuracy import Differences
+from stages.compare.verification import Differences
 
 _STATIONS, _SECTORS = 300, 120
 

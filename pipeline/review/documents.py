@@ -11,13 +11,13 @@ import numpy as np
 from pipeline.artefacts.findings import DefectKind
 from pipeline.artefacts.measured import Trajectory
 from pipeline.artefacts.model import Overlay, Overlays
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.json_file import parse_json, read_json
 from pipeline.review.assessment import strength
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.overlap import covered
 from pipeline.review.decisions.replay import GONE, Finding
 from pipeline.review.flat_tiles import FlatPicture
-from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
@@ -87,7 +87,7 @@ def model_document(model: StretchedModel) -> list[dict[str, Any]]:
     return [asdict(stretch) for stretch in model.stretches()]
 
 
-def section_document(wall: MeasuredWall, overlays: Overlays, distance_mm: float) -> dict[str, Any]:
+def section_document(wall: WallMap, overlays: Overlays, distance_mm: float) -> dict[str, Any]:
     """Return the cross-section next to a distance, with the fitted pipe and the nominal circle."""
     row = wall.row(distance_mm)
     return cleaned({
@@ -100,9 +100,7 @@ def section_document(wall: MeasuredWall, overlays: Overlays, distance_mm: float)
     })  # fmt: skip
 
 
-def profile_document(
-    wall: MeasuredWall, distance_mm: float, azimuth_rad: float, half_mm: float
-) -> dict[str, Any]:
+def profile_document(wall: WallMap, distance_mm: float, azimuth_rad: float, half_mm: float) -> dict[str, Any]:
     """Return the radius along the pipe and around it through a point, less the median of each."""
     rows = wall.rows(distance_mm - half_mm, distance_mm + half_mm)
     column, row = wall.column(azimuth_rad), wall.row(distance_mm)

@@ -22,7 +22,7 @@ from pipeline.review.quality import quality_document
 from pipeline.review.review import Review, State
 
 if TYPE_CHECKING:
-    from pipeline.review.comparison.compared import Compared
+    from pipeline.review.compared import Compared
 
 _SECTIONS = 400
 _LARGEST_MODEL = 200 << 20

@@ -13,10 +13,10 @@ import numpy as np
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.findings import Sections
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
 from pipeline.review.accounts import REASONS
 from pipeline.review.documents import cleaned
-from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.run_files import RunFiles
 
 _MOST_POINTS = 600
@@ -24,7 +24,7 @@ _LARGEST_PAGE = 64 << 20
 _PICTURE = re.compile(r"data:image/(png|jpeg);base64,[A-Za-z0-9+/=]+")
 
 
-def quality_document(files: RunFiles, wall: MeasuredWall) -> dict[str, Any]:
+def quality_document(files: RunFiles, wall: WallMap) -> dict[str, Any]:
     """Return plots along the pipe, ring samples by reason, facts of the instrument, diagnosis pictures."""
     rings, trajectory = files.artefact(RingSamples), files.artefact(Trajectory)
     return cleaned({
@@ -42,7 +42,7 @@ def _plot(title: str, unit: str, x_label: str, x: Float, **curves: Float) -> dic
     return {"title": title, "unit": unit, "x_label": x_label, "x": x[::step], "curves": named}
 
 
-def _wall_plots(wall: MeasuredWall) -> list[dict[str, Any]]:
+def _wall_plots(wall: WallMap) -> list[dict[str, Any]]:
     step = max(-(-len(wall.distance_mm) // _MOST_POINTS), 1)
     seen = np.isfinite(wall.radius_mm[::step]).mean(1)
     total, random = (_median_of_rows(a[::step]) for a in (wall.sigma_mm, wall.sigma_random_mm))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from pipeline.artefacts.measured import Wall
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.codec import Json, canonical
 from pipeline.files.disk import FileStamp, stamp_of
 from pipeline.review.decisions import actions as do
@@ -15,7 +16,6 @@ from pipeline.review.decisions.carry import carried, same_findings
 from pipeline.review.decisions.ledger import Entry, Ledger, Signature
 from pipeline.review.decisions.replay import Finding, counting, replay
 from pipeline.review.measuring.outline import OutlineGauge
-from pipeline.review.measuring.wall import MeasuredWall, measured_wall
 from pipeline.review.run_files import RunFiles, measured_findings
 
 FOLDER = "review"
@@ -140,9 +140,9 @@ class Review:
         self.ledger.sign(name, standard, remarks, revision, self.seal(self.state()).sha256)
         return self.state()
 
-    def wall(self) -> MeasuredWall:
+    def wall(self) -> WallMap:
         """Return the wall as the run measured it."""
-        return measured_wall(self.files.artefact(Wall).radius_map)
+        return self.files.artefact(Wall).radius_map
 
     def _basis(self) -> tuple[str, tuple[Finding, ...]]:
         """Return the hash of the findings as measured now, and the findings."""

@@ -88,6 +88,11 @@ class RunFiles:
         found: _Artefact = _artefact(self, kind, self.version)  # type: ignore[arg-type]
         return found
 
+    def stage_key(self, kind: type) -> str:
+        """Return the key of the result of class ``kind``, empty when the run's record has none."""
+        name = _MAKERS[kind]
+        return next((str(s["key"]) for s in self.record()["stages"] if s["name"] == name), "")
+
     def recording(self) -> Recording:
         """Return the recording that the run was made from.
 
@@ -153,8 +158,7 @@ def _refuse_other(path: Path, role: str, found: str, made_from: str) -> None:
 
 @lru_cache(maxsize=16)
 def _artefact(files: RunFiles, kind: type, _version: str) -> Any:
-    stage = _MAKERS[kind]
-    key = next((s["key"] for s in files.record()["stages"] if s["name"] == stage), "")
+    stage, key = _MAKERS[kind], files.stage_key(kind)
     found = RunFolder(files.path).store.look(stage, key, kind) if key else None
     if found is None:
         raise InputError(files.path, f"has no result of stage {stage}", hint="run it again: boresight run")

@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.review.comparison.comparison import Comparison
+from pipeline.commands.review_compare import StagedComparison
+from pipeline.review.compared import RunPair
 from pipeline.review.review import open_review
 from pipeline.review.run_files import RunFiles
 from tests.simulated import rendered, shipped, smaller
@@ -45,16 +46,17 @@ def made_walls(families: int) -> None:
 
 def simulated_runs(runs: list[Path], truths: list[Path]) -> None:
     """Print every change of two simulated runs beside the true one."""
-    comparison = Comparison(*(open_review(RunFiles(run.resolve())) for run in reversed(runs)))
-    registration = comparison.pair.registration
+    pair = RunPair(*(open_review(RunFiles(run.resolve())) for run in reversed(runs)))
+    walls, comparison = StagedComparison.configured(None, ())(pair)
+    registration = walls.registration
     walls = [_true_wall(folder) for folder in truths]
-    for change in comparison.changes():
+    for change in comparison.changes:
         if change.growth is None:
             continue
         s, psi = change.place.middle
         earlier = registration.to_earlier(np.array([s]), np.array([psi]))
         place = float(earlier[0][0]), float(earlier[1][0])
-        corner = np.concatenate(change.place.outlines)
+        corner = change.place.corners
         half = np.ptp(corner, axis=0) / 2 + [0.5, 0.5 / RADIUS]
         sign = 1 if change.place.kind.is_metal_loss else -1
         before, after = (_extreme(wall, place, half, sign) for wall in walls)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from pipeline.artefacts.reference import read_wall_map, read_wall_points
 from pipeline.batch.cluster import read_cluster
 from pipeline.errors import InputError
 from pipeline.instrument.camera.formats import read_camera, write_camera
@@ -29,6 +28,7 @@ from pipeline.review.run_files import RunFiles, measured_findings
 from pipeline.simulator.prior import read_prior
 from pipeline.simulator.scene import read_scene
 from stages.catalogue import PIPELINE
+from stages.compare.reference import read_wall_map, read_wall_points
 from stages.diagnose.drill.answer import read_answer, read_concealed
 from tests.made_recording import write_folder, write_mcap, write_ros1, write_ros2
 from tests.shared_data import PROJECT_ROOT

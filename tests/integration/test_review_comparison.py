@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from pipeline.artefacts.comparison import Fate
 from pipeline.cli import app
-from pipeline.review.comparison.changes import Fate
-from pipeline.review.comparison.compared import Compared, laid_on
-from pipeline.review.comparison.comparison import DIFFERENCE
+from pipeline.commands.review_compare import StagedComparison
+from pipeline.review.compared import DIFFERENCE, Compared, run_pair
 from pipeline.review.review import open_review
 from pipeline.review.run_files import RunFiles
 
@@ -27,7 +27,8 @@ def compared(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Compared
     shutil.copytree(sample, earlier)
     later = earlier.with_name("later")
     shutil.copytree(sample, later)
-    return laid_on(open_review(RunFiles(later)), RunFiles(earlier), years=2.0)
+    pair = run_pair(open_review(RunFiles(later)), RunFiles(earlier))
+    return Compared(pair, StagedComparison.configured(None, ()), years=2.0)
 
 
 def test_a_run_lies_on_itself_and_nothing_has_changed(compared: Compared) -> None:
@@ -52,8 +53,8 @@ def test_the_tables_tell_the_same_numbers(compared: Compared) -> None:
 
 
 def test_every_layer_is_there_for_the_page_and_for_the_copy(compared: Compared, tmp_path: Path) -> None:
-    later = compared.comparison.now.files.path
-    earlier = compared.comparison.earlier.files.path
+    later = compared.pair.now.files.path
+    earlier = compared.pair.earlier.files.path
     command = ["review", str(later), "--compare", str(earlier), "--export", str(tmp_path / "copy")]
     done = CliRunner().invoke(app, command)
     assert done.exit_code == 0, done.output

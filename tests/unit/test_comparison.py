@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.artefacts.comparison import FAMILY_ERROR, Fate
 from pipeline.errors import UnusableError
-from pipeline.review.comparison.changes import FAMILY_ERROR, Fate, changes, holm
-from pipeline.review.comparison.paired import PairedWalls
-from pipeline.review.comparison.places import put_together
-from pipeline.review.comparison.registration import register
+from stages.compare.changes import changes, holm, put_together
+from stages.compare.paired import PairedWalls
+from stages.compare.registration.by_marks import register
 from tests.two_walls import (
     FINE,
     NO_WELDS,
@@ -17,6 +17,7 @@ from tests.two_walls import (
     PLACES,
     RADIUS,
     ROLL_RAD,
+    SAME,
     SCALE,
     SHIFT_MM,
     Pipe,
@@ -25,11 +26,12 @@ from tests.two_walls import (
     finding,
     later,
     moved,
+    unseen,
 )
 
 
 def test_shift_scale_and_roll_come_out_within_their_sigma():
-    found = register(PIPE.surface((), 1), later((), 2), NO_WELDS)
+    found = register(PIPE.surface((), 1), later((), 2), NO_WELDS, SAME)
     at = np.array([40.0, 70.0, 95.0])
     now, azimuth = found.to_now(at, np.zeros(3))
     sigma = np.array([found.sigma_at(s) for s in at])
@@ -44,20 +46,20 @@ def test_shift_scale_and_roll_come_out_within_their_sigma():
 
 def test_relief_alone_is_enough():
     before, after = (replace(s, texture=None) for s in (PIPE.surface((), 1), later((), 2)))
-    assert register(before, after, NO_WELDS).chance < 1e-6
+    assert register(before, after, NO_WELDS, SAME).chance < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(2, 8))
 def test_another_pipe_is_refused(seed):
     with pytest.raises(UnusableError, match="do not show the same wall"):
-        register(PIPE.surface((), 1), later((), 2, Pipe(seed)), NO_WELDS)
+        register(PIPE.surface((), 1), later((), 2, Pipe(seed)), NO_WELDS, SAME)
 
 
 def test_another_bore_is_refused():
     wide = later((), 2)
     wide = replace(wide, wall=replace(wide.wall, radius_mm=wide.wall.radius_mm + 10))
     with pytest.raises(UnusableError, match=r"bores are 100\.. mm and 120\.. mm"):
-        register(PIPE.surface((), 1), wide, NO_WELDS)
+        register(PIPE.surface((), 1), wide, NO_WELDS, SAME)
 
 
 def test_growth_new_and_vanished_are_found_and_told_from_what_stays():
@@ -99,15 +101,15 @@ def test_wall_that_one_run_did_not_see_is_not_called_unchanged():
     hidden = np.array(before.wall.radius_mm)
     hidden[108:132, 380:412] = np.nan
     before = replace(before, wall=replace(before.wall, radius_mm=hidden))
-    registration = register(before, after, NO_WELDS)
+    registration = register(before, after, NO_WELDS, SAME)
     places = put_together([], [moved(finding(1, 60.0, 0.3))], registration, RADIUS)
-    (found,) = changes(places, PairedWalls(before.wall, after.wall, registration), FINE)
+    (found,) = changes(places, PairedWalls(before.wall, after.wall, registration), FINE, unseen)
     assert found.fate is Fate.UNSEEN_EARLIER
     assert found.seen_earlier < 0.5 < found.seen_now
 
 
 def test_a_deposit_is_not_taken_for_the_pit_beside_it():
-    registration = register(PIPE.surface((), 1), later((), 2), NO_WELDS)
+    registration = register(PIPE.surface((), 1), later((), 2), NO_WELDS, SAME)
     places = put_together(
         [finding(1, 60.0, 0.3)], [moved(finding(1, 60.0, 0.3, kind="deposit"))], registration, RADIUS
     )

@@ -12,8 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.artefacts import reference
-from pipeline.artefacts.reference import read_wall_map
 from pipeline.errors import InputError
 from pipeline.files import json_file, yaml_file
 from pipeline.instrument.camera.formats import read_camera
@@ -28,6 +26,8 @@ from pipeline.review.model_stretches import read_model
 from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.run_files import RunFiles, measured_findings
 from pipeline.review.server import guard
+from stages.compare import reference
+from stages.compare.reference import read_wall_map
 from tests.fuzz.targets import TARGETS
 from tests.shared_data import PROJECT_ROOT
 from tests.truth_run import true_axis

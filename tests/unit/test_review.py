@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
 from pipeline.review.assessment import b31g, strength
 from pipeline.review.decisions import actions as do
@@ -13,7 +14,6 @@ from pipeline.review.decisions.overlap import covered
 from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, replay
 from pipeline.review.measuring.outline import OutlineGauge
 from pipeline.review.measuring.tools import readings
-from pipeline.review.measuring.wall import MeasuredWall
 
 SQUARE = ((48.0, 0.1), (52.0, 0.1), (52.0, 0.2), (48.0, 0.2))
 SIZE = Measured(48, 52, 3, 4, 4, 5, 1.0, 0.1)
@@ -95,7 +95,7 @@ def test_a_pit_of_known_depth_is_measured_against_the_wall_around_it():
     s, psi = np.arange(0, 100, 0.5), -np.pi + 2 * np.pi / 720 * np.arange(720)
     radius = np.full((len(s), len(psi)), 50.0)
     radius[(s > 45)[:, None] & (s < 55)[:, None] & (np.abs(psi - 0.15) < 0.1)[None]] += 1.0
-    wall = MeasuredWall(s, psi, radius, np.full_like(radius, 0.03), np.full_like(radius, 0.02))
+    wall = WallMap(s, psi, radius, np.full_like(radius, 0.03), np.full_like(radius, 0.02))
     inside = ((44.0, 0.03), (56.0, 0.03), (56.0, 0.27), (44.0, 0.27))
     assert OutlineGauge(wall).measure(inside).depth_mm == pytest.approx(1.0, abs=0.01)
     diameter = readings(wall, "diameter", ((20.0, 1.0),))[0]

@@ -8,7 +8,7 @@ import typer
 from typer.testing import CliRunner
 
 from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall, WallTexture
-from pipeline.artefacts.reference import WallMap, read_surface, read_wall_map, read_wall_points
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.commands.verify import verify
 from pipeline.errors import InputError, UnusableError
 from pipeline.export.arrays import write_cloud
@@ -16,9 +16,16 @@ from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
 from pipeline.recording.input_file import files_sha256
 from pipeline.system.native import open3d
-from stages.verify.accuracy import accuracy, bore_differences, wall_coverage
-from stages.verify.maps import align_maps, map_differences
-from stages.verify.surfaces import register, surface_differences
+from stages.compare.reference import read_surface, read_wall_map, read_wall_points
+from stages.compare.registration.by_points import register_points
+from stages.compare.registration.by_radius import align_maps
+from stages.compare.verification import (
+    accuracy,
+    bore_differences,
+    map_differences,
+    surface_differences,
+    wall_coverage,
+)
 from tests.shared_data import shared
 
 SIGMA = 0.03
@@ -179,7 +186,7 @@ def test_a_reference_surface_in_its_own_frame(tmp_path, triangles):
     pose = from_parts(rotation_from_vector(np.array([0.7, -0.4, 1.1])), np.array([120.0, -40.0, 300.0]))
     file = reference_mesh(tmp_path / "wall.ply", triangles=triangles, pose=pose)
     points, surface = read_wall_points(run, 20_000), read_surface(file, 1.0)
-    found = register(points, surface)
+    found = register_points(points, surface)
     np.testing.assert_allclose(found.T_rp, pose, atol=0.03)
     figures = accuracy(surface_differences(points, surface, found, 5.0))
     assert figures.bias_mm == pytest.approx(0.05, abs=3e-3), "too large a radius is positive"

@@ -115,6 +115,11 @@ class Ledger:
             ).fetchall()
         return tuple(Entry(i, basis, who, at, action_of(text)) for i, basis, who, at, text in rows)
 
+    def revision(self) -> int:
+        """Return the number of the last action, 0 before the first."""
+        with self._open() as connection:
+            return _revision(connection)
+
     def sign(self, name: str, standard: str, remarks: str, revision: int, sha256: str) -> Signature:
         """Append a signature of the state at ``revision``.
 

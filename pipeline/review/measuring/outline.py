@@ -10,8 +10,8 @@ import numpy as np
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.findings import clock_of_azimuth
+from pipeline.artefacts.wall_map import WallMap, cells_within
 from pipeline.review.decisions.replay import Measured, Outline
-from pipeline.review.measuring.wall import MeasuredWall
 
 _AROUND_MM = 6.0
 _LEAST_AROUND = 20
@@ -23,7 +23,7 @@ _MEAN_MM = 1.0
 class OutlineGauge:
     """Measures outlines on a wall."""
 
-    wall: MeasuredWall
+    wall: WallMap
 
     def measure(self, outline: Outline) -> Measured:
         """Return the outline's extent and its extreme depth against the wall within 6 mm around it."""
@@ -50,7 +50,7 @@ class OutlineGauge:
         count = min(last - first + 1, len(wall.azimuth_rad))
         at_row = (point[:, 0] - wall.distance_mm[rows[0]]) / wall.step_mm
         at_column = (point[:, 1] - wall.azimuth_rad[0]) / wall.step_rad - first
-        inside = filled(np.stack([at_column, at_row], -1), (len(rows), count))
+        inside = cells_within(np.stack([at_column, at_row], -1), (len(rows), count))
         reach = np.array([count and _AROUND_MM / (radius * wall.step_rad), _AROUND_MM / wall.step_mm])
         size = tuple(int(2 * np.ceil(r) + 1) for r in reach)
         grown = cv2.dilate(inside.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, size))
@@ -72,12 +72,3 @@ class OutlineGauge:
         noise = float(np.median(sigma[seen & np.isfinite(sigma)])) / np.sqrt(cells[0] * cells[1])
         spread = robust_spread(away[known])
         return extreme, float(np.hypot(noise, spread / np.sqrt(cells[0] * cells[1])))
-
-
-def filled(polygon: Float, shape: tuple[int, int]) -> Bool:
-    """Return which cells (rows, columns) a polygon (V, 2) of (column, row) covers; at least one."""
-    mask = np.zeros(shape, np.uint8)
-    shift = 6
-    corner = np.round(polygon * (1 << shift)).astype(np.int32)
-    cv2.fillPoly(mask, [corner], 1, shift=shift)
-    return mask.astype(bool)

@@ -10,10 +10,10 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import BoresightError
 from pipeline.review.decisions.replay import Outline
 from pipeline.review.measuring.outline import OutlineGauge
-from pipeline.review.measuring.wall import MeasuredWall
 
 Tool = Literal["point", "distance", "area", "depth", "diameter"]
 _STEPS_PER_CELL = 2
@@ -34,7 +34,7 @@ class Reading:
     unit: str
 
 
-def readings(wall: MeasuredWall, tool: Tool, points: Outline) -> tuple[Reading, ...]:
+def readings(wall: WallMap, tool: Tool, points: Outline) -> tuple[Reading, ...]:
     """Return what a tool reads at points (distance mm, azimuth rad).
 
     Raises
@@ -51,7 +51,7 @@ def readings(wall: MeasuredWall, tool: Tool, points: Outline) -> tuple[Reading, 
     return result
 
 
-def _point(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+def _point(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
     s, a = points[0]
     radius, sigma, _ = wall.radius_at(s, a)
     return (
@@ -63,7 +63,7 @@ def _point(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
     )
 
 
-def _distance(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+def _distance(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
     """Along the wall between the points, over its relief, and straight through the bore."""
     (s0, a0), (s1, a1) = points[0], points[1]
     xyz, sigma = _line(wall, (s0, a0), (s1, a1))
@@ -80,7 +80,7 @@ def _distance(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
     )
 
 
-def _line(wall: MeasuredWall, start: tuple[float, float], end: tuple[float, float]) -> tuple[Float, Float]:
+def _line(wall: WallMap, start: tuple[float, float], end: tuple[float, float]) -> tuple[Float, Float]:
     """Return points (N, 3) of the wall on the straight line of the flat view, and their σ (N,)."""
     cells = max(abs(end[0] - start[0]) / wall.step_mm, abs(end[1] - start[1]) / wall.step_rad, 1)
     t = np.linspace(0, 1, int(cells * _STEPS_PER_CELL) + 2)
@@ -89,7 +89,7 @@ def _line(wall: MeasuredWall, start: tuple[float, float], end: tuple[float, floa
     return np.stack([radius * np.cos(a), radius * np.sin(a), s], -1), sigma
 
 
-def _area(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+def _area(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
     """Area of the polygon on the wall as if it were smooth: cells times the local radius."""
     point = np.asarray(points, float)
     rows = wall.rows(point[:, 0].min(), point[:, 0].max())
@@ -102,12 +102,12 @@ def _area(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
     return (Reading("area", area, float(np.hypot(area * sigma / radius, placed)), "mm²"),)
 
 
-def _depth(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+def _depth(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
     size = OutlineGauge(wall).measure(points)
     return (Reading("depth", size.depth_mm, size.depth_sigma_mm, "mm"),)
 
 
-def _diameter(wall: MeasuredWall, points: Outline) -> tuple[Reading, ...]:
+def _diameter(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
     """Through the axis at the point's azimuth, and the mean of the section."""
     s, a = points[0]
     (r0, sigma0, _), (r1, sigma1, _) = wall.radius_at(s, a), wall.radius_at(s, a + np.pi)

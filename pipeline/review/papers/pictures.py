@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from pipeline.arrays import Byte, Float
 from pipeline.artefacts.model import Overlays
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.review.decisions.replay import Finding
 from pipeline.review.flat_tiles import PHOTO, FlatPicture, picture_of
-from pipeline.review.measuring.wall import MeasuredWall
 from pipeline.review.run_files import RunFiles
 
 _SIZE_PX, _QUALITY = 480, 90
@@ -43,7 +43,7 @@ def finding_picture(files: RunFiles, finding: Finding, radius_mm: float) -> byte
     return _jpeg(picture)
 
 
-def section_plot(wall: MeasuredWall, overlays: Overlays, distance_mm: float, azimuth_rad: float) -> bytes:
+def section_plot(wall: WallMap, overlays: Overlays, distance_mm: float, azimuth_rad: float) -> bytes:
     """Return the cross-section at a distance as SVG, deviations exaggerated twentyfold."""
     row = wall.row(distance_mm)
     nominal = overlays.nominal_radius_mm

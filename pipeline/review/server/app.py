@@ -29,7 +29,7 @@ from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.review import Review
 
 if TYPE_CHECKING:  # a review of one run alone need not wait for it
-    from pipeline.review.comparison.compared import Compared
+    from pipeline.review.compared import Compared
 
 _CONFLICT, _REFUSED, _MISSING = 409, 422, 404
 Handler = Callable[[Request], Awaitable[Response]]

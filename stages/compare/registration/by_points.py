@@ -1,4 +1,4 @@
-"""A run's wall points against a reference mesh or cloud: registration, then signed distances."""
+"""How a run's wall points lie on a reference mesh or cloud: a pose in space, by distances along normals."""
 
 from __future__ import annotations
 
@@ -10,26 +10,30 @@ from scipy.spatial import cKDTree
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
-from pipeline.artefacts.reference import Surface, WallPoints
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
 from pipeline.system.native import open3d
-from stages.verify.accuracy import Differences
+from stages.compare.reference import ReferenceSurface, WallPoints
 
-_FIT_POINTS = 5000
+# Points that are fitted, and that each start is tried with: bounds on time alone.
+_FIT_POINTS, _TRIAL_POINTS = 5000, 800
+# Starts every 30°, so that the nearest is at most 15° off; that all come home from there was not measured.
 _ROLLS = 12
+# Twice the six coefficients of the quadric that is laid through them.
 _NEIGHBOURS = 12
+# Surfaces that stay this share of their size apart are not of one pipe: no run comes near it.
+_FARTHEST = 0.05
 
 
 @dataclass(frozen=True)
-class Registration:
+class PointsPose:
     """Pose ``T_rp`` (4, 4) of the run in the reference, and the weighted distances that stay."""
 
     T_rp: Float
     rms_mm: float
 
 
-def register(points: WallPoints, reference: Surface) -> Registration:
+def register_points(points: WallPoints, reference: ReferenceSurface) -> PointsPose:
     """Return the pose of least squared distances along the wall's normals, robustly.
 
     Starts: the reference's frame as it is, and the long axes of both brought together, either way round, at
@@ -45,40 +49,25 @@ def register(points: WallPoints, reference: Surface) -> Registration:
     )
     nearest = NearestPoints(reference)
     xyz, outward = points.xyz_p[chosen], points.outward_p[chosen]
-    few = slice(None, None, max(1, len(chosen) // 800))
+    few = slice(None, None, max(1, len(chosen) // _TRIAL_POINTS))
     starts = [np.eye(4), *_axis_starts(points.xyz_p, reference.vertices)]
     rough = [_refined(xyz[few], outward[few], nearest, start, 12) for start in starts]
     best = min(rough, key=lambda r: r.rms_mm)
     found = _refined(xyz, outward, nearest, best.T_rp, 60)
     size = float(np.linalg.norm(np.ptp(xyz, axis=0)))
-    if found.rms_mm > 0.05 * size:
+    if found.rms_mm > _FARTHEST * size:
         raise UnusableError(
-            "verify", f"run and reference stay {found.rms_mm:.3g} mm apart", limit=f"{0.05 * size:.3g} mm",
+            "verify", f"run and reference stay {found.rms_mm:.3g} mm apart",
+            limit=f"{_FARTHEST * size:.3g} mm",
             hint="check the reference's unit (--reference-unit) and that it shows this pipe",
         )  # fmt: skip
     return found
 
 
-def surface_differences(
-    points: WallPoints, reference: Surface, pose: Registration, reach_mm: float
-) -> Differences:
-    """Return the distances of the run's points from the reference along its outward normals.
-
-    Points farther than ``reach_mm`` from the reference do not lie on it and are left out.
-    """
-    xyz, outward = transform(pose.T_rp, points.xyz_p), points.outward_p @ pose.T_rp[:3, :3].T
-    closest = NearestPoints(reference)(xyz)
-    away = xyz - closest
-    error = np.sum(away * outward, -1)
-    on = np.linalg.norm(away, axis=-1) <= reach_mm
-    sigma = points.sigma_mm[on]
-    return Differences(points.distance_mm[on], points.azimuth_rad[on], error[on], sigma, sigma)
-
-
 class NearestPoints:
     """Finds the closest points of a mesh, or of quadrics through the neighbours in a cloud."""
 
-    def __init__(self, reference: Surface) -> None:
+    def __init__(self, reference: ReferenceSurface) -> None:
         self.reference = reference
         if len(reference.triangles):
             o3d = open3d()
@@ -145,7 +134,7 @@ def _long_axis(xyz: Float) -> tuple[Float, Float]:
     return middle, vectors
 
 
-def _refined(xyz: Float, outward: Float, nearest: NearestPoints, start: Float, steps: int) -> Registration:
+def _refined(xyz: Float, outward: Float, nearest: NearestPoints, start: Float, steps: int) -> PointsPose:
     """Gauss-Newton on distances along the normals, Cauchy weights at twice their spread."""
     T, rms = start, math.inf
     for _ in range(steps):
@@ -163,4 +152,4 @@ def _refined(xyz: Float, outward: Float, nearest: NearestPoints, start: Float, s
         rms = float(np.sqrt(np.average(error**2, weights=weight)))
         if np.abs(move[3:]).max() < 1e-6 and np.abs(move[:3]).max() < 1e-8:
             break
-    return Registration(T, rms)
+    return PointsPose(T, rms)

@@ -1,4 +1,4 @@
-"""Figures of accuracy: differences of a run from its reference, point by point."""
+"""How accurate a run is: its differences from a reference, point by point, and their figures."""
 
 from __future__ import annotations
 
@@ -8,10 +8,23 @@ import numpy as np
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float
-from pipeline.artefacts.reference import WallMap
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import UnusableError
+from pipeline.geometry.rigid import transform
+from stages.compare.reference import ReferenceSurface, WallPoints
+from stages.compare.registration.by_points import NearestPoints, PointsPose
+from stages.compare.registration.by_radius import (
+    Alignment,
+    cells_around,
+    looked_up,
+    pose_design,
+    samples_of,
+)
 
+# Half the width of the 95 % interval of a normal distribution, in σ.
 _NORMAL_95 = 1.959964
+# With fewer points a 95th percentile rests on five of them.
+_LEAST_POINTS = 100
 
 
 @dataclass(frozen=True)
@@ -67,9 +80,10 @@ def accuracy(differences: Differences) -> Accuracy:
         If fewer than 100 points could be compared.
     """
     error = differences.error_mm
-    if len(error) < 100:
+    if len(error) < _LEAST_POINTS:
         raise UnusableError(
-            "verify", f"only {len(error)} points of the run lie on the reference", limit="at least 100",
+            "verify", f"only {len(error)} points of the run lie on the reference",
+            limit=f"at least {_LEAST_POINTS}",
             hint="check that both show the same stretch of pipe, and --max-shift-mm",
         )  # fmt: skip
     spread = spread_about_median(error)
@@ -105,6 +119,44 @@ def bore_differences(wall: WallMap, diameter_mm: float, tolerance_mm: float) -> 
         np.sqrt(wall.sigma_mm[known] ** 2 + bore),
         np.sqrt(wall.sigma_random_mm[known] ** 2 + bore),
     )
+
+
+def map_differences(run: WallMap, reference: WallMap, alignment: Alignment) -> Differences:
+    """Return run minus aligned reference for every cell of the run that lies on it."""
+    samples = samples_of(run, run.radius_mm.size)
+    error = samples.radius_mm - looked_up(reference.radius_mm, reference, samples, alignment.placement)
+    error = error - pose_design(samples) @ np.array(alignment.pose_mm)
+    on = np.isfinite(error)
+    known = np.isfinite(run.radius_mm)
+
+    cell, weight = cells_around(reference, samples, alignment.placement)
+    # the random part of neighbouring cells averages in the interpolation, the instrument's does not
+    its_random = np.sum(weight**2 * reference.sigma_random_mm[cell] ** 2, 0)[on]
+    shared = np.maximum(reference.sigma_mm**2 - reference.sigma_random_mm**2, 0.0)
+    its_shared = np.sum(weight * shared[cell], 0)[on]
+    return Differences(
+        samples.middle_mm + samples.offset_mm[on],
+        samples.azimuth_rad[on],
+        error[on],
+        np.sqrt(run.sigma_mm[known][on] ** 2 + its_random + its_shared),
+        np.sqrt(run.sigma_random_mm[known][on] ** 2 + its_random),
+    )
+
+
+def surface_differences(
+    points: WallPoints, reference: ReferenceSurface, pose: PointsPose, reach_mm: float
+) -> Differences:
+    """Return the distances of the run's points from the reference along its outward normals.
+
+    Points farther than ``reach_mm`` from the reference do not lie on it and are left out.
+    """
+    xyz, outward = transform(pose.T_rp, points.xyz_p), points.outward_p @ pose.T_rp[:3, :3].T
+    closest = NearestPoints(reference)(xyz)
+    away = xyz - closest
+    error = np.sum(away * outward, -1)
+    on = np.linalg.norm(away, axis=-1) <= reach_mm
+    sigma = points.sigma_mm[on]
+    return Differences(points.distance_mm[on], points.azimuth_rad[on], error[on], sigma, sigma)
 
 
 def _inside(error: Float, sigma: Float) -> float:

@@ -1,4 +1,4 @@
-"""The first, rough laying of two walls on each other: every stretch is looked for all over the other wall."""
+"""Pieces of an earlier wall looked for on a later one: roughly anywhere, then closely where they must be."""
 
 from __future__ import annotations
 
@@ -9,17 +9,23 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32, Int
-from pipeline.review.comparison.surface import CELLS_PER_RADIUS, COLUMNS, Surface
+from stages.compare.registration.marks import CELLS_PER_RADIUS, COLUMNS, Surface
 
-_COARSER = 2
-_STRETCH_RADII = 0.8
-# Stretches that are looked for everywhere, and all that are then looked for near where those lie.
-_ANCHORS = 12
-_MOST_STRETCHES = 96
+# Lengths of pieces, in radii, and cells of the rough search, in cells of the close one: chosen so that a
+# 4 inch pipe is searched in a second; what they cost in certainty was not measured.
+_STRETCH_RADII, _BLOCK_RADII, _COARSER = 0.8, 0.5, 2
+# So many stretches are looked for everywhere, so many then near where those lie: bounds on time alone.
+_ANCHORS, _MOST_STRETCHES, _MOST_STATIONS, _CHUNK_ROWS = 12, 96, 400, 1024
+# A rough match may be wrong by so many of its cells. Chosen, not measured.
 _ROOM_CELLS = 3.0
-_CHUNK_ROWS = 1024
-# Encoders and calibrations agree on distance at least so well.
-LARGEST_STRAIN = 0.03
+# Encoders and calibrations agree on distance at least so well: ten times the 0.2 to 0.3 % that probes state.
+_LARGEST_STRAIN = 0.03
+_QUARTERS = 4
+# A block of which less was seen is left out.
+_LEAST_SEEN = 0.5
+# Blocks agree when they lie within this of their neighbours' median, as a share of the room they had; the
+# chance of that enters the test of whether the walls are the same (`by_marks`).
+AGREE = 0.2
 
 
 @dataclass(frozen=True)
@@ -53,13 +59,13 @@ def coarse_course(earlier: Surface, now: Surface) -> Course:
     at = _starts(len(before) - rows, min(count, _MOST_STRETCHES))
     anchors = _starts(len(before) - rows, min(count, _ANCHORS))
     found = np.array([_place(before[i : i + rows], after, 0) for i in anchors])
-    agree = _agreeing(anchors, found, now.radius_mm / cell)
+    agree = _agreeing_stretches(anchors, found, now.radius_mm / cell)
     if len(at) > len(anchors):
         windows = [_window(i, anchors[agree], found[agree, 0], rows, len(after)) for i in at]
         found = np.array(
             [_place(before[i : i + rows], after[w], w.start) for i, w in zip(at, windows, strict=True)]
         )
-        agree = _agreeing(at, found, now.radius_mm / cell)
+        agree = _agreeing_stretches(at, found, now.radius_mm / cell)
     roll = found[agree, 1] * 2 * np.pi / before.shape[1]
     shift = now.from_mm - earlier.from_mm + (found[agree, 0] - at[agree]) * cell
     middle = np.asarray(earlier.from_mm + (at[agree] + rows / 2) * cell, float)
@@ -73,7 +79,7 @@ def _starts(last: int, count: int) -> Int:
 def _window(start: int, anchors: Int, places: Float, rows: int, end: int) -> slice:
     """Return the rows among which a stretch must lie, given where the anchors do."""
     expected = float(np.interp(start, anchors, places - anchors)) + start
-    room = 2 * rows + int(LARGEST_STRAIN * np.abs(anchors - start).min())
+    room = 2 * rows + int(_LARGEST_STRAIN * np.abs(anchors - start).min())
     first = int(np.clip(expected - room, 0, max(end - rows, 0)))
     return slice(first, int(np.clip(expected + rows + room, first + rows, end)))
 
@@ -109,12 +115,12 @@ def _place(stretch: Float32, wall: Float32, first: int) -> tuple[float, float, f
     return first + row, column, score
 
 
-def _agreeing(starts: Int, found: Float, radius_cells: float) -> Bool:
+def _agreeing_stretches(starts: Int, found: Float, radius_cells: float) -> Bool:
     """Return which stretches agree with one of them, taking the one that most and best agree with.
 
     All in cells; ``found`` (N, 3) are the rows at which they lie, columns by which they turn, correlations.
     """
-    strain = LARGEST_STRAIN * np.abs(starts[:, None] - starts[None])
+    strain = _LARGEST_STRAIN * np.abs(starts[:, None] - starts[None])
     moved, turn = found[:, 0] - starts, found[:, 1] * 2 * np.pi / (COLUMNS // _COARSER)
     near = np.abs(moved[:, None] - moved[None]) < _ROOM_CELLS + strain
     turned = np.abs(_wrapped(turn[:, None] - turn[None])) * radius_cells < 2 * _ROOM_CELLS + strain
@@ -130,3 +136,78 @@ def _vertex(three: Any) -> float:
     """Return where the parabola through three equidistant values has its vertex, from the middle one."""
     bend = float(three[0] - 2 * three[1] + three[2])
     return 0.5 * float(three[0] - three[2]) / bend if bend < 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Blocks of the earlier wall found on the later one.
+
+    Attributes
+    ----------
+    at_mm : (N,)
+        Middle of the block, distance of the earlier run.
+    shift_mm, roll_rad, correlation : (N,)
+    agree : (N,) bool
+        Whether it lies where its neighbours say.
+    overlapping : float
+        Blocks that share a piece of wall: so many count for one.
+    """
+
+    at_mm: Float
+    shift_mm: Float
+    roll_rad: Float
+    correlation: Float
+    agree: Bool
+    overlapping: float
+
+
+def matched_blocks(earlier: Surface, now: Surface, course: Course) -> Matches:
+    """Return blocks along all of the earlier wall that lies on the later one."""
+    cell = now.radius_mm / CELLS_PER_RADIUS
+    rows = round(_BLOCK_RADII * now.radius_mm / cell)
+    starts = np.arange(earlier.from_mm, earlier.from_mm + earlier.length_mm - rows * cell, rows * cell / 2)
+    overlapping = 2.0
+    if len(starts) > _MOST_STATIONS:
+        starts, overlapping = np.linspace(starts[0], starts[-1], _MOST_STATIONS), 1.0
+    found = [row for s in starts for row in _at_station(earlier, now, course, float(s), rows, cell)]
+    at, shift, roll, score = np.array(found).reshape(-1, 4).T
+    agree = _agreeing_blocks(at, shift, roll * now.radius_mm, AGREE * course.room_mm)
+    return Matches(at, shift, roll, score, agree, overlapping)
+
+
+def _at_station(
+    earlier: Surface, now: Surface, course: Course, start_mm: float, rows: int, cell_mm: float
+) -> list[tuple[float, float, float, float]]:
+    """Return middle, shift, roll and correlation of the blocks at one distance."""
+    shift, roll = course.at(start_mm + rows * cell_mm / 2)
+    room = round(course.room_mm / cell_mm)
+    first_mm = start_mm + shift - room * cell_mm
+    if first_mm < now.from_mm or first_mm + (rows + 2 * room) * cell_mm > now.from_mm + now.length_mm:
+        return []
+    before = earlier.marks(start_mm, rows, cell_mm)
+    after = now.marks(first_mm, rows + 2 * room, cell_mm)
+    turn = round(roll * COLUMNS / (2 * np.pi))
+    width = COLUMNS // _QUARTERS
+    found: list[tuple[float, float, float, float]] = []
+    for quarter in range(_QUARTERS):
+        block = before[:, quarter * width : (quarter + 1) * width]
+        columns = (quarter * width + turn - room + np.arange(width + 2 * room)) % COLUMNS
+        if (block != 0).mean() < _LEAST_SEEN:
+            continue
+        r, c, score = best_place(block, np.ascontiguousarray(after[:, columns]))
+        moved = first_mm + r * cell_mm - start_mm
+        turned = (turn + c - room) * 2 * np.pi / COLUMNS
+        found.append((start_mm + rows * cell_mm / 2, moved, turned, score))
+    return found
+
+
+def _agreeing_blocks(at: Float, shift: Float, around_mm: Float, tolerance_mm: float) -> Bool:
+    """Return which blocks lie within a tolerance of the median of their surroundings."""
+    agree = np.zeros(len(at), bool)
+    for station in np.unique(at):
+        nearest = np.argsort(np.abs(at - station), kind="stable")[: 5 * _QUARTERS]
+        here = np.flatnonzero(at == station)
+        agree[here] = (np.abs(shift[here] - np.median(shift[nearest])) < tolerance_mm) & (
+            np.abs(around_mm[here] - np.median(around_mm[nearest])) < tolerance_mm
+        )
+    return agree

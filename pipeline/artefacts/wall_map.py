@@ -1,34 +1,40 @@
-"""The wall that is measured on: its radius over distance and azimuth, and points on it in space."""
+"""A wall as its radius over distance and azimuth: the map that is measured on, compared and verified."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.arrays import Float, Float32, Int
-from pipeline.artefacts.measured import RadiusMap
+from pipeline.arrays import Bool, Float
+
+# float32 in a run's own map, float64 in a reference.
+Real = NDArray[Any]
 
 
 @dataclass(frozen=True)
-class MeasuredWall:
+class WallMap:
     """Radius of the wall about the pipe's own axis.
 
     Attributes
     ----------
     distance_mm : (S,)
-        Uniform.
+        Row centres, uniform, increasing.
     azimuth_rad : (A,)
-        Uniform over the turn, first −π.
+        Column centres, uniform over the whole turn; −π first in a run's own map.
     radius_mm, sigma_mm, sigma_random_mm : (S, A)
-        NaN where nothing was seen; σ in all, and its random part.
+        Radius; its total 1 σ; the random part of that. NaN where nothing is known; σ is 0 in a reference
+        that states none.
     """
 
     distance_mm: Float
     azimuth_rad: Float
-    radius_mm: Float32
-    sigma_mm: Float32
-    sigma_random_mm: Float32
+    radius_mm: Real
+    sigma_mm: Real
+    sigma_random_mm: Real
 
     @property
     def step_mm(self) -> float:
@@ -40,7 +46,7 @@ class MeasuredWall:
         """Angle between columns."""
         return float(2 * np.pi / len(self.azimuth_rad))
 
-    def rows(self, from_mm: float, to_mm: float) -> Int:
+    def rows(self, from_mm: float, to_mm: float) -> NDArray[np.int64]:
         """Return the rows from one distance to another; at least the nearest."""
         inside = np.flatnonzero((self.distance_mm >= from_mm) & (self.distance_mm <= to_mm))
         return inside if len(inside) else np.array([self.row(from_mm)])
@@ -62,6 +68,10 @@ class MeasuredWall:
         return float(self.radius_mm[at]), float(self.sigma_mm[at]), float(self.sigma_random_mm[at])
 
 
-def measured_wall(radius_map: RadiusMap) -> MeasuredWall:
-    """Return the wall of a radius map; large arrays stay where they are, on disk."""
-    return MeasuredWall(**{name: getattr(radius_map, name) for name in MeasuredWall.__dataclass_fields__})
+def cells_within(polygon: Float, shape: tuple[int, int]) -> Bool:
+    """Return which cells (rows, columns) a polygon (V, 2) of (column, row) covers; at least one."""
+    mask = np.zeros(shape, np.uint8)
+    shift = 6
+    corner = np.round(polygon * (1 << shift)).astype(np.int32)
+    cv2.fillPoly(mask, [corner], 1, shift=shift)
+    return mask.astype(bool)

@@ -1,4 +1,7 @@
-"""What a run is compared with: another map of the radius, or a surface or cloud of the wall; its files."""
+"""The files that a run is verified against: another map of the radius, a mesh or a cloud of the wall.
+
+Commands read them; what computes takes what they return.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.arrays import Float, Int
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
 from pipeline.system.native import open3d
 
@@ -19,27 +23,6 @@ _MAP_KEYS = ("distance_mm", "azimuth_rad", "radius_mm")
 _POINT_FIELDS = ("x", "y", "z", "nx", "ny", "nz", "sigma_mm", "distance_mm", "azimuth_rad")
 LARGEST_UNPACKED_BYTES = 4 << 30
 SURFACE_SUFFIXES = (".ply", ".obj", ".stl", ".off", ".glb", ".gltf", ".pcd", ".xyz")
-
-
-@dataclass(frozen=True)
-class WallMap:
-    """Radius of a wall over distance and azimuth.
-
-    Attributes
-    ----------
-    distance_mm : (S,)
-        Uniform, increasing.
-    azimuth_rad : (A,)
-        Uniform over the whole turn.
-    radius_mm, sigma_mm, sigma_random_mm : (S, A)
-        NaN where nothing is known; σ 0 for a reference that states none.
-    """
-
-    distance_mm: Float
-    azimuth_rad: Float
-    radius_mm: Float
-    sigma_mm: Float
-    sigma_random_mm: Float
 
 
 @dataclass(frozen=True)
@@ -54,7 +37,7 @@ class WallPoints:
 
 
 @dataclass(frozen=True)
-class Surface:
+class ReferenceSurface:
     """Vertices (V, 3), mm, and triangles (T, 3); no triangles for a cloud of points."""
 
     vertices: Float
@@ -110,7 +93,7 @@ def read_wall_points(run: Path, at_most: int = 200_000) -> WallPoints:
     return WallPoints(xyz, outward, np.asarray(vertex["distance_mm"], float), azimuth, sigma)
 
 
-def read_surface(file: Path, unit_mm: float) -> Surface:
+def read_surface(file: Path, unit_mm: float) -> ReferenceSurface:
     """Read a mesh or a cloud of points; ``unit_mm`` is the length of the file's unit in mm.
 
     Raises
@@ -130,7 +113,7 @@ def read_surface(file: Path, unit_mm: float) -> Surface:
         raise InputError(
             file, f"holds {len(vertices)} usable points", expected="a mesh or a cloud of the pipe's wall"
         )
-    return Surface(vertices * unit_mm, triangles)
+    return ReferenceSurface(vertices * unit_mm, triangles)
 
 
 def map_file(path: Path) -> Path:

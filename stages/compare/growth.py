@@ -8,47 +8,17 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, shift
 
 from pipeline.arrays import Bool, Float
-from pipeline.review.comparison.patch import Patch, at_its_peak, smoothed
+from pipeline.artefacts.comparison import Growth, Value
+from stages.compare.patch import Patch, at_its_peak, smoothed
 
 # Where one wall is no deeper than this share of the other, it shows no defect of its own.
 _ALIKE = 0.5
-# The common level at which extents are read, as a share of the lesser depth.
+# Extents are read at half the lesser depth, as a full width at half maximum.
 _LEVEL = 0.5
+# 1 σ of the smoothing that makes a noise-free stand-in of the defect, onto which clean wall is then laid.
 _BASE_MM = 1.0
-# Of so many pieces of clean wall on its own rings their scatter counts where it is the larger one.
+# From so many pieces of clean wall on the defect's own rings, their scatter counts where it is larger.
 _LEAST_OWN = 8
-
-
-@dataclass(frozen=True)
-class Value:
-    """A number and its 1 σ."""
-
-    value: float
-    sigma: float
-
-
-@dataclass(frozen=True)
-class Growth:
-    """What has become of a defect from the earlier run to the later one.
-
-    Attributes
-    ----------
-    depth_now_mm, depth_before_mm : float
-        On both walls with one method, within one outline; positive into the wall.
-    depth_mm, length_mm, width_mm : Value
-        Growth of the depth (positive into the wall) and of the extents at ``level_mm``.
-    area_mm2 : Value
-    level_mm : float
-        Depth at which the extents are read on both walls.
-    """
-
-    depth_now_mm: float
-    depth_before_mm: float
-    depth_mm: Value
-    length_mm: Value
-    width_mm: Value
-    area_mm2: Value
-    level_mm: float
 
 
 @dataclass(frozen=True)

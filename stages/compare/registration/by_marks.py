@@ -1,105 +1,45 @@
-"""How an earlier run's wall lies on a later one's: shift along the pipe and roll, by distance."""
+"""How an earlier run's wall lies on a later one's, by marks: shift along the pipe and roll, by distance."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
 from scipy.stats import binom
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float, Float32
+from pipeline.artefacts.comparison import Registration, WeldPair
 from pipeline.errors import UnusableError
-from pipeline.review.comparison.blocks import AGREE, Matches, matched_blocks
-from pipeline.review.comparison.coarse import coarse_course
-from pipeline.review.comparison.surface import Surface
-from pipeline.review.comparison.welds import weld_place
+from pipeline.machine.stage import Parameters
+from stages.compare.registration.marks import Surface, sampled
+from stages.compare.registration.matching import AGREE, Matches, best_place, coarse_course, matched_blocks
 
-# Two walls are taken for the same when chance would have made their blocks agree so often at most.
-_LARGEST_CHANCE = 1e-4
-_LEAST_SHARE = 0.4
+# A shift needs two stations to have a slope.
 _LEAST_STATIONS = 2
-_BORES_ALIKE = 0.1
+# A weld's bead is looked for in a profile this long to each side, this far from where texture has it, in
+# radii: a bead is a few mm wide on a 4 inch pipe. Chosen; only welds of 4 inch pipes were tried.
+_HALF_RADII, _ROOM_RADII = 0.2, 0.06
+_SAMPLES_PER_CELL = 2
+_LEAST_CORRELATION = 0.8
+_AZIMUTHS = 360
 
 
-@dataclass(frozen=True)
-class WeldPair:
-    """One weld in both runs: distance in the earlier and in the later one."""
+class RegisterParameters(Parameters):
+    """When two walls are taken for the same."""
 
-    earlier_mm: float
-    now_mm: float
-
-
-@dataclass(frozen=True)
-class Registration:
-    """s_now = s_earlier + shift(s_earlier), ψ_now = ψ_earlier + roll(s_earlier), linear between stations.
-
-    Attributes
-    ----------
-    at_mm : (K,)
-        Stations, distances of the earlier run, increasing.
-    shift_mm, shift_sigma_mm : (K,)
-    roll_rad, roll_sigma_rad : (K,)
-    scale, scale_sigma : float
-        Slope of s_now over s_earlier, over all.
-    blocks, agreeing : int
-        Pieces of wall that were matched, and those that agree with the result.
-    correlation : float
-        Median correlation of the agreeing ones.
-    chance : float
-        Probability that so many would agree if the walls had nothing in common.
-    welds : tuple of WeldPair
-    overlap_mm : (float, float)
-        What both runs saw, in distances of the later one.
-    """
-
-    at_mm: Float
-    shift_mm: Float
-    shift_sigma_mm: Float
-    roll_rad: Float
-    roll_sigma_rad: Float
-    scale: float
-    scale_sigma: float
-    blocks: int
-    agreeing: int
-    correlation: float
-    chance: float
-    welds: tuple[WeldPair, ...]
-    overlap_mm: tuple[float, float]
-
-    def to_now(self, distance_mm: Float, azimuth_rad: Float) -> tuple[Float, Float]:
-        """Return where places of the earlier run lie in the later one; ψ runs on beyond ±π."""
-        return distance_mm + self._at(distance_mm, self.shift_mm), azimuth_rad + self._at(
-            distance_mm, self.roll_rad
-        )
-
-    def to_earlier(self, distance_mm: Float, azimuth_rad: Float) -> tuple[Float, Float]:
-        """Return where places of the later run lie in the earlier one."""
-        before = self.earlier_distance(distance_mm)
-        return before, azimuth_rad - self._at(before, self.roll_rad)
-
-    def earlier_distance(self, distance_mm: Float) -> Float:
-        """Return the earlier run's distances of the later run's; beyond the stations at the common scale."""
-        now = self.at_mm + self.shift_mm
-        inside = np.interp(distance_mm, now, self.at_mm)
-        beyond = distance_mm - np.clip(distance_mm, now[0], now[-1])
-        return np.asarray(inside + beyond / self.scale)
-
-    def sigma_at(self, earlier_mm: float) -> tuple[float, float]:
-        """Return 1 σ of shift, mm, and of roll, rad, at a distance of the earlier run."""
-        away = abs(earlier_mm - float(np.clip(earlier_mm, self.at_mm[0], self.at_mm[-1])))
-        along = float(np.interp(earlier_mm, self.at_mm, self.shift_sigma_mm))
-        turn = float(np.interp(earlier_mm, self.at_mm, self.roll_sigma_rad))
-        return float(np.hypot(along, self.scale_sigma * away)), turn
-
-    def _at(self, distance_mm: Float, values: Float) -> Float:
-        inside = np.interp(distance_mm, self.at_mm, values)
-        if values is not self.shift_mm:
-            return np.asarray(inside)
-        beyond = distance_mm - np.clip(distance_mm, self.at_mm[0], self.at_mm[-1])
-        return np.asarray(inside + (self.scale - 1) * beyond)
+    largest_chance: float = Field(
+        1e-4, gt=0, lt=1,
+        description="largest probability that so many pieces of wall would agree if the pipes were different",
+    )  # fmt: skip
+    least_share: float = Field(0.4, gt=0, le=1, description="share of the pieces of wall that must agree")
+    bores_alike: float = Field(
+        0.1, gt=0, lt=1, description="largest difference of the two mean diameters, relative"
+    )
 
 
-def register(earlier: Surface, now: Surface, welds_mm: Float) -> Registration:
+def register(earlier: Surface, now: Surface, welds_mm: Float, parameters: RegisterParameters) -> Registration:
     """Return how the earlier wall lies on the later one; ``welds_mm`` (W,) are those of the earlier run.
 
     Raises
@@ -107,10 +47,10 @@ def register(earlier: Surface, now: Surface, welds_mm: Float) -> Registration:
     UnusableError
         When the two do not show the same wall, or too little of it.
     """
-    _refuse_other_bore(earlier, now)
+    _refuse_other_bore(earlier, now, parameters.bores_alike)
     matches = matched_blocks(earlier, now, coarse_course(earlier, now))
     chance = _chance(matches)
-    _refuse_strangers(matches, chance)
+    _refuse_strangers(matches, chance, parameters)
     stations = _stations(matches)
     pairs = _weld_pairs(stations, welds_mm, earlier, now)
     return _registration(_with_welds(stations, pairs, now), matches, pairs, chance, earlier, now)
@@ -132,12 +72,12 @@ class _Stations:
         return float(shift), float(sigma)
 
 
-def _refuse_other_bore(earlier: Surface, now: Surface) -> None:
-    if not 1 - _BORES_ALIKE < earlier.radius_mm / now.radius_mm < 1 + _BORES_ALIKE:
+def _refuse_other_bore(earlier: Surface, now: Surface, alike: float) -> None:
+    if not 1 - alike < earlier.radius_mm / now.radius_mm < 1 + alike:
         raise UnusableError(
             "compare",
             f"the bores are {2 * earlier.radius_mm:.1f} mm and {2 * now.radius_mm:.1f} mm",
-            limit=f"{_BORES_ALIKE:.0%} apart",
+            limit=f"{alike:.0%} apart",
             hint="give two runs of one pipe",
         )
 
@@ -151,15 +91,15 @@ def _chance(matches: Matches) -> float:
     return float(binom.sf(good - 1, count, min(3 * AGREE**2, 1.0))) if good else 1.0
 
 
-def _refuse_strangers(matches: Matches, chance: float) -> None:
+def _refuse_strangers(matches: Matches, chance: float, limits: RegisterParameters) -> None:
     good, count = int(matches.agree.sum()), len(matches.agree)
     stations = len(np.unique(matches.at_mm[matches.agree]))
-    if stations < _LEAST_STATIONS or good < _LEAST_SHARE * count or chance > _LARGEST_CHANCE:
+    if stations < _LEAST_STATIONS or good < limits.least_share * count or chance > limits.largest_chance:
         raise UnusableError(
             "compare",
             f"the runs do not show the same wall, or too little of it: {good} of {count} pieces of wall "
             f"lie on each other, which chance does in {min(chance, 1.0):.2g} of cases",
-            limit=f"{_LEAST_SHARE:.0%} of the pieces, chance below {_LARGEST_CHANCE:g}",
+            limit=f"{limits.least_share:.0%} of the pieces, chance below {limits.largest_chance:g}",
             hint="give two runs of one pipe, driven in the same direction",
         )
 
@@ -178,7 +118,7 @@ def _stations(matches: Matches) -> _Stations:
     return _Stations(at, shift, np.full(len(at), shift_sigma), roll, np.full(len(at), roll_sigma))
 
 
-def _grouped(values: Float, group: Int, number: Int) -> tuple[Float, float]:
+def _grouped(values: Float, group: NDArray[np.int64], number: NDArray[np.int64]) -> tuple[Float, float]:
     """Return the mean of each group and the 1 σ of a single value about a line between the means."""
     mean = np.bincount(group, values) / number
     within = float(((values - mean[group]) ** 2).sum()) / max(len(values) - len(mean), 1)
@@ -189,7 +129,7 @@ def _grouped(values: Float, group: Int, number: Int) -> tuple[Float, float]:
 
 def _weld_pairs(stations: _Stations, welds_mm: Float, earlier: Surface, now: Surface) -> tuple[WeldPair, ...]:
     """Return the welds that the later run shows where the texture says, to within their own width."""
-    found = (weld_place(float(s), float(s) + stations.shift_at(float(s))[0], earlier, now) for s in welds_mm)
+    found = (_weld_place(float(s), float(s) + stations.shift_at(float(s))[0], earlier, now) for s in welds_mm)
     return tuple(
         WeldPair(float(s), place) for s, place in zip(welds_mm, found, strict=True) if place is not None
     )
@@ -237,3 +177,26 @@ def _registration(
     )  # fmt: skip
     low, high = made.to_now(ends, 0 * ends)[0]
     return replace(made, overlap_mm=(max(low, now.from_mm), min(high, now.from_mm + now.length_mm)))
+
+
+def _weld_place(before_mm: float, expected_mm: float, earlier: Surface, now: Surface) -> float | None:
+    """Return the later run's distance of the weld at ``before_mm``; None where it does not show it."""
+    step = now.wall.step_mm / _SAMPLES_PER_CELL
+    half, room = (round(share * now.radius_mm / step) for share in (_HALF_RADII, _ROOM_RADII))
+    bead = _ring_radius(earlier, before_mm, step, half)
+    around = _ring_radius(now, expected_mm, step, half + room)
+    if not (np.isfinite(bead).all() and np.isfinite(around).all()):
+        return None
+    row, _, correlation = best_place(bead[:, None], around[:, None])
+    inside = 0 < row < 2 * room
+    return expected_mm + (row - room) * step if inside and correlation > _LEAST_CORRELATION else None
+
+
+def _ring_radius(surface: Surface, middle_mm: float, step_mm: float, half: int) -> Float32:
+    """Return the ring's mean radius (2 half + 1,) along the pipe; NaN where less than half was seen."""
+    s = np.asarray(middle_mm + step_mm * np.arange(-half, half + 1), float)
+    wall = surface.wall
+    ring = sampled(wall.radius_mm, float(wall.distance_mm[0]), wall.step_mm, s, _AZIMUTHS)
+    seen = np.isfinite(ring)
+    mean = np.nan_to_num(ring).sum(1) / np.maximum(seen.sum(1), 1)
+    return np.asarray(np.where(seen.mean(1) > 0.5, mean, np.nan), np.float32)

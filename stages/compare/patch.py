@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -9,17 +10,21 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, label
 
 from pipeline.arrays import Bool, Float, Int
-from pipeline.review.comparison.paired import PairedWalls, Stretch, ring_values
-from pipeline.review.measuring.outline import filled
+from pipeline.artefacts.wall_map import cells_within
+from stages.compare.paired import PairedWalls, Stretch, ring_values
 
+# Wall around a finding that is cut out with it, as wide as the review measures depths against.
 _MARGIN_MM = 6.0
-# Heights are read on surfaces smoothed this much, 1 σ.
+# 1 σ with which heights are smoothed: that of the run's own map, by default.
 _SMOOTHING_MM = 0.3
+# A piece of wall counts as clean when this share of it was seen and is of no finding. Chosen.
 _LEAST_CLEAN = 0.9
-# Pieces of clean wall, of the defect's own rings and then of its neighbours.
-_ENOUGH = 40
-_LEAST_PIECES = 4
+# Pieces of clean wall, of the defect's own rings and then of its neighbours: 40 give a σ to 11 %, and with
+# fewer than 4 Student's t says hardly anything.
+_ENOUGH, _LEAST_PIECES = 40, 4
 _LEAST_SEEN = 0.5
+# Findings' feet reach beyond their outlines; so much wall beside them is not called clean.
+_FOOT_MM = 2.0
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,7 @@ class Cutter:
     pair: PairedWalls
     defective: Bool
 
-    def patch(self, outlines: tuple[Float, ...], random: np.random.Generator) -> Patch:
+    def patch(self, outlines: Sequence[Float], random: np.random.Generator) -> Patch:
         """Return the patch about outlines (V, 2) of the later run."""
         wall = self.pair.now
         radius = float(np.nanmedian(wall.radius_mm[wall.row(float(outlines[0][0, 0]))]))
@@ -90,7 +95,7 @@ class Cutter:
         for outline in outlines:
             row = (outline[:, 0] - wall.distance_mm[rows[0]]) / wall.step_mm
             column = (outline[:, 1] - wall.azimuth_rad[0]) / wall.step_rad - first
-            inside |= filled(np.stack([column, row], -1), inside.shape)
+            inside |= cells_within(np.stack([column, row], -1), inside.shape)
         stretch = self.pair.stretch(int(rows[0]), int(rows[-1]) + 1)
         shape = ring_values(stretch.now_mm, wall.azimuth_rad)
         heights = [(h - shape)[:, columns] for h in (stretch.now_mm, stretch.before_mm)]
@@ -166,5 +171,5 @@ def outline_mask(outlines: list[Float], pair: PairedWalls) -> Bool:
         for turn in (-1, 0, 1):
             point = np.stack([column + turn * mask.shape[1], row], -1)
             cv2.fillPoly(mask, [np.round(point).astype(np.int32)], 1)
-    reach = int(2.0 / wall.step_mm) * 2 + 1
+    reach = int(_FOOT_MM / wall.step_mm) * 2 + 1
     return np.asarray(cv2.dilate(mask, np.ones((reach, reach), np.uint8)).astype(bool))

@@ -1,4 +1,4 @@
-"""Two maps of the radius brought together and compared.
+"""How a wall lies on a reference map, by least squares of the radius.
 
 A run cannot know where its pipe frame's origin lies: shift along the pipe, roll, and the first pose, seen as
 first and second order terms of the centre line, are taken out. The distance scale is found and reported.
@@ -16,11 +16,15 @@ from scipy.optimize import least_squares
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.reference import WallMap
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import UnusableError
-from stages.verify.accuracy import Differences
 
+# Cells that are fitted, and that the search of shift and roll looks at: bounds on time alone.
 _FIT_POINTS, _SEARCH_POINTS = 10_000, 2000
+# Steps of that search: finer than half the width of the smallest defect that is reported, 3 mm.
+_SHIFT_STEP_MM, _ROLL_STEP_RAD = 0.5, math.radians(1)
+# 1 σ of the smoothing before, at least: interpolating white noise halfway between cells lowers it, which
+# would draw the alignment there.
 _SMOOTH_MM, _SMOOTH_CELLS = 1.0, 1.5
 
 
@@ -36,9 +40,14 @@ class Alignment:
     scale_error: float
     pose_mm: tuple[float, ...]
 
+    @property
+    def placement(self) -> Float:
+        """Shift, mm, roll, rad, and scale error, as `looked_up` takes them."""
+        return np.array([self.shift_mm, math.radians(self.roll_deg), self.scale_error])
+
 
 @dataclass(frozen=True)
-class _Samples:
+class WallSamples:
     """Measured cells of a map: distance from the middle, azimuth, radius, and x from −1 to 1; each (N,)."""
 
     middle_mm: float
@@ -56,7 +65,7 @@ def align_maps(run: WallMap, reference: WallMap, max_shift_mm: float, max_roll_d
     UnusableError
         If at no shift within the limits half of the run lies on the reference.
     """
-    samples, reference = _samples(_smoothed(run), _FIT_POINTS), _smoothed(reference)
+    samples, reference = samples_of(_smoothed(run), _FIT_POINTS), _smoothed(reference)
     start = _search(samples, reference, max_shift_mm, math.radians(max_roll_deg))
     spread = spread_about_median(_residual(start, samples, reference))
     found = least_squares(
@@ -68,30 +77,8 @@ def align_maps(run: WallMap, reference: WallMap, max_shift_mm: float, max_roll_d
     )
 
 
-def map_differences(run: WallMap, reference: WallMap, alignment: Alignment) -> Differences:
-    """Return run minus aligned reference for every cell of the run that lies on it."""
-    samples = _samples(run, run.radius_mm.size)
-    at = np.array([alignment.shift_mm, math.radians(alignment.roll_deg), alignment.scale_error])
-    error = samples.radius_mm - _looked_up(reference.radius_mm, reference, samples, at)
-    error = error - _pose_design(samples) @ np.array(alignment.pose_mm)
-    on = np.isfinite(error)
-    known = np.isfinite(run.radius_mm)
-
-    cell, weight = _corners(reference, samples, at)
-    # the random part of neighbouring cells averages in the interpolation, the instrument's does not
-    its_random = np.sum(weight**2 * reference.sigma_random_mm[cell] ** 2, 0)[on]
-    shared = np.maximum(reference.sigma_mm**2 - reference.sigma_random_mm**2, 0.0)
-    its_shared = np.sum(weight * shared[cell], 0)[on]
-    return Differences(
-        samples.middle_mm + samples.offset_mm[on],
-        samples.azimuth_rad[on],
-        error[on],
-        np.sqrt(run.sigma_mm[known][on] ** 2 + its_random + its_shared),
-        np.sqrt(run.sigma_random_mm[known][on] ** 2 + its_random),
-    )
-
-
-def _samples(wall: WallMap, at_most: int) -> _Samples:
+def samples_of(wall: WallMap, at_most: int) -> WallSamples:
+    """Return the measured cells of a map, drawn from evenly where they are more than ``at_most``."""
     station, azimuth = np.nonzero(np.isfinite(wall.radius_mm))
     if len(station) > at_most:
         chosen = np.sort(np.random.default_rng(0).choice(len(station), at_most, replace=False))
@@ -100,21 +87,21 @@ def _samples(wall: WallMap, at_most: int) -> _Samples:
     middle = float(distance.min() + distance.max()) / 2
     half = max(float(np.ptp(distance)) / 2, 1.0)
     offset = distance - middle
-    return _Samples(
+    return WallSamples(
         middle, offset, wall.azimuth_rad[azimuth], wall.radius_mm[station, azimuth], offset / half
     )
 
 
-def _search(samples: _Samples, reference: WallMap, max_shift_mm: float, max_roll_rad: float) -> Float:
+def _search(samples: WallSamples, reference: WallMap, max_shift_mm: float, max_roll_rad: float) -> Float:
     """Return the best of a grid of shifts and rolls, everything else 0 but the pose, which is linear."""
     best: tuple[float, Float] | None = None
     few = slice(None, None, max(1, len(samples.x) // _SEARCH_POINTS))
-    thin = _Samples(samples.middle_mm, *(a[few] for a in (
+    thin = WallSamples(samples.middle_mm, *(a[few] for a in (
         samples.offset_mm, samples.azimuth_rad, samples.radius_mm, samples.x)))  # fmt: skip
     design = _nuisance_design(thin)
-    for shift in np.arange(-max_shift_mm, max_shift_mm + 1e-9, 0.5):
-        for roll in np.arange(-max_roll_rad, max_roll_rad + 1e-9, math.radians(1)):
-            error = thin.radius_mm - _looked_up(
+    for shift in np.arange(-max_shift_mm, max_shift_mm + 1e-9, _SHIFT_STEP_MM):
+        for roll in np.arange(-max_roll_rad, max_roll_rad + 1e-9, _ROLL_STEP_RAD):
+            error = thin.radius_mm - looked_up(
                 reference.radius_mm, reference, thin, np.array([shift, roll, 0.0])
             )
             on = np.isfinite(error)
@@ -133,29 +120,30 @@ def _search(samples: _Samples, reference: WallMap, max_shift_mm: float, max_roll
     return best[1]
 
 
-def _residual(parameters: Float, samples: _Samples, reference: WallMap) -> Float:
+def _residual(parameters: Float, samples: WallSamples, reference: WallMap) -> Float:
     """Return run minus aligned reference (N,), 0 where the reference knows nothing."""
-    error = samples.radius_mm - _looked_up(reference.radius_mm, reference, samples, parameters)
+    error = samples.radius_mm - looked_up(reference.radius_mm, reference, samples, parameters)
     return np.where(np.isfinite(error), error - _nuisance_design(samples) @ parameters[3:], 0.0)
 
 
-def _pose_design(samples: _Samples) -> Float:
+def pose_design(samples: WallSamples) -> Float:
+    """Return (N, 6) what the amplitudes of `Alignment.pose_mm` do to the radius."""
     c, s, x = np.cos(samples.azimuth_rad), np.sin(samples.azimuth_rad), samples.x
     return np.stack([c, s, x * c, x * s, x * x * c, x * x * s], -1)
 
 
-def _nuisance_design(samples: _Samples) -> Float:
+def _nuisance_design(samples: WallSamples) -> Float:
     """Return the pose and a constant, which else would pull shift and scale; only the pose is taken out."""
-    return np.concatenate([_pose_design(samples), np.ones((len(samples.x), 1))], -1)
+    return np.concatenate([pose_design(samples), np.ones((len(samples.x), 1))], -1)
 
 
-def _looked_up(values: Float, grid: WallMap, samples: _Samples, at: Float) -> Float:
+def looked_up(values: Float, grid: WallMap, samples: WallSamples, at: Float) -> Float:
     """Return (N,) bilinear values (S, A) of a grid at the aligned samples; NaN beyond its ends."""
-    cell, weight = _corners(grid, samples, at)
+    cell, weight = cells_around(grid, samples, at)
     return np.asarray(np.sum(weight * values[cell], 0))
 
 
-def _corners(grid: WallMap, samples: _Samples, at: Float) -> tuple[tuple[Int, Int], Float]:
+def cells_around(grid: WallMap, samples: WallSamples, at: Float) -> tuple[tuple[Int, Int], Float]:
     """Return the four cells next to each aligned sample, (4, N) rows and columns, and weights (4, N)."""
     shift, roll, scale_error = at[:3]
     distance = samples.middle_mm + samples.offset_mm * (1 + scale_error) + shift

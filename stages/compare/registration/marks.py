@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import WallTexture
-from pipeline.review.measuring.wall import MeasuredWall
+from pipeline.artefacts.wall_map import WallMap
 
 COLUMNS = 640
 # Cells are about square on the wall, whatever the bore.
@@ -30,11 +30,11 @@ class Surface:
 
     Attributes
     ----------
-    wall : MeasuredWall
+    wall : WallMap
     texture : WallTexture or None
     """
 
-    wall: MeasuredWall
+    wall: WallMap
     texture: WallTexture | None
 
     @cached_property
