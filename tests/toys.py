@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.api.job import Job, run_job
+from pipeline.api.job import Job, recording_job, run_job
 from pipeline.arrays import Image, Int
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
@@ -17,7 +17,6 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
-from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Selection
 from pipeline.recording.base import FrameTable, PipeFacts, Planes, Recording
@@ -49,12 +48,12 @@ def toy_probe() -> Probe:
     return Probe(camera, laser, np.zeros((count, count)))
 
 
-def toy_job(folder: Path, *assignments: str) -> Job:
+def toy_job(folder: Path, *assignments: str, probe: ProbeSource | None = None) -> Job:
     configuration = resolve(TOYS, None, assignments)
-    return Job(
+    return recording_job(
         toy_recording(),
         toy_probe(),
-        ProbeSource(Path("probe.yaml"), "", None),
+        probe or ProbeSource(Path("probe.yaml"), "", None),
         TOYS,
         TOY_EXPORTERS,
         configuration,

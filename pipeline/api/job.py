@@ -1,17 +1,19 @@
-"""One run of the pipeline over one recording, from opened inputs to a finished run folder."""
+"""One piece of work: sources, stages and exporters, from opened inputs to a finished folder."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from pipeline.artefacts.headline import headline
 from pipeline.errors import InputError
 from pipeline.export.run_record import write_run_record
-from pipeline.files.codec import digest
+from pipeline.files.codec import Json, digest
+from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource, read_with_source
 from pipeline.machine.configuration import Configuration
@@ -19,39 +21,116 @@ from pipeline.machine.display import Display
 from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Plan, Selection, Source, make_plan
-from pipeline.machine.run_folder import claimed, logged
+from pipeline.machine.run_folder import RunFolder, claimed, logged
 from pipeline.machine.runner import Runner
-from pipeline.machine.stage import Stage
+from pipeline.machine.stage import Stage, of_role, plain
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
+from pipeline.recording.input_file import content_key
 from pipeline.system.stopping import stop_wish
+
+Kind = TypeVar("Kind")
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be run, and where its results go."""
+    """What is to be computed, and where its results go.
 
-    recording: Recording
-    probe: Probe
-    probe_source: ProbeSource
+    Attributes
+    ----------
+    command : str
+        Of boresight; it goes into run.json and into what exporters write.
+    sources : tuple of Source
+    stages, exporters
+    configuration : Configuration
+    folder : Path
+    about : mapping of str to JSON
+        What run.json says of the sources beyond their hashes.
+    lent : tuple of Path
+        Folders of other runs, whose results are used where they are those of the plan.
+    at_once : int
+        How many stages may run side by side.
+    """
+
+    command: str
+    sources: tuple[Source, ...]
     stages: tuple[Stage, ...]
     exporters: tuple[Exporter, ...]
     configuration: Configuration
     folder: Path
+    about: Mapping[str, Json] = field(default_factory=dict)
+    lent: tuple[Path, ...] = ()
+    at_once: int = 2
+
+    def source(self, kind: type[Kind]) -> Kind:
+        """Return the source of a class.
+
+        Raises
+        ------
+        StopIteration
+            When the job has none.
+        """
+        return next(s.value for s in self.sources if s.kind is kind)  # type: ignore[return-value]
+
+    @property
+    def recording(self) -> Recording:
+        """The recording that is worked on."""
+        return self.source(Recording)
 
     def plan(self) -> Plan:
         """Return the wired plan; raises `PipelineError` when stages do not fit together."""
-        sources = (
-            Source(
-                Recording,
-                self.recording,
-                self.recording.content_key,
-                partial(refuse_changed, self.recording),
-            ),
-            Source(Probe, self.probe, digest(self.probe)),
-        )
-        return make_plan(self.stages, self.configuration, sources)
+        return make_plan(self.stages, self.configuration, self.sources)
+
+
+def recording_source(recording: Recording, role: str = "") -> Source:
+    """Return a recording as a source, in the role it has where a job works on several."""
+    kind = of_role(Recording, role)
+    return Source(kind, recording, recording.content_key, partial(refuse_changed, recording))
+
+
+def probe_source(probe: Probe) -> Source:
+    """Return a probe as a source."""
+    return Source(Probe, probe, digest(probe))
+
+
+def recording_record(recording: Recording) -> dict[str, Json]:
+    """Return what run.json says of a recording."""
+    return {
+        "name": recording.name,
+        "kind": recording.kind,
+        "path": str(recording.path.resolve()),
+        "files_sha256": content_key(recording.files),
+    }
+
+
+def probe_record(probe: ProbeSource) -> dict[str, Json]:
+    """Return what run.json says of a probe file."""
+    return {
+        "path": str(probe.path.resolve()),
+        "calibrated_from": probe.calibrated_from,
+        "made_by": probe.made_by,
+    }
+
+
+def recording_job(
+    recording: Recording,
+    probe: Probe,
+    file: ProbeSource,
+    stages: Sequence[Stage],
+    exporters: Sequence[Exporter],
+    configuration: Configuration,
+    folder: Path,
+    command: str = "run",
+) -> Job:
+    """Return the job of stages that work on one recording with one probe, read from ``file``."""
+    about: dict[str, Json] = {
+        "recording": recording_record(recording),
+        "probe": probe_record(file),
+        "reader_warnings": list(recording.warnings),
+    }
+    sources = (recording_source(recording), probe_source(probe))
+    return Job(command, sources, tuple(stages), tuple(exporters), configuration, folder, about)
 
 
 def open_job(
@@ -61,6 +140,7 @@ def open_job(
     stages: Sequence[Stage],
     exporters: Sequence[Exporter],
     configuration: Configuration,
+    command: str = "run",
 ) -> Job:
     """Open the inputs of a job; ``probe`` None means the probe that the recording names.
 
@@ -76,19 +156,39 @@ def open_job(
         raise InputError(recording, noticed, expected="a probe file", hint="give one with --probe FILE")
     believed, source = read_with_source(file)
     check_probe_fits(opened, believed)
-    return Job(opened, believed, source, tuple(stages), tuple(exporters), configuration, folder)
+    return recording_job(opened, believed, source, stages, exporters, configuration, folder, command)
+
+
+def result_of(job: Job, kind: type[Kind]) -> Kind:
+    """Return what a stage of a job that was run has made, from its store or from one lent to it.
+
+    Raises
+    ------
+    InputError
+        When it is not there: the folder was meddled with since.
+    """
+    step = job.plan().maker(kind)
+    for folder in (job.folder, *job.lent):
+        store = RunFolder(folder).store
+        stored = None if step is None else store.borrow(step.stage.name, step.key, plain(kind))
+        if stored is not None:
+            return stored.artefact  # type: ignore[no-any-return]
+    raise InputError(
+        job.folder, f"no longer holds {plain(kind).__name__}", hint="give the same command again"
+    )
 
 
 def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
     """Run a job in its folder; raises as `Runner.run` and `run_folder.claimed`."""
     plan = job.plan()
     selection.check(plan)
+    made_by = MadeBy(job.command, plan.input_hashes(), job.configuration.tree())
+    lent = [RunFolder(path).store for path in job.lent]
     with claimed(job.folder) as folder, logged(folder) as logger, stop_wish() as wish:
-        record = partial(_record, job, plan)
+        record = partial(write_run_record, job.command, job.about, job.configuration, plan, job.folder)
         workers = len(os.sched_getaffinity(0))
-        runner = Runner(plan, job.exporters, folder, record, headline, display, logger, wish, workers)
+        runner = Runner(
+            plan, job.exporters, folder, record, headline, display, logger, wish, workers, made_by, lent,
+            job.at_once,
+        )  # fmt: skip
         return runner.run(selection)
-
-
-def _record(job: Job, plan: Plan, outcome: RunOutcome) -> None:
-    write_run_record(job.recording, job.probe_source, job.configuration, plan, outcome, job.folder)

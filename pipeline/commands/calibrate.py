@@ -2,32 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-import yaml
-from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.errors import InputError
-from pipeline.files.codec import digest
-from pipeline.files.disk import require_writable, written_together
+from pipeline.api.job import open_job, result_of
+from pipeline.commands.working import Assignments, ConfigFile, worked
+from pipeline.files.disk import require_writable
 from pipeline.files.provenance import MadeBy
-from pipeline.instrument.probe import Probe
-from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.machine.stage import quiet_context
-from pipeline.recording import open_recording
-from pipeline.recording.base import Recording
-from pipeline.recording.checks import check_probe_fits, refuse_changed
-from stages.calibrate.gauge.calibrate import calibrate_gauge
-from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.premises import require_gauge
-from stages.calibrate.gauge.result import GaugeCalibration
-from stages.rings import RingParameters, extract_rings
+from pipeline.instrument.probe_file import write_probe
+from pipeline.machine.configuration import resolve
+from pipeline.machine.exporter import Exporter
+from stages.calibrate.gauge import GAUGE, GaugeCalibration, require_gauge
+from stages.rings import RINGS
+
+STAGES = (RINGS, GAUGE)
 
 
 def calibrate(
@@ -36,69 +29,32 @@ def calibrate(
     probe: Annotated[
         Path | None, typer.Option(metavar="FILE", help="stated probe, in place of the recording's own")
     ] = None,
-    assignments: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="one parameter, such as tilt_prior_deg=1.0"),
-    ] = None,
+    config: ConfigFile = None,
+    assignments: Assignments = None,
 ) -> None:
     """Find camera and laser sheet, with covariance, from a gauge run.
 
     Writes probe.yaml, which `boresight run --probe` takes, calibration.json and calibration.html.
     """
-    parameters = gauge_parameters(assignments or ())
-    recording = open_recording(gauge)
-    stated = _stated_probe(recording, probe)
-    require_gauge(recording)
+    configuration = resolve(STAGES, config, assignments or ())
+    job = open_job(gauge, output, probe, STAGES, EXPORTERS, configuration, "calibrate")
+    require_gauge(job.recording)
     require_writable(output)
     console = Console(stderr=True)
-    with console.status("measuring rings"):
-        rings = extract_rings(recording, stated, RingParameters.model_validate({}), quiet_context())
-    with console.status("measuring fiducials, adjusting"):
-        result = calibrate_gauge(recording, rings, stated, parameters, quiet_context())
-    refuse_changed(recording)
-    inputs = {"gauge": recording.content_key, "probe": digest(stated)}
-    made_by = MadeBy("calibrate", inputs, parameters.model_dump(mode="json"))
+    worked(job, console)
+    _show(result_of(job, GaugeCalibration), output, console)
+
+
+def write_calibration(result: GaugeCalibration, made_by: MadeBy, folder: Path) -> None:
+    """Write probe.yaml, calibration.json and calibration.html."""
     # matplotlib takes a second to load, for which a refusal need not wait
     from pipeline.commands.calibrate_report import write_report
 
-    with written_together(output, last="probe.yaml") as folder:
-        write_probe(result.probe, folder / "probe.yaml", made_by)
-        write_report(result, made_by, folder)
-    _show(result, output, console)
+    write_probe(result.probe, folder / "probe.yaml", made_by)
+    write_report(result, made_by, folder)
 
 
-def gauge_parameters(assignments: Sequence[str]) -> GaugeParameters:
-    """Return the parameters with some set as ``NAME=VALUE``.
-
-    Raises
-    ------
-    InputError
-        For an unknown name or a value out of range.
-    """
-    values: dict[str, object] = {}
-    for assignment in assignments:
-        name, _, value = assignment.partition("=")
-        if name not in GaugeParameters.model_fields:
-            raise InputError(
-                "--set", f"{name!r} is no parameter", expected=", ".join(GaugeParameters.model_fields)
-            )
-        number = yaml.safe_load(value)
-        wanted = GaugeParameters.model_fields[name].annotation
-        values[name] = float(number) if wanted is float and isinstance(number, int) else number
-    try:
-        return GaugeParameters.model_validate(values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise InputError("--set", f"{first['loc'][0]}: {first['msg']}") from error
-
-
-def _stated_probe(recording: Recording, probe: Path | None) -> Probe:
-    file = probe or recording.probe_file
-    if file is None:
-        raise InputError(recording.path, "names no probe", hint="give one with --probe FILE")
-    stated = read_probe(file)
-    check_probe_fits(recording, stated)
-    return stated
+EXPORTERS = (Exporter("calibration", write_calibration),)
 
 
 def _show(result: GaugeCalibration, output: Path, console: Console) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from pipeline.api.job import Job, run_job
+from pipeline.api.job import Job, recording_job, run_job
 from pipeline.arrays import Float
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.files.codec import digest
@@ -86,7 +86,7 @@ def apply_correction(
 
 def _job(recording: Recording, probe_file: Path, configuration: Configuration, folder: Path) -> Job:
     probe, source = read_with_source(probe_file)
-    return Job(recording, probe, source, PIPELINE, EXPORTERS, configuration, folder)
+    return recording_job(recording, probe, source, PIPELINE, EXPORTERS, configuration, folder)
 
 
 def _true_field(examination: Examination, field: Recording) -> Recording:

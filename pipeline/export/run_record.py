@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import math
 import resource
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from pipeline.files.codec import Json
 from pipeline.files.disk import disk_errors_named, replace_json
 from pipeline.files.provenance import library_versions, program_version
-from pipeline.instrument.probe_file import ProbeSource
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.machine.plan import Plan
-from pipeline.recording.base import Recording
-from pipeline.recording.input_file import content_key
 
 _FORMAT = 1
 
 
 def write_run_record(
-    recording: Recording,
-    probe: ProbeSource,
+    command: str,
+    about: Mapping[str, Json],
     configuration: Configuration,
     plan: Plan,
-    outcome: RunOutcome,
     folder: Path,
+    outcome: RunOutcome,
 ) -> None:
-    """Replace ``run.json`` at one stroke.
+    """Replace ``run.json`` at one stroke; ``about`` is what it says of the sources beyond their hashes.
 
     Raises
     ------
@@ -38,25 +35,15 @@ def write_run_record(
     tree: Json = {
         "format": _FORMAT,
         "program": {"name": "boresight", "version": program_version()},
+        "command": command,
         "libraries": dict(library_versions()),
         "state": outcome.state.value,
         "problem": outcome.problem,
-        "recording": {
-            "name": recording.name,
-            "kind": recording.kind,
-            "path": str(recording.path.resolve()),
-            "files_sha256": content_key(recording.files),
-        },
-        "probe": {
-            "path": str(probe.path.resolve()),
-            "calibrated_from": probe.calibrated_from,
-            "made_by": probe.made_by,
-        },
+        **about,
         "input_sha256": dict(plan.input_hashes()),
-        "configuration": {c.stage: c.parameters.model_dump(mode="json") for c in configuration.stages},
+        "configuration": configuration.tree(),
         "stages": [_stage(s) for s in outcome.stages],
         "metrics": _numbers(outcome.metrics),
-        "reader_warnings": list(recording.warnings),
         "warnings": list(warnings_of(outcome.stages)),
         "peak_memory_mib": {"program": _peak_mib()},
     }

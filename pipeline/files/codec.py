@@ -1,7 +1,8 @@
 """Artefacts as a tree of plain values beside a set of named arrays, and back.
 
-Any frozen dataclass whose fields are arrays, numbers, strings, None, enumeration members, tuples of such, or
-further dataclasses can be encoded; nothing else can, so that nothing is stored by half.
+Any frozen dataclass whose fields are arrays, numbers, strings, None, enumeration members, parameters of a
+stage, tuples or mappings of such, or further dataclasses can be encoded; nothing else can, so that nothing is
+stored by half.
 """
 
 from __future__ import annotations
@@ -12,12 +13,16 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from typing import Any, NamedTuple, TypeAlias, get_args, get_type_hints
+from importlib import import_module
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
 
 Json: TypeAlias = "bool | int | float | str | list[Json] | dict[str, Json] | None"
+# Packages of this program.
+OWN_PACKAGES = ("pipeline", "stages")
 Array = NDArray[Any]
 
 
@@ -53,8 +58,8 @@ def decode(tree: Json, array: Callable[[str], Array], kind: type) -> Any:
         When the tree was made from another class or another version of it.
     """
     try:
-        value = _decode(tree, array, _classes_within(kind))
-    except (KeyError, TypeError, AttributeError) as error:
+        value = _decode(tree, array, {*OWN_PACKAGES, _package(kind.__module__)})
+    except (KeyError, TypeError, AttributeError, ImportError, ValidationError) as error:
         raise CodecError(f"does not fit {kind.__qualname__}: {error}") from error
     if type(value) is not kind:
         raise CodecError(f"a {type(value).__qualname__}, not a {kind.__qualname__}")
@@ -93,6 +98,10 @@ def _encode(value: object, place: str, arrays: dict[str, Array]) -> Json:
 def _encode_compound(value: object, place: str, arrays: dict[str, Array]) -> Json:
     if type(value) is tuple:
         return {"tuple": [_encode(v, _inside(place, str(i)), arrays) for i, v in enumerate(value)]}
+    if isinstance(value, Mapping):
+        return {"mapping": _encode(tuple(value.items()), place, arrays)}
+    if isinstance(value, BaseModel):
+        return {"model": _name_of(type(value)), "values": value.model_dump(mode="json")}
     if is_dataclass(value) and not isinstance(value, type):
         content = {f.name: getattr(value, f.name) for f in fields(value) if f.init}
         return {
@@ -110,7 +119,7 @@ def _encode_array(value: Array, place: str, arrays: dict[str, Array]) -> Json:
     return {"array": name}
 
 
-def _decode(tree: Json, array: Callable[[str], Array], classes: Mapping[str, type]) -> Any:
+def _decode(tree: Json, array: Callable[[str], Array], packages: set[str]) -> Any:
     if not isinstance(tree, dict):
         return tree
     match tree:
@@ -119,28 +128,34 @@ def _decode(tree: Json, array: Callable[[str], Array], classes: Mapping[str, typ
         case {"float": str(text)}:
             return float(text)
         case {"tuple": list(items)}:
-            return tuple(_decode(i, array, classes) for i in items)
+            return tuple(_decode(i, array, packages) for i in items)
+        case {"mapping": items}:
+            return dict(_decode(items, array, packages))
         case {"enum": str(name), "member": str(member)}:
-            return classes[name][member]  # type: ignore[index]
+            return _class_named(name, packages)[member]
+        case {"model": str(name), "values": values}:
+            return _class_named(name, packages).model_validate_json(json.dumps(values))
         case {"class": str(name), "fields": dict(content)}:
-            return classes[name](**{k: _decode(v, array, classes) for k, v in content.items()})
+            values = {k: _decode(v, array, packages) for k, v in content.items()}
+            return _class_named(name, packages)(**values)
     raise CodecError(f"neither a value nor an array: {sorted(tree)}")
 
 
-def _classes_within(kind: type) -> dict[str, type]:
-    """Return every dataclass and enumeration that the annotations of ``kind`` lead to, by name."""
-    found: dict[str, type] = {}
-    waiting: list[Any] = [kind]
-    while waiting:
-        hint = waiting.pop()
-        waiting.extend(get_args(hint))
-        if isinstance(hint, type) and (is_dataclass(hint) or issubclass(hint, Enum)):
-            if _name_of(hint) in found:
-                continue
-            found[_name_of(hint)] = hint
-            if is_dataclass(hint):
-                waiting.extend(get_type_hints(hint).values())
+def _class_named(name: str, packages: set[str]) -> Any:
+    """Return the class ``module:name`` of one of the packages; nothing but data classes is ever called."""
+    module, _, path = name.partition(":")
+    if _package(module) not in packages:
+        raise CodecError(f"{name} is no class of this program")
+    found: Any = import_module(module)
+    for part in path.split("."):
+        found = getattr(found, part)
+    if not isinstance(found, type) or not (is_dataclass(found) or issubclass(found, Enum | BaseModel)):
+        raise CodecError(f"{name} is no class of data")
     return found
+
+
+def _package(module: str) -> str:
+    return module.partition(".")[0]
 
 
 def _name_of(kind: type) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +10,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 
-from pipeline.files.codec import Json
+from pipeline.files.codec import Json, canonical
 
 # What computes; another version of these may change a result's last digits.
 _LIBRARIES = (
@@ -35,6 +36,12 @@ class MadeBy:
     command: str
     inputs: Mapping[str, str]
     settings: Mapping[str, Json] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        """SHA-256 of the command with what it was given."""
+        content: Json = [self.command, dict(self.inputs), dict(self.settings)]
+        return hashlib.sha256(canonical(content)).hexdigest()
 
     def document(self) -> dict[str, Json]:
         """Return all as plain data, with the versions of the program and its libraries."""

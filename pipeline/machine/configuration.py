@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from pipeline.errors import InputError
+from pipeline.files.codec import Json
 from pipeline.files.yaml_file import read_yaml
 from pipeline.machine.stage import Parameters, Stage
 
@@ -41,8 +42,12 @@ class Configuration:
     stages: tuple[StageConfiguration, ...]
 
     def of(self, stage: str) -> Parameters:
-        """Return the parameters of a stage."""
+        """Return the parameters in the section of a stage."""
         return next(s.parameters for s in self.stages if s.stage == stage)
+
+    def tree(self) -> dict[str, Json]:
+        """Return all parameters as plain data, by section."""
+        return {s.stage: s.parameters.model_dump(mode="json") for s in self.stages}
 
 
 @dataclass(frozen=True)
@@ -75,10 +80,13 @@ def resolve(
         wrong type or out of range.
     """
     settings = [*(_settings_of_file(file) if file else ()), *(_setting_of(a) for a in assignments)]
-    known = [f"{s.name}.{p}" for s in stages for p in s.parameters.model_fields]
+    known = [f"{s.configured_as}.{p}" for s in stages for p in s.parameters.model_fields]
     for setting in settings:
         _check_known(setting, known)
-    return Configuration(tuple(StageConfiguration(s.name, _parameters_of(s, settings)) for s in stages))
+    sections = {s.configured_as: s for s in stages}
+    return Configuration(
+        tuple(StageConfiguration(name, _parameters_of(s, settings)) for name, s in sections.items())
+    )
 
 
 def default_text(stages: Sequence[Stage]) -> str:
@@ -89,8 +97,7 @@ def default_text(stages: Sequence[Stage]) -> str:
 
 def resolved_text(configuration: Configuration) -> str:
     """Return a configuration as plain YAML."""
-    tree = {s.stage: s.parameters.model_dump(mode="json") for s in configuration.stages}
-    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True)
+    return yaml.safe_dump(configuration.tree(), sort_keys=False, allow_unicode=True)
 
 
 def _settings_of_file(file: Path) -> Iterator[_Setting]:
@@ -131,7 +138,9 @@ def _check_known(setting: _Setting, known: Sequence[str]) -> None:
 
 
 def _parameters_of(stage: Stage, settings: Sequence[_Setting]) -> Parameters:
-    mine = {s.place.partition(".")[2]: s for s in settings if s.place.partition(".")[0] == stage.name}
+    mine = {
+        s.place.partition(".")[2]: s for s in settings if s.place.partition(".")[0] == stage.configured_as
+    }
     try:
         # By way of JSON: strict, yet a YAML list may become a tuple and a word an enumeration member.
         return stage.parameters.model_validate_json(
@@ -156,7 +165,7 @@ def _refusal(stage: Stage, mine: Mapping[str, _Setting], error: ValidationError)
     return InputError(
         origin,
         f"{first['msg']}, not {mine[name].value!r}" if name in mine else first["msg"],
-        place=f"{stage.name}.{name}" if name else stage.name,
+        place=f"{stage.configured_as}.{name}" if name else stage.configured_as,
         expected=_meaning(field) if field else "",
     )
 

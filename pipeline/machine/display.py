@@ -50,7 +50,7 @@ class ProgressDisplay:
 
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
-            TextColumn("{task.description:<12}"),
+            TextColumn("{task.description:<20}"),
             BarColumn(),
             MofNCompleteColumn(),
             TextColumn("for"),
@@ -86,4 +86,4 @@ class ProgressDisplay:
         if outcome.name in self._tasks:
             self._progress.remove_task(self._tasks.pop(outcome.name))
         time = f"{outcome.seconds:8.1f} s" if outcome.state == State.COMPLETED else " " * 10
-        self._console.print(f"  {outcome.name:<12} {outcome.state.value:<10}{time}", highlight=False)
+        self._console.print(f"  {outcome.name:<20} {outcome.state.value:<10}{time}", highlight=False)

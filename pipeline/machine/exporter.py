@@ -45,7 +45,7 @@ class Exporter:
 
     def inputs(self) -> dict[str, type]:
         """Return argument name to class, in the order of the function's signature."""
-        hints = get_type_hints(self.write)
+        hints = get_type_hints(self.write, include_extras=True)
         return {k: v for k, v in hints.items() if k not in ("folder", "return")}
 
     def key(self, keys: Mapping[type, str]) -> str:

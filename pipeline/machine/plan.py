@@ -10,7 +10,7 @@ from pipeline.errors import BoresightError
 from pipeline.files.codec import Json, canonical
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.source_code import source_digest
-from pipeline.machine.stage import Parameters, Stage
+from pipeline.machine.stage import Parameters, Stage, of_role, plain, role_of
 
 
 class PipelineError(BoresightError):
@@ -28,7 +28,7 @@ class Source:
     value
         The thing itself.
     key
-        Hash of its content.
+        Hash of its content; empty for what is not there, such as a gauge run that was not made.
     refuse_changed
         Raises `pipeline.errors.InputError` when the content is no longer that of the key.
     """
@@ -53,7 +53,7 @@ class Step:
     key
         Hash of all that the result depends on.
     seed
-        For its random numbers: as the key, but the same whatever the program text.
+        For its random numbers: the same for equal parameters and sources, whatever the program text.
     """
 
     stage: Stage
@@ -80,17 +80,17 @@ class Plan:
             When there is no such stage.
         """
         for step in self.steps:
-            if step.stage.name == name:
+            if step.stage.label == name:
                 return step
-        raise PipelineError(f"no stage {name}; there are {', '.join(s.stage.name for s in self.steps)}")
+        raise PipelineError(f"no stage {name}; there are {', '.join(s.stage.label for s in self.steps)}")
 
     def maker(self, kind: type) -> Step | None:
         """Return the step that makes artefacts of class ``kind``, None for a source."""
-        return next((s for s in self.steps if s.output is kind), None)
+        return next((s for s in self.steps if s.output == kind), None)
 
     def input_hashes(self) -> dict[str, str]:
-        """Return the hash of every source by what it is: ``recording``, ``probe``."""
-        return {s.kind.__name__.lower(): s.key for s in self.sources}
+        """Return the hash of every source by what it is: ``recording``, ``probe``; or ``gauge``, its role."""
+        return {role_of(s.kind) or plain(s.kind).__name__.lower(): s.key for s in self.sources if s.key}
 
     def keys(self) -> dict[type, str]:
         """Return the key of every source and result by its class."""
@@ -122,15 +122,15 @@ class Selection:
 
     def skips(self, step: Step) -> bool:
         """Return whether a step is not to be computed even when its result is missing."""
-        return bool(self.only) and step.stage.name != self.only
+        return bool(self.only) and step.stage.label != self.only
 
     def recomputes(self, step: Step, plan: Plan) -> bool:
         """Return whether a step is to be computed even when its result is there."""
         if self.skips(step):
             return False
-        names = [s.stage.name for s in plan.steps]
+        names = [s.stage.label for s in plan.steps]
         since = self.recompute_from
-        return not self.resume or (bool(since) and names.index(step.stage.name) >= names.index(since))
+        return not self.resume or (bool(since) and names.index(step.stage.label) >= names.index(since))
 
 
 def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Sequence[Source]) -> Plan:
@@ -144,41 +144,50 @@ def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Se
         When a stage asks for what no earlier stage makes, or two make the same.
     """
     keys = {s.kind: s.key for s in sources}
+    made_from = {s.kind: {s.kind} for s in sources}
     steps: list[Step] = []
     for stage in stages:
         _check_wiring(stage, keys, stages)
-        parameters = configuration.of(stage.name)
-        key = _key(stage, parameters, keys)
-        seed = _seed(stage, parameters, sources)
-        steps.append(Step(stage, parameters, tuple(stage.inputs().items()), stage.output(), key, seed))
-        keys[stage.output()] = key
+        inputs = {name: _found(kind, stage, keys) for name, kind in stage.inputs().items()}
+        parameters = configuration.of(stage.configured_as)
+        key = _key(stage, parameters, {name: keys[kind] for name, kind in inputs.items()})
+        origins = set[type]().union(*(made_from[kind] for kind in inputs.values()))
+        seed = _seed(stage, parameters, [s.key for s in sources if s.kind in origins])
+        steps.append(Step(stage, parameters, tuple(inputs.items()), stage.output(), key, seed))
+        keys[stage.output()], made_from[stage.output()] = key, origins
     return Plan(tuple(sources), tuple(steps))
 
 
+def _found(kind: type, stage: Stage, made: Mapping[type, str]) -> type:
+    """Return the class of a stage's own recording where there is one, else the one that all share."""
+    own = of_role(kind, stage.role) if kind == plain(kind) else kind
+    return own if own in made else kind
+
+
 def _check_wiring(stage: Stage, made: Mapping[type, str], stages: Sequence[Stage]) -> None:
-    if [s.name for s in stages].count(stage.name) > 1:
-        raise PipelineError(f"two stages are named {stage.name}")
+    if [s.label for s in stages].count(stage.label) > 1:
+        raise PipelineError(f"two stages are named {stage.label}")
     if stage.output() in made:
-        raise PipelineError(f"stage {stage.name} makes {stage.output().__name__}, which is there already")
+        name = plain(stage.output()).__name__
+        raise PipelineError(f"stage {stage.label} makes {name}, which is there already")
     for kind in stage.inputs().values():
-        if kind not in made:
-            makers = [s.name for s in stages if s.output() is kind]
+        if _found(kind, stage, made) not in made:
+            makers = [s.label for s in stages if s.output() == kind]
             why = f"stage {makers[0]}, which must come before, makes it" if makers else "no stage makes it"
-            raise PipelineError(f"stage {stage.name} needs {kind.__name__}: {why}")
+            raise PipelineError(f"stage {stage.label} needs {plain(kind).__name__}: {why}")
 
 
-def _key(stage: Stage, parameters: Parameters, keys: Mapping[type, str]) -> str:
-    inputs: dict[str, Json] = {name: keys[kind] for name, kind in stage.inputs().items()}
+def _key(stage: Stage, parameters: Parameters, inputs: Mapping[str, Json]) -> str:
     content: Json = {
         "stage": stage.name,
         "version": stage.version,
         "source": source_digest(stage.function),
         "parameters": parameters.model_dump(mode="json"),
-        "inputs": inputs,
+        "inputs": dict(inputs),
     }
     return hashlib.sha256(canonical(content)).hexdigest()
 
 
-def _seed(stage: Stage, parameters: Parameters, sources: Sequence[Source]) -> int:
-    content: Json = [stage.name, parameters.model_dump(mode="json"), [s.key for s in sources]]
+def _seed(stage: Stage, parameters: Parameters, sources: Sequence[str]) -> int:
+    content: Json = [stage.name, parameters.model_dump(mode="json"), list(sources)]
     return int(hashlib.sha256(canonical(content)).hexdigest(), 16)

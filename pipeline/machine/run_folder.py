@@ -89,7 +89,7 @@ def _refuse_foreign(folder: RunFolder) -> None:
             folder.path,
             "holds files that are not those of a boresight run",
             expected="a new or empty folder, or an earlier run",
-            hint="give another folder with -o",
+            hint="give another folder with -o; results of an older boresight may also be moved away",
         )
 
 

@@ -13,18 +13,17 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
+from pipeline.files.provenance import MadeBy
 from pipeline.machine.display import Display
 from pipeline.machine.exporter import Exporter, Writer, published_key, withdraw
 from pipeline.machine.outcome import Number, Results, RunOutcome, StageOutcome, State
 from pipeline.machine.plan import Plan, Selection, Step
 from pipeline.machine.run_folder import RunFolder
 from pipeline.machine.scratch import Scratch
-from pipeline.machine.stage import Context
-from pipeline.machine.store import Provenance, Stored
-from pipeline.system.native import give_back_memory
+from pipeline.machine.stage import Context, plain
+from pipeline.machine.store import Provenance, Store, Stored
 
 _LONGEST_PROBLEM = 300
-_AT_ONCE = 2  # stages side by side; more would only share memory and cores among them
 _LOOK_S = 0.2  # a signal that reaches another thread is seen after so long
 
 
@@ -49,6 +48,12 @@ class Runner:
         Returns the numbers that anyone asks for first of the artefacts it is given, by class.
     display, logger, wish, workers
         Where progress goes, where messages go, the user's wish to stop, and how many threads to use.
+    made_by
+        What exporters write into their files about how they came about.
+    lent
+        Stores of other runs: a result found there is used as if it were our own.
+    at_once
+        How many stages may run side by side.
     """
 
     def __init__(
@@ -62,15 +67,22 @@ class Runner:
         logger: logging.Logger,
         wish: threading.Event,
         workers: int = 2,
+        made_by: MadeBy | None = None,
+        lent: Sequence[Store] = (),
+        at_once: int = 2,
     ) -> None:
         self._plan, self._exporters, self._folder = plan, exporters, folder
         self._record, self._headline = record, headline
         self._display, self._logger, self._wish, self._workers = display, logger, wish, workers
-        self._keys = plan.keys() | {Results: _key_of_all(plan)}
-        self._outcomes = {
-            s.stage.name: StageOutcome(s.stage.name, s.stage.version, s.key) for s in plan.steps
+        self._lent, self._at_once = lent, at_once
+        self._keys = plan.keys() | {
+            Results: _key_of_all(plan),
+            MadeBy: made_by.key if made_by is not None else "",
         }
-        self._artefacts: dict[type, object] = {s.kind: s.value for s in plan.sources}
+        self._outcomes = {
+            s.stage.label: StageOutcome(s.stage.label, s.stage.version, s.key) for s in plan.steps
+        }
+        self._artefacts: dict[type, object] = {s.kind: s.value for s in plan.sources} | {MadeBy: made_by}
         self._metrics: tuple[Number, ...] = ()
         self._writer = Writer(folder, logger)
         self._over = threading.Event()
@@ -111,10 +123,10 @@ class Runner:
         """Complete every step as soon as what it needs is there; some run side by side."""
         waiting = list(self._plan.steps)
         running: dict[Future[Stored], Step] = {}
-        with ThreadPoolExecutor(_AT_ONCE, "stage") as pool:
+        with ThreadPoolExecutor(self._at_once, "stage") as pool:
             try:
                 while waiting or running:
-                    step = _next(waiting, running.values())
+                    step = _next(waiting, running.values(), self._at_once)
                     if step is None:
                         self._await(running)
                     elif self._is_due(step, selection):
@@ -124,11 +136,11 @@ class Runner:
 
     def _is_due(self, step: Step, selection: Selection) -> bool:
         """Return whether a step has to be computed, and say that it starts; settle it if it is there."""
-        name = step.stage.name
+        name = step.stage.label
         self._at = f"stage {name}"
         self._stop_if_wished()
         if not selection.recomputes(step, self._plan):
-            stored = self._folder.store.read(name, step.key, step.output)
+            stored = self._stored(step)
             if stored is not None:
                 self._settle(step, stored, State.REUSED)
             if stored is not None or selection.skips(step):
@@ -140,12 +152,19 @@ class Runner:
         self._logger.info("stage %s starts, key %s", name, step.key)
         return True
 
+    def _stored(self, step: Step) -> Stored | None:
+        """Return the result of a step from our store, or from one that is lent to us."""
+        name, kind = step.stage.name, plain(step.output)
+        own = self._folder.store.read(name, step.key, kind)
+        lent = (store.borrow(name, step.key, kind) for store in self._lent)
+        return own if own is not None else next((s for s in lent if s is not None), None)
+
     def _await(self, running: dict[Future[Stored], Step]) -> None:
         """Settle the steps that have ended, or wait a moment for one to end."""
         ended = wait(running, _LOOK_S, FIRST_COMPLETED).done
         for future in [f for f in running if f in ended]:
             step = running.pop(future)
-            self._at = f"stage {step.stage.name}"
+            self._at = f"stage {step.stage.label}"
             self._settle(step, future.result(), State.COMPLETED)
 
     def _compute(self, step: Step) -> Stored:
@@ -161,7 +180,7 @@ class Runner:
         self._folder.store.write(artefact, provenance)
         del artefact
         give_back_memory()
-        stored = self._folder.store.read(name, step.key, step.output)
+        stored = self._folder.store.read(name, step.key, plain(step.output))
         if stored is None:
             raise TypeError(f"stage {name} made a {kind} that does not read back")
         return stored
@@ -181,10 +200,10 @@ class Runner:
     def _context(self, step: Step, numbers: list[Number]) -> Context:
         def progress(done: int, total: int) -> None:
             self._stop_if_wished()
-            self._display.progressed(step.stage.name, done, total)
+            self._display.progressed(step.stage.label, done, total)
 
         def report(name: str, value: float | int | str, unit: str = "") -> None:
-            self._logger.info("%s: %s = %s %s", step.stage.name, name, value, unit)
+            self._logger.info("%s: %s = %s %s", step.stage.label, name, value, unit)
             numbers.append(Number(name, value, unit))
 
         random = np.random.default_rng(step.seed)
@@ -203,12 +222,12 @@ class Runner:
             if kind not in self._artefacts and maker is not None:
                 raise InputError(
                     self._folder.path,
-                    f"holds no result of stage {maker.stage.name}, which {step.stage.name} needs",
+                    f"holds no result of stage {maker.stage.label}, which {step.stage.label} needs",
                     hint="run without --only, or that stage first",
                 )
 
     def _settle(self, step: Step, stored: Stored, state: State) -> None:
-        name, made = step.stage.name, stored.provenance
+        name, made = step.stage.label, stored.provenance
         self._artefacts[step.output] = stored.artefact
         self._metrics += self._headline({step.output: stored.artefact})
         outcome = replace(self._outcomes[name], state=state, seconds=made.seconds, numbers=made.numbers)
@@ -266,11 +285,11 @@ class Runner:
         return RunOutcome(state, tuple(self._outcomes.values()), self._metrics, problem)
 
 
-def _next(waiting: list[Step], running: Collection[Step]) -> Step | None:
+def _next(waiting: list[Step], running: Collection[Step], at_once: int) -> Step | None:
     """Take the first step off the list that needs nothing still to be made; None while there is no room."""
     missing = {s.output for s in (*waiting, *running)}
     ready = (s for s in waiting if not any(kind in missing for _, kind in s.inputs))
-    step = next(ready, None) if len(running) < _AT_ONCE else None
+    step = next(ready, None) if len(running) < at_once else None
     if step is not None:
         waiting.remove(step)
     return step

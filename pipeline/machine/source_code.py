@@ -9,7 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-_OWN_PACKAGES = ("pipeline", "stages")
+from pipeline.files.codec import OWN_PACKAGES
+
 _IMPORT = re.compile(
     r"^[ \t]*(?:from\s+([\w.]+)\s+import\s+(\([^)]*\)|[^\n]*)|import\s+([^\n]*))", re.MULTILINE
 )
@@ -21,7 +22,7 @@ def source_digest(function: Callable[..., Any]) -> str:
     Only what lies in the packages ``pipeline``, ``stages`` and the function's own counts: libraries are
     pinned by the lock file. Imports are followed as written, also those inside functions.
     """
-    packages = {*_OWN_PACKAGES, function.__module__.partition(".")[0]}
+    packages = {*OWN_PACKAGES, function.__module__.partition(".")[0]}
     texts: dict[str, str] = {}
     waiting = [function.__module__]
     while waiting:

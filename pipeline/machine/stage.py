@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, Protocol, get_type_hints
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Protocol, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -65,23 +65,38 @@ class Context:
     scratch: Scratch = field(default_factory=Scratch)
 
 
-def _silent_progress(done: int, total: int) -> None:
-    """Ignore progress."""
-
-
-def _silent_report(name: str, value: float | int | str, unit: str = "") -> None:
-    """Ignore headline numbers."""
-
-
 def quiet_context(seed: int = 0, workers: int = 2) -> Context:
-    """Return a context without any display, for library use and tests."""
+    """Return a context without any display."""
     return Context(
         logging.getLogger("boresight"),
-        _silent_progress,
-        _silent_report,
+        lambda done, total: None,
+        lambda name, value, unit="": None,
         np.random.default_rng(seed),
         workers,
     )
+
+
+@dataclass(frozen=True)
+class Of:
+    """Which of several recordings an artefact is of: ``Annotated[RingSamples, Of("gauge")]``."""
+
+    role: str
+
+
+def of_role(kind: type, role: str) -> type:
+    """Return the class as that of one of several recordings; the class itself for the role ""."""
+    return cast(type, Annotated[kind, Of(role)]) if role else kind
+
+
+def plain(kind: type) -> type:
+    """Return the class without the recording it is of."""
+    return kind.__origin__ if get_origin(kind) is Annotated else kind  # type: ignore[attr-defined]
+
+
+def role_of(kind: type) -> str:
+    """Return which recording the class is of; empty where there is one recording only."""
+    marks = get_args(kind)[1:] if get_origin(kind) is Annotated else ()
+    return next((m.role for m in marks if isinstance(m, Of)), "")
 
 
 @dataclass(frozen=True)
@@ -103,6 +118,10 @@ class Stage:
         ``function(**artefacts, parameters=..., context=...) -> artefact``; module level, fully annotated.
     summary
         One line for ``boresight stages``.
+    section
+        Section of the configuration with its parameters, where it is not its name: stages may share one.
+    role
+        Which of several recordings it works on: see `for_role`.
     """
 
     name: str
@@ -110,13 +129,32 @@ class Stage:
     parameters: type[Parameters]
     function: Callable[..., Any] = field(repr=False)
     summary: str = ""
+    section: str = ""
+    role: str = ""
+
+    @property
+    def configured_as(self) -> str:
+        """Section of the configuration that holds its parameters."""
+        return self.section or self.name
+
+    @property
+    def label(self) -> str:
+        """Name for people, with the recording it works on."""
+        return f"{self.role} {self.name}".strip()
+
+    def for_role(self, role: str) -> Stage:
+        """Return the stage as the one that works on one of several recordings.
+
+        It takes every artefact of that recording, and where there is none the one that all share. Its results
+        have the keys that they have without a role, so that a run of the recording alone holds them too.
+        """
+        return replace(self, role=role)
 
     def inputs(self) -> dict[str, type]:
         """Return argument name to artefact class, in the order of the function's signature."""
-        hints = get_type_hints(self.function)
+        hints = get_type_hints(self.function, include_extras=True)
         return {k: v for k, v in hints.items() if k not in ("parameters", "context", "return")}
 
     def output(self) -> type:
-        """Return the artefact class that the stage makes."""
-        made: type = get_type_hints(self.function)["return"]
-        return made
+        """Return the artefact class that the stage makes, with the recording it is of."""
+        return of_role(get_type_hints(self.function)["return"], self.role)

@@ -73,6 +73,13 @@ class Store:
 
     def read(self, stage: str, key: str, kind: type) -> Stored | None:
         """Return a whole result of class ``kind``; discard what is not whole and return None."""
+        stored = self.borrow(stage, key, kind)
+        if stored is None:
+            self.discard(stage, key)
+        return stored
+
+    def borrow(self, stage: str, key: str, kind: type) -> Stored | None:
+        """Return a whole result of class ``kind`` of a run that is not ours: nothing is discarded."""
         folder = self._place(stage, key)
         try:
             manifest = _read_manifest(folder)
@@ -82,7 +89,6 @@ class Store:
                 raise CodecError("the result of another key")
             artefact = decode(manifest["artefact"], partial(_load, folder), kind)
         except (OSError, ValueError, KeyError, TypeError):
-            self.discard(stage, key)
             return None
         return Stored(artefact, provenance)
 

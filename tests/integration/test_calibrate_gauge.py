@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.commands.calibrate import calibrate, gauge_parameters
+from pipeline.commands.calibrate import STAGES, calibrate
 from pipeline.errors import InputError
 from pipeline.instrument.probe_file import read_probe, read_with_source
+from pipeline.machine.configuration import resolve
 from pipeline.recording import open_recording
+from stages.calibrate.gauge import GaugeParameters
 from tests.shared_data import shared
 
 
@@ -54,7 +56,7 @@ def test_document_and_page_say_what_moved(calibration: Path) -> None:
     assert document["radius_error"][0]["before_largest_mm"] > 0.9
     assert document["radius_error"][0]["sigma_mm"] < 0.01
     gauge = open_recording(shared("recordings", "open-2-gauge")).content_key
-    assert document["made_by"]["input_sha256"]["gauge"] == gauge
+    assert document["made_by"]["input_sha256"]["recording"] == gauge
     _, source = read_with_source(calibration / "probe.yaml")
     assert source.made_by == document["made_by"]
     assert document["outvoted"] == {"fiducials": [], "rings": []}
@@ -65,11 +67,31 @@ def test_document_and_page_say_what_moved(calibration: Path) -> None:
 
 
 def test_unknown_parameter_is_refused() -> None:
-    with pytest.raises(InputError, match="'tilt' is no parameter"):
-        gauge_parameters(["tilt=3"])
-    with pytest.raises(InputError, match="tilt_prior_deg"):
-        gauge_parameters(["tilt_prior_deg=-1"])
-    assert gauge_parameters(["tilt_prior_deg=1", "ring_bins=120"]).tilt_prior_deg == 1.0
+    for words in ("gauge.tilt=3", "tilt_prior_deg=3", "gauge.tilt_prior_deg=-1"):
+        with pytest.raises(InputError, match="tilt_prior_deg"):
+            resolve(STAGES, None, [words])
+    set_so = resolve(STAGES, None, ["gauge.tilt_prior_deg=1", "gauge.ring_bins=120"]).of("gauge")
+    assert isinstance(set_so, GaugeParameters)
+    assert set_so.tilt_prior_deg == 1.0
+
+
+def states(folder: Path) -> dict[str, str]:
+    """Return how each stage stands by run.json."""
+    stages = json.loads((folder / "run.json").read_text("utf-8"))["stages"]
+    return {stage["name"]: stage["state"] for stage in stages}
+
+
+def test_a_second_call_computes_nothing(calibration: Path) -> None:
+    before = {p.name: p.read_bytes() for p in calibration.iterdir() if p.is_file() and p.name != "run.json"}
+    assert len(before) == 3
+    calibrate(shared("recordings", "open-2-gauge"), calibration)
+    assert states(calibration) == {"rings": "reused", "gauge": "reused"}
+    assert {name: (calibration / name).read_bytes() for name in before} == before
+
+
+def test_another_prior_keeps_the_rings(calibration: Path) -> None:
+    calibrate(shared("recordings", "open-2-gauge"), calibration, assignments=["gauge.iterations=11"])
+    assert states(calibration) == {"rings": "reused", "gauge": "completed"}
 
 
 def test_inspection_is_refused(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,8 @@ from pipeline.commands import calibrate as calibrating
 from pipeline.commands import calibrate_camera as calibrating_camera
 from pipeline.commands import diagnose as diagnosing
 from pipeline.errors import InputError
+from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.recording.base import Recording
 from tests.bad_recordings import cut_sample
 from tests.faults import obeying_permissions, on_small_disk
 from tests.shared_data import PROJECT_ROOT
@@ -85,6 +88,8 @@ def test_killed_at_any_step_the_answer_stands_for_all_files_of_one_call(tmp_path
 _FULL = """
 from pipeline.files.disk import written_together
 from pipeline.errors import InputError
+from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.recording.base import Recording
 def write(generation):
     with written_together(disk / "out", last="answer.json") as new:
         for name in ("a.bin", "b.bin", "answer.json"):
@@ -147,10 +152,7 @@ def test_a_recording_that_changes_while_it_is_measured_gives_no_result(
     def meddling(*_: object) -> None:
         spoil(recording / name)
 
-    monkeypatch.setattr(calibrating, "require_gauge", lambda recording: None)
-    monkeypatch.setattr(calibrating, "extract_rings", meddling)
-    monkeypatch.setattr(calibrating, "calibrate_gauge", lambda *_: None)
-    monkeypatch.setattr(calibrating, "written_together", unexpectedly)
+    meddle_with_calibration(monkeypatch, meddling)
     kept = (recording / name).read_bytes()
     for command in ("calibrate", "diagnose"):
         (recording / name).write_bytes(kept)
@@ -162,18 +164,37 @@ def test_a_recording_that_changes_while_it_is_measured_gives_no_result(
         assert done.exception.file == recording / name
         assert "changed while" in str(done.exception) or "cannot be read any more" in str(done.exception)
         assert "same command again" in done.exception.hint
-        assert not output.exists()
+        assert not (output / "probe.yaml").exists()
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the meddling stage makes."""
+
+
+def measure_meddled(recording: Recording, *, parameters: Parameters, context: Context) -> Measured:
+    MEDDLING[-1]()
+    return Measured()
+
+
+MEDDLING: list[Callable[[], None]] = []
+
+
+def meddle_with_calibration(monkeypatch: pytest.MonkeyPatch, meddling: Callable[[], None]) -> None:
+    MEDDLING.append(meddling)
+    stage = Stage("measured", "1", Parameters, measure_meddled)
+    monkeypatch.setattr(calibrating, "require_gauge", lambda recording: None)
+    monkeypatch.setattr(calibrating, "STAGES", (stage,))
+    monkeypatch.setattr(calibrating, "EXPORTERS", ())
+    monkeypatch.setattr(calibrating, "result_of", unexpectedly)
 
 
 def test_a_recording_that_is_only_touched_is_no_fault(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(calibrating, "require_gauge", lambda recording: None)
-    monkeypatch.setattr(calibrating, "extract_rings", lambda *_: os.utime(recording / "frames.mkv", (1, 1)))
-    monkeypatch.setattr(calibrating, "calibrate_gauge", lambda *_: None)
-    monkeypatch.setattr(calibrating, "written_together", unexpectedly)
+    meddle_with_calibration(monkeypatch, lambda: os.utime(recording / "frames.mkv", (1, 1)))
     done = CliRunner().invoke(app, ["calibrate", str(recording), "-o", str(recording.parent / "out")])
-    assert isinstance(done.exception, ReachedError | AttributeError), done.output
+    assert isinstance(done.exception, ReachedError), done.output
 
 
 def test_pictures_that_change_while_they_are_read_give_no_camera(

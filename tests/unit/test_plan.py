@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import pytest
 
 from pipeline.machine.configuration import resolve
 from pipeline.machine.plan import PipelineError, Plan, Source, make_plan
-from pipeline.machine.stage import Stage
+from pipeline.machine.stage import Context, Of, Parameters, Stage, of_role
 from pipeline.recording.base import Recording
-from tests.toy_stages import DRAW, SMOOTH, TOTAL, TOYS
+from tests.toy_stages import DRAW, SMOOTH, TOTAL, TOYS, Total
 from tests.toys import toy_recording
 
 
@@ -60,3 +61,45 @@ def test_a_version_changes_the_keys_from_its_stage_on() -> None:
 def test_another_recording_changes_every_key() -> None:
     before, after = keys(plan_of(*TOYS)), keys(plan_of(*TOYS, key="1" * 64))
     assert not set(before) & set(after)
+
+
+@dataclass(frozen=True)
+class Both:
+    difference: float
+
+
+def compare(
+    total: Total, other: Annotated[Total, Of("gauge")], *, parameters: Parameters, context: Context
+) -> Both:
+    return Both(total.total - other.total)
+
+
+def two_recordings(first: str, second: str) -> Plan:
+    sources = [
+        Source(of_role(Recording, role), replace(toy_recording(), content_key=key), key)
+        for role, key in (("", first), ("gauge", second))
+    ]
+    stages = (*TOYS, *(s.for_role("gauge") for s in TOYS), Stage("compare", "1", Parameters, compare))
+    return make_plan(stages, resolve(stages), sources)
+
+
+def test_stages_of_two_recordings_stand_side_by_side() -> None:
+    plan = two_recordings("a" * 64, "b" * 64)
+    names = [s.stage.label for s in plan.steps]
+    assert names == ["draw", "smooth", "total", "gauge draw", "gauge smooth", "gauge total", "compare"]
+    assert plan.input_hashes() == {"recording": "a" * 64, "gauge": "b" * 64}
+    assert plan.step("gauge total").output == of_role(Total, "gauge")
+    assert plan.step("total").key != plan.step("gauge total").key
+
+
+def test_a_result_has_one_key_whatever_its_role() -> None:
+    one, swapped = two_recordings("a" * 64, "b" * 64), two_recordings("b" * 64, "a" * 64)
+    assert one.step("gauge total").key == swapped.step("total").key
+    assert one.step("total").key == swapped.step("gauge total").key
+    assert one.step("compare").key != swapped.step("compare").key
+
+
+def test_a_seed_depends_on_what_the_result_is_made_from_alone() -> None:
+    one, other = two_recordings("a" * 64, "b" * 64), two_recordings("a" * 64, "c" * 64)
+    assert one.step("draw").seed == other.step("draw").seed
+    assert one.step("gauge draw").seed != other.step("gauge draw").seed

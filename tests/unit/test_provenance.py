@@ -23,7 +23,7 @@ def written(folder: Path, made_by: MadeBy | None) -> Path:
 
 def test_a_run_names_what_made_its_probe(tmp_path):
     _, source = read_with_source(written(tmp_path, MADE_BY))
-    run_job(replace(toy_job(tmp_path / "run"), probe_source=source), Selection(), SilentDisplay())
+    run_job(toy_job(tmp_path / "run", probe=source), Selection(), SilentDisplay())
     record = json.loads((tmp_path / "run" / "run.json").read_text())
     assert record["probe"]["calibrated_from"] == "gauge-7"
     assert record["probe"]["made_by"]["command"] == "diagnose"

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.api.job import Job, run_job
+from pipeline.api.job import Job, result_of, run_job
 from pipeline.errors import Cancelled, InputError, UnusableError
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
@@ -27,7 +27,7 @@ from pipeline.machine.runner import FailedError
 from pipeline.machine.stage import Context, Parameters, Stage
 from tests.disk_limit import file_size_limit
 from tests.shared_data import PROJECT_ROOT
-from tests.toy_stages import DRAW, SMOOTH, Drawn, DrawParameters
+from tests.toy_stages import DRAW, SMOOTH, Drawn, DrawParameters, Total
 from tests.toys import run_toys, toy_job
 
 
@@ -300,3 +300,20 @@ def test_a_moved_run_goes_on(tmp_path: Path) -> None:
     run_toys(tmp_path / "run")
     shutil.move(tmp_path / "run", tmp_path / "moved")
     assert states(run_toys(tmp_path / "moved")) == ["reused"] * 3
+
+
+def test_what_another_run_holds_is_not_computed_again(tmp_path: Path) -> None:
+    run_toys(tmp_path / "first")
+    job = replace(toy_job(tmp_path / "second"), lent=(tmp_path / "first",))
+    assert [s.state.value for s in run_job(job, Selection(), SilentDisplay()).stages] == ["reused"] * 3
+    assert result_of(job, Total).total == result_of(toy_job(tmp_path / "first"), Total).total
+
+
+def test_a_damaged_result_of_another_run_is_computed_here_and_left_there(tmp_path: Path) -> None:
+    run_toys(tmp_path / "first")
+    array = next((tmp_path / "first" / ".boresight").glob("draw-*/*.npy"))
+    array.write_bytes(array.read_bytes()[:-2])
+    job = replace(toy_job(tmp_path / "second"), lent=(tmp_path / "first",))
+    states = [s.state.value for s in run_job(job, Selection(), SilentDisplay()).stages]
+    assert states == ["completed", "reused", "reused"]
+    assert array.exists()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.files.codec import digest, encode
 from pipeline.machine.outcome import Number
+from pipeline.machine.stage import Parameters
 from pipeline.machine.store import Provenance, Store
 from tests.disk_limit import file_size_limit
-from tests.toy_stages import Mood
+from tests.toy_stages import DrawParameters, Mood
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class Tree:
     flag: bool
     mixed: tuple[float | int | str | bool | None, ...]
     array: NDArray[Any]
+    moods: Mapping[Mood, float] = field(default_factory=dict)
+    chosen: Parameters = field(default_factory=DrawParameters)
 
 
 KEY = "ab" * 32
@@ -58,6 +61,8 @@ trees = st.builds(
     flag=st.booleans(),
     mixed=st.lists(st.floats() | st.integers() | texts | st.booleans() | st.none(), max_size=4).map(tuple),
     array=arrays,
+    moods=st.dictionaries(st.sampled_from(Mood), st.floats(allow_nan=False)),
+    chosen=st.builds(DrawParameters, count=st.integers(1, 9), mood=st.sampled_from(Mood)),
 )
 
 
@@ -104,7 +109,7 @@ def test_big_arrays_are_mapped_and_all_are_read_only(tmp_path: Path) -> None:
             array[0] = 1
 
 
-@pytest.mark.parametrize("value", [{"a": 1}, [1], b"x", np.array([object()]), 1j, Path("x")])
+@pytest.mark.parametrize("value", [{"a"}, {"a": [1]}, [1], b"x", np.array([object()]), 1j, Path("x")])
 def test_what_cannot_be_stored_is_refused_by_name(value: object) -> None:
     with pytest.raises(TypeError, match=r"^leaf\.array"):
         encode(Tree(Leaf("a", 0.0, value), (), Mood.CALM, 0, True, (), np.arange(1)))  # type: ignore[arg-type]

@@ -80,7 +80,7 @@ def _posed(
     recording: Recording, gauge: Gauge, probe: Probe, parameters: GaugeParameters, context: Context
 ) -> PosedFrames:
     """Return the frames in which fiducials give a pose."""
-    sightings = _sightings(recording, gauge)
+    sightings = _sightings(recording, gauge, context)
     premises.require_fiducials(recording, gauge, sightings, parameters)
     first = [first_pose(s, gauge, probe.camera, context.random) for s in sightings]
     posed = posed_frames(recording, sightings, first)
@@ -106,7 +106,7 @@ def measure_gauge(
     T_pc = poses_of_all_frames(recording, posed, rings, probe)
     source = RingSource(rings, frame_index(recording, rings.frame), gauge)
     _require_bores(source, T_pc, probe, parameters)
-    edges = _edges(recording, posed, wrong, gauge, probe, parameters)
+    edges = _edges(recording, posed, wrong, gauge, probe, parameters, context)
     on_bore = source.on_bore(T_pc, probe, parameters)
     time_s, encoder = recording.frames.time_s, recording.encoder
     measured = Measurements(edges, on_bore, time_s, encoder, gauge.radius_sigma_mm, LOOSE)
@@ -123,9 +123,13 @@ def _solved(run: MeasuredRun, parameters: GaugeParameters) -> Finding:
         raise UnusableError("calibrate", f"the run does not determine the instrument ({error})") from error
 
 
-def _sightings(recording: Recording, gauge: Gauge) -> list[Sighting]:
+def _sightings(recording: Recording, gauge: Gauge, context: Context) -> list[Sighting]:
     lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
-    return [sighting for sighting, _ in find_fiducials(recording.read(lit, "grey"), gauge)]
+    found = []
+    for sighting, _ in find_fiducials(recording.read(lit, "grey"), gauge):
+        found.append(sighting)
+        context.progress(len(found), 2 * len(lit))
+    return found
 
 
 def _edges(
@@ -135,11 +139,13 @@ def _edges(
     gauge: Gauge,
     probe: Probe,
     parameters: GaugeParameters,
+    context: Context,
 ) -> Edges:
     """Measure the borders of the fiducials that fit, in all posed frames."""
     parts = []
     images = recording.read(recording.frames.frame[posed.index], "grey")
     for k, (_, image) in enumerate(images):
+        context.progress(len(posed.index) + k + 1, 2 * len(posed.index))
         if image is None:
             continue
         sighting, pose = posed.sightings[k], posed.poses[k]

@@ -1,0 +1,37 @@
+"""What commands that compute have in common: their parameters, and the progress that they show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from pipeline.api.job import Job, run_job
+from pipeline.machine.display import ProgressDisplay
+from pipeline.machine.outcome import RunOutcome, warnings_of
+from pipeline.machine.plan import Selection
+
+ConfigFile = Annotated[
+    Path | None, typer.Option("--config", metavar="FILE", help="parameters by stage (YAML)")
+]
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="one parameter; may be repeated"),
+]
+
+
+def worked(job: Job, console: Console) -> RunOutcome:
+    """Run a job with its progress shown, and print its warnings.
+
+    Raises
+    ------
+    BoresightError
+        As `run_job` raises it.
+    """
+    with ProgressDisplay(console) as display:
+        outcome = run_job(job, Selection(), display)
+    for warning in warnings_of(outcome.stages):
+        console.print(f"warning: {warning}", highlight=False)
+    return outcome
