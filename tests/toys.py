@@ -17,6 +17,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
+from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Selection
 from pipeline.recording.base import FrameTable, PipeFacts, Planes, Recording

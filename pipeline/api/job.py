@@ -89,6 +89,11 @@ def recording_source(recording: Recording, role: str = "") -> Source:
     return Source(kind, recording, recording.content_key, partial(refuse_changed, recording))
 
 
+def value_source(value: object) -> Source:
+    """Return plain data as a source, its key made from its content."""
+    return Source(type(value), value, digest(value))
+
+
 def probe_source(probe: Probe) -> Source:
     """Return a probe as a source."""
     return Source(Probe, probe, digest(probe))

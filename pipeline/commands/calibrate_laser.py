@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-import cv2
 import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.commands.calibrate_camera import BoardKind, describe_board, find_boards, list_images
-from pipeline.errors import InputError
-from pipeline.files.disk import disk_errors_named, require_writable, written_together
+from pipeline.api.job import Job, result_of, value_source
+from pipeline.commands.calibrate_camera import BoardKind, describe_board
+from pipeline.commands.working import Assignments, ConfigFile, worked
+from pipeline.files.disk import require_writable
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.base import Camera
-from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.machine.stage import quiet_context
-from pipeline.recording.input_file import content_key, input_file
-from stages.calibrate.laser.calibrate import LaserCalibration, LaserPicture, calibrate_laser_plane
-from stages.calibrate.laser.parameters import LaserPlaneParameters
+from pipeline.machine.configuration import resolve
+from pipeline.machine.exporter import Exporter
+from pipeline.recording.input_file import input_file
+from stages.calibrate.boards import BOARDS, CameraFile, Target, list_pictures
+from stages.calibrate.laser import LASER_PLANE, LaserCalibration
 
 
 def calibrate_laser(
@@ -41,11 +40,12 @@ def calibrate_laser(
     ],
     square_mm: Annotated[float, typer.Option(min=0.01, help="edge of a square, mm")],
     wavelength_nm: Annotated[
-        float, typer.Option(min=380, max=750, help="wavelength of the laser, nm")
-    ] = 520.0,
+        float | None, typer.Option(min=380, max=750, help="wavelength of the laser, nm; else 520")
+    ] = None,
     margin_squares: Annotated[
-        float, typer.Option(min=0, max=50, help="how far the plane goes on beyond the outermost corners")
-    ] = 1.0,
+        float | None,
+        typer.Option(min=0, max=50, help="how far the plane goes on beyond the outermost corners; else 1"),
+    ] = None,
     board: Annotated[BoardKind, typer.Option(help="kind of board")] = BoardKind.CHESSBOARD,
     marker_mm: Annotated[float | None, typer.Option(min=0.01, help="charuco: edge of a marker, mm")] = None,
     dictionary: Annotated[str, typer.Option(help="charuco: OpenCV's marker dictionary")] = "DICT_5X5_100",
@@ -55,36 +55,49 @@ def calibrate_laser(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")] = (
         Path("laser-calibration")
     ),
+    config: ConfigFile = None,
+    assignments: Assignments = None,
 ) -> None:
     """Find the laser plane from pictures of a board with the laser line across it.
 
     Writes laser.json and, with --probe, the probe with the given camera and the plane found as its sheet.
     """
-    target = describe_board(board, columns, rows, square_mm, marker_mm, dictionary)
+    given = (("wavelength_nm", wavelength_nm), ("margin_squares", margin_squares))
+    chosen = [f"laser_plane.{name}={value}" for name, value in given if value is not None]
+    configuration = resolve(STAGES, config, [*chosen, *(assignments or ())])
+    target = Target(describe_board(board, columns, rows, square_mm, marker_mm, dictionary))
     camera_file = input_file(camera)
-    model = read_camera(camera)
-    stated = None if probe is None else read_probe(probe)
-    parameters = LaserPlaneParameters(wavelength_nm=wavelength_nm, margin_squares=margin_squares)
-    console = Console(stderr=True)
-    files = list_images(images)
-    pictures = [input_file(file) for file in files]
+    known = CameraFile(read_camera(camera), camera.name)
+    stated = StatedProbe(read_probe(probe) if probe is not None else None)
+    of_camera = replace(value_source(known), refuse_changed=camera_file.refuse_changed)
+    sources = (list_pictures(images).source(), of_camera, value_source(target), value_source(stated))
     require_writable(output)
-    views, image_size, without_board = find_boards(files, target, console)
-    _refuse_other_size(image_size, model, camera)
-    with console.status("measuring lines"):
-        result = calibrate_laser_plane(_pictures(files, views), model, parameters, quiet_context())
-    result = replace(result, rejected=(*without_board, *result.rejected))
-    refined = None if stated is None else with_plane(stated, model, result.plane, wavelength_nm)
-    for file in (*pictures, camera_file):
-        file.refuse_changed()
-    inputs = {"pictures": content_key(pictures), "camera": content_key((camera_file,))}
-    made_by = MadeBy("calibrate-laser", inputs, parameters.model_dump(mode="json"))
+    job = Job("calibrate-laser", sources, STAGES, EXPORTERS, configuration, output)
+    console = Console(stderr=True)
+    worked(job, console)
+    _show(result_of(job, LaserCalibration), output, console)
+
+
+@dataclass(frozen=True)
+class StatedProbe:
+    """The probe that is to be written again with the plane found; None for none."""
+
+    probe: Probe | None
+
+
+def write_plane(
+    result: LaserCalibration, known: CameraFile, stated: StatedProbe, made_by: MadeBy, folder: Path
+) -> None:
+    """Write laser.json, and probe.yaml where a probe was given."""
     document = description(result) | {"made_by": made_by.document()}
-    with written_together(output, last="laser.json") as folder:
-        (folder / "laser.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
-        if refined is not None:
-            write_probe(refined, folder / "probe.yaml", made_by)
-    _show(result, output, console)
+    (folder / "laser.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
+    if stated.probe is not None and known.camera is not None:
+        refined = with_plane(stated.probe, known.camera, result.plane, result.wavelength_nm)
+        write_probe(refined, folder / "probe.yaml", made_by)
+
+
+STAGES = (BOARDS, LASER_PLANE)
+EXPORTERS = (Exporter("laser", write_plane),)
 
 
 def with_plane(stated: Probe, camera: Camera, plane: LaserPlane, wavelength_nm: float) -> Probe:
@@ -125,27 +138,6 @@ def description(result: LaserCalibration) -> dict[str, object]:
         "pictures": pictures,
         "rejected": [{"name": name, "reason": reason} for name, reason in result.rejected],
     }
-
-
-def _refuse_other_size(image_size: tuple[int, int], camera: Camera, file: Path) -> None:
-    if image_size != camera.image_size:
-        raise InputError(
-            file,
-            f"is a camera of {camera.image_size[0]} × {camera.image_size[1]} px",
-            expected=f"one of {image_size[0]} × {image_size[1]} px, as the pictures are",
-        )
-
-
-def _pictures(files: Sequence[Path], views: Sequence[BoardView]) -> list[LaserPicture]:
-    by_name = {file.name: file for file in files}
-    if len(by_name) < len(files):
-        raise InputError(files[0].parent, "two pictures have the same name", hint="rename one of them")
-    return [LaserPicture(_read(by_name[view.name]), view) for view in views]
-
-
-def _read(file: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-    with disk_errors_named(file):
-        return np.asarray(cv2.imdecode(np.fromfile(file, np.uint8), cv2.IMREAD_COLOR), np.uint8)
 
 
 def _show(result: LaserCalibration, output: Path, console: Console) -> None:

@@ -22,6 +22,7 @@ from pipeline.machine.run_folder import RunFolder
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, plain
 from pipeline.machine.store import Provenance, Store, Stored
+from pipeline.system.native import give_back_memory
 
 _LONGEST_PROBLEM = 300
 _LOOK_S = 0.2  # a signal that reaches another thread is seen after so long

@@ -66,9 +66,9 @@ def test_rendered_chessboards_give_the_camera_that_rendered_them(pictures, tmp_p
 
 
 def test_camera_file_is_a_probe_section(pictures, tmp_path):
-    run(pictures, *CHESSBOARD, "--model", "equidistant", "-o", tmp_path)
-    section = yaml.safe_load((tmp_path / "camera.yaml").read_text())["camera"]
-    assert camera_from_mapping(section, tmp_path / "camera.yaml").model == "equidistant"
+    run(pictures, *CHESSBOARD, "--model", "equidistant", "-o", tmp_path / "out")
+    section = yaml.safe_load((tmp_path / "out" / "camera.yaml").read_text())["camera"]
+    assert camera_from_mapping(section, tmp_path / "out" / "camera.yaml").model == "equidistant"
 
 
 def test_page_stands_alone_and_a_second_run_writes_the_same(pictures, tmp_path):
@@ -83,7 +83,9 @@ def test_page_stands_alone_and_a_second_run_writes_the_same(pictures, tmp_path):
     assert "http://" not in page
     assert "https://" not in page
     assert read_camera(tmp_path / "one" / "camera-kalibr.txt").model == "kannala_brandt"
-    for file in (tmp_path / "one").iterdir():
+    files = [f for f in (tmp_path / "one").iterdir() if f.is_file() and f.name != "run.json"]
+    assert len(files) == 4
+    for file in files:
         assert file.read_bytes() == (tmp_path / "two" / file.name).read_bytes(), file.name
 
 
@@ -134,7 +136,7 @@ def test_one_picture_many_times_is_refused(pictures, tmp_path):
         (tmp_path / f"{i}.png").write_bytes((pictures / "0.png").read_bytes())
     with pytest.raises(UnusableError, match="parallel planes"):
         run(tmp_path, *CHESSBOARD, "-o", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "out" / "camera.yaml").exists()
 
 
 def test_a_board_of_another_size_is_refused_with_a_hint(pictures, tmp_path):

@@ -20,6 +20,7 @@ from pipeline.commands import diagnose as diagnosing
 from pipeline.errors import InputError
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
+from stages.calibrate.boards import Pictures
 from tests.bad_recordings import cut_sample
 from tests.faults import obeying_permissions, on_small_disk
 from tests.shared_data import PROJECT_ROOT
@@ -177,6 +178,11 @@ def measure_meddled(recording: Recording, *, parameters: Parameters, context: Co
     return Measured()
 
 
+def measure_meddled_pictures(pictures: Pictures, *, parameters: Parameters, context: Context) -> Measured:
+    MEDDLING[-1]()
+    return Measured()
+
+
 MEDDLING: list[Callable[[], None]] = []
 
 
@@ -205,21 +211,16 @@ def test_pictures_that_change_while_they_are_read_give_no_camera(
     (pictures / "1.png").write_bytes(b"first")
     (pictures / "2.png").write_bytes(b"second")
 
-    def meddling(*_: object) -> tuple[list[object], tuple[int, int], list[object]]:
-        other_bytes(pictures / "2.png")
-        return [], (8, 8), []
-
-    class Report:
-        def with_rejected(self, rejected: object) -> object:
-            return self
-
-    monkeypatch.setattr(calibrating_camera, "find_boards", meddling)
-    monkeypatch.setattr(calibrating_camera, "calibrate_boards", lambda *_: Report())
+    MEDDLING.append(lambda: other_bytes(pictures / "2.png"))
+    stage = Stage("boards", "1", Parameters, measure_meddled_pictures)
+    monkeypatch.setattr(calibrating_camera, "STAGES", (stage,))
+    monkeypatch.setattr(calibrating_camera, "EXPORTERS", ())
+    monkeypatch.setattr(calibrating_camera, "result_of", unexpectedly)
     words = ["calibrate-camera", str(pictures), "--columns", "9", "--rows", "6", "--square-mm", "10"]
     done = CliRunner().invoke(app, [*words, "-o", str(tmp_path / "out")])
     assert isinstance(done.exception, InputError), done.output
     assert done.exception.file == pictures / "2.png"
-    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "out" / "camera.yaml").exists()
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,9 +20,27 @@ from stages.calibrate.boards.compare import (
     without_outlier_views,
 )
 from stages.calibrate.boards.fit import NAME, adjust, refuse_one_plane, refuse_too_few
-from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
+from stages.calibrate.boards.parameters import MODEL_NAMES, BoardCalibrationParameters, ModelName
 from stages.calibrate.boards.parts import Part, deal
+from stages.calibrate.boards.pictures import FoundBoards
 from stages.calibrate.boards.start import start
+
+
+@dataclass(frozen=True)
+class CameraFile:
+    """A camera that is given, and the name of its file; None where none is."""
+
+    camera: Camera | None = None
+    name: str = ""
+
+
+def calibrate_camera(
+    found: FoundBoards, reference: CameraFile, *, parameters: BoardCalibrationParameters, context: Context
+) -> CalibrationReport:
+    """Fit camera models to the boards found: see `calibrate_boards`."""
+    models = MODEL_NAMES if parameters.model == "best" else (parameters.model,)
+    report = calibrate_boards(found.views, found.image_size, models, reference.camera, parameters, context)
+    return report.with_rejected(found.rejected)
 
 
 def calibrate_boards(

@@ -18,6 +18,9 @@ class BoardCalibrationParameters(Parameters):
     huber_px: float = Field(
         default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
     )
+    model: Literal["best", ModelName] = Field(
+        default="best", description="camera model; best: the one that predicts held-out pictures best"
+    )
     board_shape: Literal["flat", "bent", "surveyed", "best"] = Field(
         default="best",
         description="board taken for flat, its sag estimated, every corner estimated, or whichever of the "

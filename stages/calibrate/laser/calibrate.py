@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.arrays import Float, Image
-from pipeline.errors import UnusableError
+from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, rms
 from pipeline.instrument.laser import NAME, LaserPlane
 from pipeline.machine.stage import Context
+from stages.calibrate.boards import CameraFile, FoundBoards, Pictures
 from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
+from stages.calibrate.boards.pictures import read_picture
 from stages.calibrate.boards.start import pose
 from stages.calibrate.laser.line import measure_line, patch_around
 from stages.calibrate.laser.parameters import LaserPlaneParameters
@@ -54,11 +56,50 @@ class BoardLine:
 
 @dataclass(frozen=True)
 class LaserCalibration:
-    """A laser plane, the lines it was fitted to, and the pictures not used with reasons."""
+    """A laser plane, the lines it was fitted to, the pictures not used with reasons, and the wavelength."""
 
     plane: LaserPlane
     lines: tuple[BoardLine, ...]
     rejected: tuple[tuple[str, str], ...]
+    wavelength_nm: float = 520.0
+
+
+def calibrate_laser(
+    pictures: Pictures,
+    found: FoundBoards,
+    camera: CameraFile,
+    *,
+    parameters: LaserPlaneParameters,
+    context: Context,
+) -> LaserCalibration:
+    """Find the laser plane in pictures of boards: see `calibrate_laser_plane`.
+
+    Raises
+    ------
+    InputError
+        When the camera's images are not of the pictures' size, or two pictures have one name.
+    """
+    known = camera.camera
+    if known is None or found.image_size != known.image_size:
+        stated = "no camera" if known is None else f"a camera of {_size(known.image_size)} px"
+        raise InputError(
+            camera.name, f"is {stated}", expected=f"one of {_size(found.image_size)} px, as the pictures are"
+        )
+    result = calibrate_laser_plane(_lit_boards(pictures, found), known, parameters, context)
+    return replace(result, rejected=(*found.rejected, *result.rejected))
+
+
+def _size(size: tuple[int, int]) -> str:
+    return f"{size[0]} × {size[1]}"
+
+
+def _lit_boards(pictures: Pictures, found: FoundBoards) -> list[LaserPicture]:
+    files = [file.path for file in pictures.files]
+    by_name = {file.name: file for file in files}
+    if len(by_name) < len(files):
+        raise InputError(files[0].parent, "two pictures have the same name", hint="rename one of them")
+    read = ((view, read_picture(by_name[view.name])) for view in found.views)
+    return [LaserPicture(image, view) for view, image in read if image is not None]
 
 
 def calibrate_laser_plane(
@@ -85,7 +126,7 @@ def calibrate_laser_plane(
     _refuse_one_line(xyz_c, parameters)
     plane = fit_plane_robustly(xyz_c, group)
     _refuse_undetermined(plane, parameters)
-    return LaserCalibration(plane, tuple(lines), tuple(rejected))
+    return LaserCalibration(plane, tuple(lines), tuple(rejected), parameters.wavelength_nm)
 
 
 def line_on_board(picture: LaserPicture, camera: Camera, parameters: LaserPlaneParameters) -> BoardLine:
