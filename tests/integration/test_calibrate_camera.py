@@ -149,7 +149,7 @@ def test_pictures_of_two_sizes_are_refused(pictures, tmp_path):
     small = tmp_path / "small.png"
     cv2.imwrite(str(small), cv2.resize(cv2.imread(str(pictures / "0.png")), (320, 240)))
     with pytest.raises(InputError, match="320 × 240 px"):
-        run(pictures / "0.png", small, *CHESSBOARD, "-o", tmp_path)
+        run(pictures / "0.png", small, *CHESSBOARD, "-o", tmp_path / "out")
 
 
 def test_nothing_to_look_at_is_refused(tmp_path):
@@ -160,7 +160,7 @@ def test_nothing_to_look_at_is_refused(tmp_path):
         run(tmp_path / "absent", *CHESSBOARD)
     (tmp_path / "a.png").write_bytes(b"")
     with pytest.raises(InputError, match="no other file is"):
-        run(tmp_path / "a.png", *CHESSBOARD)
+        run(tmp_path / "a.png", *CHESSBOARD, "-o", tmp_path / "out")
 
 
 @pytest.mark.parametrize(
