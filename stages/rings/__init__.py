@@ -6,5 +6,5 @@ from stages.rings.extract import RingParameters, extract_rings
 __all__ = ["RINGS", "RingParameters", "extract_rings"]
 
 RINGS = Stage(
-    "rings", "3", RingParameters, extract_rings, "laser frames to sub-pixel ring samples with their σ"
+    "rings", "4", RingParameters, extract_rings, "laser frames to sub-pixel ring samples with their σ"
 )

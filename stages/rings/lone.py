@@ -25,10 +25,11 @@ SAYING_RINGS = WALL_RINGS + 1
 _RUN_SIGMAS, _SEED_SIGMAS = 2.5, 5.0
 # A ring 0.7 of a defect's half width away still sees a quarter of its depth (a bell of 1.7 half widths).
 _SHARE = 0.25
-_NEAR_SECTORS = 2
+_NEAR_SECTORS, _GAP_SECTORS = 2, 4
 # Root mean square, over a run, of how many robust σ of the ring it is brighter and wider than the ring. The
-# ring's own runs have 1.
-_ODD_RUN = 3.0
+# ring's own runs have 1. Glaring runs are glints even where a second ring shows one in the same place; what
+# three of five rings show is the wall and no run.
+_ODD_RUN, _GLARING_RUN = 3.0, 6.0
 # Nothing is known of a lone sample: it is the wall or not with equal chances.
 _CHANCE = 0.5
 _LEAST_WIDTH_SPREAD, _LEAST_BRIGHTNESS_SPREAD = 0.03, 0.1
@@ -43,12 +44,13 @@ def lone_runs(
     """
     away = _away_from_wall(radius_px.astype(np.float64))
     sigma = np.maximum(sigma_px, _spread_of(away))
-    lone = _lone(away, sigma, np.empty(away.shape, np.bool_))
+    runs = _runs(away, sigma)
     odd = _oddness(np.log(width_px), _LEAST_WIDTH_SPREAD) ** 2
     odd += _oddness(np.log(amplitude), _LEAST_BRIGHTNESS_SPREAD) ** 2
-    glint = _mean_over_runs(lone, np.where(np.isfinite(radius_px), odd, 0.0)) > _ODD_RUN**2
-    unsure = np.hypot(sigma_px, np.sqrt(_CHANCE) * np.where(lone, np.abs(away), 0.0))
-    return lone & glint, np.asarray(unsure, np.float32)
+    odd = _mean_over_runs(runs > 0, odd)
+    glint = ((runs == 2) & (odd > _ODD_RUN**2)) | (odd > _GLARING_RUN**2)
+    unsure = np.hypot(sigma_px, np.sqrt(_CHANCE) * np.where(runs == 2, np.abs(away), 0.0))
+    return glint & np.isfinite(radius_px), np.asarray(unsure, np.float32)
 
 
 def _oddness(value: Float32, least_spread: float) -> Float:
@@ -57,7 +59,7 @@ def _oddness(value: Float32, least_spread: float) -> Float:
     for row, ring in zip(out, value.astype(float), strict=True):
         beyond = ring - slow_around(ring)
         spread = robust_spread(beyond) if np.isfinite(beyond).any() else 0.0
-        row[:] = np.maximum(np.nan_to_num(beyond), 0.0) / max(spread, least_spread)
+        row[:] = np.maximum(beyond, 0.0) / max(spread, least_spread)
     return out
 
 
@@ -92,27 +94,36 @@ def _away_from_wall(radius):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _lone(away, sigma, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` (F, A) with the runs that no neighbouring ring confirms."""
+def _runs(away, sigma):  # type: ignore[no-untyped-def]
+    """Mark runs (F, A) that leave the wall to one side: 1 where a neighbouring ring does too, 2 alone, else 0.
+
+    A run goes on over a few sectors without a sample.
+    """
     rings, sectors = away.shape
-    out[:] = False
+    out = np.zeros((rings, sectors), np.uint8)
     for k in range(rings):
-        for first in range(sectors):
+        first = 0
+        while first < sectors:
             sign = 1.0 if away[k, first] > 0 else -1.0
-            before = sign * away[k, first - 1] > _RUN_SIGMAS * sigma[k, first - 1]
-            if before or not sign * away[k, first] > _RUN_SIGMAS * sigma[k, first]:
+            if not sign * away[k, first] > _RUN_SIGMAS * sigma[k, first]:
+                first += 1
                 continue
-            length, confirmed, top = 0, 0, 0.0
-            while length < sectors:
-                a = (first + length) % sectors
-                if not sign * away[k, a] > _RUN_SIGMAS * sigma[k, a]:
+            length, gap, total, confirmed, top = 1, 0, 0.0, 0.0, 0.0
+            while gap <= _GAP_SECTORS and length + gap <= sectors:
+                a = (first + length - 1 + gap) % sectors
+                height = sign * away[k, a]
+                if height > _RUN_SIGMAS * sigma[k, a]:
+                    length, gap = length + gap, 1
+                    total += height
+                    top = max(top, height / sigma[k, a])
+                    confirmed += height if _confirmed(away, sigma, k, a, sign) else 0.0
+                elif np.isnan(height):
+                    gap += 1
+                else:
                     break
-                top = max(top, sign * away[k, a] / sigma[k, a])
-                confirmed += _confirmed(away, sigma, k, a, sign)
-                length += 1
-            if top > _SEED_SIGMAS and 2 * confirmed < length:
-                for a in range(first, first + length):
-                    out[k, a % sectors] = True
+            if top > _SEED_SIGMAS:
+                out[k, np.arange(first, first + length) % sectors] = 1 if 2 * confirmed > total else 2
+            first += length
     return out
 
 
@@ -125,7 +136,7 @@ def _confirmed(away, sigma, k, a, sign):  # type: ignore[no-untyped-def]
             continue
         for turn in range(-_NEAR_SECTORS, _NEAR_SECTORS + 1):
             b = (a + turn) % sectors
-            least = max(_SHARE * sign * away[k, a], 2 * sigma[n, b])
+            least = max(_SHARE * sign * away[k, a], _RUN_SIGMAS * sigma[n, b])
             if sign * away[n, b] > least:
                 return True
     return False
@@ -133,17 +144,18 @@ def _confirmed(away, sigma, k, a, sign):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _mean_over_runs(runs, value):  # type: ignore[no-untyped-def]
-    """Mean of ``value`` (F, A) over each run of neighbours in ``runs`` (F, A), 0 elsewhere."""
+    """Mean of the finite ``value`` (F, A) over each run of neighbours in ``runs`` (F, A), 0 elsewhere."""
     rings, sectors = value.shape
     out = np.zeros((rings, sectors))
     for k in range(rings):
         for first in range(sectors):
-            if not runs[k, first] or runs[k, first - 1]:
+            if not runs[k, first] or (first > 0 and runs[k, first - 1]):
                 continue
-            length, total = 0, 0.0
-            while length < sectors and runs[k, (first + length) % sectors]:
-                total += value[k, (first + length) % sectors]
-                length += 1
-            for a in range(first, first + length):
-                out[k, a % sectors] = total / length
+            last, total, count = first, 0.0, 0
+            while last < sectors and runs[k, last]:
+                if np.isfinite(value[k, last]):
+                    total += value[k, last]
+                    count += 1
+                last += 1
+            out[k, first:last] = total / max(count, 1)
     return out

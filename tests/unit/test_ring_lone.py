@@ -43,13 +43,13 @@ def test_a_glint_goes(drawn, away):
     assert rejected.sum() == 0, "rings beside a glint are not blamed for it"
 
 
-@pytest.mark.parametrize("rings", [2, 3, 6])
-def test_what_two_rings_show_stays_however_bright_it_is(drawn, rings):
+@pytest.mark.parametrize(("rings", "width_factor", "gain"), [(2, 1.1, 1.7), (3, 1.4, 2.0), (6, 1.4, 2.0)])
+def test_a_pit_that_two_rings_show_stays_and_of_three_however_bright_it_is(drawn, rings, width_factor, gain):
     radius, _, width, amplitude = drawn
     for row in range(4, 4 + rings):
         radius[row, RUN] += 3 * np.hanning(16)
-        width[row, RUN] *= 1.4
-        amplitude[row, RUN] *= 2
+        width[row, RUN] *= width_factor
+        amplitude[row, RUN] *= gain
     rejected, sigma = lone_runs(*drawn)
     assert rejected.sum() == 0
     assert sigma[4 : 4 + rings, RUN].max() < 2 * NOISE
