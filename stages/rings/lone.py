@@ -95,7 +95,7 @@ def _away_from_wall(radius):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _runs(away, sigma):  # type: ignore[no-untyped-def]
-    """Mark runs (F, A) that leave the wall to one side: 1 where a neighbouring ring does too, 2 alone, else 0.
+    """Mark runs (F, A) that leave the wall to one side: 1 where a next ring does too, 2 alone, else 0.
 
     A run goes on over a few sectors without a sample.
     """
