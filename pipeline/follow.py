@@ -88,6 +88,7 @@ def _bytes(file: Path) -> int:
         return 0
 
 
+# Size of the chart, px, and points drawn in it: two a pixel.
 _WIDTH, _HEIGHT, _SHOWN = 1000, 260, 2000
 
 

@@ -20,9 +20,13 @@ from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
 
+# Colour of what was not measured: middle grey, which no colour map has.
 _NOT_MEASURED_BGR = (128, 128, 128)
+# Centre and oval: the shape of a sound pipe.
 _HARMONICS = (1, 2)
+# 95 % efficiency for normal errors (P. Huber, "Robust statistics", 1981).
 _HUBER = 1.345
+# Rows and cells worked on at a time, for memory's sake.
 _ROWS, _AT_ONCE = 4096, 1 << 24
 
 

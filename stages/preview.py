@@ -19,6 +19,7 @@ from pipeline.recording.base import FrameTable, Recording
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 
+# A quarter of the preview's 360 azimuths: a circle through less is badly determined.
 _LEAST_POINTS = 90
 # A line's errors are alike over this many of 360 degrees.
 _ALIKE = 8.0

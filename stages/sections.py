@@ -21,6 +21,7 @@ from pipeline.recording.base import Recording
 _DIRECTIONS: Float = np.linspace(0, np.pi, 360, endpoint=False)
 # Most of its period that a harmonic may span unseen: in mid-gap the series is then as sure as one sample.
 _LONGEST_GAP = 5 / 6
+# Ovality is the second harmonic: with fewer there is no section to report.
 _LEAST_HARMONICS = 2
 
 

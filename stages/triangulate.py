@@ -16,8 +16,11 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.system.threads import in_threads
 
 _UPPER = np.triu_indices(3)
+# Frames a thread takes at a time.
 _CHUNK_FRAMES = 16
+# Rings that the report's median is taken of.
 _REPORTED_RINGS = 500
+# Samples of the running median: four on each side, so that a feature of five is kept.
 _NEIGHBOURS = 9
 
 

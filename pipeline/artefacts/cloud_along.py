@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import PointCloud
 
+# Points in a chunk: some MB, for memory's sake.
 _AT_ONCE = 1 << 16
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.arrays import Float, Int
 
+# A depth counts as known from 2 σ: with 95 % it is not zero.
 _KNOWN_SIGMA = 2.0
 
 
@@ -174,6 +175,8 @@ def azimuth_of_clock(clock_hours: Float | float) -> Float:
     return np.asarray(np.radians(np.mod(degrees + 180, 360) - 180))
 
 
+# Angles from the pipe's axis below and above which a crack is called longitudinal or circumferential.
+# Chosen.
 _LONGITUDINAL, _CIRCUMFERENTIAL = np.radians(30), np.radians(60)
 
 _PACP = {

@@ -78,6 +78,7 @@ def read_cluster(file: Path | None) -> Cluster:
 if TYPE_CHECKING:
     from dask_jobqueue.core import JobQueueCluster
 
+# Time after which a scheduler that does not answer is given up, s.
 _CONNECT_S = 15
 # A run takes the cores of its job by itself; the worker has it compute nothing beside.
 _ONE_AT_A_TIME = ("--nthreads", "1")

@@ -46,9 +46,12 @@ def _name(path: Path, folder: Path) -> str:
     return "-".join(parts) if parts else folder.name
 
 
+# Exit status of `boresight run` for input that cannot be used.
 _REFUSED = 2
 _BUSY = "is at work in this run folder"
+# Time between two attempts at a run folder that another process still holds, and how long to try, s.
 _WAIT_S, _PATIENCE_S = 2.0, 120.0
+# Lines of a failed run's error output that are kept.
 _TOLD_LINES = 4
 
 

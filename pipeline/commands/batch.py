@@ -16,6 +16,7 @@ from pipeline.files.disk import disk_errors_named
 from pipeline.machine.configuration import resolve
 from stages.catalogue import PIPELINE
 
+# Exit status where some recordings failed and the batch itself did not.
 _EXIT_SOME_FAILED = 3
 
 

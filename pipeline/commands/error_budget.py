@@ -19,6 +19,7 @@ from pipeline.instrument.budget.scan import RingScan
 from pipeline.instrument.budget.sources import typical_probe
 from pipeline.instrument.probe_file import read_probe
 
+# Wished accuracies where none are given: the seed paper's 0.1 mm, and what a calibrated probe may reach.
 ACCURACIES_MM = (0.1, 0.02)
 
 

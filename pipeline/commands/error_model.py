@@ -25,7 +25,10 @@ from pipeline.instrument.misalignment import (
 )
 from pipeline.instrument.probe_file import read_probe
 
+# Baseline of the physics notes; see `implied_baselines_mm` for what the paper's figures imply.
 PAPER_BASELINE_MM = 22.0
+# Table of a camera that the page does not know: every degree up to 110°, every 7.5° around; the page is
+# linear between.
 _THETA_STEP_RAD, _THETA_COUNT, _PSI_COUNT = math.radians(1), 111, 48
 
 

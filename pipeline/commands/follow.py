@@ -16,6 +16,7 @@ from pipeline.system.stopping import stop_wish
 from stages.preview import PreliminarySection, preliminary_sections
 from stages.rings import RingParameters
 
+# Time between two looks at a growing recording, s.
 _POLL_S = 0.5
 # Enough for a circle, and quick.
 _RINGS = RingParameters.model_validate({"azimuths": 360})

@@ -32,7 +32,9 @@ from pipeline.simulator.laws.closed_form import lever_of
 from pipeline.simulator.laws.table import all_checks, verdict
 
 _INCH_MM = 25.4
+# Typical 1 σ of a line's position in one frame, px, named for comparison.
 _NOISE_PX = 0.1
+# Cosine from which two patterns are listed as alike: 26° between them.
 _LIKE = 0.9
 
 

@@ -16,11 +16,15 @@ from pipeline.simulator.gallery.scenes import Course
 
 # Size of a plot's field; the page adds the margins.
 WIDTH, HEIGHT = 360.0, 130.0
+# Side of the small picture, px.
 _PICTURE_PX = 300
+# Of the unrolled line: px on each side, step, columns around, and how often a column is repeated.
 _STRIP_PX, _STRIP_STEP_PX, _STRIP_COLUMNS, _STRIP_SCALE = 10.0, 0.25, 360, 2
 # The eye's response, so that a faint ghost or tail is seen beside the line.
 _DISPLAY_GAMMA = 0.45
+# Smallest light that a difference is stretched to: below it there is rounding only.
 _LEAST_FULL_SCALE = 1e-4
+# About so many marks on an axis.
 _TICKS = 4
 
 

@@ -13,7 +13,9 @@ from pipeline.arrays import Byte
 from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, Wall, WallTexture
 from pipeline.export.pictures import display_colours
 
+# Points written at a time (50 bytes each), for memory's sake.
 _AT_ONCE = 1 << 20
+# Colour of points without a photo: middle grey.
 _GREY = 128
 _ROW = np.dtype(
     [
@@ -90,6 +92,7 @@ def write_radius_map(wall: Wall, folder: Path) -> None:
 if TYPE_CHECKING:
     import zarr
 
+# Frames in a chunk of the store.
 _FRAMES_PER_CHUNK = 64
 
 

@@ -22,11 +22,14 @@ from pipeline.arrays import Byte, Float
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, TexturedMesh
 from pipeline.machine.scratch import Scratch
 
+# Magic numbers of GLB, its JSON chunk and its binary chunk; version; largest length (glTF 2.0, section
+# 4.4).
 _GLTF, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _VERSION = 2
 _LARGEST = (1 << 32) - 1
 # EXT_structural_metadata asks for eight where glTF asks for four.
 _ALIGNED = 8
+# Bytes copied at a time.
 _AT_ONCE = 1 << 24
 
 
@@ -101,6 +104,7 @@ class GlbBuilder:
 
 
 HALF_TURN_ABOUT_X = [1.0, 0.0, 0.0, 0.0]
+# Quality of photo textures. Chosen by eye.
 _JPEG_QUALITY = 88
 _VARIANTS = "KHR_materials_variants"
 _UNLIT = "KHR_materials_unlit"

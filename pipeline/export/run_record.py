@@ -14,6 +14,7 @@ from pipeline.machine.configuration import Configuration
 from pipeline.machine.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.machine.plan import Plan
 
+# Version of run.json's format.
 _FORMAT = 1
 
 

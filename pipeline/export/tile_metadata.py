@@ -19,6 +19,7 @@ from pipeline.export.glb import GlbBuilder
 
 Json = dict[str, Any]
 FEATURES, METADATA = "EXT_mesh_features", "EXT_structural_metadata"
+# Stands for "not measured" in tables that have no NaN; no radius is negative.
 _NOT_MEASURED = -1.0
 _KINDS = {"U": "UINT32", "D": "FLOAT64", "F": "FLOAT32"}
 _NUMPY = {"UINT32": "<u4", "FLOAT64": "<f8", "FLOAT32": "<f4"}

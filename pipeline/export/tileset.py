@@ -28,6 +28,7 @@ from pipeline.geometry.axis import PipeAxis, to_pipe
 from pipeline.recording.base import Recording
 
 Json = dict[str, Any]
+# Stretches that a coarse tile tells apart, so that its metadata stay small.
 _MOST_STRETCHES = 16
 # Viewers refine where an error shows as some 16 px or more; a texel counts as an error eight times as large.
 _TEXELS = 8.0

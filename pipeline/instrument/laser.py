@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 
+# Orders of waviness that a probe file may state.
 _WAVES = (2, 3, 4)
 
 
@@ -131,6 +132,7 @@ class LaserSheet:
 
 
 NAME = "calibrate-laser"
+# Tangent of 45°, beyond which a plane does not surround the axis as a ring probe's sheet does.
 _STEEPEST = 1.0
 
 

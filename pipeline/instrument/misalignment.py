@@ -17,6 +17,7 @@ from pipeline.errors import InputError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.laser import LaserSheet
 
+# Half a degree apart: the largest of a first harmonic is met within 1e-5 of it.
 AZIMUTHS = 720
 
 

@@ -28,6 +28,7 @@ from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.build import build_wall, facts_of
 from pipeline.simulator.wall.grid import Wall
 
+# Number of the random stream of the instrument's draw; the wall's streams hash their purpose (`Seeds`).
 _INSTRUMENT_STREAM = 1
 
 

@@ -17,6 +17,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Shutter
 from pipeline.simulator.window import Window
 
+# An exponentially modified Gaussian has a skewness below 2 (a pure exponential); 1.9 leaves a normal part.
 _LARGEST_SKEWNESS = 1.9
 
 

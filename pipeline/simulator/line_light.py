@@ -14,6 +14,7 @@ from pipeline.simulator.view import TILE_PX, Line, View, Work, new_work, to_wall
 
 Speckle = tuple[float, float, int]
 
+# Distance at which light is stated (see `TrueLaser.power_mm`): about the radius of a 4 inch pipe.
 REFERENCE_MM = 50.0
 # How near to the wall a hit must lie, mm: a thousandth of what a pixel spans along a line.
 _CLOSE_MM = 2e-5

@@ -151,7 +151,9 @@ class Odometer:
         return at
 
 
+# Knots of the spline over an easing time, and steps of the integration between two knots.
 _KNOTS_AN_EASING = 8
+# See above.
 _FINE = 16
 
 

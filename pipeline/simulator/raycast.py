@@ -10,8 +10,11 @@ from pipeline.simulator.surface import NEAR_BLOCKS, WIDE_BLOCKS, Surface
 
 # A step of a ray stays within the blocks that a floor looks ahead by so much, mm.
 _SPARE = 0.1
+# Longest step near the wall: about a cell of the relief (0.25 mm), so that no feature is stepped over.
 _FINE_MM = 0.3
+# Shortest step: the precision of a hit that the line needs.
 _LEAST_STEP_MM = 2e-5
+# Way after which a ray counts as lost: farther than any light in a pipe of this kind reaches.
 _FAR_MM = 2000.0
 
 

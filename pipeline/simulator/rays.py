@@ -11,8 +11,11 @@ from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.window import through
 
+# Spacing of the table's nodes: see `ray_table` for the error of interpolating between them.
 _STEP_PX = 8
+# Nodes beyond the picture that the cubic interpolation needs on each side.
 _MARGIN = 2
+# Fixed-point steps: each reduces the error by about 6 p |m| ≤ 0.2, so that 20 reach rounding.
 _DECENTRING_STEPS = 20
 
 

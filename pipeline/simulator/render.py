@@ -22,6 +22,7 @@ from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.view import Line, View, line_of, line_tiles
 from pipeline.simulator.wall_light import Lamps, add_wall_light, lamps_of, stray_light
 
+# Moments of an exposure at which a changing sheet is tabulated; linear between them.
 _SHEET_MOMENTS = 5
 
 

@@ -13,7 +13,9 @@ from pipeline.simulator.instrument import TrueSensor
 from pipeline.simulator.kernel import in_bands, kernel
 from pipeline.simulator.line_light import hashed
 
+# Glare spreads over tens of px: a picture 8 times smaller holds it.
 _VEIL_SHRINK = 8
+# Normal quantiles that noise is drawn from: 16 random bits each; the largest is 4.3 σ.
 _QUANTILES = 1 << 16
 
 

@@ -13,8 +13,12 @@ from pipeline.simulator.raycast import meet, normal_at
 from pipeline.simulator.surface import Surface
 from pipeline.simulator.window import through
 
+# Sheet rays around the turn: linear between nodes 0.25° apart errs by (0.25°)²/8 = 2.4e-6 of a first
+# harmonic.
 _NODES = 1440
+# Nodes over about 11 σ: linear interpolation errs by (11/4000)²/8 = 1e-6 of the peak.
 _PROFILE_NODES = 4001
+# Precision of a hit, as for the line itself.
 _CLOSE_MM = 2e-5
 
 

@@ -102,7 +102,9 @@ def _floor(wall: Wall) -> Float:
     return np.stack([minimum_filter1d(least, blocks, mode="nearest") for blocks in reach])
 
 
+# Halvings of the texture along the pipe: up to 32 texels a pixel, as at a grazing view.
 _LEVELS = 6
+# Nodes over the cosine: linear between them, a lobe cos^40 errs by 40·39/(8·4096²) = 1.2e-5 of its peak.
 _SHEEN_NODES = 4097
 
 

@@ -26,8 +26,11 @@ from pipeline.simulator.wall.description import Defect, Pipe, Weld
 from pipeline.simulator.wall.fiducials import markers_of
 from pipeline.simulator.wall.grid import Wall
 
+# Quality of the stored albedo: it is looked at, not computed with.
 _JPEG_QUALITY = 95
+# A JPEG has at most 65535 px a side.
 _JPEG_LARGEST = 65000
+# Rows written at a time, for memory's sake.
 _PIXELS_AT_A_TIME = 1024
 Json = dict[str, object]
 
@@ -156,7 +159,9 @@ def _weld(weld: Weld) -> Json:
 
 SEAL_FILE = "sealed.yaml"
 NONCE_FILE = "nonce.txt"
+# Version of the seal's format.
 _FORMAT = 1
+# Bytes hashed at a time.
 _CHUNK = 1 << 20
 
 

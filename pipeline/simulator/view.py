@@ -14,7 +14,9 @@ from pipeline.simulator.rays import RayTable, ray_at
 from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
 from pipeline.simulator.surface import Surface, Texture
 
+# Side of the tiles that are tested for the line before any of their pixels is.
 TILE_PX = 8
+# Precision of a hit where only tiles are chosen.
 _CLOSE_MM = 1e-3
 
 

@@ -17,6 +17,7 @@ from pipeline.simulator.view import View, Work, new_work, to_wall
 
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
 _CLOSE_MM = 5e-4
+# Side of a patch, px: the pixels of a patch share the wall's samples in the processor's cache.
 _PATCH_PX = 16
 
 

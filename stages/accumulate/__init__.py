@@ -17,6 +17,7 @@ from stages.accumulate.survey import survey_of
 
 __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 
+# Rows that the report's medians are taken of.
 _REPORTED_ROWS = 2000
 
 

@@ -13,8 +13,11 @@ from pipeline.instrument.probe import Probe
 from stages.accumulate.grid import MapGrid
 from stages.accumulate.survey import RingSurvey
 
+# Azimuths, 5° apart: the instrument's errors are harmonics up to the fourth, and linear between nodes.
 _AZIMUTHS = 72
+# Rings at which the instrument's share is worked out: at least so many, on long runs every 500th.
 _RINGS = 24
+# See above.
 _EVERY = 500
 
 

@@ -20,9 +20,14 @@ from pipeline.system.threads import in_threads
 from stages.accumulate.samples import WallSamples
 from stages.accumulate.survey import RingSurvey
 
+# Columns a thread takes at a time, and threads: see `pipeline.system.threads`.
 _BLOCK, _THREADS = 64, 2
+# Least 1 σ of the kernel in ring spacings: narrower ones leave rows between rings with one ring. Debt:
+# data/debts.md.
 _WIDTH_IN_RINGS = 0.4
+# Cells of the running median that roughness is counted from. Debt: data/debts.md.
 _FINE_CELLS = (9, 9)
+# Share of a ring from which its distance belongs to the map. Debt: data/debts.md.
 _SEEN_SHARE = 0.1
 
 

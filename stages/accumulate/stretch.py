@@ -16,8 +16,11 @@ from stages.accumulate.grid import MapGrid, gridded, rings_on_columns
 from stages.accumulate.samples import RingsOnWall, WallSamples
 from stages.accumulate.survey import RingSurvey, centred, some_at_a_time
 
+# Rows of a stretch, for memory's sake.
 _ROWS = 1000
+# A stretch is computed from the rings within so many reaches of it. Debt: data/debts.md.
 _REACHES = 4.0
+# Reach of the kernel in its σ, and its least σ in ring spacings, as in `grid`.
 _WIDTHS, _WIDTH_IN_RINGS = 3.0, 0.4
 
 

@@ -12,9 +12,13 @@ from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Int
 from stages.accumulate.samples import RingsOnWall, WallSamples
 
+# Times the weights are computed anew. Debt: data/debts.md.
 _ITERATIONS = 12
+# Robust spreads at which a sample's weight falls to a quarter. Debt: data/debts.md.
 _REDESCENT = 2.5
+# Share of the circle that must be seen for a first harmonic to be told from shape.
 _FEWEST = 0.5
+# Rings of the running median and of the mean after it. Debt: data/debts.md.
 _RINGS = 31
 _SMOOTH_RINGS = 7
 
@@ -61,6 +65,7 @@ def first_harmonic(samples: WallSamples) -> Float:
     return np.where(usable[:, None], shape[:, :2], 0.0)
 
 
+# Rings worked out at a time, for memory's sake.
 _AT_ONCE = 512
 
 

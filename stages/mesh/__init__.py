@@ -23,6 +23,7 @@ from stages.mesh.join import OpenMesh
 from stages.mesh.poisson import folded_cells, joined_pieces, piece_cuts, poisson_surface, seen_part
 from stages.mesh.surface import Surface, grid_surface, row_pieces, with_normals
 
+# Rows and points that medians are taken of.
 _SAMPLED_ROWS, _SAMPLED_POINTS = 2000, 1 << 20
 
 

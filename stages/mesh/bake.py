@@ -16,6 +16,7 @@ from pipeline.system.native import open3d
 from stages.mesh.charts import PADDING_PX, Atlas, Chart, Unrolled
 from stages.mesh.surface import Surface
 
+# Error colours vary slowly: their texels are three times as large as the photo's.
 _ERROR_COARSER = 3
 _UNTEXTURED = 55  # linear grey, 128 as sRGB
 

@@ -12,9 +12,14 @@ from pipeline.arrays import Bool, Float, Float32
 from pipeline.geometry.axis import PipeAxis, frames_at, to_pipe
 from stages.mesh.surface import Face, Index, Surface
 
+# Texels between charts: three halvings of a texture do not mix them.
 PADDING_PX = 8
+# A chart spans at most a quarter turn, so that it is nearly flat.
 _LEAST_SECTORS = 4
+# Departure from the reference radius, relative, from which a triangle is not unrolled: as `mesh.fold`.
 _LARGEST_FOLD = 0.35
+# Cosine between a triangle's normal and the axis below which unrolling stretches it to three times its
+# size.
 _LEAST_FACING = 0.35
 
 

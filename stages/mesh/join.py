@@ -120,6 +120,7 @@ NO_CUT = Cut(*(np.empty(0, np.int64) for _ in range(4)))
 
 
 _SAME_MM = 0.02  # vertices closer than this along a border become one
+# A border that runs once around travels one length: half of one is the largest doubt.
 _CLOSED = 0.5
 
 

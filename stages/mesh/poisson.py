@@ -20,15 +20,21 @@ from pipeline.system.native import open3d
 from stages.mesh.join import NO_CUT, NOTHING, OpenMesh, clip, join
 from stages.mesh.surface import Surface
 
+# Neighbours and σ of open3d's statistical outlier filter, as its documentation proposes. Debt:
+# data/debts.md.
 _NEIGHBOURS = 20
 _OUTLIER_SIGMA = 3.0
+# See `piece_cuts`: a deeper octree would take more memory than a machine has.
 _LARGEST_DEPTH = 10
 _BOX = 1.1  # the solver's box over the points'
 # Points are measured to a small part of a cell: the surface is held to them more than by the usual 4.
 _POINT_WEIGHT = 10.0
+# Points worked on at a time, for memory's sake.
 _AT_ONCE = 1 << 20
+# Fewer points than this make no surface. Debt: data/debts.md.
 _LEAST_POINTS = 100
 _APART_MM = 1.0  # farther apart than this, borders of two pieces are not of one wall
+# How far pieces overlap, so that the surface at a cut does not depend on where the points end.
 OVERLAP_MM = 25.0
 
 

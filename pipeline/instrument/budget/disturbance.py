@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.instrument.camera.base import Camera
 
+# Refractive index of crown glass, and outer radius of the tube that the budget supposes. Debt: data/debts.md.
 TUBE_INDEX = 1.51
 TUBE_RADIUS_MM = 14.0
 # (n − 1) t / (n ρ²) of an acrylic dome 1.5 mm thick with a radius of 12 mm, 1/mm

@@ -25,6 +25,7 @@ from pipeline.instrument.camera.base import (
     smallest_positive_root,
 )
 
+# Sine of the angle below which a point counts as on the axis, where the azimuth has no meaning.
 _ON_AXIS = 1e-12
 
 
@@ -183,6 +184,7 @@ class Equidistant(RadialCamera):
         return np.where(np.isnan(polar.theta)[..., None, None], np.nan, out)
 
 
+# Nodes of the table that an inversion starts from; Newton's steps do the rest.
 _NODES = 256
 
 

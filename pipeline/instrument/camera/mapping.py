@@ -11,6 +11,7 @@ from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.plumb_bob import Pinhole, Unified
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem
 
+# Largest side of a picture that image formats hold.
 LARGEST_SIDE_PX = 65535
 
 
@@ -65,6 +66,7 @@ def _side(section: Section, key: str, value: object, expected: str) -> int:
     return value
 
 
+# Fewest and most coefficients: a quadratic; far more than OCamCalib's usual five.
 SCARAMUZZA_TERMS = (3, 15)
 _COMMON = ("model", "image_size", "centre_px")
 _KEYS: Mapping[str, tuple[str, ...]] = {

@@ -24,9 +24,13 @@ from pipeline.instrument.camera.base import (
     smallest_positive_root,
 )
 
+# Nodes of the table that an inversion starts from; Newton's steps do the rest.
 _NODES = 256
+# Radius on the image plane up to which a model without distortion is used: 89.94° off the axis.
 _FARTHEST = 1e3
+# Newton's method converges quadratically from the radial solution; 12 steps reach rounding.
 _NEWTON_STEPS = 12
+# Largest relative error of an inversion that counts as converged.
 _CLOSED = 1e-9
 
 

@@ -19,6 +19,7 @@ from pipeline.arrays import Float
 from pipeline.instrument.camera.base import invert_increasing, smallest_positive_root
 from pipeline.instrument.camera.fisheye import Polar, RadialCamera
 
+# Nodes of the table that an inversion starts from; Newton's steps do the rest.
 _NODES = 256
 # The polynomial is an interpolation: twice as far out as the image's farthest corner it says nothing.
 _REACH = 2.0

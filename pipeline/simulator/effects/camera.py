@@ -147,6 +147,7 @@ def magnified(model: Camera, relative: float) -> Camera:
     return _with_added(model, "focal_scale", **{n: relative * names.get(n, 0.0) for n in ("fx", "fy")})
 
 
+# Fewest moments of an exposure at which a longer exposure is rendered. Debt: data/debts.md.
 _BLUR_MOMENTS = 8
 
 

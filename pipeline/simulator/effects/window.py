@@ -17,6 +17,7 @@ from pipeline.simulator.window import CylinderWindow, SphereWindow, Window
 
 # Outer radius of the sealed probe, and the glass of the tube that tilts (catalogue, PHYSICS notes).
 TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM = 15.0, 2.0
+# Refractive index of air, taken as that of vacuum: the difference, 2.7e-4, is the effect `outside_index`.
 _AIR = 1.0
 
 

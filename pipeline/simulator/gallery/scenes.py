@@ -88,7 +88,9 @@ def _rough_wall(radius_mm: float) -> Wall:
 
 
 _RADIUS_MM = max(RADII_MM)
+# Points of a plotted course, and azimuths of each ring on it: enough for the first six harmonics.
 _MOMENTS, _AZIMUTHS = 61, 24
+# Speed of a slow crawler, and the duration of each of the four legs that encoder effects are shown on.
 _SPEED_MM_S, _LEG_S = 15.0, 4.0
 
 

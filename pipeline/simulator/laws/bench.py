@@ -28,12 +28,17 @@ from pipeline.simulator.wall.grid import Wall, WallGrid
 
 # The instrument of the notes: baseline 22 mm, equidistant lens of 360 px/rad, 2 MP.
 BASELINE_MM, FOCAL_PX = 22.0, 360.0
+# Width and height of a 2 MP sensor, px.
 IMAGE_SIZE = (1600, 1200)
+# Width of the line on the wall (1 σ), as in the physics notes.
 LINE_SIGMA_MM = 0.15
 # 2, 3 and 4 inch.
 RADII_MM = (25.4, 38.1, 50.8)
+# Reflectance of the bench's grey wall: the default of a scene's surface.
 ALBEDO = 0.4
+# Extent and cells of the bench's wall. It is smooth, so that coarse cells are exact.
 _FROM_MM, _TO_MM, _STEP_MM, _COLUMNS = -20.0, 120.0, 0.5, 256
+# Frames a second: the default of a scene.
 _FRAME_RATE = 30.0
 
 
@@ -162,7 +167,10 @@ def exponent(radii_mm: Float, sizes: Float) -> float:
     return float(np.log(abs(sizes[-1] / sizes[0])) / np.log(radii_mm[-1] / radii_mm[0]))
 
 
+# Traced directions; 500 px halved 50 times is below rounding; steps to a wall that depends on azimuth
+# alone.
 _TRACED_AZIMUTHS, _BISECTIONS, _WALL_STEPS = 144, 50, 8
+# Image radii, px, between which the bench's ring lies in bores of 2 to 4 inch: atan(r/22 mm) × 360 px/rad.
 _SEARCH_PX = (60.0, 560.0)
 
 

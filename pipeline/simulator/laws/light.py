@@ -20,8 +20,10 @@ from pipeline.simulator.motion import Motion, Signal, constant
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.grid import Wall, WallGrid
 
+# Radius of a 4 inch pipe, mm.
 _R = 50.8
 _MM_PER_PX = lever_of(_R) / FOCAL_PX
+# Relative change of the reflectance a millimetre: the example of the physics notes.
 _GRADIENT = 0.2
 
 

@@ -27,8 +27,11 @@ from pipeline.simulator.laws.radius import SHARE, effect_ring
 from pipeline.simulator.motion import Motion, Odometer, Signal, constant
 from pipeline.simulator.truth import SceneTruth
 
+# Radius of a 4 inch pipe, mm.
 _RADIUS_MM = 50.8
+# Offset and yaw of the examples: large enough for second-order terms to show, small enough for the laws.
 _OFF_CENTRE_MM, _YAW_DEG = 2.0, 5.0
+# Speed of a slow crawler; a vibration above half of 30 frames/s, so that its alias is what is seen.
 _SPEED_MM_S, _ALIASED_HZ = 15.0, 26.0
 
 

@@ -108,8 +108,11 @@ def _along(c: complex, crest: complex) -> float:
     return float((c * crest.conjugate()).real)
 
 
+# Radius of a 4 inch pipe, mm.
 _R = 50.8
+# Rays of the sheet, half a degree apart; harmonics are fitted to all of them.
 _RAYS = 720
+# Direction of the effects' crest: oblique, so that a law which mixes up x and y is found out.
 _DIRECTION_DEG = 40.0
 
 

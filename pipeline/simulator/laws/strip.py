@@ -16,8 +16,11 @@ from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import shade_of, through_lens
 from pipeline.simulator.truth import SceneTruth, with_sensor
 
+# Strip of the sensor, px, that holds the ring of a 4 inch pipe (atan(50.8/22) × 360 = 419 px) at azimuth 0.
 _SIZE, _CENTRE = (480, 65), (20.0, 32.0)
+# Rows used on each side of the middle; those beyond are needed by the blur.
 _ROWS = 24
+# Channel of the laser's light in BGR pictures.
 _GREEN = 1
 
 

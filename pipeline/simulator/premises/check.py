@@ -19,6 +19,8 @@ from pipeline.simulator.truth import SceneTruth
 
 # A Gaussian of 0.5 steps 1 σ, summed at steps, moves by 0.002 steps at most.
 _LEAST_STEPS = 0.5
+# Step of the derivative, mm: 0.02 mm moves the line by far more than rounding and by far less than its
+# curvature.
 _LITTLE_MM = 0.01
 
 
@@ -43,14 +45,21 @@ def line_px_per_mm(truth: SceneTruth) -> float:
     return float(np.linalg.norm(uv[1] - uv[0]) / (2 * _LITTLE_MM))
 
 
+# Grey level at which a line counts as seen, and share of azimuths that must show it. Chosen, not measured.
 _LEAST_PEAK, _LEAST_SHARE = 25.0, 0.85
+# Largest shares of line and lit wall that may clip. Chosen, not measured.
 _MOST_CLIPPED_LINE, _MOST_CLIPPED_WALL = 0.9, 0.05
+# Least median grey and least texture contrast of the lit wall, grey levels. Chosen, not measured.
 _LEAST_WALL, _LEAST_TEXTURE = 8.0, 1.0
+# A pose needs three markers; share of lit frames that must show them. The share is chosen, not measured.
 _LEAST_MARKERS, _LEAST_FRAMES_WITH = 3, 0.3
+# Grey level from which a pixel counts as clipped: the codec may move 255 by one.
 _CLIPPED = 254
+# Directions looked along, and the size below which contrast counts as texture, px.
 _AZIMUTHS, _TEXTURE_PX = 360, 8
 # beyond the picture's edge is black, and not whatever the memory held
 _POLAR = cv2.INTER_LINEAR | cv2.WARP_FILL_OUTLIERS
+# Frames of each illumination that are looked at: a few seconds of rendering before the whole.
 _LED_LOOKED_AT, _LASER_LOOKED_AT = 6, 4
 
 

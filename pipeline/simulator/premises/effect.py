@@ -20,10 +20,15 @@ from pipeline.simulator.truth import SceneTruth
 
 # Errors of a stored picture that do not average out over frames: interpolation, rounding, codec.
 _FIXED_PX = 0.005
+# The same for relative light and width of the line. Chosen, not measured.
 _FIXED_SHAPE = 0.003
+# An effect must exceed the floor so many times (3 σ) for a scene to show it.
 _TIMES_THE_FLOOR = 3.0
+# Of N independent azimuths, a harmonic's amplitude has 1 σ of σ √(2/N); 72 are taken as independent.
 _HARMONICS = 36
+# Directions around the ring; px on each side of the peak that hold a line of up to 2.5 px (1 σ) whole.
 _AZIMUTHS, _REACH_PX = 720, 12
+# Light along an azimuth, full scales × px, below which a centroid is not taken. Chosen, not measured.
 _FAINT = 0.1
 # beyond the picture's edge is black, and not whatever the memory held
 _POLAR = cv2.INTER_LINEAR | cv2.WARP_FILL_OUTLIERS

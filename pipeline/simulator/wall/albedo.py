@@ -15,7 +15,9 @@ from pipeline.simulator.wall.grid import Grid, window, wrapped
 from pipeline.simulator.wall.noise import Seeds, above_share, field
 from pipeline.simulator.wall.shape import branch_cover, coarse_field, rust_field, weld_across, weld_rows
 
+# Exponent that decodes a photograph: close to sRGB's.
 _SRGB_GAMMA = 2.2
+# Reflectances that a painted surface can have: soot to fresh white paint.
 _DARKEST, _BRIGHTEST = 0.01, 0.95
 
 
@@ -59,6 +61,7 @@ def _mirrored(pixel: Float, size: int) -> Float:
     return np.asarray(np.minimum(folded, 2 * size - folded) - 0.5)
 
 
+# Reflectances in red, green, blue of what covers a wall: chosen by eye for a plausible picture.
 _RUST: Tint = (0.40, 0.19, 0.09)
 _LIME: Tint = (0.66, 0.64, 0.58)
 _BLOT: Tint = (0.11, 0.11, 0.12)

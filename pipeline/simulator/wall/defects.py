@@ -11,6 +11,7 @@ from pipeline.arrays import Float
 from pipeline.simulator.wall.description import Defect, Tint
 from pipeline.simulator.wall.noise import plane_waves
 
+# Reflectances in red, green, blue of what a defect leaves: chosen by eye for a plausible picture.
 _RUST: Tint = (0.34, 0.13, 0.05)
 _DARK: Tint = (0.06, 0.06, 0.06)
 _BRIGHT: Tint = (0.62, 0.62, 0.60)

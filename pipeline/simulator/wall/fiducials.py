@@ -12,7 +12,9 @@ from pipeline.simulator.wall.description import Fiducials, Pipe
 from pipeline.simulator.wall.grid import Grid, window
 from pipeline.simulator.wall.shape import bore_radius, step_distances
 
+# Reflectances of matt black and white paint.
 _BLACK, _WHITE = 0.055, 0.68
+# Samples a cell and side: painted edges lie within an eighth of a cell of where they should.
 _SAMPLES = 4
 
 

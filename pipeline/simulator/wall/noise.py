@@ -23,6 +23,7 @@ class Seeds:
         return np.random.default_rng([self.seed, zlib.crc32(purpose.encode()), index])
 
 
+# Waves of a random function: enough that their sum is nearly Gaussian.
 _PLANE_WAVES = 48
 
 

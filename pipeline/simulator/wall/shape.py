@@ -62,7 +62,9 @@ def _joint(s: Float, psi: Float, joint: Joint) -> Float:
     return np.asarray(groove + beyond * shift)
 
 
+# Longest wave of the slow error of form: about a diameter. Chosen, not measured.
 _FORM_LONGEST_MM = 80.0
+# Length over which the edge of a branch falls.
 _BRANCH_CHAMFER_MM = 0.6
 # OpenCV interpolates pictures of less than 32767 rows.
 _MOST_ROWS = 32_000

@@ -21,8 +21,13 @@ from pipeline.instrument.camera.mapping import LARGEST_SIDE_PX
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem
 
 _LINES = ("direct polynomial", "inverse polynomial", "centre (row column)", "affine (c d e)", "image size")
+# More coefficients than any calibration has: a file beyond that is not one.
 _MOST_TERMS = 60
+# A published inverse polynomial is an approximation. Where it differs by more, the two lines are taken for
+# those of two cameras. Chosen, not measured.
 _LARGEST_DISAGREEMENT_PX = 5.0
+# Samples, degrees tried, and error aimed at of a written inverse polynomial: below what any program
+# resolves.
 _FIT_SAMPLES = 2000
 _FIT_DEGREES = range(4, 21)
 _FIT_GOAL_PX = 1e-3

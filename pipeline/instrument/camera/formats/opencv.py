@@ -17,6 +17,7 @@ from pipeline.instrument.camera.plumb_bob import Pinhole
 _MATRIX_KEYS = ("camera_matrix", "K", "cameraMatrix")
 _DISTORTION_KEYS = ("distortion_coefficients", "D", "distCoeffs", "dist_coeffs")
 _FISHEYE = {"equidistant": True, "fisheye": True, "plumb_bob": False, "radtan": False}
+# OpenCV's longest model has 14 coefficients.
 _MOST_COEFFICIENTS = 14
 
 
