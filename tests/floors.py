@@ -38,10 +38,7 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
 PUT_TOGETHER = ("pipeline.api", "pipeline.commands", "pipeline.cli")
 # What is still to be removed, with the day it was noted. Whoever removes one removes its line as well: a line
 # that nobody needs fails.
-IMPORTS_STILL_THERE: Mapping[tuple[str, str], str] = {
-    ("pipeline.export.report", "pipeline.review.report"): "2026-11-22: the report moves out of the review",
-    ("pipeline.export.report", "pipeline.review.summary"): "2026-11-22: the report moves out of the review",
-}
+IMPORTS_STILL_THERE: Mapping[tuple[str, str], str] = {}
 
 
 _ONE_WAY = "2026-11-22: the motion gets one public way in for run and diagnosis"

@@ -15,7 +15,7 @@ from pipeline.artefacts.findings import Sections
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
-from pipeline.review.accounts import REASONS
+from pipeline.export.report.tables import REASONS
 from pipeline.review.documents import cleaned
 from pipeline.review.run_files import RunFiles
 

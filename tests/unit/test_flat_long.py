@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.artefacts.measured import WallTexture
 from pipeline.export.pictures import display_colours, write_unrolled
-from pipeline.review.flat import TOP_RAD, Window, photo, seen_through
+from pipeline.export.report.pictures import TOP_RAD, Window, photo, seen_through
 
 ROWS, COLUMNS = 40000, 48
 

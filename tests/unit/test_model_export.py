@@ -16,9 +16,9 @@ from pipeline.export.arrays import write_cloud
 from pipeline.export.glb import write_model
 from pipeline.export.pictures import write_overlays
 from pipeline.machine.stage import quiet_context
-from pipeline.review.picture import inside_view, render
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
+from tests.model_picture import inside_view, render
 from tests.unit.small_wall import RADIUS, small_wall, smooth_photo
 
 

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import MotionEvent, RingSamples, RingValidity, Trajectory
+from pipeline.export import report
+from pipeline.export.report.summary import RunSummary
+from pipeline.export.report.tables import tables
+from pipeline.export.report.write import page_of, write_report
 from pipeline.geometry.axis import PipeAxis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
+from pipeline.machine.outcome import Number, StageOutcome, State
 from pipeline.machine.stage import quiet_context
-from pipeline.review import report
-from pipeline.review.accounts import tables
-from pipeline.review.report import page_of, write_report
-from pipeline.review.summary import ReportedNumber, RunSummary, StageRecord
 from stages.defects import DefectParameters, find_defects
 from stages.overlays import OverlayParameters, draw_overlays
 from stages.sections import SectionParameters, measure_sections
@@ -70,8 +71,12 @@ def summary():
         overlays=draw_overlays(recording, wall, OverlayParameters(), context),
         sections=measure_sections(recording, wall, SectionParameters(), context),
         defects=find_defects(recording, wall, texture, DefectParameters(), context),
-        numbers=(ReportedNumber("rings", "rejected: " + HOSTILE, 12, "samples"),),
-        stages=(StageRecord("rings", "1", "completed", 1.5, "ab" * 32, HOSTILE),),
+        stages=(
+            StageOutcome(
+                "rings", "1", "ab" * 32, State.COMPLETED, 1.5,
+                (Number("rejected: " + HOSTILE, 12, "samples"),), HOSTILE,
+            ),
+        ),
         versions=(("boresight", "0.1.0"),),
         inputs=((HOSTILE, "cd" * 32),),
     )  # fmt: skip
@@ -139,9 +144,8 @@ def test_the_wall_is_not_hidden_behind_the_numbers_of_very_many_findings(summary
 
 
 def test_what_stages_warn_of_is_told_first_and_as_text(summary, tmp_path):
-    warned = replace(
-        summary, numbers=(*summary.numbers, ReportedNumber("motion", "warning", f"36 σ {HOSTILE}"))
-    )
+    motion = StageOutcome("motion", "1", "", State.COMPLETED, 1.0, (Number("warning", f"36 σ {HOSTILE}"),))
+    warned = replace(summary, stages=(*summary.stages, motion))
     text = written(warned, tmp_path)
     assert text.index("motion: 36 σ &lt;script&gt;") < text.index("Ring samples")
     assert text.count("36 σ") == 1
@@ -168,7 +172,7 @@ def test_says_that_the_instrument_was_only_stated(summary):
 
 
 def test_an_incomplete_run_still_gets_its_report(summary, tmp_path):
-    stopped = StageRecord("rings", "1", "unusable", 0.1, "", "no ring in any frame")
+    stopped = StageOutcome("rings", "1", "", State.UNUSABLE, 0.1, problem="no ring in any frame")
     text = written(RunSummary(summary.recording, PROBE, "", stages=(stopped,)), tmp_path)
     assert "The run stopped at the stage rings: no ring in any frame" in text
 

@@ -7,9 +7,9 @@ from collections import Counter
 import numpy as np
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
-from pipeline.machine.outcome import WARNING
-from pipeline.review.page import Table
-from pipeline.review.summary import ReportedNumber, RunSummary
+from pipeline.export.report.page import Table
+from pipeline.export.report.summary import RunSummary
+from pipeline.machine.outcome import WARNING, Number
 
 REASONS = {
     RingValidity.VALID: "used",
@@ -67,8 +67,8 @@ def _samples(rings: RingSamples | None) -> Table | None:
 
 
 def _rejections(summary: RunSummary) -> Table | None:
-    rejected = [n for n in summary.numbers if n.name.startswith("rejected")]
-    rows = tuple((n.stage, n.name.removeprefix("rejected").strip(": "), _value(n)) for n in rejected)
+    rejected = [(stage, n) for stage, n in summary.numbers if n.name.startswith("rejected")]
+    rows = tuple((stage, n.name.removeprefix("rejected").strip(": "), _value(n)) for stage, n in rejected)
     return Table("Not used, by stage and reason", ("stage", "reason", "count"), rows) if rows else None
 
 
@@ -84,24 +84,20 @@ def _events(summary: RunSummary) -> Table | None:
 
 
 def _numbers(summary: RunSummary) -> Table | None:
-    told = [n for n in summary.numbers if n.name != WARNING and not n.name.startswith("rejected")]
-    rows = tuple((n.stage, n.name, _value(n)) for n in told)
+    told = [(s, n) for s, n in summary.numbers if n.name != WARNING and not n.name.startswith("rejected")]
+    rows = tuple((stage, n.name, _value(n)) for stage, n in told)
     return Table("What the stages measured", ("stage", "quantity", "value"), rows) if rows else None
 
 
-def stage_warnings(summary: RunSummary) -> tuple[str, ...]:
-    """Return what stages warn of, each with the stage's name."""
-    return tuple(f"{n.stage}: {n.value}" for n in summary.numbers if n.name == WARNING)
-
-
-def _value(number: ReportedNumber) -> str:
+def _value(number: Number) -> str:
     text = f"{number.value:.6g}" if isinstance(number.value, float) else str(number.value)
     return f"{text} {number.unit}".strip()
 
 
 def _stages(summary: RunSummary) -> Table | None:
     rows = tuple(
-        (s.name, s.version, s.state, f"{s.seconds:.1f} s", s.key[:16], s.note) for s in summary.stages
+        (s.name, s.version, s.state.value, f"{s.seconds:.1f} s", s.key[:16], s.problem)
+        for s in summary.stages
     )
     header = ("stage", "version", "state", "time", "key", "note")
     return Table("Stages", header, rows) if rows else None

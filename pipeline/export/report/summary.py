@@ -1,4 +1,4 @@
-"""All that the report tells, gathered by the runner."""
+"""All that the report tells of a run."""
 
 from __future__ import annotations
 
@@ -8,29 +8,8 @@ from pipeline.artefacts.findings import Defects, Sections
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
 from pipeline.instrument.probe import Probe
+from pipeline.machine.outcome import Number, StageOutcome
 from pipeline.recording.base import Recording
-
-
-@dataclass(frozen=True)
-class ReportedNumber:
-    """A number that a stage told through ``context.report``."""
-
-    stage: str
-    name: str
-    value: float | int | str
-    unit: str = ""
-
-
-@dataclass(frozen=True)
-class StageRecord:
-    """How a stage ended: ``state`` is completed, reused, unusable, failed, skipped or cancelled."""
-
-    name: str
-    version: str
-    state: str
-    seconds: float
-    key: str
-    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -43,9 +22,9 @@ class RunSummary:
     created : str
         When the run was made, ISO 8601, or empty.
     rings, trajectory, wall, texture, overlays, sections, defects
-    numbers : tuple of ReportedNumber
-        In the order of being reported. Names that begin with ``rejected`` account for what was not used.
-    stages : tuple of StageRecord
+    stages : tuple of StageOutcome
+        How each ended, and the numbers it reported. Names of numbers that begin with ``rejected`` account for
+        what was not used.
     versions : tuple of (str, str)
         Name and version of the program and of what it stands on.
     inputs : tuple of (str, str)
@@ -62,7 +41,11 @@ class RunSummary:
     overlays: Overlays | None = None
     sections: Sections | None = None
     defects: Defects | None = None
-    numbers: tuple[ReportedNumber, ...] = ()
-    stages: tuple[StageRecord, ...] = ()
+    stages: tuple[StageOutcome, ...] = ()
     versions: tuple[tuple[str, str], ...] = ()
     inputs: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def numbers(self) -> tuple[tuple[str, Number], ...]:
+        """All numbers that stages reported, each with its stage's name."""
+        return tuple((stage.name, number) for stage in self.stages for number in stage.numbers)

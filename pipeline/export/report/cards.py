@@ -8,9 +8,10 @@ import numpy as np
 
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import Trajectory, Wall
+from pipeline.export.report.page import Card
+from pipeline.export.report.summary import RunSummary
 from pipeline.geometry.axis import distance_along
-from pipeline.review.page import Card
-from pipeline.review.summary import RunSummary
+from pipeline.machine.outcome import State
 
 _ONE = {"corrosion": "area of corrosion"}
 _MANY = {"corrosion": "areas of corrosion"}
@@ -18,9 +19,9 @@ _MANY = {"corrosion": "areas of corrosion"}
 
 def verdict(summary: RunSummary) -> str:
     """Return the run's outcome in one sentence."""
-    stopped = [s for s in summary.stages if s.state in ("unusable", "failed", "cancelled")]
+    stopped = [s for s in summary.stages if s.state in (State.UNUSABLE, State.FAILED, State.CANCELLED)]
     if stopped:
-        return f"The run stopped at the stage {stopped[0].name}: {stopped[0].note}"
+        return f"The run stopped at the stage {stopped[0].name}: {stopped[0].problem}"
     if summary.wall is None or summary.defects is None:
         return "The run is not complete: see the stages below."
     length = np.ptp(_seen_distances(summary.wall))
@@ -79,7 +80,8 @@ def _measured(summary: RunSummary) -> Card:
     sigma, random = (float(np.median(s[seen])) for s in (radius_map.sigma_mm, radius_map.sigma_random_mm))
     lines = [
         f"{100 * seen[rows].mean():.1f} % of the wall was seen",
-        f"of it {random:.3f} mm random, {np.sqrt(max(0.0, sigma**2 - random**2)):.3f} mm from calibration",
+        f"of this uncertainty, {random:.3f} mm is random and "
+        f"{np.sqrt(max(0.0, sigma**2 - random**2)):.3f} mm comes from the calibration",
     ]
     if summary.trajectory is not None:
         lines += _motion(summary.trajectory)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.review.plots import Plot, Tick
+from pipeline.export.report.plots import Plot, Tick
 
 _MOST_NUMBERED = 40
 

@@ -1,21 +1,56 @@
-"""One self-contained report page that opens offline."""
+"""report.html, written from the results of a completed run: one self-contained page that opens offline."""
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from pipeline.artefacts.findings import Defect, Sections
-from pipeline.review import cards
-from pipeline.review.accounts import stage_warnings, tables
-from pipeline.review.page import Finding, Page
-from pipeline.review.pictures import Gallery, gallery
-from pipeline.review.plots import Curve, Plot, plot
-from pipeline.review.summary import RunSummary
+from pipeline.artefacts.findings import Defect, Defects, Sections
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.model import Overlays
+from pipeline.export.report import cards
+from pipeline.export.report.page import Finding, Page
+from pipeline.export.report.pictures import Gallery, gallery
+from pipeline.export.report.plots import Curve, Plot, plot
+from pipeline.export.report.summary import RunSummary
+from pipeline.export.report.tables import tables
+from pipeline.files.codec import digest
+from pipeline.files.provenance import program_version
+from pipeline.instrument.probe import Probe
+from pipeline.machine.outcome import Results, warnings_of
+from pipeline.recording.base import Recording
 
+# Libraries that the results stand on, named with their versions.
+_STANDS_ON = ("numpy", "scipy", "opencv-contrib-python-headless", "av")
+# Findings with pictures: about 5 MB of a page that is to open anywhere.
 _PICTURED = 60
+
+
+def write_report_page(results: Results, recording: Recording, probe: Probe, folder: Path) -> None:
+    """Write ``report.html`` from the results of a completed run."""
+    write_report(_summary(results, recording, probe), folder)
+
+
+def _summary(results: Results, recording: Recording, probe: Probe) -> RunSummary:
+    return RunSummary(
+        recording=recording,
+        probe=probe,
+        created=datetime.now(UTC).isoformat(timespec="minutes"),
+        rings=results.of(RingSamples),
+        trajectory=results.of(Trajectory),
+        wall=results.of(Wall),
+        texture=results.of(WallTexture),
+        overlays=results.of(Overlays),
+        sections=results.of(Sections),
+        defects=results.of(Defects),
+        stages=results.outcome.stages,
+        versions=(("boresight", program_version()), *((p, version(p)) for p in _STANDS_ON)),
+        inputs=(("recording", recording.content_key), ("probe", digest(probe))),
+    )
 
 
 def write_report(summary: RunSummary, folder: Path) -> None:
@@ -27,7 +62,7 @@ def write_report(summary: RunSummary, folder: Path) -> None:
         When a picture cannot be encoded or the file cannot be written.
     """
     environment = Environment(
-        loader=PackageLoader("pipeline.review", "."),
+        loader=PackageLoader("pipeline.export.report", "."),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -52,7 +87,7 @@ def page_of(summary: RunSummary) -> Page:
         flats=pictures.flats(),
         plots=_plots(summary.sections, summary.recording.pipe.nominal_diameter_mm),
         tables=tables(summary),
-        warnings=(*summary.recording.warnings, *stage_warnings(summary)),
+        warnings=(*summary.recording.warnings, *warnings_of(summary.stages)),
     )
 
 

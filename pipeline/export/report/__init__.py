@@ -1,0 +1,1 @@
+"""report.html: one page that tells a whole run and opens offline."""
