@@ -16,7 +16,6 @@ from pipeline.errors import BoresightError, Cancelled, UnusableError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from pipeline.machine.configuration import Configuration
     from pipeline.machine.outcome import RunOutcome
 
 _EXIT_FAILED, _EXIT_REFUSED, _EXIT_UNUSABLE, _EXIT_CANCELLED = 1, 2, 3, 130
@@ -95,19 +94,18 @@ def run(
     """Turn a recording into a run folder: model, measurements, defects and report."""
     from rich.console import Console
 
-    from pipeline.api.job import open_job, run_job
-    from pipeline.export.catalogue import EXPORTERS
+    from pipeline.api.job import run_job
+    from pipeline.api.run import configuration, prepare
     from pipeline.machine.display import ProgressDisplay
     from pipeline.machine.plan import Selection
-    from stages.catalogue import PIPELINE
 
     console = Console(stderr=True)
-    configuration = _configuration(config, assignments)
+    parameters = configuration(config, assignments or ())
     if follow:
         from pipeline.commands.follow import follow as follow_recording
 
         follow_recording(recording, output, probe, quiet_s, console)
-    job = open_job(recording, output, probe, PIPELINE, EXPORTERS, configuration)
+    job = prepare(recording, output, probe=probe, configuration=parameters)
     _print_inputs(console, job.recording.name, job.recording.warnings)
     with ProgressDisplay(console) as display:
         outcome = run_job(job, Selection(from_stage, only, resume), display)
@@ -134,10 +132,11 @@ def config(
     ] = False,
 ) -> None:
     """Print the configuration that a run would use, as YAML."""
+    from pipeline.api.run import configuration
     from pipeline.machine.configuration import default_text, resolved_text
     from stages.catalogue import PIPELINE
 
-    text = default_text(PIPELINE) if default else resolved_text(_configuration(file, assignments))
+    text = default_text(PIPELINE) if default else resolved_text(configuration(file, assignments or ()))
     typer.echo(text, nl=False)
 
 
@@ -174,13 +173,6 @@ def _attach(command: _Attached) -> None:
     app.command(command.name, help=command.summary, add_help_option=False, context_settings=passing_on)(
         forward
     )
-
-
-def _configuration(file: Path | None, assignments: list[str] | None) -> Configuration:
-    from pipeline.machine.configuration import resolve
-    from stages.catalogue import PIPELINE
-
-    return resolve(PIPELINE, file, assignments or ())
 
 
 def _print_inputs(console: Console, name: str, warnings: tuple[str, ...]) -> None:

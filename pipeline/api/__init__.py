@@ -1,1 +1,1 @@
-"""The public face: what `import boresight` offers, and what the commands are made of."""
+"""The public face: what `import boresight` offers; the command line is built on it."""

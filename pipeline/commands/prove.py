@@ -23,9 +23,8 @@ from pipeline.commands.prove_cases import (
 from pipeline.commands.prove_report import rows_of, write_report
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable, written_together
+from pipeline.files.shipped import PRIORS, file_or_shipped
 from stages.diagnose.drill.cases import find_cases
-
-_PRIOR = Path(__file__).resolve().parents[2] / "configs" / "priors" / "pairs.yaml"
 
 
 def prove(
@@ -38,8 +37,8 @@ def prove(
     ] = None,
     cases: Annotated[int, typer.Option(min=1, help="how many probes to draw, without --sealed")] = 10,
     prior: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="what to draw from; else configs/priors/pairs.yaml")
-    ] = None,
+        Path, typer.Option(metavar="FILE", help="what to draw from: a file, or the name of a shipped one")
+    ] = Path("pairs"),
     seed: Annotated[int, typer.Option(min=0, help="of the draw")] = 0,
     leave_out: Annotated[
         bool,
@@ -59,7 +58,7 @@ def prove(
     require_writable(output)
     sweep(output)
     if sealed is None:
-        drawing = Drawing(prior or _PRIOR, seed, output / "recordings", output / "truth")
+        drawing = Drawing(file_or_shipped(prior, PRIORS), seed, output / "recordings", output / "truth")
         done = _drawn_and_worked(drawing, cases, output, leave_out, workers, console)
     else:
         done = _sealed_and_worked(sealed, truth, output, leave_out, workers, console)

@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pipeline.artefacts.findings import DefectKind, Sections
-from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.findings import DefectKind, Defects, Sections
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
 from pipeline.files.codec import digest
@@ -28,7 +28,7 @@ from pipeline.review.decisions.replay import Finding, Measured
 _Artefact = TypeVar("_Artefact")
 _MAKERS: dict[type, str] = {
     Overlays: "overlays", Trajectory: "motion", Wall: "accumulate", RingSamples: "rings",
-    Sections: "sections", WallTexture: "texture",
+    Sections: "sections", WallTexture: "texture", RingPoints: "triangulate", Defects: "defects",
 }  # fmt: skip
 # What a signature binds: the results and the record of how they came about.
 _BOUND = ("run.json", "defects.json", "radius_map.npz", "unrolled.png", "model.glb", "sections.csv")

@@ -1,0 +1,44 @@
+"""boresight: measured, textured pipe models from recorded laser-ring runs, from a script.
+
+    import boresight
+
+    run = boresight.run("recording", "run")             # or boresight.open_run("run")
+    print(run.wall.radius_map.radius_mm.shape)          # typed arrays; lengths in mm
+    print(run.table("sections"))                        # a pandas table
+
+What is wrong with an input is told by an `InputError`, what a recording cannot show by an `UnusableError`.
+"""
+
+try:
+    from pipeline.api.opened import MissingPackageError, Run, open_run
+except ModuleNotFoundError as error:
+    if error.name not in ("pipeline.api", "pipeline.api.opened"):
+        raise
+    import pipeline
+
+    raise ImportError(
+        f"another package named pipeline hides boresight's own: {list(pipeline.__path__)}. "
+        "Install boresight in an environment without it."
+    ) from error
+from pipeline.api.run import run
+from pipeline.api.simulate import Simulated, simulate, simulate_pairs
+from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
+from pipeline.files.shipped import PARAMETERS, PRIORS, SCENES, shipped_names
+
+__all__ = [
+    "PARAMETERS",
+    "PRIORS",
+    "SCENES",
+    "BoresightError",
+    "Cancelled",
+    "InputError",
+    "MissingPackageError",
+    "Run",
+    "Simulated",
+    "UnusableError",
+    "open_run",
+    "run",
+    "shipped_names",
+    "simulate",
+    "simulate_pairs",
+]

@@ -1,0 +1,163 @@
+"""Recordings rendered from a script, as `boresight simulate` renders them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.files.shipped import PRIORS, SCENES, file_or_shipped
+from pipeline.simulator.effects.switch import parse_switches
+from pipeline.simulator.premises import Premise
+from pipeline.simulator.prior import draw_pair, read_prior
+from pipeline.simulator.produce import Order, Places, beside, produce
+from pipeline.simulator.scene import Scene, read_scene
+
+# Is told the name of a scene, how many of its frames are rendered, and how many it has.
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A rendered recording.
+
+    Attributes
+    ----------
+    recording : Path
+        Folder that `run`, `calibrate` and `diagnose` take.
+    truth : Path
+        Folder of everything that was drawn or chosen: wall, motion, instrument, effects.
+    frames : int
+    sealed : bool
+        Whether the recording holds hashes of its truth.
+    premises : tuple of Premise
+        What was checked so that the scene shows what it is meant to show.
+    """
+
+    recording: Path
+    truth: Path
+    frames: int
+    sealed: bool
+    premises: tuple[Premise, ...]
+
+
+def simulate(
+    scene: Path | str,
+    recording: Path | str,
+    *,
+    truth: Path | str | None = None,
+    effects: Sequence[str] = (),
+    seed: int | None = None,
+    frames: int | None = None,
+    seal: bool = False,
+    progress: Progress | None = None,
+) -> Simulated:
+    """Render the recording of a scene, with its truth apart.
+
+    Parameters
+    ----------
+    scene : path or str
+        A scene file, or the name of a shipped one (`shipped_names`).
+    recording : path
+        Folder of the recording, which must not be there yet.
+    truth : path, optional
+        Folder of the truth; beside the recording, with ``-truth`` added to its name, when it is left out.
+    effects : sequence of str
+        Effects to switch on, each as on the command line: ``laser_tilt`` at its typical size, or with its
+        sizes, such as ``laser_tilt=0.6@40``.
+    seed : int, optional
+        In place of the scene's.
+    frames : int, optional
+        Render only so many, from the first.
+    seal : bool
+        Give the recording hashes of its truth, so that the truth can be checked later.
+    progress : callable, optional
+        Is told the scene's name, the frames rendered and the frames in all.
+
+    Raises
+    ------
+    InputError
+        When the scene, an effect or a folder cannot be used.
+    UnusableError
+        When the scene cannot show what it is meant to show; says what to change.
+    """
+    file = file_or_shipped(Path(scene), SCENES)
+    described = read_scene(file)
+    switched = {s.name: s.quantities for s in parse_switches(effects)}
+    changes: dict[str, object] = {"effects": {**described.effects, **switched}}
+    if seed is not None:
+        changes["seed"] = seed
+    changed = _shortened(described.model_copy(update=changes), frames)
+    folder = Path(recording)
+    places = Places(folder, beside(folder) if truth is None else Path(truth), seal)
+    (made,) = _produced([Order(changed, file, places)], progress)
+    return made
+
+
+def simulate_pairs(
+    prior: Path | str,
+    folder: Path | str,
+    count: int,
+    *,
+    first: int = 0,
+    truth: Path | str | None = None,
+    seed: int = 0,
+    frames: int | None = None,
+    seal: bool = False,
+    progress: Progress | None = None,
+) -> Iterator[tuple[Simulated, Simulated]]:
+    """Draw probes with concealed effects; yield the gauge run and the inspection of each, rendered.
+
+    Parameters
+    ----------
+    prior : path or str
+        What to draw from: a file, or the name of a shipped one (`shipped_names`).
+    folder : path
+        Gets a folder for each recording.
+    count, first : int
+        Draw ``count`` pairs, from pair number ``first`` on.
+    truth : path, optional
+        Folder of all truths; beside ``folder`` when it is left out.
+    seed : int
+        Of the draw; the same seed draws the same pairs.
+    frames, seal, progress
+        As in `simulate`.
+
+    Raises
+    ------
+    InputError
+        When the prior, a scene or a folder cannot be used.
+    UnusableError
+        When a scene cannot show what it is meant to show; says what to change.
+    """
+    file = file_or_shipped(Path(prior), PRIORS)
+    drawn_from, recordings = read_prior(file), Path(folder)
+    truths = beside(recordings) if truth is None else Path(truth)
+    for index in range(first, first + count):
+        pair = draw_pair(drawn_from, file, seed, index)
+        orders = [
+            Order(
+                _shortened(scene, frames),
+                pair.folder / "scene.yaml",
+                Places(recordings / scene.name, truths / scene.name, seal),
+            )
+            for scene in (pair.gauge, pair.field)
+        ]
+        gauge, field = _produced(orders, progress)
+        yield gauge, field
+
+
+def _shortened(scene: Scene, frames: int | None) -> Scene:
+    return scene if frames is None else scene.model_copy(update={"frames": min(frames, scene.frames)})
+
+
+def _produced(orders: Sequence[Order], progress: Progress | None) -> list[Simulated]:
+    def tell(order: Order, done: int) -> None:
+        if progress is not None:
+            progress(order.scene.name, done, order.scene.frames)
+
+    found = produce(orders, tell)
+    return [
+        Simulated(o.places.recording, o.places.truth, o.scene.frames, o.places.sealed, premises)
+        for o, premises in zip(orders, found, strict=True)
+    ]
