@@ -25,6 +25,7 @@ from stages.diagnose.gauge.examine import examine
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.result import Diagnosis
+from stages.diagnose.second_line import held_against_rings, sheet_by_rings
 from stages.diagnose.seen import Seen
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.diagnose.travel.gauge import gauge_travel
@@ -86,6 +87,9 @@ def diagnose(
         of_field = _with_travel(of_field, travel_of_run(corrected, "field with the corrected probe"))
     if of_field is not None and correction is not None and correction.unsaid:
         of_field = _without_scale(of_field, correction.unsaid)
+    sheet = sheet_by_rings(of_gauge, correction, probe)
+    if sheet is not None:
+        of_gauge, of_field = (held_against_rings(s, sheet) if s else None for s in (of_gauge, of_field))
     found = with_field(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe, library)
     run = of_field.field.run if of_field is not None and of_field.field is not None else None
     seen = compared(run, corrected, of_gauge, correction)

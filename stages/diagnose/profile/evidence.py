@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,6 +60,11 @@ class ProfileEvidence:
     def found(self) -> tuple[Finding, ...]:
         """Findings beyond what image formation and chance do, the clearest first."""
         return tuple(sorted((f for f in self.findings if f.found), key=lambda f: -abs(f.z)))
+
+    def with_finding(self, finding: Finding) -> ProfileEvidence:
+        """Return the evidence with the finding of one effect replaced."""
+        findings = tuple(finding if f.effect == finding.effect else f for f in self.findings)
+        return replace(self, findings=findings)
 
     def of(self, effect: str) -> Finding:
         """Return the finding of an effect.

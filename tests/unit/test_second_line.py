@@ -1,0 +1,82 @@
+"""A second line is told from the skirt that compression leaves around a bright line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.finding import FOUND_Z, Size, finding
+from stages.diagnose.profile.ghost import bounced, responses
+from stages.diagnose.second_line import SheetByRings, against_rings
+
+BLOCKS, SECTORS, WIDTH_PX = 10, 72, 1.4
+OFFSET = np.arange(-59.75, 60.0, 0.5)
+FLOOR = 1e-3
+
+
+def cells(second: float, skirt: float, seed: int = 0) -> Cells:
+    """A line with a second one up to 10 px off, and a skirt higher on the side that faces one direction."""
+    random = np.random.default_rng(seed)
+    count = BLOCKS * SECTORS
+    block, sector = np.repeat(np.arange(BLOCKS), SECTORS), np.tile(np.arange(SECTORS), BLOCKS)
+    azimuth = -np.pi + (sector + 0.5) * 2 * np.pi / SECTORS
+    gauss = np.exp(-0.5 * (OFFSET / WIDTH_PX) ** 2)
+    rest = random.normal(0, 1e-3, (count, len(OFFSET)))
+    apart = 10 * np.cos(azimuth - 1.0)
+    rest += second * np.exp(-0.5 * ((OFFSET - apart[:, None]) / WIDTH_PX) ** 2)
+    direction = random.uniform(-np.pi, np.pi)
+    both = (1 + np.sign(OFFSET) * np.cos(azimuth - direction)[:, None]) * np.exp(
+        -0.5 * ((np.abs(OFFSET) - 10) / 3) ** 2
+    )
+    rest += skirt * both
+    ones = np.ones(count)
+    return Cells(
+        OFFSET, block, sector, gauss + rest, 0 * ones, WIDTH_PX * ones, rest, ones > 0, azimuth, 7 * ones,
+        50 * ones, 100 * ones, tuple(np.arange(12) + 12 * b for b in range(BLOCKS)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_uneven_skirt_is_no_second_line(seed):
+    drawn = cells(0.0, 0.02, seed)
+    line = bounced(responses(drawn), drawn, FLOOR)
+    assert line.relative > FOUND_Z * FLOOR, "the skirt is too even to feign anything"
+    assert abs(line.test.z) < FOUND_Z / 2
+
+
+@pytest.mark.parametrize("skirt", [0.0, 0.002])
+def test_a_second_line_beyond_the_skirt_is_found_where_it_is(skirt):
+    drawn = cells(0.03, skirt)
+    line = bounced(responses(drawn), drawn, FLOOR)
+    assert line.test.z > FOUND_Z
+    assert line.relative == pytest.approx(0.03, abs=4 * line.test.sigma)
+    np.testing.assert_allclose(np.arctan2(line.parameters[1], line.parameters[0]), 1.0, atol=0.1)
+
+
+def ghost(tilt_x: float, tilt_y: float, cone: float):
+    """The finding of a second line whose place asks for these misalignments, deg."""
+    confirms = (
+        Size("laser_tilt.tilt_deg along x", "deg", tilt_x, 0.01),
+        Size("laser_tilt.tilt_deg along y", "deg", tilt_y, 0.01),
+        Size("laser_cone.cone_deg", "deg", cone, 0.01),
+    )
+    return finding("ghost_ring", 9.0, 1e-12, (), "A second line of 1 % …", confirms=confirms)
+
+
+def rings(tilt_x: float, tilt_y: float, cone: float):
+    """What the rings of a gauge say of the sheet: true minus stated, deg, with 0.01° each."""
+    return SheetByRings(np.array([tilt_x, tilt_y, cone]), 1e-4 * np.eye(3))
+
+
+def test_rings_bear_a_second_line_out():
+    told = against_rings(ghost(0.3, 0.5, 0.0), rings(0.301, 0.49, 0.005))
+    assert told is not None
+    assert told.confirmation.agrees
+
+
+@pytest.mark.parametrize("seen", [(0.0, 0.0, 0.0), (-0.3, -0.5, 0.0), (0.3, 0.5, 0.4)])
+def test_rings_contradict_a_second_line(seen):
+    told = against_rings(ghost(0.3, 0.5, 0.0), rings(*seen))
+    assert told is not None
+    assert not told.confirmation.agrees
