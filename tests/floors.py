@@ -41,14 +41,7 @@ PUT_TOGETHER = ("pipeline.api", "pipeline.commands", "pipeline.cli")
 IMPORTS_STILL_THERE: Mapping[tuple[str, str], str] = {}
 
 
-_ONE_WAY = "2026-11-22: the motion gets one public way in for run and diagnosis"
-PRIVATE_STILL_THERE: Mapping[tuple[str, str], str] = {
-    ("stages.diagnose.field.run", "_pipe_in_rings"): _ONE_WAY,
-    ("stages.diagnose.field.run", "_strip_grid"): _ONE_WAY,
-    ("stages.diagnose.field.run", "_tracked"): _ONE_WAY,
-    ("stages.diagnose.field.run", "_require_distance"): _ONE_WAY,
-    ("stages.diagnose.field.run", "_require_convergence"): _ONE_WAY,
-}
+PRIVATE_STILL_THERE: Mapping[tuple[str, str], str] = {}
 _PACKAGES = ("pipeline", "stages")
 
 

@@ -10,12 +10,12 @@ from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
-from stages.motion.bundle_adjustment.unknowns import EncoderReadings
+from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.tracking.observations import _SEEN, TrackStore
+from stages.motion.tracking.landmarks import OBSERVATION, ObservationStore, TrackedPoses
 from stages.motion.tracking.strips import StripGrid
-from stages.motion.tracking.tracker import Followed
-from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.tracking.tracker import TrackedTexture
+from stages.motion.windows.sliding_window import MeasuredRun
 from tests.drawn_run import RADIUS, rings_on_wall, small_probe
 
 SCALE, SIGMA_PX, ENCODER_SIGMA_MM = 1.001, 0.1, 0.005
@@ -40,7 +40,7 @@ def long_motion(
     laser = k[::2]
     rings = rings_on_wall(probe, T_pc, laser, random, sigma_px=0.05, azimuths=144)
     grid = StripGrid(RADIUS, 960, RADIUS / np.tan(_NEAR), RADIUS / np.tan(_FAR))
-    store = TrackStore.on(Scratch(), MotionParameters.model_validate({}).most_observations)
+    store = ObservationStore.on(Scratch(), MotionParameters.model_validate({}).most_observations)
     last = 0.0
     count = round(landmarks_per_mm * (step_mm * frames + 60))
     place = np.sort(random.uniform(0, step_mm * frames + 60, count))
@@ -50,11 +50,10 @@ def long_motion(
     assert last > 0
     lit = k[1::2]
     guess = _guessed(T_pc)
-    followed = Followed(store, grid, lit, guess[lit], np.zeros(len(lit), bool))
+    texture = TrackedTexture(store, grid, TrackedPoses(lit, guess[lit], np.zeros(len(lit), bool)))
     distance = step_mm * k / SCALE + ENCODER_SIGMA_MM * random.standard_normal(frames)
     encoder = EncoderReadings(distance - distance[0], ENCODER_SIGMA_MM, np.ones(frames, bool))
-    unsure = probe.principal_uncertainties()
-    return LongMotion(MeasuredRun(followed, rings, laser, k / 30, guess, encoder, probe, unsure), T_pc)
+    return LongMotion(MeasuredRun(texture, rings, laser, k / 30, guess, encoder, probe), T_pc)
 
 
 def _poses(z_mm: Float) -> Float:
@@ -71,8 +70,8 @@ def _guessed(T_pc: Float) -> Float:
 
 
 def _observe(
-    store: TrackStore, probe: Probe, grid: StripGrid, T_pc: Float, s: Float, number: int, step_mm: float,
-    random: np.random.Generator,
+    store: ObservationStore, probe: Probe, grid: StripGrid, T_pc: Float, s: Float, number: int,
+    step_mm: float, random: np.random.Generator,
 ) -> None:  # fmt: skip
     psi = random.uniform(-np.pi, np.pi, len(s))
     xyz = np.stack([RADIUS * np.cos(psi), RADIUS * np.sin(psi), s], -1)
@@ -81,7 +80,7 @@ def _observe(
     frame = first[:, None] + np.arange(span)
     seen = (frame >= 0) & (frame < len(T_pc)) & (frame % 2 == 1)
     landmark, frame = np.broadcast_to(np.arange(len(s))[:, None], seen.shape)[seen], frame[seen]
-    records = np.zeros(len(frame), _SEEN)
+    records = np.zeros(len(frame), OBSERVATION)
     uv = probe.camera.project(transform(inverse(T_pc[frame]), xyz[landmark])).uv
     records["landmark"], records["frame"] = number + landmark, frame
     records["uv"] = uv + SIGMA_PX * random.standard_normal(uv.shape)
@@ -89,4 +88,4 @@ def _observe(
     row, column = grid.position(xyz * [1, 1, 1.002])
     records["at"] = np.stack([row, column], -1)[landmark]
     store.open.append(records)
-    store.settle()
+    store.write()

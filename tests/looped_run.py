@@ -13,9 +13,8 @@ from pipeline.geometry.axis import axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion.loops.revisits import Passage
 from stages.motion.tracking.strips import Strip, StripGrid
-from stages.motion.windows.measured_run import Window, cut_windows
-from stages.motion.windows.submap_joining import Joined, join, seam
-from stages.motion.windows.submaps import Settled, Submap
+from stages.motion.windows.submap_joining import JoinedRun, join_submaps
+from stages.motion.windows.submaps import SharedParameters, Submap, Window, cut_windows, handover
 
 STEP_MM, FRAMES, LENGTH, OVERLAP, SHARED = 4.0, 400, 80, 30, 2
 GRID = StripGrid(50.0, 720, 10.5, 64.0)
@@ -30,7 +29,7 @@ _BEND_FROM_MM, _BEND_TO_MM = 300.0, 600.0
 class LoopedRun:
     """What windows gave, and the true distance (N,) and roll (N,)."""
 
-    joined: Joined
+    joined: JoinedRun
     distance_mm: Float
     roll_rad: Float
 
@@ -40,7 +39,7 @@ class LoopedRun:
         lit = np.arange(1, FRAMES, 2)
         return Passage.of(lit, self.believed()[0][lit], GRID.near_mm, GRID.far_mm)
 
-    def believed(self, joined: Joined | None = None) -> tuple[Float, Float, Float]:
+    def believed(self, joined: JoinedRun | None = None) -> tuple[Float, Float, Float]:
         """Return distance, roll and offset (N, 2) from the axis as a run has them; the true offset is 0."""
         run = joined or self.joined
         distance, azimuth, radius = to_pipe(run.axis, run.T_pc[:, :3, 3])
@@ -59,7 +58,9 @@ def looped_run(seed: int = 0, curvature_per_mm: float = 0.0) -> LoopedRun:
     roll = 0.1 * np.sin(k / 60)
     windows = cut_windows(FRAMES, LENGTH, OVERLAP)
     submaps = [_submap(windows, n, distance, roll, curvature_per_mm, random) for n in range(len(windows))]
-    return LoopedRun(join(submaps, Settled(np.zeros(SHARED), np.eye(SHARED))), distance, roll)
+    return LoopedRun(
+        join_submaps(submaps, SharedParameters(np.zeros(SHARED), np.eye(SHARED))), distance, roll
+    )
 
 
 def _submap(
@@ -80,8 +81,8 @@ def _submap(
     axis = axis_through(
         _bent(along, bend, float(z.mean()), curvature)[0], np.array([1.0, 0, 0]), float(along[0])
     )
-    anchor = seam(windows[n - 1], window) - window.first if n else 0
-    end = seam(window, windows[n + 1]) - window.first if n + 1 < len(windows) else window.frames - 1
+    anchor = handover(windows[n - 1], window) - window.first if n else 0
+    end = handover(window, windows[n + 1]) - window.first if n + 1 < len(windows) else window.frames - 1
     some = np.unique(np.linspace(anchor, end, 8).astype(int))
     together = np.minimum.outer(some - anchor, some - anchor).astype(float)
     joint = together[:, None, :, None] * np.diag(DRIFT**2)[None, :, None, :]

@@ -13,9 +13,10 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
-from stages.motion.bundle_adjustment.residuals import RingBins
-from stages.motion.bundle_adjustment.unknowns import GLOBALS, EncoderReadings, State, straight_start
-from stages.motion.tracking.observations import Tracks
+from stages.motion.bundle_adjustment.unknowns import GLOBALS, State, straight_start
+from stages.motion.encoder import EncoderReadings
+from stages.motion.rings import RingBins
+from stages.motion.tracking.landmarks import TrackedPoses, Tracks
 
 RADIUS = 50.0
 ENCODER_SIGMA_MM = 0.05
@@ -101,7 +102,7 @@ def _tracks(state: State, instrument: Probe, noise: float, random: np.random.Gen
     n = len(state.T_pc)
     return Tracks(
         landmark[keep], frame[keep], uv, np.full(len(uv), _SIGMA_PX), state.xyz_p,
-        np.arange(n), state.T_pc, np.zeros(n, bool),
+        TrackedPoses(np.arange(n), state.T_pc, np.zeros(n, bool)),
     )  # fmt: skip
 
 

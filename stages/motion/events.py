@@ -11,24 +11,54 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
 from pipeline.recording.base import FrameTable
-from stages.motion.tracking.observations import Course
+from stages.motion.tracking.landmarks import TrackedPoses
 
+# Events inform and change no result. None of their bounds was measured; each keeps a steadily driven probe
+# free of events (`test_steady_motion_has_no_events`).
+_FEWEST_FRAMES = 5
+_CRUISE_PERCENT = 90.0
+"""The usual speed is the one that nine in ten frames do not exceed."""
 _STOP_SHARE = 0.03
+_LEAST_SPEED_MM_S = 0.05
 _SHORTEST_STOP_S = 0.3
+"""A stop is slower than 3 % of the usual speed, or than 0.05 mm/s, for 0.3 s."""
+_MOVING_SHARE = 0.05
+_SHORTEST_REVERSAL_MM = 0.5
+"""A reversal is faster than 5 % of the usual speed and longer than 0.5 mm."""
+_GAP_TIMES = 1.6
+"""A gap of the clock is longer than so many usual frame times: nearer to two than to one, with some
+jitter."""
+_SAME_SHARE = 0.05
+_LEAST_STEP_MM = 0.05
+_MOST_DUPLICATES = 50
+"""A duplicated frame moved by less than 5 % of the steps beside it, which are longer than 0.05 mm. No more
+than 50 are listed."""
+_SLIP_SPREADS = 6.0
+_SLIP_STEP_MM = 0.02
 _SLIP_MM = 0.3
+"""A slip is a row of steps of the encoder's slip beyond six spreads and 0.02 mm, 0.3 mm in all."""
 
 
 def find_events(
-    frames: FrameTable, trajectory: Trajectory, tracks: Course, slip: Float, has_encoder: bool
+    frames: FrameTable, trajectory: Trajectory, tracked: TrackedPoses, slip: Float, has_encoder: bool
 ) -> tuple[MotionEvent, ...]:
-    """Return the events in the order of their frames."""
+    """Return the events in the order of their frames.
+
+    Parameters
+    ----------
+    frames, trajectory, tracked
+    slip : (N,)
+        Encoder's accumulated slip, mm.
+    has_encoder : bool
+        Whether ``slip`` means anything.
+    """
     z, t, f = distance_along(trajectory.axis, trajectory.T_pc), frames.time_s, frames.frame
-    if len(z) < 5:
+    if len(z) < _FEWEST_FRAMES:
         return ()
     speed = np.gradient(z, np.maximum.accumulate(t + 1e-9 * np.arange(len(t))))
-    cruise = float(np.percentile(np.abs(speed), 90))
+    cruise = float(np.percentile(np.abs(speed), _CRUISE_PERCENT))
     found = [*_stops(f, t, speed, cruise), *_reversals(f, z, speed, cruise), *_gaps(f, t)]
-    found += [*_duplicates(f, z, tracks), *_lost(f, tracks)]
+    found += [*_duplicates(f, z, tracked), *_lost(f, tracked)]
     if has_encoder:
         found += list(_slips(f, slip))
     return tuple(sorted(found, key=lambda e: (e.frame_from, e.kind)))
@@ -42,49 +72,55 @@ def _runs(mask: Bool) -> Iterator[tuple[int, int]]:
 
 
 def _stops(f: Int, t: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
-    for a, b in _runs(np.abs(speed) < max(_STOP_SHARE * cruise, 0.05)):
+    for a, b in _runs(np.abs(speed) < max(_STOP_SHARE * cruise, _LEAST_SPEED_MM_S)):
         if t[b] - t[a] >= _SHORTEST_STOP_S:
-            yield MotionEvent("stop", int(f[a]), int(f[b]), float(t[b] - t[a]), "s", "the probe stood still")
+            lasted = float(t[b] - t[a])
+            yield MotionEvent("stop", int(f[a]), int(f[b]), lasted, "s", "The probe stood still.")
 
 
 def _reversals(f: Int, z: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
-    moving = np.where(np.abs(speed) > 0.05 * cruise, np.sign(speed), 0)
+    moving = np.where(np.abs(speed) > _MOVING_SHARE * cruise, np.sign(speed), 0)
     main = 1 if z[-1] >= z[0] else -1
     for a, b in _runs(moving == -main):
         back = float(abs(z[b] - z[a]))
-        if back > 0.5:
-            yield MotionEvent("reversal", int(f[a]), int(f[b]), back, "mm", "the probe moved back")
+        if back > _SHORTEST_REVERSAL_MM:
+            yield MotionEvent("reversal", int(f[a]), int(f[b]), back, "mm", "The probe moved back.")
 
 
 def _gaps(f: Int, t: Float) -> Iterator[MotionEvent]:
     step = np.diff(t)
     usual = float(np.median(step))
-    for k in np.flatnonzero(step > 1.6 * usual):
+    for k in np.flatnonzero(step > _GAP_TIMES * usual):
         lost = float(round(step[k] / usual) - 1)
-        yield MotionEvent("dropped_frames", int(f[k]), int(f[k + 1]), lost, "frames", "the clock jumps")
+        note = "The frames' times jump here: frames are missing."
+        yield MotionEvent("dropped_frames", int(f[k]), int(f[k + 1]), lost, "frames", note)
 
 
-def _duplicates(f: Int, z: Float, tracks: Course) -> Iterator[MotionEvent]:
-    step = np.abs(np.diff(z[tracks.frames]))
+def _duplicates(f: Int, z: Float, tracked: TrackedPoses) -> Iterator[MotionEvent]:
+    step = np.abs(np.diff(z[tracked.frames]))
     if len(step) < 3:
         return
-    around = np.minimum(np.roll(step, 1), np.roll(step, -1))
-    for k in np.flatnonzero((step < 0.05 * around) & (around > 0.05))[:50]:
+    beside = np.minimum(np.roll(step, 1), np.roll(step, -1))
+    same = (step < _SAME_SHARE * beside) & (beside > _LEAST_STEP_MM)
+    note = "The wall did not move between these frames, but before and after: one picture was recorded twice."
+    for k in np.flatnonzero(same)[:_MOST_DUPLICATES]:
         if 0 < k < len(step) - 1:
-            a, b = tracks.frames[k], tracks.frames[k + 1]
-            yield MotionEvent("duplicated_frame", int(f[a]), int(f[b]), 1.0, "frames", "no motion between")
+            a, b = tracked.frames[k], tracked.frames[k + 1]
+            yield MotionEvent("duplicated_frame", int(f[a]), int(f[b]), 1.0, "frames", note)
 
 
-def _lost(f: Int, tracks: Course) -> Iterator[MotionEvent]:
-    for a, b in _runs(tracks.lost & (np.arange(len(tracks.lost)) > 0)):
-        first, last = int(f[tracks.frames[a]]), int(f[tracks.frames[b]])
-        yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", "too little texture")
+def _lost(f: Int, tracked: TrackedPoses) -> Iterator[MotionEvent]:
+    note = "The wall showed too little texture to be followed."
+    for a, b in _runs(tracked.lost & (np.arange(len(tracked.lost)) > 0)):
+        first, last = int(f[tracked.frames[a]]), int(f[tracked.frames[b]])
+        yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", note)
 
 
 def _slips(f: Int, slip: Float) -> Iterator[MotionEvent]:
     step = np.diff(slip)
     usual = robust_spread(step) + 1e-6
-    for a, b in _runs(np.abs(step) > max(6 * usual, 0.02)):
+    note = "The encoder and the wall's texture disagree: the encoder slipped."
+    for a, b in _runs(np.abs(step) > max(_SLIP_SPREADS * usual, _SLIP_STEP_MM)):
         size = float(slip[b + 1] - slip[a])
         if abs(size) > _SLIP_MM:
-            yield MotionEvent("encoder_slip", int(f[a]), int(f[b + 1]), size, "mm", "encoder and wall differ")
+            yield MotionEvent("encoder_slip", int(f[a]), int(f[b + 1]), size, "mm", note)

@@ -1,6 +1,8 @@
-"""Rings condensed: where the pipe's axis passes each ring, and azimuth bins for the joint adjustment."""
+"""Laser rings in the motion stage: circles through them, and azimuth bins for the bundle adjustment."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import interp1d
@@ -8,64 +10,109 @@ from scipy.interpolate import interp1d
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples
+from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
-from stages.motion.bundle_adjustment.residuals import RingBins
 
-_FEWEST = 0.3
 CORRELATED_FRAMES = 4.0
+"""Neighbouring frames in which a ring meets the same relief of the wall, so that their errors are alike: the
+relief's length along the pipe over the way from ring to ring. Taken for all recordings, not measured."""
+_LEAST_COVERED = 0.3
+"""Share of the circle that a ring must show to have a centre. Not measured."""
+_FEWEST_RINGS = 3
+_ROUNDS = 5
+"""Reweighted fits of a circle; on the open recordings the last changes nothing that matters. Not measured."""
+_OUTLYING = 3.0
+"""Spreads at which a sample weighs half in the fit of a circle. Not measured."""
 _AT_ONCE = 256
 
 
-def ring_centres(points: RingPoints) -> tuple[Float, Float, Float]:
-    """Return circle centre (F, 2), mm in C, radius (F,) and coverage (F,); NaN where a ring is too short.
+@dataclass(frozen=True)
+class RingBins:
+    """Rings condensed to azimuth bins.
 
-    Algebraic circle fit (Kåsa), reweighted: the wall is round to a few tenths of a millimetre.
+    Attributes
+    ----------
+    frame : (M,) int
+    xyz_c : (M, 3)
+        Mean point with the instrument as stated.
+    by_instrument : (M, 3, Q)
+        Its change with the instrument's principal uncertainties, mm per σ.
+    sigma_mm : (M,)
+        1 σ of its radius: noise and relief of the wall.
+    """
+
+    frame: Int
+    xyz_c: Float
+    by_instrument: Float
+    sigma_mm: Float
+
+
+@dataclass(frozen=True)
+class RingCircles:
+    """Circles through the rings.
+
+    Attributes
+    ----------
+    frame : (F,) int
+        Frame numbers.
+    centre_c : (F, 2)
+        Where the pipe's axis passes the laser's plane, mm in C; NaN where too little of a ring is seen.
+    radius_mm : (F,)
+    """
+
+    frame: Int
+    centre_c: Float
+    radius_mm: Float
+
+    @property
+    def usual_radius_mm(self) -> float:
+        """Return the median radius."""
+        return float(np.nanmedian(self.radius_mm))
+
+    def centre_at(self, frame: Int) -> Float:
+        """Return the centre (N, 2) in all frames of the recording, linear between rings; 0 without any."""
+        ok = np.isfinite(self.centre_c).all(1)
+        place, value = np.searchsorted(frame, self.frame[ok]), self.centre_c[ok]
+        if len(value) < 2:
+            return np.broadcast_to(value[0] if len(value) else np.zeros(2), (len(frame), 2)).copy()
+        line = interp1d(place, value, axis=0, bounds_error=False, fill_value=(value[0], value[-1]))
+        return np.asarray(line(np.arange(len(frame))))
+
+
+def circles_in_rings(points: RingPoints) -> RingCircles:
+    """Fit a circle to each ring: algebraic (Kåsa 1976), reweighted, as the wall is round to some 0.1 mm.
+
+    Raises
+    ------
+    UnusableError
+        When fewer than three rings show enough of their circle.
     """
     parts = [_circles(points.xyz_c[a : a + _AT_ONCE, :, :2]) for a in range(0, len(points.frame), _AT_ONCE)]
-    centre, radius, coverage = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return centre, radius, coverage
+    centre, radius = (np.concatenate(p) for p in zip(*parts, strict=True))
+    if np.isfinite(radius).sum() < _FEWEST_RINGS:
+        raise UnusableError(
+            "motion",
+            f"only {int(np.isfinite(radius).sum())} laser frames show enough of a ring to place the pipe",
+            limit=f"{_FEWEST_RINGS} rings seen over {100 * _LEAST_COVERED:.0f} % of the circle",
+            hint="check exposure and that the laser is on; see the rejected ring samples by reason",
+        )
+    return RingCircles(points.frame, centre, radius)
 
 
-def _circles(xy_c: Float32) -> tuple[Float, Float, Float]:
-    """Return centre, radius and coverage of rings (F, A, 2)."""
-    xy = xy_c.astype(float)
-    seen = np.isfinite(xy).all(-1)
-    x = np.where(seen[..., None], xy, 0.0)
-    design = np.concatenate([x, np.ones_like(x[..., :1])], -1)
-    target = np.sum(x * x, -1)
-    weight = seen.astype(float)
-    coverage = seen.mean(1)
-    usable = coverage > _FEWEST
-    out = np.full((len(xy), 3), np.nan)
-    for _ in range(5):
-        normal = np.einsum("fai,fa,faj->fij", design, weight, design)[usable]
-        right = np.einsum("fai,fa,fa->fi", design, weight, target)[usable]
-        out[usable] = np.linalg.solve(normal, right[..., None])[..., 0]
-        error = target - np.einsum("fai,fi->fa", design, np.nan_to_num(out))
-        size = np.where(seen & usable[:, None], np.abs(error), np.nan)
-        scale = np.ones(len(xy))
-        scale[usable] = robust_spreads(size[usable], axis=1)
-        weight = seen / (1 + (error / (3 * np.maximum(scale, 1e-6))[:, None]) ** 2)
-    centre = out[:, :2] / 2
-    return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1)), coverage
-
-
-def at_all_frames(frame: Int, value: Float, frames: int) -> Float:
-    """Return values (frames, ...) at all frames, linear between the frames (F,) where they are not NaN."""
-    ok = np.isfinite(value).reshape(len(value), -1).all(1)
-    if ok.sum() < 2:
-        only = value[ok][0] if ok.any() else np.zeros(value.shape[1:])
-        return np.broadcast_to(only, (frames, *only.shape)).copy()
-    ends = (value[ok][0], value[ok][-1])
-    line = interp1d(frame[ok], value[ok], axis=0, bounds_error=False, fill_value=ends)
-    return np.asarray(line(np.arange(frames)))
-
-
-def ring_bins(rings: RingSamples, probe: Probe, unsure: Float, bins: int, wall_sigma_mm: float) -> RingBins:
+def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigma_mm: float) -> RingBins:
     """Condense each ring to the mean of every azimuth bin that is at least half seen.
 
-    ``unsure`` (P, Q) are the instrument's principal uncertainties. The wall's own relief is alike in
-    neighbouring frames, so σ is widened by the root of that many frames.
+    Parameters
+    ----------
+    rings
+    place : (F,) int
+        Places of the rings in the list of frames.
+    probe
+    bins : int
+        Azimuth bins of a ring.
+    wall_sigma_mm : float
+        1 σ of the wall about the smooth pipe. The relief is alike in neighbouring frames, so it is widened by
+        the root of `CORRELATED_FRAMES`.
     """
     frames, azimuths = rings.radius_px.shape
     size = azimuths // bins
@@ -83,7 +130,31 @@ def ring_bins(rings: RingSamples, probe: Probe, unsure: Float, bins: int, wall_s
     by_pixel, by_parameters = probe.triangulate_jacobian(uv)
     noise_mm = np.linalg.norm(np.einsum("mij,mj->mi", by_pixel, outward), axis=1) * noise_px
     sigma = np.sqrt(CORRELATED_FRAMES * wall_sigma_mm**2 + noise_mm**2)
-    frame = np.broadcast_to(rings.frame[:, None], keep.shape)[keep]
+    frame = np.broadcast_to(place[:, None], keep.shape)[keep]
     xyz_c = probe.triangulate(uv)
     ok = np.isfinite(xyz_c).all(1)
-    return RingBins(frame[ok], xyz_c[ok], (by_parameters @ unsure)[ok], sigma[ok])
+    by_instrument = by_parameters @ probe.principal_uncertainties()
+    return RingBins(frame[ok], xyz_c[ok], by_instrument[ok], sigma[ok])
+
+
+def _circles(xy_c: Float32) -> tuple[Float, Float]:
+    """Return centre (F, 2) and radius (F,) of rings (F, A, 2)."""
+    xy = xy_c.astype(float)
+    seen = np.isfinite(xy).all(-1)
+    x = np.where(seen[..., None], xy, 0.0)
+    design = np.concatenate([x, np.ones_like(x[..., :1])], -1)
+    target = np.sum(x * x, -1)
+    weight = seen.astype(float)
+    usable = seen.mean(1) > _LEAST_COVERED
+    out = np.full((len(xy), 3), np.nan)
+    for _ in range(_ROUNDS):
+        normal = np.einsum("fai,fa,faj->fij", design, weight, design)[usable]
+        right = np.einsum("fai,fa,fa->fi", design, weight, target)[usable]
+        out[usable] = np.linalg.solve(normal, right[..., None])[..., 0]
+        error = target - np.einsum("fai,fi->fa", design, np.nan_to_num(out))
+        size = np.where(seen & usable[:, None], np.abs(error), np.nan)
+        scale = np.ones(len(xy))
+        scale[usable] = robust_spreads(size[usable], axis=1)
+        weight = seen / (1 + (error / (_OUTLYING * np.maximum(scale, 1e-6))[:, None]) ** 2)
+    centre = out[:, :2] / 2
+    return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1))

@@ -1,4 +1,4 @@
-"""The estimate expressed in the pipe frame P of the run: its origin, roll and covariance."""
+"""The estimate expressed in the pipe frame P of the run, and whether the stated probe fits the recording."""
 
 from __future__ import annotations
 
@@ -9,25 +9,23 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import PipeAxis, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
 from pipeline.instrument.probe import Probe
+from pipeline.machine.outcome import WARNING
+from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable
-from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
-from stages.motion.windows.sliding_window import of_one_window
-from stages.motion.windows.submap_joining import Joined
-from stages.motion.windows.submaps import Estimate
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES
+from stages.motion.windows.submap_joining import JoinedRun
 
 _START_MM = 60.0
+"""Length of pipe whose direction is the z-axis of P: two knots of the axis. Not measured."""
+_TOO_FAR = 5.0
+"""A right probe moves farther than so many σ along one of its ten or so directions once in 10⁵ recordings."""
 
 
-def in_pipe_frame(estimate: Estimate, frames: FrameTable, measured: Measurements) -> Trajectory:
-    """Return the trajectory in P of an estimate of all frames at once."""
-    run, has_encoder = of_one_window(estimate), measured.encoder is not None
-    return trajectory_of(run, frames, measured.probe, measured.unsure, has_encoder)
+def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder: bool) -> Trajectory:
+    """Return the trajectory in P.
 
-
-def trajectory_of(
-    run: Joined, frames: FrameTable, probe: Probe, unsure: Float, has_encoder: bool
-) -> Trajectory:
-    """Return the trajectory in P: distance 0 and roll those of the first camera, z along the pipe there."""
+    Distance 0 and roll 0 are those of the first camera, z is the direction of the pipe there.
+    """
     T_po = _pipe_of_origin(run.T_pc[0], run.axis)
     first = float(to_pipe(run.axis, run.T_pc[0, :3, 3])[0])
     axis = PipeAxis(
@@ -37,9 +35,9 @@ def trajectory_of(
     )
     turn = np.eye(6)
     turn[:3, :3] = T_po[:3, :3]
-    own = slice(1, -MATCH_BIASES)
-    found, spread = run.settled.value[own], run.settled.covariance[own, own]
-    scale_sigma = float(np.sqrt(run.settled.covariance[0, 0]))
+    own, unsure = slice(1, -MATCH_BIASES), probe.principal_uncertainties()
+    found, covariance = run.shared.value[own], run.shared.covariance[own, own]
+    scale_sigma = float(np.sqrt(run.shared.covariance[0, 0]))
     return Trajectory(
         frame=frames.frame,
         time_s=frames.time_s,
@@ -47,18 +45,43 @@ def trajectory_of(
         covariance=turn @ run.covariance @ turn.T,
         axis=axis,
         radius_mm=run.radius_mm,
-        encoder_scale=float(run.settled.value[0]) if has_encoder else float("nan"),
+        encoder_scale=float(run.shared.value[0]) if has_encoder else float("nan"),
         encoder_scale_sigma=scale_sigma if has_encoder else float("nan"),
         scale_sigma=run.radius_sigma_mm / run.radius_mm,
         distance_sigma_mm=run.distance_sigma_mm,
         events=(),
         instrument=probe.parameters + unsure @ found,
-        instrument_covariance=unsure @ spread @ unsure.T,
+        instrument_covariance=unsure @ covariance @ unsure.T,
     )
 
 
+def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) -> None:
+    """Report how far the probe was moved, in its stated σ, and warn where it cannot have been right."""
+    if trajectory.instrument is None:
+        return
+    change = trajectory.instrument - probe.parameters
+    farthest = _farthest(change, probe.principal_uncertainties())
+    context.report("instrument moved by the adjustment, at most", farthest, "stated σ")
+    if farthest > _TOO_FAR:
+        sigma = np.sqrt(np.diagonal(probe.covariance))
+        most = int(np.argmax(np.divide(np.abs(change), sigma, out=np.zeros_like(change), where=sigma > 0)))
+        context.report(
+            WARNING,
+            f"the stated probe does not fit this recording: it had to be moved by {farthest:.0f} times its "
+            f"stated σ, most of all {probe.parameter_names[most]} by {change[most]:+.3g}; radii "
+            "and distances may be wrong by more than their σ. Run boresight diagnose, or "
+            "calibrate the probe anew",
+        )
+
+
+def _farthest(change: Float, directions: Float) -> float:
+    """Return the longest part of a change (P,) along the principal directions (P, Q), in σ."""
+    moved, *_ = np.linalg.lstsq(directions, change, rcond=None)
+    return float(np.max(np.abs(moved), initial=0.0))
+
+
 def _pipe_of_origin(T_oc: Float, axis: PipeAxis) -> Float:
-    """Return the transform from the estimate's frame to P."""
+    """Return the transform from the estimate's frame O to P."""
     s = float(to_pipe(axis, T_oc[:3, 3])[0])
     near, far = (frames_at(axis, np.array(d))[0] for d in (s, s + _START_MM))
     origin = frames_at(axis, np.array(s))[0]

@@ -47,9 +47,9 @@ from pipeline.review.run_files import RunFiles
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.defects import DefectParameters, find_defects
 from stages.mesh import MeshParameters, make_mesh
+from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.parameters import MotionParameters
 from stages.motion.windows.sliding_window import adjust_run
-from stages.motion.windows.submaps import Estimate
 from stages.overlays import OverlayParameters, draw_overlays
 from stages.rings import RingParameters, extract_rings
 from stages.sections import SectionParameters, measure_sections

@@ -28,16 +28,15 @@ from pipeline.recording.base import Recording
 from pipeline.simulator.produce import Order, Places, produce
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
-from stages.motion.loops.strip_registration import Expected, Piece, Verdict, compare
-from stages.motion.tracking.strips import Strip, StripGrid
-from stages.motion.tracking.wall_view import WallView
+from stages.motion.loops.strip_registration import ExpectedShift, StoredStrip, Verdict, register
+from stages.motion.tracking.strips import Strip, StripGrid, WallView
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.benchmarks.loop_scenes import SCENES_BY_NAME, WELD_SPACING_MM
 from tests.truth_comparison import compare_wall
 
 _WINDOWS = {"window_frames": 150, "overlap_frames": 40}
-_CONTROL = Expected(np.zeros(2), np.array([60.0, 30.0]))
+_CONTROL = ExpectedShift(np.zeros(2), np.array([60.0, 30.0]))
 
 
 @dataclass(frozen=True)
@@ -188,10 +187,10 @@ def _control(measured: Measured) -> None:
             if abs(s[b] - s[a] - apart) > 12.0 or b <= a:
                 continue
             earlier = replace(
-                Piece.of(strips[int(a)]),
+                StoredStrip.of(strips[int(a)]),
                 first_row=strips[int(a)].first_row + round(apart / view.grid.step_mm),
             )
-            found = compare([earlier], strips[int(b)], _CONTROL, parameters)
+            found = register([earlier], strips[int(b)], _CONTROL, parameters)
             told[apart == 0][0] += 1
             told[apart == 0][1] += found.verdict is Verdict.SAME
     print(f"  control: the same weld recognised in {told[True][1]} of {told[True][0]} pairs,")

@@ -17,20 +17,20 @@ _MATCHED = """
 import hashlib
 import cv2
 import numpy as np
-from stages.motion.tracking.patches import cut, match
+from stages.motion.tracking.patches import cut
 
 random = np.random.default_rng(0)
 wall = cv2.GaussianBlur(random.standard_normal((120, 400)).astype(np.float32), (0, 0), 2)
 row, column = random.integers(30, 90, 60), random.integers(0, 400, 60)
 seen = wall + 0.01 * random.standard_normal(wall.shape).astype(np.float32)
-found = match(seen, np.ones(wall.shape, bool), cut(wall, row, column, 10), row + 0.7, column - 1.3)
+found = cut(wall, row, column, 10).match(seen, np.ones(wall.shape, bool), row + 0.7, column - 1.3)
 print(hashlib.sha256(found.offset.tobytes() + found.correlation.tobytes()).hexdigest())
 """
 
 
 def test_matches_are_the_same_bytes_freshly_compiled_and_from_the_cache(tmp_path: Path) -> None:
     first, second = (_printed(_MATCHED, tmp_path) for _ in range(2))
-    assert any(tmp_path.rglob("matching._match*.nbi")), "the control: the second time it was in the cache"
+    assert any(tmp_path.rglob("patches._match*.nbi")), "the control: the second time it was in the cache"
     assert len(first) == 64
     assert first == second
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from stages.motion.windows.error_chain import Chain, Closures, ErrorSums, Link, astray, interpolated
+from stages.motion.loops.pose_graph import Closures, conditioned, contradicted_places
+from stages.motion.windows.error_chain import ErrorChain, ErrorSums, Link, interpolated
 
 KNOTS, WINDOWS, SHARED = 4, 5, 2
 
 
 @pytest.fixture(scope="module")
-def chain() -> Chain:
+def chain() -> ErrorChain:
     random = np.random.default_rng(5)
     links = []
     for n in range(WINDOWS):
@@ -23,10 +24,10 @@ def chain() -> Chain:
         joint = np.einsum("air,bjr->aibj", root, root)
         response = random.standard_normal((KNOTS, 6, SHARED))
         links.append(Link(30 * n + np.arange(0, 31, 10), carry, joint, response))
-    return Chain(tuple(links), 0.3 * np.eye(6), np.diag([0.5, 0.2]))
+    return ErrorChain(tuple(links), 0.3 * np.eye(6), np.diag([0.5, 0.2]))
 
 
-def written_out(chain: Chain) -> Float:
+def written_out(chain: ErrorChain) -> Float:
     """Return the covariance (6 K, 6 K) by the linear map from all independent sources to all errors."""
     own = 6 * KNOTS
     sources = 6 + own * WINDOWS + SHARED
@@ -53,11 +54,11 @@ def sums_of(dense: Float) -> ErrorSums:
     return ErrorSums.of(knot, column, dense[knot, :, column], dense.shape[2])
 
 
-def dense(sums: ErrorSums, chain: Chain) -> Float:
-    return sums.on(0, len(chain.at))
+def dense(sums: ErrorSums, chain: ErrorChain) -> Float:
+    return sums.dense(0, len(chain.at))
 
 
-def closures(chain: Chain, count: int, seed: int = 2) -> Closures:
+def closures(chain: ErrorChain, count: int, seed: int = 2) -> Closures:
     """Return differences between far ends, two components each, as errors drawn from the chain show."""
     random = np.random.default_rng(seed)
     knots = len(chain.at)
@@ -70,25 +71,25 @@ def closures(chain: Chain, count: int, seed: int = 2) -> Closures:
     return Closures(sums_of(by_error), seen, sigma, np.arange(count) // 2)
 
 
-def test_covariances_are_those_of_the_chain_written_out(chain: Chain) -> None:
+def test_covariances_are_those_of_the_chain_written_out(chain: ErrorChain) -> None:
     every = np.eye(6 * len(chain.at)).reshape(len(chain.at), 6, -1)
     got = np.concatenate(list(chain.covariances_with(sums_of(every)))).reshape(6 * len(chain.at), -1)
     np.testing.assert_allclose(got, written_out(chain), rtol=1e-9, atol=1e-9)
 
 
-def test_some_sums_are_those_sums(chain: Chain) -> None:
+def test_some_sums_are_those_sums(chain: ErrorChain) -> None:
     known = closures(chain, 6).by_error
-    some = known.some(np.array([4, 1]), np.array([2.0, -1.0]))
+    some = known.select(np.array([4, 1]), np.array([2.0, -1.0]))
     np.testing.assert_array_equal(dense(some, chain), dense(known, chain)[..., [4, 1]] * [2.0, -1.0])
-    np.testing.assert_array_equal(known.on(3, 9), dense(known, chain)[3:9])
+    np.testing.assert_array_equal(known.dense(3, 9), dense(known, chain)[3:9])
 
 
-def test_closing_is_conditioning(chain: Chain) -> None:
+def test_closing_is_conditioning(chain: ErrorChain) -> None:
     known = closures(chain, 6)
     full, by_error = written_out(chain), dense(known.by_error, chain).reshape(-1, 6)
     spread = by_error.T @ full @ by_error + np.diag(known.sigma**2)
     gain = full @ by_error @ np.linalg.inv(spread)
-    found = chain.conditioned(known)
+    found = conditioned(chain, known)
     np.testing.assert_allclose(found.error.ravel(), gain @ known.residual, rtol=1e-6, atol=1e-8)
     knots, left = len(chain.at), full - gain @ by_error.T @ full
     blocks = left.reshape(knots, 6, knots, 6)[np.arange(knots), :, np.arange(knots)]
@@ -96,19 +97,19 @@ def test_closing_is_conditioning(chain: Chain) -> None:
     np.testing.assert_allclose(before - found.gained, blocks, rtol=1e-6, atol=1e-7)
 
 
-def test_errors_that_are_left_lie_within_sigma(chain: Chain) -> None:
+def test_errors_that_are_left_lie_within_sigma(chain: ErrorChain) -> None:
     """Over many drawn runs the squared error left, in its stated covariance, is on average its dimension."""
     random, full = np.random.default_rng(0), written_out(chain)
     known, knots = closures(chain, 6), len(chain.at)
     by_error = dense(known.by_error, chain)
     marginal = full.reshape(knots, 6, knots, 6)[np.arange(knots), :, np.arange(knots)]
-    left = marginal - chain.conditioned(known).gained
+    left = marginal - conditioned(chain, known).gained
     root = np.linalg.cholesky(full + 1e-9 * np.eye(len(full)))
     squares = []
     for _ in range(400):
         error = (root @ random.standard_normal(len(full))).reshape(knots, 6)
         seen = np.einsum("kic,ki->c", by_error, error) + known.sigma * random.standard_normal(6)
-        rest = error - chain.conditioned(Closures(known.by_error, seen, known.sigma, known.place)).error
+        rest = error - conditioned(chain, Closures(known.by_error, seen, known.sigma, known.place)).error
         squares.append(float(rest[-1] @ np.linalg.solve(left[-1], rest[-1])))
     assert np.mean(squares) == pytest.approx(6.0, abs=0.7)
     open_ = (root @ random.standard_normal((len(full), 50))).T[:, -6:]
@@ -116,22 +117,25 @@ def test_errors_that_are_left_lie_within_sigma(chain: Chain) -> None:
     assert np.mean(plain) > 12, "the control: without closing they do not"
 
 
-def off_by(known: Closures, chain: Chain, component: int, sigmas: float) -> Closures:
+def off_by(known: Closures, chain: ErrorChain, component: int, sigmas: float) -> Closures:
     """Return the closures with one component off by some σ of its prediction by the motion alone."""
     wrong = known.residual.copy()
-    wrong[component] += sigmas * np.sqrt(chain.spread(known)[component, component])
+    wrong[component] += sigmas * np.sqrt(known.residual_covariance(chain)[component, component])
     return Closures(known.by_error, wrong, known.sigma, known.place)
 
 
-def test_what_contradicts_the_rest_is_found_and_nothing_else(chain: Chain) -> None:
+def test_what_contradicts_the_rest_is_found_and_nothing_else(chain: ErrorChain) -> None:
     known = closures(chain, 16)
-    spread = chain.spread(known)
-    assert astray(spread, known, 1e-6) == set()
-    assert astray(spread, off_by(known, chain, 6, 20.0), 1e-6) == {3}
-    assert astray(spread, off_by(off_by(known, chain, 6, 20.0), chain, 12, -25.0), 1e-6) == {3, 6}
+    spread = known.residual_covariance(chain)
+    assert contradicted_places(spread, known, 1e-6) == set()
+    assert contradicted_places(spread, off_by(known, chain, 6, 20.0), 1e-6) == {3}
+    assert contradicted_places(spread, off_by(off_by(known, chain, 6, 20.0), chain, 12, -25.0), 1e-6) == {
+        3,
+        6,
+    }
 
 
-def test_where_two_contradict_each_other_neither_is_believed(chain: Chain) -> None:
+def test_where_two_contradict_each_other_neither_is_believed(chain: ErrorChain) -> None:
     first = closures(chain, 2)
     twice = Closures(
         sums_of(np.repeat(dense(first.by_error, chain), 2, 2)),
@@ -139,9 +143,9 @@ def test_where_two_contradict_each_other_neither_is_believed(chain: Chain) -> No
         np.full(4, 0.05),
         np.array([0, 1, 0, 1]),
     )
-    spread = chain.spread(twice)
+    spread = twice.residual_covariance(chain)
     assert np.sqrt(spread[0, 0]) > 2.0, "the motion alone would believe either"
-    assert astray(spread, twice, 1e-6) == {0, 1}
+    assert contradicted_places(spread, twice, 1e-6) == {0, 1}
 
 
 def test_values_between_knots_are_linear() -> None:

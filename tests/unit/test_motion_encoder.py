@@ -7,9 +7,8 @@ import pytest
 
 from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import Encoder, FrameTable
-from stages.motion.bundle_adjustment.unknowns import EncoderReadings
-from stages.motion.encoder import contradicted, encoder_at_frames
-from stages.motion.tracking.observations import Tracks
+from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames
+from stages.motion.tracking.landmarks import TrackedPoses
 
 RATE = 30.0
 SPEED = 18.0
@@ -38,14 +37,10 @@ def readings(time_s: np.ndarray, distance_mm: np.ndarray) -> EncoderReadings | N
     return encoder_at_frames(recorded(time_s, distance_mm), 0.0, 60.0, quiet_context())  # type: ignore[arg-type]
 
 
-def tracked(z: np.ndarray) -> Tracks:
+def tracked(z: np.ndarray) -> TrackedPoses:
     T_pc = np.tile(np.eye(4), (len(z), 1, 1))
     T_pc[:, 2, 3] = z
-    none = np.zeros(0, np.int64)
-    return Tracks(
-        none, none, np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.arange(len(z)), T_pc,
-        np.zeros(len(z), bool),
-    )  # fmt: skip
+    return TrackedPoses(np.arange(len(z)), T_pc, np.zeros(len(z), bool))
 
 
 def test_sigma_is_that_of_the_quantum() -> None:

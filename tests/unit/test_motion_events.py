@@ -10,7 +10,7 @@ from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events
-from stages.motion.tracking.observations import Tracks
+from stages.motion.tracking.landmarks import TrackedPoses
 
 FRAMES, RATE, STEP = 120, 30.0, 0.6
 
@@ -31,10 +31,9 @@ def events(
     T = np.tile(np.eye(4), (n, 1, 1))
     T[:, :3, 3] = frames_at(axis, z)[0]
     run = Trajectory(number, t, T, np.zeros((n, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
-    none = np.zeros(0, np.int64)
     gone = np.zeros(n, bool)
     gone[list(lost)] = True
-    tracks = Tracks(none, none, np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.arange(n), T, gone)
+    tracks = TrackedPoses(np.arange(n), T, gone)
     table = FrameTable(number, t, np.array(["both"] * n))
     found = find_events(table, run, tracks, np.zeros(n) if slip is None else slip, encoder)
     assert [e.frame_from for e in found] == sorted(e.frame_from for e in found)

@@ -11,20 +11,19 @@ from pipeline.arrays import Float
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import quiet_context
 from stages.motion import estimate_motion
-from stages.motion.loops.foresight import Foresight
-from stages.motion.loops.loop_closure import Loops, close_loops
+from stages.motion.loops.loop_closure import LoopReport, ShiftPredictor, close_loops
 from stages.motion.loops.revisits import (
     Passage,
-    Place,
-    Signs,
+    Revisit,
+    WallFeatures,
     bands_in_rings,
-    choose_places,
+    choose_revisits,
     texture_at,
     widened,
 )
-from stages.motion.loops.strip_registration import Comparison, Expected, Piece, Verdict, compare
+from stages.motion.loops.strip_registration import ExpectedShift, Registration, StoredStrip, Verdict, register
 from stages.motion.parameters import MotionParameters
-from stages.motion.windows.submap_joining import Joined
+from stages.motion.windows.submap_joining import JoinedRun
 from tests.drawn_run import drawn_run, without_encoder
 from tests.looped_run import FRAMES, GRID, DrawnView, LoopedRun, looped_run, rough_wall
 
@@ -38,20 +37,20 @@ def run() -> LoopedRun:
 
 
 @pytest.fixture(scope="module")
-def closed(run: LoopedRun) -> tuple[Joined, Loops]:
+def closed(run: LoopedRun) -> tuple[JoinedRun, LoopReport]:
     return closing(run, DrawnView(run, WALL, WALL, {}))
 
 
-def plain_signs(passage: Passage) -> Signs:
-    return Signs(np.ones(len(passage.frame)), np.zeros(0))
+def plain_features(passage: Passage) -> WallFeatures:
+    return WallFeatures(np.ones(len(passage.frame)), np.zeros(0))
 
 
-def closing(run: LoopedRun, view: DrawnView, **changes: float) -> tuple[Joined, Loops]:
+def closing(run: LoopedRun, view: DrawnView, **changes: float) -> tuple[JoinedRun, LoopReport]:
     parameters = PARAMETERS.model_copy(update=changes)
-    return close_loops(run.joined, run.passage, plain_signs, view, parameters, Scratch())
+    return close_loops(run.joined, run.passage, plain_features, view, parameters, Scratch())
 
 
-def gap(run: LoopedRun, joined: Joined) -> tuple[Float, Float, Float]:
+def gap(run: LoopedRun, joined: JoinedRun) -> tuple[Float, Float, Float]:
     """Return by how much distance, roll and axis at the way out differ from those on the way back."""
     distance, roll, aside = run.believed(joined)
     there, here = np.arange(10, 150), FRAMES - 1 - np.arange(10, 150)
@@ -59,10 +58,10 @@ def gap(run: LoopedRun, joined: Joined) -> tuple[Float, Float, Float]:
     return off[here] - off[there], turned[here] - turned[there], aside[here] - aside[there]
 
 
-def test_what_drifted_comes_together_again(run: LoopedRun, closed: tuple[Joined, Loops]) -> None:
+def test_what_drifted_comes_together_again(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
     joined, loops = closed
-    assert len(loops.places) >= 6
-    assert all(loops.taken)
+    assert len(loops.revisits) >= 6
+    assert all(loops.closed)
     before, after = gap(run, run.joined), gap(run, joined)
     assert np.abs(before[0]).max() > 0.5
     assert np.abs(after[0]).max() < 0.15
@@ -75,7 +74,7 @@ def test_what_drifted_comes_together_again(run: LoopedRun, closed: tuple[Joined,
 def test_loops_are_closed_beyond_a_bend() -> None:
     bent = looped_run(curvature_per_mm=2e-3)
     joined, loops = closing(bent, DrawnView(bent, WALL, WALL, {}))
-    assert all(loops.taken)
+    assert all(loops.closed)
     before, after = gap(bent, bent.joined), gap(bent, joined)
     assert np.abs(before[0]).max() > 0.5
     assert np.abs(after[0]).max() < 0.15
@@ -84,7 +83,7 @@ def test_loops_are_closed_beyond_a_bend() -> None:
     assert np.abs(after[2]).max() < 0.15
 
 
-def test_sigma_falls_and_holds(run: LoopedRun, closed: tuple[Joined, Loops]) -> None:
+def test_sigma_falls_and_holds(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
     joined, _ = closed
     sigma = [np.sqrt(np.diagonal(j.covariance, axis1=1, axis2=2)) for j in (run.joined, joined)]
     assert np.all(sigma[1] <= sigma[0] + 1e-12)
@@ -127,27 +126,27 @@ def test_equal_welds_at_equal_spacing_are_told_apart(run: LoopedRun) -> None:
     off = {frame: 100.0 for frame in range(FRAMES // 2, FRAMES)}
     joined, loops = closing(run, DrawnView(run, wall, wall, off))
     assert joined is run.joined
-    assert not any(loops.taken)
+    assert not any(loops.closed)
     _, right = closing(run, DrawnView(run, wall, wall, {}))
-    assert all(right.taken), "the control: with the same welds where they are believed"
+    assert all(right.closed), "the control: with the same welds where they are believed"
 
 
-def test_a_few_wrong_places_are_found_out(run: LoopedRun, closed: tuple[Joined, Loops]) -> None:
-    places = closed[1].places
+def test_a_few_wrong_places_are_found_out(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
+    places = closed[1].revisits
     wrong = {places[2].later: 2.8, places[5].later: -3.2}
     joined, loops = closing(run, DrawnView(run, WALL, WALL, wrong))
     assert [n for n, v in enumerate(loops.verdicts) if v is Verdict.CONTRADICTED] == [2, 5]
-    assert sum(loops.taken) == len(places) - 2
+    assert sum(loops.closed) == len(places) - 2
     assert np.abs(gap(run, joined)[0]).max() < 0.15
 
 
 def test_none_is_closed_when_as_many_contradict_as_agree(
-    run: LoopedRun, closed: tuple[Joined, Loops]
+    run: LoopedRun, closed: tuple[JoinedRun, LoopReport]
 ) -> None:
-    wrong = {p.later: 2.5 * (-1) ** n for n, p in enumerate(closed[1].places)}
+    wrong = {p.later: 2.5 * (-1) ** n for n, p in enumerate(closed[1].revisits)}
     joined, loops = closing(run, DrawnView(run, WALL, WALL, wrong))
     assert joined is run.joined
-    assert not any(loops.taken)
+    assert not any(loops.closed)
 
 
 def test_shift_and_its_sigma_are_right(run: LoopedRun) -> None:
@@ -158,11 +157,15 @@ def test_shift_and_its_sigma_are_right(run: LoopedRun) -> None:
         T[2, 3] = run.distance_mm[frame]
         earlier = next(view.strips(np.array([frame]), T[None]))
         later = next(DrawnView(run, WALL, WALL, {frame: off}).strips(np.array([frame]), T[None]))
-        found = compare([Piece.of(earlier)], later, Expected(np.zeros(2), np.array([20.0, 20.0])), PARAMETERS)
+        found = register(
+            [StoredStrip.of(earlier)], later, ExpectedShift(np.zeros(2), np.array([20.0, 20.0])), PARAMETERS
+        )
         assert found.verdict is Verdict.SAME
         errors.append((found.shift[0] - off / GRID.step_mm) / found.sigma[0])
     assert np.abs(errors).max() < 3
-    beyond = compare([Piece.of(earlier)], later, Expected(np.zeros(2), np.array([5.0, 20.0])), PARAMETERS)
+    beyond = register(
+        [StoredStrip.of(earlier)], later, ExpectedShift(np.zeros(2), np.array([5.0, 20.0])), PARAMETERS
+    )
     assert beyond.verdict is not Verdict.SAME, "further off than can be"
 
 
@@ -190,13 +193,13 @@ def test_places_prefer_welds_then_texture() -> None:
     back = passage(np.concatenate([out, out[::-1]]))
     texture = np.where(np.arange(400) == 60, 5.0, 1.0)
     pairs = back.seen_again(10)
-    places = choose_places(back, pairs, Signs(texture, np.array([355.0])), 100.0, 50)
+    places = choose_revisits(back, pairs, WallFeatures(texture, np.array([355.0])), 100.0, 50)
     assert [p for p in places if p.earlier == (60,)], "most texture"
     welds = [p for p in places if p.at_weld]
     assert len(welds) in (1, 2)
     assert all(abs(back.distance_mm[p.later] + 35 - 355) <= 12.5 for p in welds)
-    assert len(choose_places(back, pairs, Signs(texture, np.zeros(0)), 20.0, 5)) == 5
-    beside = widened(Place((100,), 300, False), back, 40.0)
+    assert len(choose_revisits(back, pairs, WallFeatures(texture, np.zeros(0)), 20.0, 5)) == 5
+    beside = widened(Revisit((100,), 300, False), back, 40.0)
     assert beside.earlier[0] == 100
     assert len(beside.earlier) == 5
     assert max(abs(back.distance_mm[f] - 400.0) for f in beside.earlier) < 40
@@ -220,13 +223,13 @@ def test_texture_is_counted_by_frame() -> None:
 def test_what_is_expected_is_learnt_from_place_to_place() -> None:
     """Shifts that grow as a random walk, one step a place: the reach stays that of the next step."""
     walk = 100.0 * np.minimum.outer(np.arange(1, 7), np.arange(1, 7))
-    foresight = Foresight(np.kron(walk, np.eye(2)))
-    before = foresight.of(5).reach
+    predictor = ShiftPredictor(np.kron(walk, np.eye(2)))
+    before = predictor.predict(5).reach
     for place in range(5):
-        found = Comparison(Verdict.SAME, np.array([7.0 * place, -3.0]), np.array([0.1, 0.1]))
-        foresight.learn(place, found)
-    foresight.learn(4, Comparison.refused(Verdict.OTHER))
-    expected = foresight.of(5)
+        found = Registration(Verdict.SAME, np.array([7.0 * place, -3.0]), np.array([0.1, 0.1]))
+        predictor.learn(place, found)
+    predictor.learn(4, Registration.refused(Verdict.OTHER))
+    expected = predictor.predict(5)
     np.testing.assert_allclose(expected.shift, [28.0, -3.0], atol=0.1)
     assert np.all(expected.reach < 0.5 * before)
     assert expected.allows(np.array([40.0, 20.0]))
@@ -236,7 +239,7 @@ def test_what_is_expected_is_learnt_from_place_to_place() -> None:
 def test_none_is_closed_where_none_is_wanted(run: LoopedRun) -> None:
     joined, loops = closing(run, DrawnView(run, WALL, WALL, {}), most_loops=0)
     assert joined is run.joined
-    assert not loops.places
+    assert not loops.revisits
 
 
 def test_pictures_there_and_back_close_loops_and_the_report_says_so() -> None:

@@ -11,8 +11,9 @@ import pytest
 from pipeline.arrays import Float32
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion import MotionParameters
-from stages.motion.tracking.patches import _match, _wrapped, cut, match
-from stages.motion.tracking.strips import Strip, StripGrid, _sample, _without_light, softened, unroll
+from stages.motion.tracking.normalisation import without_illumination
+from stages.motion.tracking.patches import cut
+from stages.motion.tracking.strips import Strip, StripGrid, sample, softened, unroll
 from stages.motion.tracking.tracker import TextureTracker
 from tests.unit.drawn_pipe import RADIUS, draw, led_light, reflectance, small_probe, wall_hits
 
@@ -65,15 +66,12 @@ def test_match_is_the_plain_one() -> None:
     patches = cut(image, row, column, HALF)
     inverse = np.linalg.inv(patches.information)
     near = row + random.uniform(-1.5, 1.5, 20), column + random.uniform(-1.5, 1.5, 20)
-    wide = _wrapped(image, np.ones(image.shape, bool), patches.value.shape[1])
-    offset, correlation, _ = _match(
-        *wide, image.shape[1], patches.value, patches.by_row, patches.by_column, inverse, *near, 30
-    )
+    found = patches.match(image, np.ones(image.shape, bool), *near)
     for k in range(20):
         parts = patches.value[k], patches.by_row[k], patches.by_column[k], inverse[k]
         wanted = plain_match(image, *parts, near[0][k], near[1][k])
-        np.testing.assert_allclose(offset[k], wanted[0], atol=1e-3)
-        assert correlation[k] == pytest.approx(wanted[1], abs=1e-4)
+        np.testing.assert_allclose(found.offset[k], wanted[0], atol=1e-3)
+        assert found.correlation[k] == pytest.approx(wanted[1], abs=1e-4)
 
 
 @pytest.mark.parametrize(("gain", "offset"), [(1.0, 0.0), (0.6, 0.3)])
@@ -86,7 +84,7 @@ def test_shift_is_found_within_sigma(gain: float, offset: float) -> None:
         g.ravel() for g in np.meshgrid(np.arange(20, 70, 12), np.arange(0, 240, 18), indexing="ij")
     )
     patches = cut(image, row, column, HALF)
-    found = match(there, np.ones(image.shape, bool), patches, row.astype(float), column.astype(float))
+    found = patches.match(there, np.ones(image.shape, bool), row.astype(float), column.astype(float))
     error = (found.offset - [0.37, -0.81]) / found.sigma[:, None]
     assert np.all(found.correlation > 0.9)
     # Looking between samples averages their noise, so that σ, taken from what is left, is low by this factor;
@@ -101,14 +99,14 @@ def test_patches_that_leave_the_strip_or_meet_unusable_pixels_are_lost() -> None
     usable = np.ones(image.shape, bool)
     usable[50:55, 100:105] = False
     row, column = np.array([40, 3, 50, 40]), np.array([30, 30, 100, 239])
-    found = match(image, usable, cut(image, row, column, HALF), row.astype(float), column.astype(float))
+    found = cut(image, row, column, HALF).match(image, usable, row.astype(float), column.astype(float))
     np.testing.assert_array_equal(np.isfinite(found.offset[:, 0]), [True, False, False, True])
 
 
 def test_another_texture_is_not_taken_for_the_patch() -> None:
     row, column = np.full(12, 45), 20 * np.arange(12)
     patches = cut(texture(seed=0), row, column, HALF)
-    found = match(texture(seed=9), np.ones((90, 240), bool), patches, row.astype(float), column.astype(float))
+    found = patches.match(texture(seed=9), np.ones((90, 240), bool), row.astype(float), column.astype(float))
     assert not np.any(found.correlation > 0.8)
 
 
@@ -117,7 +115,7 @@ def test_sample_is_a_bilinear_look_up() -> None:
     image = cv2.GaussianBlur(random.integers(0, 255, (60, 80)).astype(np.uint8), (0, 0), 2)
     coarse = np.stack(np.meshgrid(np.linspace(3, 70, 11), np.linspace(4, 50, 8)), -1).astype(np.float32)
     coarse += random.uniform(-0.5, 0.5, coarse.shape).astype(np.float32)
-    grey, seen = _sample(image, coarse, 4)
+    grey, seen = sample(image, coarse, 4)
     i, j = np.meshgrid(np.arange(28) / 4, np.arange(40) / 4, indexing="ij")
     uv = [
         cv2.remap(coarse[..., c].copy(), j.astype(np.float32), i.astype(np.float32), cv2.INTER_LINEAR)
@@ -130,7 +128,7 @@ def test_sample_is_a_bilinear_look_up() -> None:
 
 def test_sample_tells_what_lies_outside() -> None:
     coarse = np.stack(np.meshgrid(np.linspace(-20, 100, 11), np.linspace(-20, 80, 8)), -1).astype(np.float32)
-    grey, seen = _sample(np.full((60, 80), 9, np.uint8), coarse, 4)
+    grey, seen = sample(np.full((60, 80), 9, np.uint8), coarse, 4)
     assert 0 < seen.mean() < 1
     np.testing.assert_array_equal(grey[~seen], 0)
     np.testing.assert_allclose(grey[seen], 9, atol=1e-4)
@@ -215,12 +213,12 @@ def mean_shift(slope_per_px: float) -> float:
     image = 100 * (1 + 0.15 * texture(seed=4, finest=2.5))
     light = np.exp(-slope_per_px * np.arange(90))[:, None]
     usable = np.ones(image.shape, bool)
-    first = _without_light(image.astype(np.float32), usable)
-    second = _without_light((image * light).astype(np.float32), usable)
+    first = without_illumination(image.astype(np.float32), usable)
+    second = without_illumination((image * light).astype(np.float32), usable)
     row, column = (
         g.ravel() for g in np.meshgrid(np.arange(25, 65, 10), np.arange(0, 240, 15), indexing="ij")
     )
-    found = match(second, usable, cut(first, row, column, HALF), row.astype(float), column.astype(float))
+    found = cut(first, row, column, HALF).match(second, usable, row.astype(float), column.astype(float))
     return float(np.mean(found.offset[:, 0]))
 
 
@@ -232,9 +230,7 @@ def naive_shift(slope_per_px: float) -> float:
         g.ravel() for g in np.meshgrid(np.arange(25, 65, 10), np.arange(0, 240, 15), indexing="ij")
     )
     patches = cut(image.astype(np.float32), row, column, HALF)
-    found = match(
-        (image * light).astype(np.float32), usable, patches, row.astype(float), column.astype(float)
-    )
+    found = patches.match((image * light).astype(np.float32), usable, row.astype(float), column.astype(float))
     return float(np.nanmean(found.offset[:, 0]))
 
 

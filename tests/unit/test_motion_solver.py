@@ -129,11 +129,11 @@ def test_damping_grows_faster_with_every_failure_and_is_gone_after_good_steps() 
     first = Damping().after(0.0)
     second = first.after(-1.0)
     assert second.value / first.value > first.value / 1e-7 > 1
-    assert not second.slight
+    assert not second.is_slight
     better = second
     for _ in range(4):
         better = better.after(1.0)
-    assert better.slight
+    assert better.is_slight
     assert better.value < 1e-6 * second.value
     assert second.after(0.5).value == pytest.approx(second.value)
 

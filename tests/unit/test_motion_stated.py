@@ -13,7 +13,7 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import quiet_context
-from stages.motion.stated import report_instrument
+from stages.motion.trajectory import report_instrument
 
 COUNT = 20
 

@@ -13,11 +13,19 @@ from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from pipeline.machine.scratch import Scratch
 from stages.motion.parameters import MotionParameters
-from stages.motion.tracking.observations import TrackStore
-from stages.motion.windows.measured_run import Window, cut_windows
+from stages.motion.tracking.landmarks import ObservationStore
 from stages.motion.windows.sliding_window import RunEstimate, adjust_run
-from stages.motion.windows.submap_joining import Joined, join, seam
-from stages.motion.windows.submaps import Say, Settled, Submap, carried, settle
+from stages.motion.windows.submap_joining import JoinedRun, join_submaps
+from stages.motion.windows.submaps import (
+    SharedInformation,
+    SharedParameters,
+    Submap,
+    Window,
+    carried_error,
+    cut_windows,
+    fuse_shared,
+    handover,
+)
 from tests.long_motion import LongMotion, long_motion
 
 FRAMES, SHARED = 240, 3
@@ -54,7 +62,7 @@ def difference(T_pc: Float, other_T_pc: Float) -> Float:
     return np.concatenate([a[:, :3, 3] - b[:, :3, 3], turn], -1)
 
 
-def sigma_of(run: Joined) -> Float:
+def sigma_of(run: JoinedRun) -> Float:
     return np.sqrt(np.diagonal(run.covariance, axis1=1, axis2=2))
 
 
@@ -63,8 +71,8 @@ def test_windows_give_what_all_frames_at_once_do(at_once: RunEstimate, in_window
     apart = difference(many.T_pc, one.T_pc)[10:] / sigma_of(one)[10:]
     assert np.abs(apart).max() < 0.35
     assert in_windows.trials > at_once.trials, "the control: it was cut"
-    sigma = np.sqrt(np.diagonal(one.settled.covariance))
-    assert np.abs((many.settled.value - one.settled.value) / sigma).max() < 0.5
+    sigma = np.sqrt(np.diagonal(one.shared.covariance))
+    assert np.abs((many.shared.value - one.shared.value) / sigma).max() < 0.5
     assert many.radius_mm == pytest.approx(one.radius_mm, abs=0.005)
 
 
@@ -96,10 +104,10 @@ def test_many_windows_that_err_alike_do_not_overrule_what_is_stated(drawn: LongM
     measured = drawn.run.measured(window, parameters)
     state = drawn.run.start(window, measured, parameters)
     numbers = 1 + len(state.instrument)
-    say = Say(np.append(1.0, np.full(numbers - 1, 0.5)), np.eye(numbers))
+    say = SharedInformation(np.append(1.0, np.full(numbers - 1, 0.5)), np.eye(numbers))
 
-    def settled(windows: int) -> Settled:
-        return settle([say] * windows, [1.0] * windows, measured, state)
+    def settled(windows: int) -> SharedParameters:
+        return fuse_shared([say] * windows, [1.0] * windows, measured, state)
 
     one, two, three, many = (settled(windows) for windows in (1, 2, 3, 80))
     np.testing.assert_allclose(one.value, say.value)
@@ -114,7 +122,7 @@ def test_windows_cover_all_frames_and_overlap() -> None:
         windows = cut_windows(frames, length, overlap)
         assert (windows[0].first, windows[-1].last) == (0, frames)
         assert all(a.last - b.first >= overlap for a, b in pairwise(windows))
-        assert all(a.first < seam(a, b) < a.last for a, b in pairwise(windows))
+        assert all(a.first < handover(a, b) < a.last for a, b in pairwise(windows))
         assert len(windows) == 1 or {w.frames for w in windows} == {length}
 
 
@@ -127,8 +135,8 @@ def submaps(T_pc: Float, axis: PipeAxis, windows: tuple[Window, ...]) -> list[Su
         moved = np.eye(4) if k == 0 else moved
         origin, R = transform(moved, axis.origin_p), moved[:3, :3] @ axis.R_pa
         own = PipeAxis(axis.distance_mm + (k > 0) * random.standard_normal(), origin, R)
-        anchor = 0 if k == 0 else seam(windows[k - 1], window) - window.first
-        end = window.frames - 1 if k + 1 == len(windows) else seam(window, windows[k + 1]) - window.first
+        anchor = 0 if k == 0 else handover(windows[k - 1], window) - window.first
+        end = window.frames - 1 if k + 1 == len(windows) else handover(window, windows[k + 1]) - window.first
         some = np.unique(np.linspace(anchor, end, 4).astype(int))
         together = 1e-4 * np.minimum.outer(some - anchor, some - anchor)
         joint = together[:, None, :, None] * np.eye(6)[None, :, None, :]
@@ -156,8 +164,8 @@ def test_pieces_of_one_course_become_that_course_again() -> None:
     T_pc = from_parts(rotation_from_vector(turn), np.stack([np.sin(k / 20), np.cos(k / 15), 0.7 * k], -1))
     windows = cut_windows(100, 40, 20)
     axis = straight_axis(-30.0, 150.0)
-    settled = Settled(np.zeros(SHARED), np.eye(SHARED))
-    got = join(submaps(T_pc, axis, windows), settled)
+    settled = SharedParameters(np.zeros(SHARED), np.eye(SHARED))
+    got = join_submaps(submaps(T_pc, axis, windows), settled)
     np.testing.assert_allclose(got.T_pc, T_pc, atol=1e-9)
     np.testing.assert_allclose(got.slip, 0, atol=1e-12)
     np.testing.assert_allclose(got.axis.origin_p[:, :2], 0, atol=1e-9)
@@ -165,7 +173,7 @@ def test_pieces_of_one_course_become_that_course_again() -> None:
     broken[1] = replace(
         broken[1], T_pc=from_parts(broken[1].T_pc[:, :3, :3], 1.001 * broken[1].T_pc[:, :3, 3])
     )
-    assert np.abs(join(broken, settled).T_pc - T_pc).max() > 1e-4, "the control"
+    assert np.abs(join_submaps(broken, settled).T_pc - T_pc).max() > 1e-4, "the control"
     variance = got.covariance[:, 0, 0]
     assert np.all(np.diff(variance) > -1e-9), "errors only grow"
 
@@ -181,20 +189,20 @@ def test_an_error_of_the_anchor_is_carried_as_a_motion_of_the_whole() -> None:
         return from_parts(T[:3, :3] @ rotation_from_vector(by[3:]), T[:3, 3] + by[:3])
 
     whole = moved(T_pc[0], step) @ inverse(T_pc[0])
-    for T, carry in zip(T_pc, carried(T_pc, T_pc[0]), strict=True):
+    for T, carry in zip(T_pc, carried_error(T_pc, T_pc[0]), strict=True):
         np.testing.assert_allclose(moved(T, carry @ step), whole @ T, atol=1e-9)
 
 
 def test_tracks_come_back_from_the_disk_thinned_and_cut() -> None:
-    store = TrackStore.on(Scratch(), most=4)
+    store = ObservationStore.on(Scratch(), most=4)
     for frame in range(20):
         seen = np.array([0, 1] if frame < 12 else [1, 2])
-        store.note(
+        store.add(
             seen, frame, np.stack([seen + frame, seen], -1).astype(float), 0.1 + 0 * seen, np.zeros((2, 2))
         )
         if frame == 12:
-            store.settle(np.array([0]))
-    store.settle()
+            store.write(np.array([0]))
+    store.write()
     found = store.between(0, 20)
     assert np.array_equal(np.bincount(found["landmark"]), [4, 4, 4])
     assert np.all(np.diff(found["frame"][found["landmark"] == 1]) == 5), "spread evenly"

@@ -9,10 +9,7 @@ import numpy as np
 from pipeline.adjustment.bordered import LandmarkRows, Rows
 from pipeline.arrays import Bool, Int
 from stages.diagnose.field.run import FieldRun
-from stages.motion.bundle_adjustment.equations import Equations
-from stages.motion.bundle_adjustment.residuals import RingBins
-from stages.motion.bundle_adjustment.unknowns import EncoderReadings
-from stages.motion.tracking.observations import Tracks
+from stages.motion import EncoderReadings, Equations, RingBins, Tracks
 
 _SEEN_OFTEN = 3
 

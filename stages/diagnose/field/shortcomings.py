@@ -67,7 +67,8 @@ def _length(run: FieldRun) -> tuple[str, ...]:
 
 
 def _texture(run: FieldRun) -> tuple[str, ...]:
-    lost = float(np.mean(run.measured.tracks.lost[1:])) if len(run.measured.tracks.lost) > 1 else 1.0
+    is_lost = run.measured.tracks.poses.lost[1:]
+    lost = float(np.mean(is_lost)) if len(is_lost) else 1.0
     if lost < _LOST_SHARE:
         return ()
     return (

@@ -17,9 +17,7 @@ from stages.diagnose.effects.predict import columns, reading_columns, texture_co
 from stages.diagnose.evidence import INSTRUMENT, Column
 from stages.diagnose.field.points import distance_mm, ring_points, speed_mm_s, texture_points
 from stages.diagnose.field.run import FieldRun
-from stages.motion.bundle_adjustment import residuals
-from stages.motion.bundle_adjustment.equations import MATCH_BIASES
-from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State
+from stages.motion import MATCH_BIASES, EncoderReadings, State, residuals
 
 Asked = Sequence[tuple[EffectModel, Shape]]
 _RADIUS_SHARE = 0.1

@@ -1,4 +1,4 @@
-"""All equations of the joint adjustment at one state, what they cost, and the step they ask for."""
+"""All equations of the bundle adjustment at one state: their cost and the step to their minimum."""
 
 from __future__ import annotations
 
@@ -15,18 +15,35 @@ from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.system.threads import in_threads
 from stages.motion.bundle_adjustment import residuals
-from stages.motion.bundle_adjustment.residuals import RingBins
-from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State
+from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.tracking.observations import Tracks
+from stages.motion.rings import RingBins
+from stages.motion.tracking.landmarks import Tracks
 
 MATCH_BIASES = 2
+"""Corrections of texture matching, last of the instrument's: radial, constant and linear in the polar
+angle."""
+LOOSE_SMOOTHNESS = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
+"""1 σ, mm and rad, of third differences before the motion's smoothness is known: far more than any probe's,
+so that the first adjustment follows texture and rings alone. Not measured."""
+_RADIUS_SHARE = 0.1
+"""1 σ of radius and ovality beforehand, as a share of the radius: rings tell far more."""
 _FINEST_WALL_MM = 0.02
+"""Smallest spread of the rings about the smooth pipe that is believed. Not measured."""
 _REDESCENT = 2.5
+"""Width of the rings' Geman-McClure loss in spreads of the wall: what lies farther off, a defect, hardly
+counts. The usual tuning constant; not measured here."""
 _LEAST_EXCESS = 0.3
-_ASTRAY_PX = 1000.0
-_ROUNDING = 1e-5
+"""Matches are never believed to be more than three times better than predicted. Not measured."""
+_NO_PIXEL_PX = 1000.0
+"""Residual of a landmark that projects nowhere."""
+_DAMPED = 1e-5
+"""Relative damping with which covariances are computed where rounding made the equations singular."""
 _LEAST_REACH = 4
+"""Frames that are coupled at least: a third difference has four."""
+_MIDDLE_RAD, _HALF_SPAN_RAD = 1.0, 0.35
+"""Middle and half width of the polar angles at which texture is tracked by default: 38° to 78°."""
 _AT_ONCE, _THREADS = 16384, 2
 
 
@@ -46,8 +63,8 @@ class Measurements:
         Its principal uncertainties.
     smooth_sigma : (6,)
         1 σ of the pose's third difference from frame to frame, mm and rad.
-    settled : (1 + Q,) or None
-        Encoder scale and instrument, where the rest of the run has settled them.
+    shared : (S,) or None
+        Encoder scale and instrument (`State.shared`) as the whole run has them, where that is known.
     """
 
     tracks: Tracks
@@ -57,7 +74,15 @@ class Measurements:
     probe: Probe
     unsure: Float
     smooth_sigma: Float
-    settled: Float | None = None
+    shared: Float | None = None
+
+    @staticmethod
+    def of(
+        tracks: Tracks, rings: RingBins, time_s: Float, encoder: EncoderReadings | None, probe: Probe
+    ) -> Measurements:
+        """Return measurements of a motion whose smoothness is not known yet."""
+        unsure = probe.principal_uncertainties()
+        return Measurements(tracks, rings, time_s, encoder, probe, unsure, LOOSE_SMOOTHNESS)
 
     def camera_at(self, state: State) -> Camera:
         """Return the camera with the corrections found so far."""
@@ -67,7 +92,7 @@ class Measurements:
 
 @dataclass(frozen=True)
 class Scales:
-    """What residuals show of themselves.
+    """Scales of the residuals, estimated from them.
 
     Attributes
     ----------
@@ -139,8 +164,8 @@ class Equations:
         try:
             return system.factor()
         except np.linalg.LinAlgError:
-            # Rounding can make a weakly held direction negative: its σ is then a little too small.
-            return system.factor(_ROUNDING)
+            # Rounding can make a weakly determined direction negative: its σ is then a little too small.
+            return system.factor(_DAMPED)
 
     def _system(self) -> BorderedSystem:
         border = self.rings.by_border.shape[1]
@@ -153,7 +178,7 @@ class Equations:
 def linearised(
     state: State, measured: Measurements, parameters: MotionParameters, scales: Scales
 ) -> Equations:
-    """Return all equations at a state, judged by given scales."""
+    """Return all equations at a state, weighted by given scales."""
     rows = [
         residuals.origin_rows(state),
         residuals.smooth_rows(state, measured.time_s, measured.smooth_sigma),
@@ -164,22 +189,22 @@ def linearised(
     else:
         rows.extend(residuals.encoder_rows(state, measured.encoder, parameters.encoder_slip_sigma_mm))
     rows.append(residuals.axis_rows(state, parameters.axis_bend_sigma))
-    scale_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, 0.1 * state.nominal_radius_mm
-    rows.append(residuals.prior_rows(state, scale_sigma, radius_sigma_mm, measured.settled))
+    scale_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, _RADIUS_SHARE * state.nominal_radius_mm
+    rows.append(residuals.prior_rows(state, scale_sigma, radius_sigma_mm, measured.shared))
     rings = residuals.ring_rows(state, measured.rings, GemanMcClure(_REDESCENT * scales.wall_mm))
     texture = landmark_rows(state, measured, parameters)
     return rescaled(Equations(len(state.T_pc), tuple(rows), rings, texture), measured.tracks, scales)
 
 
 def rescaled(equations: Equations, tracks: Tracks, scales: Scales) -> Equations:
-    """Return the same equations, judged by other scales."""
+    """Return the same equations, weighted by other scales."""
     rings = replace(equations.rings, loss=GemanMcClure(_REDESCENT * scales.wall_mm))
     texture = replace(equations.texture, sigma=scales.texture * tracks.sigma_px)
     return replace(equations, rings=rings, texture=texture)
 
 
 def scales_of(equations: Equations, tracks: Tracks, alike: float) -> Scales:
-    """Return the scales that the residuals show; ``alike`` observations of a landmark err alike."""
+    """Return the scales that residuals show; ``alike`` neighbouring observations of a landmark err alike."""
     size = np.linalg.norm(equations.texture.residual, axis=1)
     excess = _excess_of(size, tracks.sigma_px) * np.sqrt(alike)
     relief = np.abs(equations.rings.residual)
@@ -190,7 +215,7 @@ def scales_of(equations: Equations, tracks: Tracks, alike: float) -> Scales:
 def landmark_rows(state: State, measured: Measurements, parameters: MotionParameters) -> LandmarkRows:
     """Return the equations of texture, each match with its predicted σ.
 
-    A landmark without a pixel pulls nothing, but costs as one far astray.
+    A landmark that projects nowhere does not pull, but costs as much as one far from its match.
     """
     tracks, count = measured.tracks, len(measured.tracks.frame)
     unsure = measured.unsure.shape[1]
@@ -227,10 +252,10 @@ def _observed(
     by_camera = by_parameters.reshape(2 * len(T), len(unsure)) @ unsure
     by_instrument = np.concatenate([by_camera.reshape(len(T), 2, unsure.shape[1]), bias], -1)
     by_point, by_pose = by_point_and_pose(by_c, T, xyz_c)
-    astray = ~np.isfinite(residual).all(1)
-    residual[astray] = _ASTRAY_PX
+    nowhere = ~np.isfinite(residual).all(1)
+    residual[nowhere] = _NO_PIXEL_PX
     for derivative in (by_point, by_pose, by_instrument):
-        derivative[astray] = 0.0
+        derivative[nowhere] = 0.0
     return residual, by_point, by_pose, by_instrument
 
 
@@ -242,13 +267,14 @@ def _excess_of(size: Float, sigma: Float) -> float:
 
 
 def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
-    """Return (M, 2, 2) what matching may get wrong alike all round: radial, constant and linear in θ.
+    """Return the derivatives (M, 2, 2) of pixels by systematic errors of matching, the same all round.
 
-    Light that falls off across a patch and blur that grows with distance shift matches along the radius; that
-    must not be taken for the lens.
+    They are radial, one constant, one linear in the polar angle: light that falls off across a patch and blur
+    that grows with distance shift matches along the radius, which must not be taken for the lens.
     """
     theta = np.arctan2(np.hypot(xyz_c[:, 0], xyz_c[:, 1]), xyz_c[:, 2])
     radial = from_centre_px / np.maximum(np.linalg.norm(from_centre_px, axis=1), 1.0)[:, None]
     return np.asarray(
-        radial[:, :, None] * np.stack([np.ones_like(theta), (theta - 1.0) / 0.35], -1)[:, None, :]
+        radial[:, :, None]
+        * np.stack([np.ones_like(theta), (theta - _MIDDLE_RAD) / _HALF_SPAN_RAD], -1)[:, None, :]
     )

@@ -1,47 +1,43 @@
-"""The equations of the joint adjustment without landmarks: rings, smooth motion, encoder, axis, origin."""
+"""The equations of the bundle adjustment without landmarks: rings, smooth motion, encoder, axis and priors.
+
+Every function returns linearised equations (`pipeline.adjustment.bordered.Rows`): residual, derivatives by
+the unknowns of the frames (pose and slip) and by the border, and the σ of the residual.
+"""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.robust import Cauchy, Loss, Squares
 from pipeline.adjustment.sums import BLOCK
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation
-from stages.motion.bundle_adjustment.unknowns import GLOBALS, EncoderReadings, State
+from stages.motion.bundle_adjustment.unknowns import ENCODER_SCALE, GLOBALS, State
+from stages.motion.encoder import EncoderReadings
+from stages.motion.rings import RingBins
 
-ORIGIN_SIGMA = np.array([1e-4] * 3 + [1e-6] * 3)  # mm and rad
-_SETTLED = 1e-3  # of the stated σ: what is held is not held exactly, so that the equations stay regular
-_VIEW_RAD = 0.2  # 1 σ of the angle between the first camera and the pipe
-
-
-@dataclass(frozen=True)
-class RingBins:
-    """Rings condensed to azimuth bins.
-
-    Attributes
-    ----------
-    frame : (M,) int
-    xyz_c : (M, 3)
-        Mean point with the instrument as stated.
-    by_instrument : (M, 3, Q)
-        Its change with the instrument's principal uncertainties, mm per σ.
-    sigma_mm : (M,)
-        1 σ of its radius: noise and relief of the wall.
-    """
-
-    frame: Int
-    xyz_c: Float
-    by_instrument: Float
-    sigma_mm: Float
+ORIGIN_SIGMA = np.array([1e-4] * 3 + [1e-6] * 3)
+"""1 σ, mm and rad, of the first pose, which defines the frame: far below the σ of any other pose."""
+_HELD = 1e-3
+"""Shared parameters settled by the whole run are held to this share of their stated σ: so tightly that a
+window cannot move them, yet not exactly, so that the equations stay regular."""
+_VIEW_RAD = 0.2
+"""1 σ of the angle between the first camera and the pipe: centring skids lean by less than 11°. Not
+measured."""
+_JERK_SIGMAS = 5.0
+"""Third differences of so many σ weigh half: probes also jerk. Not measured."""
+_WEAK_CURVATURE = 100.0
+"""How much weaker the prior on the axis' curvature is than the one on its change from knot to knot: 0.2 per
+mm by default, which no pipe has; it only keeps the equations regular where no ring was seen."""
 
 
 def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
-    """Return residual (M,) of points against the smooth pipe, its slope by point (M, 3) and border (M, B)."""
+    """Return the residual (M,) of points (M, 3) against the smooth pipe, with derivatives.
+
+    The derivatives are by the point, (M, 3), and by the border, (M, B).
+    """
     s, psi, rho = to_pipe(state.axis, xyz_p)
     basis = state.axis_basis(s)
     a2, b2 = state.globals[1:3]
@@ -58,7 +54,7 @@ def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
 
 
 def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
-    """Every ring bin lies on the pipe's smooth surface."""
+    """Return the equations: every ring bin lies on the pipe's smooth surface."""
     T = state.T_pc[rings.frame]
     unsure = rings.by_instrument.shape[2]
     xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument[:unsure]
@@ -73,7 +69,7 @@ def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
 
 
 def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
-    """Third differences of the pose over time are small: ``sigma`` (6,) for evenly spaced frames."""
+    """Return the equations: third differences of the pose are 0 ± ``sigma`` (6,), at even time steps."""
     n = len(time_s)
     first = np.arange(n - 3)
     frame = first[:, None] + np.arange(4)
@@ -87,12 +83,13 @@ def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
         by_frame[:, i, :, i] = coefficient
     return Rows(
         np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK),
-        np.zeros((6 * (n - 3), state.border_size)), residual.reshape(-1), np.tile(sigma, n - 3), Cauchy(5.0),
+        np.zeros((6 * (n - 3), state.border_size)), residual.reshape(-1), np.tile(sigma, n - 3),
+        Cauchy(_JERK_SIGMAS),
     )  # fmt: skip
 
 
 def turn_rows(state: State, sigma_rad: float) -> Rows:
-    """Return small turns from frame to frame: all that is known of them where no texture shows them."""
+    """Return the equations: turns from frame to frame are small; they matter where no texture shows turns."""
     n = len(state.T_pc)
     rotation = state.T_pc[:, :3, :3]
     residual = vector_from_rotation(np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:])
@@ -107,15 +104,15 @@ def turn_rows(state: State, sigma_rad: float) -> Rows:
 
 
 def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -> tuple[Rows, Rows]:
-    """Distance = scale × encoder + slip, and slip hardly changes from frame to frame."""
+    """Return the equations: distance = scale × encoder + slip, and slip changes little between frames."""
     n = len(encoder.distance_mm)
     origin = state.T_pc[:, :3, 3]
     s = to_pipe(state.axis, origin)[0]
-    scale = state.globals[3]
+    scale = state.globals[ENCODER_SCALE]
     by_frame = np.zeros((n, 1, BLOCK))
     by_frame[:, 0, :3], by_frame[:, 0, 6] = state.section_frames(s)[:, :, 2], -1
     by_border = np.zeros((n, state.border_size))
-    by_border[:, 3] = -encoder.distance_mm
+    by_border[:, ENCODER_SCALE] = -encoder.distance_mm
     residual = s - scale * encoder.distance_mm - state.slip
     sigma = np.where(encoder.known, encoder.sigma_mm, np.inf)
     reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, sigma)
@@ -128,7 +125,7 @@ def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -
 
 
 def no_slip_rows(state: State) -> Rows:
-    """Without an encoder the slip is zero."""
+    """Return the equations that replace those of the encoder where there is none: slip is zero."""
     n = len(state.slip)
     by_frame = np.zeros((n, 1, BLOCK))
     by_frame[:, 0, 6] = 1
@@ -136,7 +133,7 @@ def no_slip_rows(state: State) -> Rows:
 
 
 def origin_rows(state: State) -> Rows:
-    """Hold the first frame where it is: it defines the frame of the estimate."""
+    """Return the equations: the first frame stays where it is, since it defines the frame of the estimate."""
     by_frame = np.zeros((6, 1, BLOCK))
     by_frame[np.arange(6), 0, np.arange(6)] = 1
     return Rows(
@@ -145,14 +142,13 @@ def origin_rows(state: State) -> Rows:
 
 
 def axis_rows(state: State, bend_sigma: float) -> Rows:
-    """Return an axis that bends as little as it may."""
+    """Return the equations: the axis' curvature changes little from knot to knot."""
     knots, h2 = state.knots, state.knot_mm**2
     third = np.diff(np.eye(knots), 3, axis=0)
     second = np.diff(np.eye(knots), 2, axis=0)
     slope = np.diff(np.eye(knots), axis=0)[:1]
-    sigma = (
-        [bend_sigma * h2] * len(third) + [100 * bend_sigma * h2] * len(second) + [_VIEW_RAD * state.knot_mm]
-    )
+    sigma = [bend_sigma * h2] * len(third) + [_WEAK_CURVATURE * bend_sigma * h2] * len(second)
+    sigma += [_VIEW_RAD * state.knot_mm]
     one = np.concatenate([third, second, slope])
     by_border = np.zeros((2 * len(one), state.border_size))
     by_border[: len(one), GLOBALS : GLOBALS + knots] = one
@@ -162,19 +158,20 @@ def axis_rows(state: State, bend_sigma: float) -> Rows:
 
 
 def prior_rows(
-    state: State, encoder_sigma: float, radius_sigma_mm: float, settled: Float | None = None
+    state: State, encoder_sigma: float, radius_sigma_mm: float, shared: Float | None = None
 ) -> Rows:
-    """Return what is known of the global numbers beforehand: pipe, encoder scale and instrument.
+    """Return the equations of what is known beforehand: of the pipe, the encoder scale and the instrument.
 
-    ``settled`` (1 + Q,) are encoder scale and instrument as the whole run has them: then all but held.
+    ``shared`` (S,) are encoder scale and instrument as the whole run has them; they are all but held then.
     """
-    size, unsure = state.border_size, len(state.instrument)
+    size, corrections = state.border_size, len(state.instrument)
     pipe = state.globals[:3] - np.array([state.nominal_radius_mm, 0.0, 0.0])
-    mean = np.concatenate([[1.0], np.zeros(unsure)]) if settled is None else settled
-    residual = np.concatenate([pipe, np.append(state.globals[3], state.instrument) - mean])
-    shared = np.array([encoder_sigma] + [1.0] * unsure) * (1.0 if settled is None else _SETTLED)
-    sigma = np.concatenate([[radius_sigma_mm] * 3, shared])
-    return _border_only(np.eye(size)[np.r_[0:GLOBALS, size - unsure : size]], residual, sigma, Squares())
+    mean = np.concatenate([[1.0], np.zeros(corrections)]) if shared is None else shared
+    residual = np.concatenate([pipe, state.shared - mean])
+    stated = np.array([encoder_sigma] + [1.0] * corrections) * (1.0 if shared is None else _HELD)
+    sigma = np.concatenate([[radius_sigma_mm] * 3, stated])
+    of_border = np.r_[0:GLOBALS, size - corrections : size]
+    return _border_only(np.eye(size)[of_border], residual, sigma, Squares())
 
 
 def _border_only(by_border: Float, residual: Float, sigma: Float, loss: Loss) -> Rows:

@@ -1,4 +1,4 @@
-"""The unknowns of the joint adjustment."""
+"""The unknowns of the bundle adjustment."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import BSpline
 
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Float, Int
 from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, from_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 
 GLOBALS = 4
-_DEGREE = 3
+ENCODER_SCALE = GLOBALS - 1
 AXIS_STEP_MM = 2.0
+"""Spacing of the axis' points. Between them the axis is straight, which in a bend of radius R errs by
+AXIS_STEP_MM² / 8 R: 0.01 mm for R = 50 mm."""
+_DEGREE = 3
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,23 @@ class State:
 
     @property
     def border_size(self) -> int:
-        """Number of global unknowns."""
+        """Number of global unknowns: the border of the normal equations."""
         return GLOBALS + 2 * self.knots + len(self.instrument)
+
+    @property
+    def shared(self) -> Float:
+        """What all windows of a run have in common (S,): encoder scale and instrument."""
+        return np.append(self.globals[ENCODER_SCALE], self.instrument)
+
+    @property
+    def shared_columns(self) -> Int:
+        """Places (S,) of `shared` in the border."""
+        return np.asarray(np.r_[ENCODER_SCALE, self.border_size - len(self.instrument) : self.border_size])
+
+    def with_shared(self, shared: Float) -> State:
+        """Return the state with other encoder scale and instrument (S,)."""
+        globals_ = np.append(self.globals[:ENCODER_SCALE], shared[0])
+        return replace(self, globals=globals_, instrument=shared[1:])
 
     def axis_basis(self, distance_mm: Float) -> Float:
         """Return the spline basis (M, knots) at distances (M,), clamped to the axis."""
@@ -95,26 +113,23 @@ class State:
 
 
 def moved(T_pc: Float, step: Float) -> Float:
-    """Return T = [R exp(w), t + d] for a step (..., 6) = (d, w)."""
+    """Return poses [R exp(w), t + d] (..., 4, 4) for steps (..., 6) = (d, w) of poses [R, t]."""
     turn = rotation_from_vector(step[..., 3:])
     return from_parts(T_pc[..., :3, :3] @ turn, T_pc[..., :3, 3] + step[..., :3])
 
 
-@dataclass(frozen=True)
-class EncoderReadings:
-    """Encoder distance at all frames (N,), mm, the 1 σ of one reading, mm, and where it is known (N,)."""
-
-    distance_mm: Float
-    sigma_mm: float
-    known: Bool
-
-
 def straight_start(
-    T_pc: Float, xyz_p: Float, from_mm: float, to_mm: float, radius_mm: float, knot_mm: float, unsure: int
+    T_pc: Float,
+    xyz_p: Float,
+    from_mm: float,
+    to_mm: float,
+    radius_mm: float,
+    knot_mm: float,
+    corrections: int,
 ) -> State:
     """Return the state of a straight pipe from first guesses of poses and landmarks.
 
-    ``unsure`` is the number of corrections of the instrument and of texture matching.
+    ``corrections`` is the number of those of the instrument and of texture matching.
     """
     steps = max(int(np.ceil((to_mm - from_mm) / AXIS_STEP_MM)), 2)
     z = np.linspace(from_mm, to_mm, steps + 1)
@@ -122,5 +137,5 @@ def straight_start(
     knots = int(np.ceil((to_mm - from_mm) / knot_mm)) + _DEGREE
     return State(
         T_pc, np.zeros(len(T_pc)), xyz_p, np.array([radius_mm, 0.0, 0.0, 1.0]), axis,
-        np.zeros((2, knots)), knot_mm, radius_mm, np.zeros(unsure),
+        np.zeros((2, knots)), knot_mm, radius_mm, np.zeros(corrections),
     )  # fmt: skip

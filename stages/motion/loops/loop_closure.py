@@ -1,14 +1,15 @@
-"""Loops closed: where the probe passes a wall again, what it measured the first time is measured once more.
+"""Loop closure: where the probe passes a wall again, the drift since the first time is measured and removed.
 
-Distance and roll come from the texture of unrolled frames; sideways and in direction the pipe itself is the
-measure, for rings place it well in every window. What closures show is distributed over the chain of windows.
+Distance and roll come from registering unrolled frames; sideways and in direction the pipe itself is the
+measure, since rings place its axis well in every window. What the closures show is distributed over the chain
+of windows (`pose_graph`).
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -16,20 +17,30 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context
-from stages.motion.loops.closing import closed
-from stages.motion.loops.foresight import Foresight
-from stages.motion.loops.pipe_frames import PipeFrames, pipe_frames
-from stages.motion.loops.revisits import Passage, Place, Signs, choose_places, widened
-from stages.motion.loops.strip_registration import Comparison, Piece, Verdict, compare
+from stages.motion.loops.loop_geometry import LoopEnds, PipeFrames
+from stages.motion.loops.pose_graph import Closures, conditioned, contradicted_places, corrected
+from stages.motion.loops.revisits import Passage, Revisit, WallFeatures, choose_revisits, widened
+from stages.motion.loops.strip_registration import (
+    ExpectedShift,
+    Registration,
+    StoredStrip,
+    Verdict,
+    register,
+)
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import CORRELATED_FRAMES
 from stages.motion.tracking.strips import Strip, StripGrid
-from stages.motion.windows.error_chain import Chain, Closures, ErrorSums, astray, beside
-from stages.motion.windows.submap_joining import Joined, Laid, chain_of, lay
+from stages.motion.windows.error_chain import ErrorChain, ErrorSums
+from stages.motion.windows.submap_joining import JoinedRun
 
 _LEAST_PROBABILITY = 1e-6
+"""A revisit that would lie so far off what all others predict in one of a million runs is taken for wrong."""
+_REACH_SIGMA = 5.0
+_LEAST_REACH_PX = 4.0
+"""Shifts are looked for up to so many σ of their prediction, and some strip samples more for its rounding."""
 _DISTANCE, _ROLL = 2, 5
-_ASIDE = (0, 1, 3, 4)
+_ACROSS = (0, 1, 3, 4)
+"""Components of a closure: along z and about z of the section; the others come from the windows' axes."""
 
 
 class View(Protocol):
@@ -44,33 +55,33 @@ class View(Protocol):
 
 
 @dataclass(frozen=True)
-class Loops:
+class LoopReport:
     """How closing loops went.
 
     Attributes
     ----------
-    places : tuple of Place
+    revisits : tuple of Revisit
         Where the wall was compared.
     verdicts : tuple of Verdict
-        What came of it at each.
-    taken : tuple of bool
+        The outcome at each.
+    closed : tuple of bool
         Whether the loop was closed there.
     moved_mm : float
         Largest change of a camera's position.
     """
 
-    places: tuple[Place, ...] = ()
+    revisits: tuple[Revisit, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
-    taken: tuple[bool, ...] = ()
+    closed: tuple[bool, ...] = ()
     moved_mm: float = 0.0
 
     def report(self, context: Context) -> None:
-        """Report what closing loops came to."""
-        context.report("places where the wall was compared with what was seen before", len(self.places), "")
-        if not self.places:
+        """Report how many loops were closed, and why others were not."""
+        context.report("places where the wall was compared with what was seen before", len(self.revisits), "")
+        if not self.revisits:
             return
-        at_weld = sum(t and p.at_weld for t, p in zip(self.taken, self.places, strict=True))
-        context.report("loops closed there", sum(self.taken), "")
+        at_weld = sum(t and r.at_weld for t, r in zip(self.closed, self.revisits, strict=True))
+        context.report("loops closed there", sum(self.closed), "")
         context.report("loops closed at welds or joints", at_weld, "")
         for verdict, count in Counter(self.verdicts).items():
             if verdict is not Verdict.SAME:
@@ -79,22 +90,22 @@ class Loops:
 
 
 def close_loops(
-    joined: Joined,
+    joined: JoinedRun,
     passage: Passage,
-    signs: Callable[[Passage], Signs],
+    features: Callable[[Passage], WallFeatures],
     view: View,
     parameters: MotionParameters,
     scratch: Scratch,
-) -> tuple[Joined, Loops]:
-    """Return the run with its loops closed, and how that went; as it was where none is closed.
+) -> tuple[JoinedRun, LoopReport]:
+    """Return the run with its loops closed, and how that went; the run as it was where none is closed.
 
     Parameters
     ----------
     joined
     passage
         Which frames saw the wall.
-    signs
-        Tells what makes the wall easy to recognise; asked only where some wall was passed again.
+    features
+        Tells what makes the wall easy to recognise; called only where some wall was passed again.
     view
     parameters
     scratch
@@ -102,131 +113,129 @@ def close_loops(
     """
     pairs = passage.seen_again(parameters.max_track_frames)
     if not len(pairs) or not parameters.most_loops:
-        return joined, Loops()
-    at = choose_places(passage, pairs, signs(passage), parameters.loop_spacing_mm, parameters.most_loops)
-    laid = lay(joined.submaps)
-    chain = chain_of(laid, joined.settled)
-    ends = _Ends.of(at, laid, joined)
-    by_error = ends.by_error(joined, chain)
-    foresight = Foresight(_spread_px(chain, by_error, view.grid))
-    reach_mm = [foresight.of(n).reach[0] * view.grid.step_mm for n in range(len(at))]
-    places = [widened(p, passage, far) for p, far in zip(at, reach_mm, strict=True)]
-    compared = _compared(places, foresight, laid, joined, view, parameters, scratch)
-    closures = _closures(by_error, ends, compared, view.grid, parameters)
-    taken, verdicts = _judged(chain, closures, compared)
-    if not any(taken):
-        return joined, Loops(tuple(places), verdicts, taken)
-    found = closed(joined, laid, chain, chain.conditioned(closures.at(np.flatnonzero(taken))))
+        return joined, LoopReport()
+    spacing_mm, most = parameters.loop_spacing_mm, parameters.most_loops
+    chosen = choose_revisits(passage, pairs, features(passage), spacing_mm, most)
+    ends = LoopEnds.of(chosen, joined)
+    by_error = ends.by_error(joined)
+    predictor = ShiftPredictor(_shift_covariance(joined.chain, by_error, view.grid))
+    reach_mm = [predictor.predict(n).reach[0] * view.grid.step_mm for n in range(len(chosen))]
+    revisits = [widened(r, passage, far) for r, far in zip(chosen, reach_mm, strict=True)]
+    registered = _registered(revisits, predictor, joined, view, parameters, scratch)
+    closures = _closures(by_error, ends, registered, view.grid, parameters)
+    closed, verdicts = _judged(joined.chain, closures, registered)
+    if not any(closed):
+        return joined, LoopReport(tuple(revisits), verdicts, closed)
+    found = corrected(joined, conditioned(joined.chain, closures.at(np.flatnonzero(closed))))
     moved_mm = float(np.linalg.norm(found.T_pc[:, :3, 3] - joined.T_pc[:, :3, 3], axis=1).max())
-    return found, Loops(tuple(places), verdicts, taken, moved_mm)
+    return found, LoopReport(tuple(revisits), verdicts, closed, moved_mm)
 
 
-@dataclass(frozen=True)
-class _Ends:
-    """The two ends of M loops: frames and where they are in the pipe."""
+@dataclass
+class ShiftPredictor:
+    """Where the wall should lie at each revisit, learning from the revisits already registered.
 
-    earlier: Int
-    later: Int
-    there: PipeFrames
-    here: PipeFrames
+    Drift grows with the way between two frames, so the reach hardly grows from one revisit to the next, and
+    hardly anything else can be taken for the wall. The prediction is the conditional mean of a Gaussian.
 
-    @staticmethod
-    def of(places: Sequence[Place], laid: Sequence[Laid], joined: Joined) -> _Ends:
-        earlier, later = np.array([(p.earlier[0], p.later) for p in places]).T
-        there, here = (pipe_frames(laid, joined, frame) for frame in (earlier, later))
-        return _Ends(earlier, later, there, here)
+    Attributes
+    ----------
+    covariance : (2 M, 2 M)
+        Of the shifts, rows and columns by turns, before any is known.
+    known : list of int
+        Revisits learnt.
+    shift, variance : list of (2,)
+        What was measured there.
+    """
 
-    def by_error(self, joined: Joined, chain: Chain) -> ErrorSums:
-        """Return how errors at the chain's frames enter the difference of both ends, 6 M sums.
+    covariance: Float
+    known: list[int] = field(default_factory=list)
+    shift: list[Float] = field(default_factory=list)
+    variance: list[Float] = field(default_factory=list)
 
-        Six of each place: along x, y and z of its section, mm, and turns about them, rad.
-        """
-        at, places = chain.at, len(self.earlier)
-        knots, weights = [], []
-        for frame, view, sign in ((self.later, self.here, 1.0), (self.earlier, self.there, -1.0)):
-            seen = sign * _by_error(frame, view, joined)
-            left, right, share = beside(frame, at)
-            for knot, part in ((left, 1 - share), (right, share)):
-                knots.append(np.repeat(knot, 6))
-                weights.append((part[:, None, None] * seen).reshape(-1, 6))
-        column = np.tile(np.arange(6 * places), len(knots))
-        return ErrorSums.of(np.concatenate(knots), column, np.concatenate(weights), 6 * places)
+    def predict(self, revisit: int) -> ExpectedShift:
+        """Return the shift expected at a revisit."""
+        mine, theirs = _both_shifts([revisit]), _both_shifts(self.known)
+        mean: Float = np.zeros(2)
+        covariance = self.covariance[np.ix_(mine, mine)]
+        if self.known:
+            own = self.covariance[np.ix_(theirs, theirs)] + np.diag(np.concatenate(self.variance))
+            with_mine = self.covariance[np.ix_(theirs, mine)]
+            gain = np.asarray(np.linalg.solve(own, with_mine).T, float)
+            mean, covariance = gain @ np.concatenate(self.shift), covariance - gain @ with_mine
+        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return ExpectedShift(mean, np.ceil(_REACH_SIGMA * sigma + _LEAST_REACH_PX))
 
-    def aside(self) -> Float:
-        """Return by how much (M, 6) the axis of the later window lies off that of the earlier one."""
-        section = self.there.section_o
-        shift = np.einsum("nji,nj->ni", section, self.here.axis_o - self.there.axis_o)
-        lean = np.einsum("nji,nj->ni", section, self.here.section_o[..., 2])
-        zero = np.zeros(len(shift))
-        return np.stack([shift[:, 0], shift[:, 1], zero, -lean[:, 1], lean[:, 0], zero], -1)
-
-
-def _by_error(frame: Int, view: PipeFrames, joined: Joined) -> Float:
-    """Return how errors at frames (n,) move them along and about the axes of their sections, (n, 6, 6)."""
-    back = np.swapaxes(view.section_o, 1, 2)
-    seen = np.zeros((len(frame), 6, 6))
-    seen[:, :3, :3], seen[:, 3:, 3:] = back, back @ joined.T_pc[frame, :3, :3]
-    return seen
+    def learn(self, revisit: int, found: Registration) -> None:
+        """Take note of what registering a revisit gave."""
+        if found.verdict is Verdict.SAME:
+            self.known.append(revisit)
+            self.shift.append(found.shift)
+            self.variance.append(found.sigma**2)
 
 
-def _spread_px(chain: Chain, by_error: ErrorSums, grid: StripGrid) -> Float:
-    """Return the covariance (2 M, 2 M) of the shifts before any loop is closed."""
+def _both_shifts(revisits: Sequence[int]) -> Int:
+    """Return the rows of both shifts of revisits."""
+    return (2 * np.array(revisits, np.int64)[:, None] + np.arange(2)).ravel()
+
+
+def _shift_covariance(chain: ErrorChain, by_error: ErrorSums, grid: StripGrid) -> Float:
+    """Return the covariance (2 M, 2 M) of the shifts, strip samples, before any loop is closed."""
     along = (6 * np.arange(by_error.columns // 6)[:, None] + np.array([_DISTANCE, _ROLL])).ravel()
-    return chain.covariance_of(by_error.some(along, np.tile(1 / _per_px(grid), len(along) // 2)))
+    return chain.covariance_of(by_error.select(along, np.tile(1 / _per_sample(grid), len(along) // 2)))
 
 
-def _per_px(grid: StripGrid) -> Float:
+def _per_sample(grid: StripGrid) -> Float:
     """Return mm per row and rad per column."""
     return np.array([grid.step_mm, 2 * np.pi / grid.columns])
 
 
-def _compared(
-    places: Sequence[Place],
-    foresight: Foresight,
-    laid: Sequence[Laid],
-    joined: Joined,
+def _registered(
+    revisits: Sequence[Revisit],
+    predictor: ShiftPredictor,
+    joined: JoinedRun,
     view: View,
     parameters: MotionParameters,
     scratch: Scratch,
-) -> list[Comparison]:
-    """Return what comparing the wall says at each place; of earlier strips no more than one is in memory."""
-    frames = np.unique([f for p in places for f in (*p.earlier, p.later)])
-    earlier = {f for p in places for f in p.earlier}
-    kept = scratch.spool(np.float16, (view.grid.rows, view.grid.columns))
+) -> list[Registration]:
+    """Return what registering the strips of each revisit gave; in memory is one earlier strip at a time."""
+    frames = np.unique([f for r in revisits for f in (*r.earlier, r.later)])
+    earlier = {f for r in revisits for f in r.earlier}
+    stored = scratch.spool(np.float16, (view.grid.rows, view.grid.columns))
     rows: dict[int, tuple[int, int]] = {}
-    found: dict[int, Comparison] = {}
-    poses = pipe_frames(laid, joined, frames).T_pc
+    found: dict[int, Registration] = {}
+    poses = PipeFrames.of(joined, frames).T_pc
     for frame, strip in zip(frames.tolist(), view.strips(frames, poses), strict=True):
         if strip is None:
             continue
-        for n in (n for n, p in enumerate(places) if p.later == frame):
-            known = (rows[f] for f in places[n].earlier if f in rows)
-            pieces = (Piece(first, kept.part(k, k + 1)[0].astype(np.float32)) for k, first in known)
-            found[n] = compare(pieces, strip, foresight.of(n), parameters)
-            foresight.learn(n, found[n])
+        for n in (n for n, r in enumerate(revisits) if r.later == frame):
+            known = (rows[f] for f in revisits[n].earlier if f in rows)
+            strips = (StoredStrip(first, stored.part(k, k + 1)[0].astype(np.float32)) for k, first in known)
+            found[n] = register(strips, strip, predictor.predict(n), parameters)
+            predictor.learn(n, found[n])
         if frame in earlier:
-            rows[frame] = (kept.count, strip.first_row)
-            kept.append(Piece.of(strip).contrast[None])
-    return [found.get(n, Comparison.refused(Verdict.UNREAD)) for n in range(len(places))]
+            rows[frame] = (stored.count, strip.first_row)
+            stored.append(StoredStrip.of(strip).contrast[None])
+    return [found.get(n, Registration.refused(Verdict.UNREAD)) for n in range(len(revisits))]
 
 
 def _closures(
     by_error: ErrorSums,
-    ends: _Ends,
-    compared: Sequence[Comparison],
+    ends: LoopEnds,
+    registered: Sequence[Registration],
     grid: StripGrid,
     parameters: MotionParameters,
 ) -> Closures:
-    """Return what all places show that have the same wall in both frames."""
-    residual, sigma = ends.aside(), np.tile(_axis_sigma(parameters), (len(compared), 1))
+    """Return what all revisits show that have the same wall in both frames."""
+    residual, sigma = ends.axis_difference(), np.tile(_axis_sigma(parameters), (len(registered), 1))
     along = [_DISTANCE, _ROLL]
-    residual[:, along] = [c.shift for c in compared] * _per_px(grid)
-    sigma[:, along] = [c.sigma for c in compared] * _per_px(grid)
-    use = np.tile(np.array([c.verdict is Verdict.SAME for c in compared])[:, None], 6)
-    # One window has one axis: there is nothing to compare sideways.
-    use[:, _ASIDE] &= (ends.here.window != ends.there.window)[:, None]
+    residual[:, along] = [r.shift for r in registered] * _per_sample(grid)
+    sigma[:, along] = [r.sigma for r in registered] * _per_sample(grid)
+    use = np.tile(np.array([r.verdict is Verdict.SAME for r in registered])[:, None], 6)
+    # One window has one axis: there is nothing to compare across the pipe.
+    use[:, _ACROSS] &= (ends.here.window != ends.there.window)[:, None]
     which = np.flatnonzero(use.ravel())
-    seen = by_error.some(which, np.ones(len(which)))
+    seen = by_error.select(which, np.ones(len(which)))
     return Closures(seen, residual.ravel()[which], sigma.ravel()[which], which // 6)
 
 
@@ -237,22 +246,24 @@ def _axis_sigma(parameters: MotionParameters) -> Float:
     apart. Distance and roll are not known from rings.
     """
     bin_mm = np.sqrt(CORRELATED_FRAMES) * parameters.surface_sigma_mm
-    aside = np.sqrt(2.0) * bin_mm * np.sqrt(2 / parameters.ring_bins)
-    lean = np.sqrt(2.0) * aside / parameters.axis_knot_mm
-    return np.array([aside, aside, np.inf, lean, lean, np.inf])
+    across = np.sqrt(2.0) * bin_mm * np.sqrt(2 / parameters.ring_bins)
+    lean = np.sqrt(2.0) * across / parameters.axis_knot_mm
+    return np.array([across, across, np.inf, lean, lean, np.inf])
 
 
 def _judged(
-    chain: Chain, closures: Closures, compared: Sequence[Comparison]
+    chain: ErrorChain, closures: Closures, registered: Sequence[Registration]
 ) -> tuple[tuple[bool, ...], tuple[Verdict, ...]]:
-    """Return which places are closed, and every place's verdict.
+    """Return which loops are closed, and every revisit's verdict.
 
     Where as many contradict the rest as do not, nobody can tell which are wrong: none is closed.
     """
-    verdicts = [c.verdict for c in compared]
-    out = astray(chain.spread(closures), closures, _LEAST_PROBABILITY) if closures.place.size else set()
-    for place in out:
+    verdicts = [r.verdict for r in registered]
+    wrong: set[int] = set()
+    if closures.place.size:
+        wrong = contradicted_places(closures.residual_covariance(chain), closures, _LEAST_PROBABILITY)
+    for place in wrong:
         verdicts[place] = Verdict.CONTRADICTED
     same = sum(v is Verdict.SAME for v in verdicts)
-    taken = tuple(v is Verdict.SAME and same > len(out) for v in verdicts)
-    return taken, tuple(verdicts)
+    closed = tuple(v is Verdict.SAME and same > len(wrong) for v in verdicts)
+    return closed, tuple(verdicts)

@@ -1,4 +1,4 @@
-"""Places that the probe passes again: where the way turned, and which frames see the same wall twice."""
+"""Revisits: where the probe passes a wall again, and which frames see the same wall twice."""
 
 from __future__ import annotations
 
@@ -13,11 +13,19 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 
 _BESIDE = 15
+"""Rings on either side whose median radius is that of the pipe: longer than a weld, shorter than a pipe's
+length at usual ring spacings. Not measured."""
 _BAND_SIGMA = 6.0
 _LEAST_BAND_MM = 0.15
-_NEAR_ENOUGH = 0.25
+"""Rings stand out, as welds do, if their radius is off by so many spreads and mm: beyond the noise of a mean
+radius by far. Not measured."""
+_SAME_WALL = 0.25
+"""Share of the view by which two frames may be apart to be taken for seeing the same wall. Not measured."""
 _STRIDE = 0.35
+"""Share of the view from one earlier frame that is compared to the next, so that any place
+within reach overlaps one of them by more than four fifths."""
 _MOST_STRIDES = 4
+"""Frames on either side of a place that are compared at most, for the time it takes."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +81,13 @@ class Passage:
         for before in range(later - 1, -1, -1):
             partner = _nearest(self.distance_mm, np.flatnonzero(self.number == before), left)
             off = np.abs(self.distance_mm[partner] - self.distance_mm[left])
-            ok = (off < _NEAR_ENOUGH * self.view_mm) & (self.frame[left] - self.frame[partner] > apart)
+            ok = (off < _SAME_WALL * self.view_mm) & (self.frame[left] - self.frame[partner] > apart)
             yield from zip(partner[ok].tolist(), left[ok].tolist(), strict=True)
             left = left[~ok]
 
 
 @dataclass(frozen=True)
-class Signs:
+class WallFeatures:
     """What makes a wall easy to recognise.
 
     Attributes
@@ -95,7 +103,7 @@ class Signs:
 
 
 @dataclass(frozen=True)
-class Place:
+class Revisit:
     """A stretch of wall seen again.
 
     Attributes
@@ -113,32 +121,37 @@ class Place:
     at_weld: bool
 
 
-def choose_places(passage: Passage, pairs: Int, signs: Signs, spacing_mm: float, most: int) -> list[Place]:
-    """Return places among pairs (M, 2): in each stretch where a band is in view, else where most texture is.
+def choose_revisits(
+    passage: Passage, pairs: Int, features: WallFeatures, spacing_mm: float, most: int
+) -> list[Revisit]:
+    """Return one revisit for each stretch of the pipe: where a band is in view, else where most texture is.
 
     Parameters
     ----------
-    passage, pairs, signs
+    passage
+    pairs : (M, 2) int
+        Of `Passage.seen_again`.
+    features
     spacing_mm : float
         Length of a stretch.
     most : int
-        Places kept, spread evenly.
+        Revisits kept, spread evenly.
     """
     earlier, later = pairs.T
-    shows_band = _in_view(passage, later, signs.bands_mm)
+    has_band = _in_view(passage, later, features.bands_mm)
     stretch = np.floor(passage.distance_mm[later] / spacing_mm).astype(np.int64)
-    order = np.lexsort((-signs.texture[earlier], ~shows_band, stretch, passage.number[later]))
+    order = np.lexsort((-features.texture[earlier], ~has_band, stretch, passage.number[later]))
     stretches = np.stack([passage.number[later], stretch])[:, order]
     _, first = np.unique(stretches, axis=1, return_index=True)
-    chosen = _apart(np.sort(order[first]), passage.distance_mm[later], shows_band, spacing_mm / 2)
+    chosen = _apart(np.sort(order[first]), passage.distance_mm[later], has_band, spacing_mm / 2)
     if len(chosen) > most:
         chosen = chosen[np.linspace(0, len(chosen), most, endpoint=False).astype(int)]
     frame = passage.frame
-    return [Place((int(frame[earlier[k]]),), int(frame[later[k]]), bool(shows_band[k])) for k in chosen]
+    return [Revisit((int(frame[earlier[k]]),), int(frame[later[k]]), bool(has_band[k])) for k in chosen]
 
 
-def widened(place: Place, passage: Passage, reach_mm: float) -> Place:
-    """Return a place with the frames beside the earlier one, up to ``reach_mm`` away along the same pass."""
+def widened(place: Revisit, passage: Passage, reach_mm: float) -> Revisit:
+    """Return a revisit with frames beside the earlier one too, up to ``reach_mm`` away on the same pass."""
     stride = _STRIDE * passage.view_mm
     count = min(int(np.ceil(max(reach_mm - stride, 0.0) / stride)), _MOST_STRIDES)
     steps = np.array(sorted(range(-count, count + 1), key=abs))
@@ -169,6 +182,7 @@ def texture_at(frame: Int, observations: Iterable[NDArray[np.void]]) -> Float:
 
 
 def _passes(distance_mm: Float, view_mm: float) -> Int:
+    """Return the pass of each frame (K,); a new one begins where the way turns back by ``view_mm``."""
     turns: list[int] = []
     heading, farthest = 0.0, 0
     for k, distance in enumerate(distance_mm.tolist()):
@@ -199,12 +213,12 @@ def _in_view(passage: Passage, index: Int, bands_mm: Float) -> Bool:
     return np.asarray(high > low)
 
 
-def _apart(chosen: Int, distance_mm: Float, shows_band: Bool, least_mm: float) -> Int:
-    """Return the pairs chosen but one of any two nearer to each other than so much: bands before others."""
+def _apart(chosen: Int, distance_mm: Float, has_band: Bool, least_mm: float) -> Int:
+    """Return the pairs without those nearer than ``least_mm`` to the one before; bands are preferred."""
     kept: list[int] = []
     for k in chosen.tolist():
         if kept and abs(distance_mm[k] - distance_mm[kept[-1]]) < least_mm:
-            if shows_band[kept[-1]] or not shows_band[k]:
+            if has_band[kept[-1]] or not has_band[k]:
                 continue
             kept.pop()
         kept.append(k)

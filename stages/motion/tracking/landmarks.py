@@ -1,15 +1,25 @@
-"""The texture landmarks known so far, grown while the wall is followed; those given up are put aside."""
+"""Texture landmarks: those that are still looked for, and the observations of all of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.arrays import Bool, Float, Int
+from pipeline.machine.scratch import Scratch, Spool
 from stages.motion.tracking.patches import Patches
 
 _FEWEST_DROPPED = 256
+"""Retired landmarks are removed in batches of at least so many, since the arrays are copied each time."""
+_FEWEST_SEEN = 3
+"""Observations below which a landmark is left out: two of them fix it and check nothing."""
+OBSERVATION = np.dtype(
+    [("landmark", "i8"), ("frame", "i8"), ("uv", "f8", 2), ("sigma", "f8"), ("at", "f8", 2)]
+)
+"""One observation: number of the landmark, place of the frame in the list of all, pixel and its 1 σ, px, and
+the row and column of the strip where the landmark was found first."""
 
 
 @dataclass
@@ -19,13 +29,13 @@ class LandmarkMap:
     Attributes
     ----------
     half : int
-        Half size of a patch, strip px.
+        Half size of a patch, strip samples.
     number : (L,) int
         Landmarks are numbered in the order in which they were found.
     row, column : (L,)
         Strip position where the landmark was found first.
     offset : (L, 2)
-        How far it lies now from there beside the motion of the whole strip, strip px.
+        How far it lies now from there, beside the common motion of all landmarks; rows and columns.
     born : (L,) int
         First frame.
     retired : (L,) bool
@@ -49,7 +59,7 @@ class LandmarkMap:
     patches: list[Patches] = field(default_factory=list)
     found: int = 0
 
-    def gather(self, index: Int) -> Patches:
+    def patches_of(self, index: Int) -> Patches:
         """Return the patches of landmarks at places (N,) as one batch."""
         starts = self._starts()
         batch = np.searchsorted(starts, index, side="right") - 1
@@ -71,13 +81,13 @@ class LandmarkMap:
         self.found += n
 
     @property
-    def is_crowded(self) -> bool:
+    def has_many_retired(self) -> bool:
         """Whether so many landmarks are retired that it pays to drop them."""
         return int(self.retired.sum()) > max(len(self.retired) // 2, _FEWEST_DROPPED)
 
-    def drop(self, gone: Bool) -> Int:
-        """Forget landmarks (L,), so that the work of a frame does not grow; return their numbers."""
-        dropped, keep, starts = self.number[gone], ~gone, self._starts()
+    def drop_retired(self) -> Int:
+        """Forget retired landmarks, so that the work of a frame does not grow; return their numbers."""
+        dropped, keep, starts = self.number[self.retired], ~self.retired, self._starts()
         kept = [p.of(keep[a:b]) for p, a, b in zip(self.patches, starts[:-1], starts[1:], strict=True)]
         self.patches = [p for p in kept if len(p.value)]
         for name in ("number", "row", "column", "offset", "born", "retired", "misses"):
@@ -86,3 +96,137 @@ class LandmarkMap:
 
     def _starts(self) -> Int:
         return np.cumsum([0] + [len(p.value) for p in self.patches])
+
+
+@dataclass(frozen=True)
+class TrackedPoses:
+    """Where texture took the probe.
+
+    Attributes
+    ----------
+    frames : (K,) int
+        Frames that were tracked, as places in the list of all frames.
+    T_pc : (K, 4, 4)
+        First guess of their poses in the straightened pipe.
+    lost : (K,) bool
+        Frames in which too little texture was found to move the pose.
+    """
+
+    frames: Int
+    T_pc: Float
+    lost: Bool
+
+    def between(self, first: int, last: int) -> TrackedPoses:
+        """Return those of frames ``first`` to ``last`` (exclusive), counted from ``first``."""
+        inside = (self.frames >= first) & (self.frames < last)
+        return TrackedPoses(self.frames[inside] - first, self.T_pc[inside], self.lost[inside])
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Observations of landmarks, sorted by landmark, then frame.
+
+    Attributes
+    ----------
+    landmark, frame : (M,) int
+        Index into ``xyz`` and index into the list of frames.
+    uv : (M, 2)
+        Observed pixels.
+    sigma_px : (M,)
+        1 σ, px, of each coordinate.
+    xyz : (L, 3)
+        First guess of the landmarks in the straightened pipe.
+    poses : TrackedPoses
+    """
+
+    landmark: Int
+    frame: Int
+    uv: Float
+    sigma_px: Float
+    xyz: Float
+    poses: TrackedPoses
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Records ``first`` to ``last`` (exclusive), all of frames ``from_frame`` to ``to_frame``."""
+
+    first: int
+    last: int
+    from_frame: int
+    to_frame: int
+
+
+@dataclass
+class ObservationStore:
+    """Observations of a whole run; in memory are only those of landmarks that are still looked for.
+
+    Attributes
+    ----------
+    most : int
+        Observations of one landmark that are kept, spread evenly: those of neighbouring frames have nearly
+        the same error, so the rest would take room and add no information.
+    spool : Spool
+        Of `OBSERVATION`, on the disk.
+    open : list of arrays
+        Observations of landmarks that may be seen again.
+    batches : list
+    landmarks : int
+        Landmarks on the disk.
+    """
+
+    most: int
+    spool: Spool
+    open: list[NDArray[np.void]] = field(default_factory=list)
+    batches: list[_Batch] = field(default_factory=list)
+    landmarks: int = 0
+
+    @staticmethod
+    def on(scratch: Scratch, most: int) -> ObservationStore:
+        """Return an empty store."""
+        return ObservationStore(most, scratch.spool(OBSERVATION))
+
+    def add(self, landmark: Int, frame: int, uv: Float, sigma: Float, at: Float) -> None:
+        """Keep the observations (N,) of one frame; ``at`` (N, 2) is where landmarks lie in the strip."""
+        seen = np.zeros(len(landmark), OBSERVATION)
+        seen["landmark"], seen["frame"], seen["uv"], seen["sigma"] = landmark, frame, uv, sigma
+        seen["at"] = at
+        self.open.append(seen)
+
+    def write(self, retired: Int | None = None) -> None:
+        """Put the observations of retired landmarks on the disk; None stands for all landmarks."""
+        seen = np.concatenate(self.open) if self.open else np.zeros(0, OBSERVATION)
+        complete = np.ones(len(seen), bool) if retired is None else np.isin(seen["landmark"], retired)
+        self.open = [seen[~complete]]
+        kept = _thinned(seen[complete], self.most)
+        if len(kept):
+            frame, first = kept["frame"], self.spool.count
+            self.spool.append(kept)
+            self.landmarks += len(np.unique(kept["landmark"]))
+            self.batches.append(_Batch(first, self.spool.count, int(frame.min()), int(frame.max()) + 1))
+
+    def between(self, first: int, last: int) -> NDArray[np.void]:
+        """Return the records of frames ``first`` to ``last`` (exclusive), sorted by landmark, then frame.
+
+        Landmarks seen less than three times in them are left out.
+        """
+        near = [b for b in self.batches if b.from_frame < last and b.to_frame > first]
+        parts = [self.spool.part(b.first, b.last) for b in near]
+        seen = np.concatenate(parts) if parts else np.zeros(0, OBSERVATION)
+        seen = seen[(seen["frame"] >= first) & (seen["frame"] < last)]
+        seen = seen[np.lexsort((seen["frame"], seen["landmark"]))]
+        _, place, count = np.unique(seen["landmark"], return_inverse=True, return_counts=True)
+        often: NDArray[np.void] = seen[count[place] >= _FEWEST_SEEN]
+        return often
+
+
+def _thinned(seen: NDArray[np.void], most: int) -> NDArray[np.void]:
+    """Return at most ``most`` observations of each landmark, and none of those seen less than three times."""
+    seen = seen[np.lexsort((seen["frame"], seen["landmark"]))]
+    _, place, count = np.unique(seen["landmark"], return_inverse=True, return_counts=True)
+    first = np.cumsum(count) - count
+    rank = np.arange(len(seen)) - first[place]
+    share = np.minimum(most / np.maximum(count[place], 1), 1.0)
+    keep = np.floor((rank + 1) * share) > np.floor(rank * share)
+    kept: NDArray[np.void] = seen[keep & (count[place] >= _FEWEST_SEEN)]
+    return kept

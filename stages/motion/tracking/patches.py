@@ -1,7 +1,7 @@
-"""Sub-pixel patch matching by inverse compositional Lucas-Kanade with free gain and offset.
+"""Sub-pixel matching of patches by inverse compositional Lucas-Kanade with free gain and offset.
 
-S. Baker, I. Matthews, "Lucas-Kanade 20 years on: a unifying framework", IJCV 2004, § 3.2; the gain and the
-offset are taken out by matching zero-mean patches and scaling by the least-squares gain.
+S. Baker, I. Matthews, "Lucas-Kanade 20 years on: a unifying framework", IJCV 2004, § 3.2; gain and offset are
+eliminated by matching zero-mean patches and scaling by the least-squares gain.
 """
 
 from __future__ import annotations
@@ -16,22 +16,53 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32, Int, Int32
 from stages.rings.kernels import FAST
 
-_STEPS = 30
-_ENOUGH = 0.003  # a step, strip px, after which the next would not matter
+_MOST_STEPS = 30
+"""Gauss-Newton steps of one match; those that need more do not converge. Not measured."""
+_SMALL_STEP = 0.003
+"""Step, strip samples, after which matching ends: a hundredth of ``landmark_sigma_px``."""
+_REGULAR = 1e-9
+"""Added to the information of patches, so that those without any texture can be inverted."""
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Templates: zero-mean ``value`` (N, n, n), slopes along rows and columns, ``information`` (N, 2, 2)."""
+    """Templates cut from strips.
+
+    Attributes
+    ----------
+    value : (N, n, n) float32
+        Contrast, of zero mean.
+    by_row, by_column : (N, n, n) float32
+        Its derivatives along the pipe and around it.
+    information : (N, 2, 2)
+        Of the position, for noise of variance 1.
+    """
 
     value: Float32
     by_row: Float32
     by_column: Float32
     information: Float
 
+    @property
+    def sigma_per_noise(self) -> Float:
+        """Return 1 σ (N,), strip samples, of a match in noise of 1 σ = 1 per sample (Cramér-Rao bound)."""
+        return np.asarray(np.sqrt(np.trace(self._covariance, axis1=1, axis2=2) / 2))
+
+    @property
+    def _covariance(self) -> Float:
+        return np.asarray(np.linalg.inv(self.information + _REGULAR * np.eye(2)))
+
     def of(self, index: Int | Bool) -> Patches:
         """Return some of the patches."""
         return Patches(*(getattr(self, name)[index] for name in _FIELDS))
+
+    def match(self, contrast: Float32, usable: Bool, row: Float, column: Float) -> Matches:
+        """Find the patches near predicted positions (N,) in a strip (H, W), up to half a patch away."""
+        offset, correlation, residual = _match(
+            *_wrapped(contrast, usable, self.value.shape[1]), contrast.shape[1],
+            self.value, self.by_row, self.by_column, self._covariance, row, column, _MOST_STEPS,
+        )  # fmt: skip
+        return Matches(offset, correlation, residual * self.sigma_per_noise)
 
     @staticmethod
     def none(side: int) -> Patches:
@@ -50,7 +81,17 @@ _FIELDS = tuple(Patches.__dataclass_fields__)
 
 @dataclass(frozen=True)
 class Matches:
-    """Row and column offsets (N, 2), correlation (N,) and predicted 1 σ (N,), strip px; NaN if lost."""
+    """Where patches were found.
+
+    Attributes
+    ----------
+    offset : (N, 2)
+        Rows and columns from the predicted position; NaN where a patch was lost.
+    correlation : (N,)
+        Normalised cross-correlation there.
+    sigma : (N,)
+        1 σ of ``offset``, strip samples, from what differs between the patch and the strip.
+    """
 
     offset: Float
     correlation: Float
@@ -58,7 +99,7 @@ class Matches:
 
 
 def cut(contrast: Float32, row: Int, column: Int, half: int) -> Patches:
-    """Cut patches of side 2 half + 1 around integer positions (N,), columns wrapping round."""
+    """Cut patches of side 2 half + 1 around integer positions (N,); columns wrap round the pipe."""
     span = np.arange(-half - 1, half + 2)
     rows = np.clip(row[:, None] + span, 0, contrast.shape[0] - 1)
     columns = np.mod(column[:, None] + span, contrast.shape[1])
@@ -73,32 +114,38 @@ def cut(contrast: Float32, row: Int, column: Int, half: int) -> Patches:
     return Patches(value, by_row, by_column, information)
 
 
-def match(contrast: Float32, usable: Bool, patches: Patches, row: Float, column: Float) -> Matches:
-    """Find patches near predicted strip positions (N,); they move by at most half a patch."""
-    inverse = np.linalg.inv(patches.information + 1e-9 * np.eye(2))
-    offset, correlation, residual = _match(
-        *_wrapped(contrast, usable, patches.value.shape[1]), contrast.shape[1],
-        patches.value, patches.by_row, patches.by_column, inverse, row, column, _STEPS,
-    )  # fmt: skip
-    sigma = residual * np.sqrt(np.trace(inverse, axis1=1, axis2=2) / 2)
-    return Matches(offset, correlation, sigma)
+def cornerness(contrast: Float32, usable: Bool, half: int) -> Float32:
+    """Return how well a patch (side 2 half + 1) around each sample (H, W) can be matched; 0: it is cut off.
+
+    The smaller eigenvalue of the structure tensor: J. Shi, C. Tomasi, "Good features to track", CVPR 1994.
+    """
+    corner = np.asarray(cv2.cornerMinEigenVal(contrast, 2 * half + 1), np.float32)
+    corner[~whole_patches(usable, half + 1)] = 0
+    corner[: half + 2], corner[-half - 3 :] = 0, 0
+    return corner
+
+
+def whole_patches(usable: Bool, half: int) -> Bool:
+    """Return where (H, W) all samples of a patch of side 2 half + 1 are usable."""
+    return np.asarray(cv2.erode(usable.astype(np.uint8), np.ones((2 * half + 1,) * 2)) > 0)
 
 
 def _wrapped(contrast: Float32, usable: Bool, side: int) -> tuple[Float32, Int32]:
-    """Return the strip with its first columns again behind the last, and its unusable samples summed up.
+    """Return the strip with its first columns again behind the last, and where it is unusable.
 
-    The sums (H + 1, W + side + 2) are over all samples above and to the left.
+    The latter is an integral image (H + 1, W + side + 2): sums over all samples above and to the left.
     """
     wide = np.concatenate([contrast, contrast[:, : side + 1]], 1)
-    spoilt = (~np.concatenate([usable, usable[:, : side + 1]], 1)).astype(np.uint8)
-    return wide, np.asarray(cv2.integral(spoilt), np.int32)
+    unusable = (~np.concatenate([usable, usable[:, : side + 1]], 1)).astype(np.uint8)
+    return wide, np.asarray(cv2.integral(unusable), np.int32)
 
 
-# Inlined in one kernel: a fast function on its own rounds otherwise freshly compiled than from the cache.
+# These are inlined in one kernel: as a function of its own, a `fastmath` kernel rounds differently when it
+# was just compiled than when it comes from the cache, and results would differ in their last digits.
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _whole(spoilt, i, j, n):  # type: ignore[no-untyped-def]
+def _whole(unusable, i, j, n):  # type: ignore[no-untyped-def]
     """Whether the square of side n from (i, j) on holds no unusable sample."""
-    return spoilt[i + n, j + n] - spoilt[i, j + n] - spoilt[i + n, j] + spoilt[i, j] == 0
+    return unusable[i + n, j + n] - unusable[i, j + n] - unusable[i + n, j] + unusable[i, j] == 0
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, forceinline=True)
@@ -121,11 +168,11 @@ def _sums(contrast, i0, j0, a, b, template, by_row, by_column):  # type: ignore[
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _settled(contrast, spoilt, width, template, by_row, by_column, own, inverse, row, column, steps):  # type: ignore[no-untyped-def]
-    """Return the offset of one patch with Σ t s and Σ s² about the mean there; 0 where it is lost.
+def _match_one(contrast, unusable, width, template, by_row, by_column, own, inverse, row, column, steps):  # type: ignore[no-untyped-def]
+    """Return the offset of one patch, and Σ t s and Σ s² about the mean there; both are 0 where it is lost.
 
-    ``own``: Σ ∂t/∂row, Σ ∂t/∂column, Σ t ∂t/∂row, Σ t ∂t/∂column. With them one pass over the patch gives the
-    Gauss-Newton step, and the patch looked at need not be kept.
+    ``own``: Σ ∂t/∂row, Σ ∂t/∂column, Σ t ∂t/∂row, Σ t ∂t/∂column. With these, one pass over the
+    samples gives the Gauss-Newton step, and the samples need not be kept.
     """
     n = template.shape[0]
     r, c, tr, tc = own
@@ -136,12 +183,12 @@ def _settled(contrast, spoilt, width, template, by_row, by_column, own, inverse,
         i, j = i - n // 2, (j - n // 2) % width
         if i < 0 or i + n >= contrast.shape[0]:
             return dr, dc, 0.0, 0.0
-        if not (_whole(spoilt, i, j, n) and _whole(spoilt, i + 1, j + 1, n)):
+        if not (_whole(unusable, i, j, n) and _whole(unusable, i + 1, j + 1, n)):
             return dr, dc, 0.0, 0.0
         s1, s2, ts, rs, cs = _sums(contrast, i, j, a, b, template, by_row, by_column)
         mean = s1 / (n * n)
         ss = s2 - s1 * mean
-        if step < _ENOUGH:
+        if step < _SMALL_STEP:
             break
         gain = ts / ss if ss > 0 else 1.0
         g0, g1 = tr - gain * (rs - mean * r), tc - gain * (cs - mean * c)
@@ -153,7 +200,7 @@ def _settled(contrast, spoilt, width, template, by_row, by_column, own, inverse,
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _match(contrast, spoilt, width, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]
+def _match(contrast, unusable, width, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]
     """Return offset (N, 2), correlation (N,) and residual 1 σ (N,) in a strip of ``_wrapped``."""
     count, n = value.shape[0], value.shape[1]
     offset = np.full((count, 2), np.nan)
@@ -162,7 +209,9 @@ def _match(contrast, spoilt, width, value, by_row, by_column, inverse, row, colu
     for k in range(count):
         t, r, c = value[k], by_row[k], by_column[k]
         own = np.sum(r), np.sum(c), np.sum(t * r), np.sum(t * c)
-        dr, dc, ts, ss = _settled(contrast, spoilt, width, t, r, c, own, inverse[k], row[k], column[k], steps)
+        dr, dc, ts, ss = _match_one(
+            contrast, unusable, width, t, r, c, own, inverse[k], row[k], column[k], steps
+        )
         tt = np.sum(t * t)
         if tt > 0 and ss > 0:
             offset[k, 0], offset[k, 1] = dr, dc

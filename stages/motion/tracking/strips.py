@@ -1,33 +1,46 @@
-"""The wall in front of a camera, unrolled about the local pipe axis and freed of its illumination.
+"""Unrolled strips: the wall in front of the camera as a picture over distance and azimuth.
 
-A strip has rows of constant distance (``row`` 0 is distance 0 of the straightened pipe, spacing
-``grid.step_mm``) and columns of constant azimuth (column 0 is −π). Where the texture lies in a strip hardly
-depends on the camera's pose, so patches can be compared over many frames without warping.
+A strip has rows of constant distance (row 0 is distance 0 of the straightened pipe, spacing
+``grid.step_mm``) and columns of constant azimuth (column 0 is −π). Where a spot of the wall lies in a strip
+hardly depends on the camera's pose, so patches can be compared over many frames without warping.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
 import numba
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
-from pipeline.arrays import Bool, Float, Float32, Image
+from pipeline.arrays import Bool, Float, Float32, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
-from stages.rings.kernels import FAST
+from pipeline.recording.background import in_background
+from pipeline.recording.base import Illumination, Recording
+from stages.motion.tracking.normalisation import (
+    SOFTENING_PX,
+    equally_sharp,
+    noise_of_rows,
+    without_illumination,
+)
 from stages.texture.light import irradiance
 
 _COARSE = 4
-_BLUR_PX = 1.2
-_SMOOTH_PX = 0.7
-_IMAGE_BLUR_PX = 1.5  # lens, pixel and the blur above
-_BLURS = 4
+"""The camera model is computed for every fourth row and column and interpolated between. `Strip.pixel` uses
+the same interpolation, so that no error of a position comes of it."""
 _LEAST_LIGHT = 0.05
-_COURSE_PX = 3.0
+"""Predicted light is not believed below this share of the largest: the division would amplify noise."""
 _DARKEST, _BRIGHTEST = 5.0, 250.0
+"""Grey values of 8 bits between which a sample is usable: beyond, the sensor may clip."""
+_LINE_HALF_WIDTH_SIGMA = 12
+"""Half width, in σ of the laser line, of the wall hidden under it: the line is below 1e-4 of its peak beyond
+4.3 σ; what reaches farther is its glow, a gradient that `without_illumination` removes. Not measured."""
+_BLUE, _RED = 0, 2
+_YELLOW_NM = 575.0
+"""Lasers of a shorter wavelength reach the red channel least, others the blue one."""
+_DECODED_AHEAD = 4
 
 
 @dataclass(frozen=True)
@@ -80,7 +93,7 @@ class Strip:
     first_row : int
         Row of the pipe that is row 0 of the arrays.
     contrast : (H, W) float32
-        Grey value over its neighbourhood's mean, minus 1; 0 where unusable.
+        Grey value over the mean of its row, minus 1; 0 where unusable.
     usable : (H, W) bool
     coarse_uv : (H/4 + 1, W/4 + 1, 2) float32
         Pixels of every fourth row and column.
@@ -106,9 +119,57 @@ class Strip:
         return np.asarray(top * (1 - a) + low * a)
 
 
+@dataclass(frozen=True)
+class WallView:
+    """The lit frames of a recording: pictures of the wall, and how they are unrolled."""
+
+    recording: Recording
+    probe: Probe
+    grid: StripGrid
+
+    @property
+    def lit(self) -> Int:
+        """Return the lit frames (K,) as places in the list of all frames."""
+        frames = self.recording.frames
+        return self._place(frames.of(Illumination.LED, Illumination.BOTH))
+
+    @property
+    def blocked_mm(self) -> tuple[float, float]:
+        """Return the range of wall ahead of the camera hidden under the laser line; empty if equal."""
+        half = _LINE_HALF_WIDTH_SIGMA * self.probe.laser.line_sigma_mm if self._both else 0.0
+        return self.probe.laser.baseline_mm - half, self.probe.laser.baseline_mm + half
+
+    def images(self, place: Int) -> Iterator[tuple[int, Image | None]]:
+        """Yield places and softened grey pictures; with the laser on, the colour its light reaches least.
+
+        A picture that cannot be decoded is None. Decoding goes on in a thread while a picture is worked on.
+        """
+        for frame, image in in_background(self._softened(self.recording.frames.frame[place]), _DECODED_AHEAD):
+            yield int(self._place(np.array(frame))), image
+
+    def strips(self, place: Int, T_pc: Float) -> Iterator[Strip | None]:
+        """Yield frames (n,), ascending, unrolled from poses (n, 4, 4) in the straightened pipe."""
+        for (_, image), T in zip(self.images(place), T_pc, strict=True):
+            yield None if image is None else unroll(image, self.probe, T, self.grid, self.blocked_mm)
+
+    @property
+    def _both(self) -> bool:
+        """Whether LEDs and laser are on in the same frames."""
+        return bool(np.any(self.recording.frames.illumination == Illumination.BOTH.value))
+
+    def _place(self, frame: Int) -> Int:
+        return np.asarray(np.searchsorted(self.recording.frames.frame, frame))
+
+    def _softened(self, frame: Int) -> Iterator[tuple[int, Image | None]]:
+        channel = _RED if self.probe.laser.wavelength_nm < _YELLOW_NM else _BLUE
+        for number, image in self.recording.read(frame, "bgr" if self._both else "grey"):
+            grey = np.ascontiguousarray(image[..., channel]) if image is not None and self._both else image
+            yield number, None if grey is None else softened(grey)
+
+
 def softened(image: Image) -> Image:
-    """Return a grey image (H, W) without noise finer than a strip sample, which would fold into it."""
-    return np.asarray(cv2.GaussianBlur(image, (0, 0), _BLUR_PX), np.uint8)
+    """Return a grey image (H, W) without noise finer than a strip sample, which would alias into it."""
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), SOFTENING_PX), np.uint8)
 
 
 def unroll(
@@ -120,91 +181,13 @@ def unroll(
     """
     first_row = int(np.ceil((T_pc[2, 3] + grid.near_mm) / grid.step_mm))
     coarse_uv, light = _coarse_view(probe, T_pc, grid, first_row)
-    grey, seen = _sample(image, coarse_uv, _COARSE)
+    grey, seen = sample(image, coarse_uv, _COARSE)
     ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
     seen[(ahead > blocked_mm[0]) & (ahead < blocked_mm[1])] = False
     usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST)
-    contrast = _equally_sharp(_without_light(grey / _refined(light, _COARSE), usable), coarse_uv)
-    return Strip(first_row, contrast, usable, coarse_uv, _noise_of(contrast, usable))
-
-
-def _without_light(grey: Float32, usable: Bool) -> Float32:
-    """Return grey over the light that fell there, minus 1; 0 where unusable.
-
-    A slope of the light within a patch shifts its match by half the slope times the squared length of the
-    texture, always the same way. Divided out are the light predicted and the course along the pipe, the same
-    all round, of what that leaves. A local mean would follow the light too, but at borders, where it sees one
-    side only, it shifts the texture.
-    """
-    course, count = _row_means(grey, usable)
-    row = np.arange(len(course))
-    known = count > 0.1 * grey.shape[1]
-    if not known.any():
-        return np.zeros_like(grey)
-    course = gaussian_filter1d(np.interp(row, row[known], course[known]), _COURSE_PX)
-    return np.asarray(_over(grey, usable, np.maximum(course, 1.0).astype(np.float32)))
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _row_means(grey, usable):  # type: ignore[no-untyped-def]
-    """Return each row's mean (H,) of the usable samples, and how many there are."""
-    mean, count = np.zeros(len(grey)), np.zeros(len(grey), np.int64)
-    for i in range(grey.shape[0]):
-        total, many = np.float32(0), 0
-        for j in range(grey.shape[1]):
-            total += grey[i, j] if usable[i, j] else np.float32(0)
-            many += usable[i, j]
-        mean[i], count[i] = total / max(many, 1), many
-    return mean, count
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _over(grey, usable, course):  # type: ignore[no-untyped-def]
-    """Return grey over each row's ``course`` (H,), minus 1; 0 where unusable."""
-    out = np.empty_like(grey)
-    for i in range(grey.shape[0]):
-        for j in range(grey.shape[1]):
-            out[i, j] = grey[i, j] / course[i] - np.float32(1) if usable[i, j] else np.float32(0)
-    return out
-
-
-def _equally_sharp(contrast: Float32, coarse_uv: Float32) -> Float32:
-    """Smooth each row so that the near wall is as blurred as the far one.
-
-    Contrast that falls off across a patch shifts its match just as light does, and the image's blur is larger
-    on the wall far ahead. Blurs of some sizes are mixed by variance.
-    """
-    along, around = (_blur_of(coarse_uv, axis) for axis in (0, 1))
-    wanted = np.sqrt(np.stack([along.max() - along, around.max() - around], -1) + _SMOOTH_PX**2)
-    share = np.linspace(0, 1, _BLURS)
-    sizes = wanted.min(0) + share[:, None] * (wanted.max(0) - wanted.min(0))
-    level = (_BLURS - 1) * np.clip((wanted[:, 0] - sizes[0, 0]) / max(np.ptp(sizes[:, 0]), 1e-6), 0, 1)
-    out = np.zeros_like(contrast)
-    for k, (sigma_along, sigma_around) in enumerate(sizes):
-        weight = np.maximum(1 - np.abs(level - k), 0).astype(np.float32)[:, None]
-        rows = np.flatnonzero(weight)
-        if rows.size:
-            part = slice(rows[0], rows[-1] + 1)
-            out[part] += weight[part] * _blurred(contrast, part, sigma_along, sigma_around)
-    return out
-
-
-def _blurred(contrast: Float32, part: slice, sigma_along: float, sigma_around: float) -> Float32:
-    """Return some rows of the blurred strip, blurred with just as many more as the blur reaches."""
-    more = int(np.ceil(5 * sigma_along)) + 1
-    first = max(part.start - more, 0)
-    wide = cv2.GaussianBlur(contrast[first : part.stop + more], (0, 0), sigma_around, None, sigma_along)
-    return np.asarray(wide[part.start - first : part.stop - first])
-
-
-def _blur_of(coarse_uv: Float32, axis: int) -> Float:
-    """Return the image blur's variance (H,), strip px², along rows (axis 0) or columns (1)."""
-    step = np.linalg.norm(np.diff(coarse_uv.astype(np.float64), axis=axis), axis=-1) / _COARSE
-    # A median of numbers alone takes a tenth of the time of one that minds NaN.
-    per_px = np.median(np.nan_to_num(step, nan=1.0), axis=1)
-    variance = (_IMAGE_BLUR_PX / np.maximum(per_px, 1e-3)) ** 2
-    rows = (np.arange((coarse_uv.shape[0] - 1) * _COARSE) + 0.5) / _COARSE
-    return np.asarray(np.interp(rows, np.arange(len(variance)) + (0.5 if axis == 0 else 0.0), variance))
+    contrast = without_illumination(grey / _refined(light, _COARSE), usable)
+    contrast = equally_sharp(contrast, coarse_uv, _COARSE)
+    return Strip(first_row, contrast, usable, coarse_uv, noise_of_rows(contrast, usable))
 
 
 def _coarse_view(probe: Probe, T_pc: Float, grid: StripGrid, first_row: int) -> tuple[Float32, Float32]:
@@ -220,29 +203,6 @@ def _coarse_view(probe: Probe, T_pc: Float, grid: StripGrid, first_row: int) -> 
     light = irradiance(probe.lighting, xyz_c, normal_c)
     light = np.maximum(light, _LEAST_LIGHT * light.max(initial=1e-12)) / light.mean()
     return probe.camera.project(xyz_c).uv.astype(np.float32), light.astype(np.float32)
-
-
-def _noise_of(contrast: Float32, usable: Bool) -> Float32:
-    """Return each row's noise (H,), 1 σ, from second differences around, which texture hardly reaches."""
-    power, share = _second_differences(contrast, usable)
-    known = gaussian_filter1d(share, 2 * _COURSE_PX)
-    return np.sqrt(gaussian_filter1d(power, 2 * _COURSE_PX) / np.maximum(known, 1e-3)).astype(np.float32)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def _second_differences(contrast, usable):  # type: ignore[no-untyped-def]
-    """Return each row's mean (H,) of a sixth of their squares, and the share that is usable."""
-    rows, columns = contrast.shape
-    power, share = np.zeros(rows), np.zeros(rows)
-    for i in range(rows):
-        total, count = np.float32(0), 0
-        for j in range(columns - 4):
-            d = contrast[i, j + 4] - np.float32(2) * contrast[i, j + 2] + contrast[i, j]
-            ok = usable[i, j + 4] and usable[i, j + 2] and usable[i, j]
-            total += d * d if ok else np.float32(0)
-            count += ok
-        power[i], share[i] = total / max(count, 1) / 6, count / (columns - 4)
-    return power, share
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -268,8 +228,11 @@ def _refined(coarse, step):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _sample(image, coarse, step):  # type: ignore[no-untyped-def]
-    """Bilinear look-up of the image on the coarse pixel grid refined ``step`` times."""
+def sample(image, coarse, step):  # type: ignore[no-untyped-def]
+    """Return the image (H, W), looked up bilinearly on the coarse pixel grid refined ``step`` times.
+
+    The second array (H, W) tells which samples lie in the image.
+    """
     rows, columns = (coarse.shape[0] - 1) * step, (coarse.shape[1] - 1) * step
     grey = np.zeros((rows, columns), np.float32)
     seen = np.zeros((rows, columns), np.bool_)

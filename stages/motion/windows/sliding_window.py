@@ -1,29 +1,94 @@
-"""The joint adjustment slid over a long run window by window; a short run is one window."""
+"""The bundle adjustment slid over a long run window by window; a short run is one window."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.arrays import Float
-from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.measured import RingSamples
+from pipeline.instrument.probe import Probe
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
+from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, estimate_with_shared
+from stages.motion.bundle_adjustment.unknowns import State, straight_start
+from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.windows.measured_run import MeasuredRun, Window, cut_windows
-from stages.motion.windows.submap_joining import Joined, join, seam
+from stages.motion.rings import ring_bins
+from stages.motion.tracking.landmarks import Tracks
+from stages.motion.tracking.tracker import TrackedTexture
+from stages.motion.windows.submap_joining import JoinedRun, join_submaps
 from stages.motion.windows.submaps import (
-    Estimate,
-    Say,
-    Settled,
+    SharedInformation,
+    SharedParameters,
     Submap,
-    again,
-    estimated,
-    say_of,
-    settle,
-    shared_numbers,
+    Window,
+    cut_windows,
+    fuse_shared,
+    handover,
+    shared_information,
     submap_of,
 )
+
+_MARGIN_MM = 20.0
+"""Length of axis before the first and beyond the last wall in view, for poses that move while adjusted."""
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """What was measured over a whole run; a window's part is worked out when it is needed.
+
+    Attributes
+    ----------
+    texture : TrackedTexture
+    rings : RingSamples
+    ring_place : (F,) int
+        Places of the rings' frames in the list of all frames.
+    time_s : (N,)
+    T_pc : (N, 4, 4)
+        First guess in the straightened pipe.
+    encoder : EncoderReadings or None
+    probe : Probe
+        As stated.
+    """
+
+    texture: TrackedTexture
+    rings: RingSamples
+    ring_place: Int
+    time_s: Float
+    T_pc: Float
+    encoder: EncoderReadings | None
+    probe: Probe
+
+    @property
+    def whole(self) -> Window:
+        """Return the window of all frames."""
+        return Window(0, len(self.time_s))
+
+    def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
+        """Return what was measured in a window, frames and distance counted from its first."""
+        part = slice(window.first, window.last)
+        rows = slice(*np.searchsorted(self.ring_place, [window.first, window.last]))
+        rings, place = _some_rings(self.rings, rows), self.ring_place[rows] - window.first
+        bins = ring_bins(rings, place, self.probe, parameters.ring_bins, parameters.surface_sigma_mm)
+        tracks = _behind(self.texture.between(window.first, window.last), self._start_mm(window))
+        encoder = _since_first(self.encoder, part)
+        return Measurements.of(tracks, bins, self.time_s[part], encoder, self.probe)
+
+    def start(self, window: Window, measured: Measurements, parameters: MotionParameters) -> State:
+        """Return the first guess in a window: a straight pipe, as long as its wall was seen."""
+        T_pc = self.T_pc[window.first : window.last].copy()
+        T_pc[:, 2, 3] -= self._start_mm(window)
+        z, grid = T_pc[:, 2, 3], self.texture.grid
+        span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
+        corrections = measured.unsure.shape[1] + MATCH_BIASES
+        return straight_start(
+            T_pc, measured.tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, corrections
+        )
+
+    def _start_mm(self, window: Window) -> float:
+        return float(self.T_pc[window.first, 2, 3]) if window.first else 0.0
 
 
 @dataclass(frozen=True)
@@ -32,7 +97,7 @@ class RunEstimate:
 
     Attributes
     ----------
-    joined : Joined
+    joined : JoinedRun
     trials : int
         Steps tried in all windows together.
     unsettled : int
@@ -41,7 +106,7 @@ class RunEstimate:
         Median over the windows of the median reprojection error.
     """
 
-    joined: Joined
+    joined: JoinedRun
     trials: int
     unsettled: int
     reprojection_px: float
@@ -49,11 +114,25 @@ class RunEstimate:
 
 @dataclass(frozen=True)
 class _Alone:
-    """A window adjusted on its own."""
+    """What is kept of a window adjusted on its own."""
 
     state: State
     smooth_sigma: Float
-    say: Say
+    told: SharedInformation
+
+
+@dataclass(frozen=True)
+class _End:
+    """How a window's adjustment ended."""
+
+    trials: int
+    settled: bool
+    reprojection_px: float
+
+    @staticmethod
+    def of(estimate: Estimate) -> _End:
+        adjusted = estimate.adjusted
+        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px)
 
 
 def adjust_run(
@@ -71,75 +150,84 @@ def adjust_run(
     """
     windows = cut_windows(len(run.time_s), parameters.window_frames, parameters.overlap_frames)
     if len(windows) == 1:
-        measured = run.measured(windows[0], parameters)
-        estimate = estimated(run.start(windows[0], measured, parameters), measured, parameters)
+        estimate = _adjusted(run, windows[0], parameters)[0]
         check(estimate)
-        return _run_estimate(of_one_window(estimate), [_End.of(estimate)])
+        return _run_estimate(joined_at_once(estimate), [_End.of(estimate)])
     alone: list[_Alone] = []
     for window in windows:
         alone.append(_adjusted_alone(run, window, parameters, check))
         progress(len(alone), 2 * len(windows))
     measured = run.measured(windows[-1], parameters)
-    settled = settle([a.say for a in alone], _shares(windows), measured, alone[-1].state)
+    shared = fuse_shared([a.told for a in alone], _new_shares(windows), measured, alone[-1].state)
     submaps: list[Submap] = []
     ends: list[_End] = []
     for k, own in enumerate(alone):
         measured = run.measured(windows[k], parameters)
-        estimate = again(own.state, measured, settled, own.smooth_sigma, parameters)
+        estimate = estimate_with_shared(own.state, measured, shared.value, own.smooth_sigma, parameters)
         check(estimate)
         ends.append(_End.of(estimate))
         submaps.append(_submap(estimate, windows, k))
         progress(len(windows) + len(submaps), 2 * len(windows))
-    return _run_estimate(join(submaps, settled), ends)
+    return _run_estimate(join_submaps(submaps, shared), ends)
 
 
-def of_one_window(estimate: Estimate) -> Joined:
+def joined_at_once(estimate: Estimate) -> JoinedRun:
     """Return an estimate of all frames at once as a run of one window."""
     state = estimate.state
-    which = shared_numbers(state)
-    value = np.append(state.globals[GLOBALS - 1], state.instrument)
-    settled = Settled(value, estimate.factor.border_covariance()[np.ix_(which, which)])
-    return join([_submap(estimate, [Window(0, len(state.T_pc))], 0)], settled)
+    which = state.shared_columns
+    shared = SharedParameters(state.shared, estimate.factor.border_covariance()[np.ix_(which, which)])
+    return join_submaps([_submap(estimate, [Window(0, len(state.T_pc))], 0)], shared)
 
 
-@dataclass(frozen=True)
-class _End:
-    """How a window's adjustment ended."""
-
-    trials: int
-    settled: bool
-    reprojection_px: float
-
-    @staticmethod
-    def of(estimate: Estimate) -> _End:
-        adjusted = estimate.adjusted
-        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px)
-
-
-def _run_estimate(joined: Joined, ends: Sequence[_End]) -> RunEstimate:
+def _run_estimate(joined: JoinedRun, ends: Sequence[_End]) -> RunEstimate:
     error = float(np.median([e.reprojection_px for e in ends]))
     return RunEstimate(joined, sum(e.trials for e in ends), sum(not e.settled for e in ends), error)
+
+
+def _adjusted(
+    run: MeasuredRun, window: Window, parameters: MotionParameters
+) -> tuple[Estimate, Measurements]:
+    measured = run.measured(window, parameters)
+    return estimate_state(run.start(window, measured, parameters), measured, parameters), measured
 
 
 def _adjusted_alone(
     run: MeasuredRun, window: Window, parameters: MotionParameters, check: Callable[[Estimate], None]
 ) -> _Alone:
-    measured = run.measured(window, parameters)
-    estimate = estimated(run.start(window, measured, parameters), measured, parameters)
+    estimate, measured = _adjusted(run, window, parameters)
     check(estimate)
-    return _Alone(estimate.state, estimate.smooth_sigma, say_of(estimate, measured))
+    return _Alone(estimate.state, estimate.smooth_sigma, shared_information(estimate, measured))
 
 
 def _submap(estimate: Estimate, windows: Sequence[Window], number: int) -> Submap:
-    """Return a window as others need it; its errors count from the seam with the one before to the next."""
+    """Return a window's submap, its errors stated from the handover before it to the one behind it."""
     window = windows[number]
-    first = seam(windows[number - 1], window) - window.first if number else 0
+    first = handover(windows[number - 1], window) - window.first if number else 0
     is_last = number + 1 == len(windows)
-    last = window.frames - 1 if is_last else seam(window, windows[number + 1]) - window.first
+    last = window.frames - 1 if is_last else handover(window, windows[number + 1]) - window.first
     return submap_of(estimate, window, first, last, len(windows))
 
 
-def _shares(windows: Sequence[Window]) -> list[float]:
-    """Return the part of each window that the one before it had not seen."""
+def _new_shares(windows: Sequence[Window]) -> list[float]:
+    """Return the part of each window that the one before it has not seen."""
     ends = [windows[0].first, *(w.last for w in windows)]
     return [(w.last - max(w.first, before)) / w.frames for w, before in zip(windows, ends, strict=False)]
+
+
+def _some_rings(rings: RingSamples, rows: slice) -> RingSamples:
+    per_frame = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
+    return replace(rings, **{name: getattr(rings, name)[rows] for name in per_frame})
+
+
+def _behind(tracks: Tracks, start_mm: float) -> Tracks:
+    """Return tracks with distance counted from ``start_mm``."""
+    T_pc, xyz = tracks.poses.T_pc.copy(), tracks.xyz - np.array([0, 0, start_mm])
+    T_pc[:, 2, 3] -= start_mm
+    return replace(tracks, poses=replace(tracks.poses, T_pc=T_pc), xyz=xyz)
+
+
+def _since_first(encoder: EncoderReadings | None, part: slice) -> EncoderReadings | None:
+    if encoder is None:
+        return None
+    distance = encoder.distance_mm[part]
+    return replace(encoder, distance_mm=distance - distance[0], known=encoder.known[part])

@@ -1,4 +1,4 @@
-"""Windows joined: each is laid on the one before by the frames they share, and all axes become one."""
+"""Submap joining: each window is placed on the one before by the frames that they share."""
 
 from __future__ import annotations
 
@@ -12,48 +12,31 @@ from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from stages.motion.bundle_adjustment.residuals import ORIGIN_SIGMA
 from stages.motion.bundle_adjustment.unknowns import AXIS_STEP_MM
-from stages.motion.windows.error_chain import Chain, Link, interpolated
-from stages.motion.windows.measured_run import Window
-from stages.motion.windows.submaps import Settled, Submap, carried
+from stages.motion.windows.error_chain import ErrorChain, Link, interpolated
+from stages.motion.windows.submaps import SharedParameters, Submap, carried_error, handover
 
-_SEAM_SHARE = 0.5
+_BLENDED = 0.5
+"""Middle share of the frames of an overlap over which poses go over from one window to the next: the outer
+quarters are worst determined in one of the two. Not measured."""
 _LEAST_WEIGHT = 1e-3
+"""Weight of an axis, mm, beyond the wall that its window drove along, where no other window has one."""
 
 
 @dataclass(frozen=True)
-class Joined:
-    """A whole run in the frame of its first window.
+class PlacedSubmap:
+    """A submap in the frame O of the run's first window.
 
     Attributes
     ----------
-    submaps : tuple of Submap
-        Its windows, each in a frame of its own.
-    T_pc : (N, 4, 4)
-    slip : (N,)
-    axis : PipeAxis
-    covariance : (N, 6, 6)
-        Of the poses, as in `pipeline.artefacts.measured.Trajectory`.
-    radius_mm, radius_sigma_mm : float
-    settled : Settled
-        Encoder scale and instrument.
-    distance_sigma_mm : float
-        1 σ of the distance along the axis from the first frame to the last.
+    submap : Submap
+    T_pc : (n, 4, 4)
+        Poses in O.
+    slip : (n,)
+    T_ow : (4, 4)
+        The submap's own frame W in O.
+    distance_mm : float
+        Added to distances along the submap's axis to get those along the run.
     """
-
-    submaps: tuple[Submap, ...]
-    T_pc: Float
-    slip: Float
-    axis: PipeAxis
-    covariance: Float
-    radius_mm: float
-    radius_sigma_mm: float
-    settled: Settled
-    distance_sigma_mm: float
-
-
-@dataclass(frozen=True)
-class Laid:
-    """A submap's poses and slip in the first window's frame, and how its own frame and distance lie."""
 
     submap: Submap
     T_pc: Float
@@ -62,60 +45,86 @@ class Laid:
     distance_mm: float
 
 
-def seam(window: Window, following: Window) -> int:
-    """Return the frame, in the list of all frames, at which one window hands over to the next."""
-    return (window.last - 1 + following.first) // 2
+@dataclass(frozen=True)
+class JoinedRun:
+    """A whole run in the frame O of its first window.
+
+    Attributes
+    ----------
+    placed : tuple of PlacedSubmap
+    chain : ErrorChain
+        Of the submaps as placed.
+    T_pc : (N, 4, 4)
+    slip : (N,)
+    axis : PipeAxis
+    covariance : (N, 6, 6)
+        Of the poses, as in `pipeline.artefacts.measured.Trajectory`.
+    radius_mm, radius_sigma_mm : float
+    shared : SharedParameters
+    distance_sigma_mm : float
+        1 σ of the distance along the axis from the first frame to the last.
+    """
+
+    placed: tuple[PlacedSubmap, ...]
+    chain: ErrorChain
+    T_pc: Float
+    slip: Float
+    axis: PipeAxis
+    covariance: Float
+    radius_mm: float
+    radius_sigma_mm: float
+    shared: SharedParameters
+    distance_sigma_mm: float
 
 
-def join(submaps: Sequence[Submap], settled: Settled) -> Joined:
-    """Lay every window on the one before it.
+def join_submaps(submaps: Sequence[Submap], shared: SharedParameters) -> JoinedRun:
+    """Place every window on the one before it.
 
     Neighbouring windows see much the same in the frames they share, so these agree to a fraction of their σ:
-    poses go over from one window to the other gradually, along the middle of the shared frames.
+    poses go over from one window to the other gradually, in the middle of the shared frames.
     """
-    laid = lay(submaps)
-    frames = submaps[-1].window.last
-    T_pc, slip = np.zeros((frames, 4, 4)), np.zeros(frames)
-    for part in laid:
-        _write(part, T_pc, slip)
+    placed = _placed(submaps)
+    T_pc, slip = _blended(placed)
+    chain = _error_chain(placed, shared)
+    covariance = interpolated(np.arange(len(T_pc)), chain.at, chain.covariances())
     radius = np.average([s.radius_mm for s in submaps], weights=[s.window.frames for s in submaps])
-    response = np.mean([s.radius_response for s in submaps], 0)
-    variance = float(np.mean([s.radius_variance for s in submaps])) / len(submaps)
-    variance += float(response @ settled.covariance @ response)
-    return Joined(
-        tuple(submaps), T_pc, slip, one_axis(laid), _covariance(laid, settled), float(radius),
-        float(np.sqrt(variance)), settled, _distance_sigma(submaps, settled),
+    return JoinedRun(
+        tuple(placed), chain, T_pc, slip, merged_axis(placed), covariance, float(radius),
+        _radius_sigma(submaps, shared), shared, _distance_sigma(submaps, shared),
     )  # fmt: skip
 
 
-def lay(submaps: Sequence[Submap]) -> list[Laid]:
-    """Return every window laid on the one before it."""
-    laid = [Laid(submaps[0], submaps[0].T_pc, submaps[0].slip, np.eye(4), 0.0)]
+def merged_axis(placed: Sequence[PlacedSubmap]) -> PipeAxis:
+    """Return the mean of all windows' axes, each weighing most in the middle of the wall it saw."""
+    if len(placed) == 1:
+        return placed[0].submap.axis
+    spans = [part.submap.axis.distance_mm[[0, -1]] + part.distance_mm for part in placed]
+    first, last = min(s[0] for s in spans), max(s[1] for s in spans)
+    distance = first + AXIS_STEP_MM * np.arange(int((last - first) / AXIS_STEP_MM) + 1)
+    total, weight = np.zeros((len(distance), 3)), np.zeros(len(distance))
+    for part, span in zip(placed, spans, strict=True):
+        mine = slice(*np.searchsorted(distance, [span[0], span[1] + 1e-9]))
+        origin = frames_at(part.submap.axis, distance[mine] - part.distance_mm)[0]
+        seen = to_pipe(part.submap.axis, part.submap.T_pc[:, :3, 3])[0] + part.distance_mm
+        inside = np.minimum(distance[mine] - seen.min(), seen.max() - distance[mine])
+        share = np.maximum(inside, 0.0) + _LEAST_WEIGHT
+        total[mine] += share[:, None] * transform(part.T_ow, origin)
+        weight[mine] += share
+    origin = total / weight[:, None]
+    return axis_through(origin, placed[0].submap.axis.R_pa[0, :, 0], float(first))
+
+
+def _placed(submaps: Sequence[Submap]) -> list[PlacedSubmap]:
+    placed = [PlacedSubmap(submaps[0], submaps[0].T_pc, submaps[0].slip, np.eye(4), 0.0)]
     for submap in submaps[1:]:
-        laid.append(_laid_on(laid[-1], submap))
-    return laid
+        placed.append(_placed_on(placed[-1], submap))
+    return placed
 
 
-def chain_of(laid: Sequence[Laid], settled: Settled) -> Chain:
-    """Return how errors run on through windows as they are laid."""
-    links: list[Link] = []
-    before = np.zeros((6, len(settled.value)))
-    for part in laid:
-        own, place = part.submap, part.submap.some
-        turn = np.eye(6)
-        turn[:3, :3] = part.T_ow[:3, :3]
-        carry = carried(part.T_pc[place], part.T_pc[own.anchor])
-        joint = np.einsum("ij,ajbk,lk->aibl", turn, own.joint, turn)
-        response = carry @ before + turn @ own.response
-        links.append(Link(own.window.first + place, carry, joint, response))
-        before = response[-1]
-    return Chain(tuple(links), np.diag(ORIGIN_SIGMA**2), settled.covariance)
-
-
-def _laid_on(before: Laid, submap: Submap) -> Laid:
+def _placed_on(before: PlacedSubmap, submap: Submap) -> PlacedSubmap:
     first, last = submap.window.first, before.submap.window.last
-    middle = seam(before.submap.window, submap.window)
-    weight = _hat(np.arange(first, last), middle, _SEAM_SHARE * (last - first) / 2)
+    middle = handover(before.submap.window, submap.window)
+    weight = _hat(np.arange(first, last), middle, _BLENDED * (last - first) / 2)
     old, new = before.T_pc[first - before.submap.window.first :], submap.T_pc[: last - first]
     at = middle - first
     step = _mean_step(inverse(old[at]) @ old, inverse(new[at]) @ new, weight)
@@ -124,15 +133,16 @@ def _laid_on(before: Laid, submap: Submap) -> Laid:
     slip = submap.slip + np.average(old_slip - submap.slip[: last - first], weights=weight)
     there = _distance_of(before, old[at])
     distance = there - float(to_pipe(submap.axis, new[at][:3, 3])[0])
-    return Laid(submap, T_ow @ submap.T_pc, slip, T_ow, distance)
+    return PlacedSubmap(submap, T_ow @ submap.T_pc, slip, T_ow, distance)
 
 
-def _distance_of(laid: Laid, T_pc: Float) -> float:
-    own = inverse(laid.T_ow) @ T_pc
-    return laid.distance_mm + float(to_pipe(laid.submap.axis, own[:3, 3])[0])
+def _distance_of(placed: PlacedSubmap, T_pc: Float) -> float:
+    own = inverse(placed.T_ow) @ T_pc
+    return placed.distance_mm + float(to_pipe(placed.submap.axis, own[:3, 3])[0])
 
 
 def _hat(place: Int, middle: int, half: float) -> Float:
+    """Return weights (K,) that fall linearly from 1 in the middle to 0 at ``half`` from it."""
     return np.asarray(np.maximum(1 - np.abs(place - middle) / max(half, 1.0), 0.0))
 
 
@@ -144,18 +154,22 @@ def _mean_step(old: Float, new: Float, weight: Float) -> Float:
     return from_parts(rotation, np.average(shift, axis=0, weights=weight))
 
 
-def _write(part: Laid, T_pc: Float, slip: Float) -> None:
-    """Write a window's poses behind those of the windows before, over which it gains weight gradually."""
-    window = part.submap.window
-    mine = slice(window.first, window.last)
-    shared = int(np.count_nonzero(T_pc[mine, 3, 3]))
-    ramp = np.ones(window.frames)
-    if shared:
-        start, end = shared * (1 - _SEAM_SHARE) / 2, shared * (1 + _SEAM_SHARE) / 2
-        ramp[:shared] = np.clip((np.arange(shared) - start) / max(end - start, 1e-9), 0, 1)
-    new, old = part.T_pc, np.where(T_pc[mine, 3:, 3:] > 0, T_pc[mine], part.T_pc)
-    T_pc[mine] = _between(old, new, ramp)
-    slip[mine] = slip[mine] * (1 - ramp) + part.slip * ramp
+def _blended(placed: Sequence[PlacedSubmap]) -> tuple[Float, Float]:
+    """Return poses (N, 4, 4) and slip (N,) of all frames; each window gains weight gradually."""
+    frames = placed[-1].submap.window.last
+    T_pc, slip = np.zeros((frames, 4, 4)), np.zeros(frames)
+    for part in placed:
+        window = part.submap.window
+        mine = slice(window.first, window.last)
+        shared = int(np.count_nonzero(T_pc[mine, 3, 3]))
+        share = np.ones(window.frames)
+        if shared:
+            start, end = shared * (1 - _BLENDED) / 2, shared * (1 + _BLENDED) / 2
+            share[:shared] = np.clip((np.arange(shared) - start) / max(end - start, 1e-9), 0, 1)
+        old = np.where(T_pc[mine, 3:, 3:] > 0, T_pc[mine], part.T_pc)
+        T_pc[mine] = _between(old, part.T_pc, share)
+        slip[mine] = slip[mine] * (1 - share) + part.slip * share
+    return T_pc, slip
 
 
 def _between(old: Float, new: Float, share: Float) -> Float:
@@ -167,54 +181,39 @@ def _between(old: Float, new: Float, share: Float) -> Float:
     return np.where(whole[:, None, None], new, from_parts(rotation, origin))
 
 
-def one_axis(laid: Sequence[Laid]) -> PipeAxis:
-    """Return the mean of all windows' axes, each weighing most in the middle of the wall it saw."""
-    if len(laid) == 1:
-        return laid[0].submap.axis
-    spans = [laid_.submap.axis.distance_mm[[0, -1]] + laid_.distance_mm for laid_ in laid]
-    first, last = min(s[0] for s in spans), max(s[1] for s in spans)
-    distance = first + AXIS_STEP_MM * np.arange(int((last - first) / AXIS_STEP_MM) + 1)
-    total, weight = np.zeros((len(distance), 3)), np.zeros(len(distance))
-    for part, span in zip(laid, spans, strict=True):
-        mine = slice(*np.searchsorted(distance, [span[0], span[1] + 1e-9]))
-        origin = frames_at(part.submap.axis, distance[mine] - part.distance_mm)[0]
-        seen = to_pipe(part.submap.axis, part.submap.T_pc[:, :3, 3])[0] + part.distance_mm
-        inside = np.minimum(distance[mine] - seen.min(), seen.max() - distance[mine])
-        share = np.maximum(inside, 0.0) + _LEAST_WEIGHT
-        total[mine] += share[:, None] * transform(part.T_ow, origin)
-        weight[mine] += share
-    origin = total / weight[:, None]
-    return axis_through(origin, laid[0].submap.axis.R_pa[0, :, 0], float(first))
-
-
-def _distance_sigma(submaps: Sequence[Submap], settled: Settled) -> float:
-    """Return 1 σ of the distance along the axis: each window's own, and what they share.
-
-    Where the pipe points drifts from window to window, which turns the way behind and does not lengthen it.
-    """
-    variance, response = 0.0, np.zeros(len(settled.value))
-    for own in submaps:
-        tangent = frames_at(own.axis, to_pipe(own.axis, own.T_pc[own.some[-1], :3, 3])[0])[1][:, 2]
-        variance += float(tangent @ own.covariance[-1, :3, :3] @ tangent)
-        response += tangent @ own.response[-1, :3]
-    return float(np.sqrt(variance + response @ settled.covariance @ response))
-
-
-def _covariance(laid: Sequence[Laid], settled: Settled) -> Float:
-    """Return (N, 6, 6): errors go on from anchor to anchor, those of the shared numbers alike in all."""
-    frames = laid[-1].submap.window.last
-    at: list[Int] = []
-    values: list[Float] = []
-    start = np.diag(ORIGIN_SIGMA**2)
-    start_response = np.zeros((6, len(settled.value)))
-    for part in laid:
-        own, place = part.submap, part.submap.some
-        carry = carried(part.T_pc[place], part.T_pc[own.anchor])
+def _error_chain(placed: Sequence[PlacedSubmap], shared: SharedParameters) -> ErrorChain:
+    """Return how errors accumulate through windows as they are placed."""
+    links: list[Link] = []
+    before = np.zeros((6, len(shared.value)))
+    for part in placed:
+        own, place = part.submap, part.submap.sampled
         turn = np.eye(6)
         turn[:3, :3] = part.T_ow[:3, :3]
-        random = carry @ start @ np.swapaxes(carry, 1, 2) + turn @ own.covariance @ turn.T
-        response = carry @ start_response + turn @ own.response
-        at.append(own.window.first + place)
-        values.append(random + response @ settled.covariance @ np.swapaxes(response, 1, 2))
-        start, start_response = random[-1], response[-1]
-    return interpolated(np.arange(frames), np.concatenate(at), np.concatenate(values))
+        carry = carried_error(part.T_pc[place], part.T_pc[own.anchor])
+        joint = np.einsum("ij,ajbk,lk->aibl", turn, own.joint, turn)
+        response = carry @ before + turn @ own.response
+        links.append(Link(own.window.first + place, carry, joint, response))
+        before = response[-1]
+    return ErrorChain(tuple(links), np.diag(ORIGIN_SIGMA**2), shared.covariance)
+
+
+def _radius_sigma(submaps: Sequence[Submap], shared: SharedParameters) -> float:
+    """Return 1 σ of the mean radius: independent in each window, but for what they share."""
+    response = np.mean([s.radius_response for s in submaps], 0)
+    variance = float(np.mean([s.radius_variance for s in submaps])) / len(submaps)
+    return float(np.sqrt(variance + float(response @ shared.covariance @ response)))
+
+
+def _distance_sigma(submaps: Sequence[Submap], shared: SharedParameters) -> float:
+    """Return 1 σ of the distance along the axis: independent in each window, but for what they share.
+
+    The direction of the pipe drifts from window to window; that turns the way behind and does not lengthen
+    it.
+    """
+    variance, response = 0.0, np.zeros(len(shared.value))
+    for own in submaps:
+        last_mm = to_pipe(own.axis, own.T_pc[own.sampled[-1], :3, 3])[0]
+        tangent = frames_at(own.axis, last_mm)[1][:, 2]
+        variance += float(tangent @ own.covariance[-1, :3, :3] @ tangent)
+        response += tangent @ own.response[-1, :3]
+    return float(np.sqrt(variance + response @ shared.covariance @ response))

@@ -1,0 +1,249 @@
+"""The motion stage: one robust estimate of camera, pipe axis and encoder from texture, rings and encoder.
+
+Texture tracks are landmarks on the wall; rings lie on the wall; the encoder has a scale and slips; the motion
+is smooth; the axis bends as little as it may; the instrument is as stated within its uncertainty. All of it
+is one least-squares problem with robust weights. A long run is a chain of them, whose loops are closed where
+the probe passes a wall again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from pipeline.arrays import Int
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
+from pipeline.errors import UnusableError
+from pipeline.geometry.axis import distance_along
+from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context, Stage
+from pipeline.recording.base import FrameTable, Recording
+from stages.motion.bundle_adjustment.equations import Equations, Measurements
+from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames
+from stages.motion.events import find_events
+from stages.motion.loops.loop_closure import close_loops
+from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
+from stages.motion.parameters import MotionParameters
+from stages.motion.rings import RingCircles, circles_in_rings
+from stages.motion.tracking.landmarks import TrackedPoses
+from stages.motion.tracking.prediction import PosePredictor
+from stages.motion.tracking.strips import StripGrid, WallView
+from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track_texture
+from stages.motion.trajectory import report_instrument, trajectory_of
+from stages.motion.windows.sliding_window import MeasuredRun, RunEstimate, adjust_run, joined_at_once
+
+_LARGEST_CHANGE = 0.1
+"""Share by which the radius may differ from the rings' before the adjustment counts as diverged: the rings'
+median radius errs by far less. Not measured."""
+_LEAST_TRACKED = 0.5
+"""Share of the lit frames that texture must be followed in where there is no encoder. Not measured."""
+_FEWEST_COLUMNS = 240
+"""Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
+_OBSERVATIONS_AT_ONCE = 1 << 16
+
+
+def estimate_motion(
+    recording: Recording,
+    probe: Probe,
+    rings: RingSamples,
+    points: RingPoints,
+    parameters: MotionParameters,
+    context: Context,
+) -> Trajectory:
+    """Estimate the camera's pose in every frame, with the axis of the pipe and corrections of the probe.
+
+    Raises
+    ------
+    UnusableError
+        When neither rings nor texture and encoder determine the motion.
+    """
+    run = measure_run(recording, probe, rings, points, parameters, context)
+    check = partial(_require_convergence, run.texture.grid.radius_mm)
+    estimate = adjust_run(run, parameters, check, context.progress)
+    distance = distance_along(estimate.joined.axis, estimate.joined.T_pc)
+    grid, lit = run.texture.grid, run.texture.poses.frames
+    passage = Passage.of(lit, distance[lit], grid.near_mm, grid.far_mm)
+    at_rings = distance[places_of(recording, points.frame)] + probe.laser.baseline_mm
+
+    def features(passage: Passage) -> WallFeatures:
+        bands_mm = bands_in_rings(at_rings, circles_in_rings(points).radius_mm)
+        observations = run.texture.store.spool.parts(_OBSERVATIONS_AT_ONCE)
+        return WallFeatures(texture_at(passage.frame, observations), bands_mm)
+
+    view = WallView(recording, probe, grid)
+    joined, loops = close_loops(estimate.joined, passage, features, view, parameters, context.scratch)
+    has_encoder = run.encoder is not None
+    trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
+    events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
+    _report(context, estimate, run.texture, trajectory)
+    loops.report(context)
+    report_instrument(probe, trajectory, context)
+    return replace(trajectory, events=events)
+
+
+def measure_run(
+    recording: Recording,
+    probe: Probe,
+    rings: RingSamples,
+    points: RingPoints,
+    parameters: MotionParameters,
+    context: Context,
+    use_encoder: bool = True,
+) -> MeasuredRun:
+    """Track the wall's texture and gather what was measured: texture, rings, times and encoder.
+
+    Without ``use_encoder`` the encoder has no say, so that it can be compared with what is seen.
+
+    Raises
+    ------
+    UnusableError
+        When the rings do not place the pipe, or neither texture nor encoder determines the distance.
+    """
+    circles = circles_in_rings(points)
+    grid = strip_grid(circles.usual_radius_mm, parameters)
+    view, encoder = WallView(recording, probe, grid), None
+    if use_encoder:
+        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
+    texture, predictor = _track(view, circles, encoder, parameters, context)
+    if encoder is not None and contradicted(encoder, texture.poses, context):
+        encoder = None
+        texture, predictor = _track(view, circles, None, parameters, context)
+    _require_distance(texture.poses, encoder)
+    place = places_of(recording, rings.frame)
+    T_pc = predictor.between(texture.poses)
+    return MeasuredRun(texture, rings, place, recording.frames.time_s, T_pc, encoder, probe)
+
+
+@dataclass(frozen=True)
+class JointEstimate:
+    """All frames of a recording adjusted at once.
+
+    Attributes
+    ----------
+    measured : Measurements
+    state : State
+        At the optimum.
+    equations : Equations
+        There, with the robust weights.
+    trajectory : Trajectory
+        In P.
+    """
+
+    measured: Measurements
+    state: State
+    equations: Equations
+    trajectory: Trajectory
+
+
+def adjust_at_once(
+    start: State,
+    measured: Measurements,
+    frames: FrameTable,
+    radius_mm: float,
+    parameters: MotionParameters,
+    context: Context,
+) -> JointEstimate:
+    """Adjust all frames of a recording at once, however many, and do not look for loops.
+
+    ``radius_mm`` is the rings' radius, from which the adjusted one may not differ much.
+
+    Raises
+    ------
+    UnusableError
+        When rings and texture do not determine the motion.
+    """
+    estimate = estimate_state(start, measured, parameters)
+    _report_steps(context, estimate.adjusted.trials, int(not estimate.adjusted.settled))
+    _require_convergence(radius_mm, estimate)
+    joined, has_encoder = joined_at_once(estimate), measured.encoder is not None
+    trajectory = trajectory_of(joined, frames, measured.probe, has_encoder)
+    events = find_events(frames, trajectory, measured.tracks.poses, estimate.state.slip, has_encoder)
+    trajectory = replace(trajectory, events=events)
+    return JointEstimate(measured, estimate.state, estimate.adjusted.equations, trajectory)
+
+
+def strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:
+    """Return the sampling of the wall between the near and the far angle, in a pipe of a radius."""
+    near = radius_mm / np.tan(np.radians(parameters.near_angle_deg))
+    far = radius_mm / np.tan(np.radians(parameters.far_angle_deg))
+    columns = max(4 * round(2 * np.pi * radius_mm / parameters.strip_step_mm / 4), _FEWEST_COLUMNS)
+    return StripGrid(radius_mm, columns, near, far)
+
+
+def places_of(recording: Recording, frame: Int) -> Int:
+    """Return the places of frame numbers in the recording's list of frames."""
+    return np.asarray(np.searchsorted(recording.frames.frame, frame))
+
+
+def _track(
+    view: WallView,
+    circles: RingCircles,
+    encoder: EncoderReadings | None,
+    parameters: MotionParameters,
+    context: Context,
+) -> tuple[TrackedTexture, PosePredictor]:
+    frames, lit = view.recording.frames, view.lit
+    predictor = PosePredictor(frames.time_s, encoder, circles.centre_at(frames.frame))
+    tracker = TextureTracker(view.probe, view.grid, parameters, view.blocked_mm, context.scratch)
+    images = view.images(lit)
+    found = track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
+    return found, predictor
+
+
+def _require_distance(tracked: TrackedPoses, encoder: EncoderReadings | None) -> None:
+    share = float(np.mean(~tracked.lost[1:])) if len(tracked.lost) > 1 else 0.0
+    if encoder is None and share < _LEAST_TRACKED:
+        raise UnusableError(
+            "motion",
+            f"the wall's texture could be followed in only {100 * share:.0f} % of the lit frames and "
+            "there is no encoder, so distance is not determined",
+            limit="half of the lit frames",
+            hint="give the encoder file, light the wall better, or record lit frames more often",
+        )
+
+
+def _require_convergence(radius_mm: float, estimate: Estimate) -> None:
+    """Refuse an estimate that ran away from the pipe that the rings show."""
+    found = float(estimate.state.globals[0])
+    if not abs(found - radius_mm) < _LARGEST_CHANGE * radius_mm:
+        raise UnusableError(
+            "motion",
+            f"the adjustment of the motion does not converge: its radius is {found:.4g} mm, that of the "
+            f"rings {radius_mm:.4g} mm",
+            limit=f"{100 * _LARGEST_CHANGE:.0f} % of difference",
+            hint="cut the recording where the pictures jump, and process the parts",
+        )
+
+
+def _report_steps(context: Context, steps: int, unsettled: int) -> None:
+    context.report("steps of the joint adjustment", steps, "")
+    if unsettled:
+        context.logger.warning(
+            "The adjustment of the motion stopped after its largest number of steps, before it had settled."
+        )
+
+
+def _report(context: Context, estimate: RunEstimate, texture: TrackedTexture, trajectory: Trajectory) -> None:
+    _report_steps(context, estimate.trials, estimate.unsettled)
+    context.report("landmarks", texture.store.landmarks, "")
+    context.report("texture observations", texture.store.spool.count, "")
+    context.report("lit frames without enough texture", int(texture.poses.lost[1:].sum()), "frames")
+    context.report("median reprojection error", estimate.reprojection_px, "px")
+    context.report("pipe radius", trajectory.radius_mm, "mm")
+    context.report("encoder scale", trajectory.encoder_scale, "")
+    travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
+    context.report("distance travelled", travelled, "mm")
+    context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")
+
+
+MOTION = Stage(
+    "motion",
+    "4",
+    MotionParameters,
+    estimate_motion,
+    "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",
+)
