@@ -159,16 +159,14 @@ def adjust_run(
         progress(len(alone), 2 * len(windows))
     measured = run.measured(windows[-1], parameters)
     shared = fuse_shared([a.told for a in alone], _new_shares(windows), measured, alone[-1].state)
-    submaps: list[Submap] = []
-    ends: list[_End] = []
+    found: list[tuple[Submap, _End]] = []
     for k, own in enumerate(alone):
         measured = run.measured(windows[k], parameters)
         estimate = estimate_with_shared(own.state, measured, shared.value, own.smooth_sigma, parameters)
         check(estimate)
-        ends.append(_End.of(estimate))
-        submaps.append(_submap(estimate, windows, k))
-        progress(len(windows) + len(submaps), 2 * len(windows))
-    return _run_estimate(join_submaps(submaps, shared), ends)
+        found.append((_submap(estimate, windows, k), _End.of(estimate)))
+        progress(len(windows) + len(found), 2 * len(windows))
+    return _run_estimate(join_submaps([f[0] for f in found], shared), [f[1] for f in found])
 
 
 def joined_at_once(estimate: Estimate) -> JoinedRun:
