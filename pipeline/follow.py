@@ -18,8 +18,8 @@ from pipeline.recording.growing import GrowingRecording
 
 
 @dataclass(frozen=True)
-class Glimpse:
-    """A growing recording as it stands.
+class Snapshot:
+    """The state of a growing recording.
 
     Attributes
     ----------
@@ -27,16 +27,16 @@ class Glimpse:
         None where it cannot be opened yet.
     problem : str
         Why it cannot.
-    resting : bool
-        Whether it has not grown for as long as was asked: the last glimpse.
+    complete : bool
+        Whether it has not grown for ``quiet_s``: this is the last state.
     """
 
     recording: Recording | None
     problem: str
-    resting: bool
+    complete: bool
 
 
-def glimpses(place: Path, quiet_s: float, poll_s: float, wish: threading.Event) -> Iterator[Glimpse]:
+def snapshots(place: Path, quiet_s: float, poll_s: float, wish: threading.Event) -> Iterator[Snapshot]:
     """Yield the recording each time it has grown, and once more when it rests.
 
     Parameters
@@ -60,19 +60,19 @@ def glimpses(place: Path, quiet_s: float, poll_s: float, wish: threading.Event) 
         now = _size(place)
         if now != size:
             size, grown_at = now, time.monotonic()
-            yield _glimpse(growing, resting=False)
+            yield _snapshot(growing, complete=False)
         elif time.monotonic() - grown_at >= quiet_s:
-            yield _glimpse(growing, resting=True)
+            yield _snapshot(growing, complete=True)
             return
         wish.wait(poll_s)
 
 
-def _glimpse(growing: GrowingRecording, *, resting: bool) -> Glimpse:
-    # A line or a packet that is half there is no fault before the end.
+def _snapshot(growing: GrowingRecording, *, complete: bool) -> Snapshot:
+    # A half-written line or packet is an error only at the end.
     try:
-        return Glimpse(open_recording(growing.path) if resting else growing.look(), "", resting)
+        return Snapshot(open_recording(growing.path) if complete else growing.look(), "", complete)
     except InputError as error:
-        return Glimpse(None, str(error), resting)
+        return Snapshot(None, str(error), complete)
 
 
 def _size(place: Path) -> int:

@@ -151,7 +151,7 @@ def _overlay(
 
 
 def _palette(colours: str) -> Byte:
-    # matplotlib is slow to import: a run is under way by then.
+    # matplotlib is slow to import, so it is imported only when it is needed.
     from matplotlib import colormaps
 
     rgb = colormaps[colours](np.linspace(0, 1, 255))[:, :3]

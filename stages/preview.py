@@ -1,6 +1,6 @@
-"""What a recording that is still being written shows of the pipe: a circle through every ring, at once.
+"""Preliminary sections of a recording that is still being written: a circle through every ring.
 
-No motion, no wall and no axis: these need the whole recording. The probe's own pose is in every figure.
+Motion, wall and axis need the whole recording, so that the probe's pose affects every figure.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 
 # A quarter of the preview's 360 azimuths: a circle through less is badly determined.
 _LEAST_POINTS = 90
-# A line's errors are alike over this many of 360 degrees.
+# Correlation length of a line's errors around the ring, degrees. Debt: data/debts.md.
 _ALIKE = 8.0
 
 

@@ -19,7 +19,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
 
 _DIRECTIONS: Float = np.linspace(0, np.pi, 360, endpoint=False)
-# Most of its period that a harmonic may span unseen: in mid-gap the series is then as sure as one sample.
+# Largest gap, in periods of a harmonic: in the middle of such a gap the series is as certain as one sample.
 _LONGEST_GAP = 5 / 6
 # Ovality is the second harmonic: with fewer there is no section to report.
 _LEAST_HARMONICS = 2
@@ -79,7 +79,7 @@ def measure_sections(
     for k, station in enumerate(stations):
         slab = _slab(radius_map, station, parameters.spacing_mm)
         seen = np.isfinite(slab.radius_mm)
-        harmonics = _told_harmonics(seen, parameters.harmonics)
+        harmonics = _determined_harmonics(seen, parameters.harmonics)
         if seen.mean() >= parameters.min_coverage and harmonics >= _LEAST_HARMONICS:
             shape = _fit_shape(radius_map.azimuth_rad, slab, harmonics)
             rows.append(_measures(station, slab, shape, recording.pipe.nominal_diameter_mm))
@@ -117,8 +117,8 @@ def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
     return _Slab(mean, variance, calibration, float(seen.mean()))
 
 
-def _told_harmonics(seen: Bool, most: int) -> int:
-    """Return how many harmonics samples (A,) around a turn can tell, by the longest unseen arc."""
+def _determined_harmonics(seen: Bool, most: int) -> int:
+    """Return how many harmonics samples (A,) around a turn determine, by the longest unseen arc."""
     edges = np.flatnonzero(np.concatenate([seen, seen]))
     if not edges.size:
         return 0

@@ -25,7 +25,7 @@ _NEIGHBOURS = 9
 
 
 class TriangulateParameters(Parameters):
-    """Triangulation itself is exact; what can be set is which samples cannot be of the wall."""
+    """Triangulation is exact; the parameters decide which samples cannot lie on the wall."""
 
     largest_departure: float = Field(
         0.2,
@@ -78,8 +78,9 @@ def triangulate_rings(
 def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
     """Return where samples lie off the ring that their neighbours form.
 
-    A dent, a step or a branch is as wide as most of its neighbours and stays; what is narrower than half of
-    them and as deep as a fifth of the pipe's radius is no wall: light does not come out of such a hole.
+    A dent, a step or a branch is wider than half of the nine neighbours and is kept. A feature that is
+    narrower and as deep as a fifth of the pipe's radius cannot be wall: no light would come out of such a
+    hole.
 
     Parameters
     ----------
@@ -145,7 +146,7 @@ def _report(context: Context, counts: Int, noise: Float32) -> None:
     context.report("points triangulated", placed, "points")
     context.report("ring samples that miss the laser sheet", missed, "samples")
     context.report("rejected: far off the ring beside them", off, "samples")
-    # The median of some hundred rings is that of all.
+    # The median of some hundred rings is close enough to that of all.
     some = noise[:: max(len(noise) // _REPORTED_RINGS, 1)]
     length = np.linalg.norm(some[np.isfinite(some[..., 0])], axis=-1)
     if length.size:

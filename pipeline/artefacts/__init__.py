@@ -1,1 +1,1 @@
-"""What stages hand to each other: frozen dataclasses of arrays, with units and frames."""
+"""Results that stages pass to each other: frozen dataclasses of arrays, with units and frames."""

@@ -1,4 +1,4 @@
-"""The few numbers of a run that anyone asks for first."""
+"""Headline numbers of a run."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ class RingPoints:
 
 @dataclass(frozen=True)
 class MotionEvent:
-    """Something of note in the motion: slip, stop, reversal, dropped or duplicated frame, lost track."""
+    """An event of the motion: slip, stop, reversal, dropped or duplicated frame, lost track."""
 
     kind: str
     frame_from: int
@@ -135,7 +135,7 @@ class Trajectory:
         Relative 1 σ of the distance scale from calibration (it does not average away).
     events : tuple of MotionEvent
     instrument : (P,) or None
-        The probe's parameters as this run bears them out (stated values, moved within their uncertainty);
+        The probe's parameters as estimated in this run (stated values, moved within their uncertainty);
         None where they are as stated. `Probe.as_found_in` applies them.
     instrument_covariance : (P, P) or None
         Their covariance.

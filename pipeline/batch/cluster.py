@@ -13,7 +13,7 @@ import dask
 from distributed import Client, LocalCluster, as_completed
 from pydantic import Field, TypeAdapter, ValidationError
 
-from pipeline.batch.runs import Ending, Work, run_one
+from pipeline.batch.runs import BatchOutcome, Work, run_one
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import read_yaml
 from pipeline.machine.configuration import CLUSTER
@@ -80,11 +80,11 @@ if TYPE_CHECKING:
 
 # Time after which a scheduler that does not answer is given up, s.
 _CONNECT_S = 15
-# A run takes the cores of its job by itself; the worker has it compute nothing beside.
+# A run uses all cores of its job, so that the worker computes one run at a time.
 _ONE_AT_A_TIME = ("--nthreads", "1")
-# A recording is given up after so many workers were lost over it: it may be what kills them.
+# A recording fails after so many workers died while computing it: the recording may be the cause.
 _LOST_WORKERS = 5
-# What becomes of work when nobody is there to hand it out.
+# States of work whose scheduler is gone.
 _GONE = ("cancelled", "lost")
 
 
@@ -131,7 +131,7 @@ def _queued(cluster: QueuedJobs) -> JobQueueCluster:
         queue=cluster.queue, account=cluster.account, worker_extra_args=list(_ONE_AT_A_TIME),
         scheduler_options={"dashboard_address": None, "host": cluster.host},
     )  # fmt: skip
-    # Adapting, where both ends are the same, queues a job again that ended or was killed.
+    # Adapting with equal limits queues a job again when it ends or is killed.
     jobs.adapt(minimum_jobs=cluster.jobs, maximum_jobs=cluster.jobs)
     return jobs
 
@@ -143,8 +143,8 @@ def _client(place: str | LocalCluster | JobQueueCluster) -> Client:
         raise InputError(str(place), f"no scheduler answers: {error}", expected="tcp://HOST:PORT") from error
 
 
-def endings(client: Client, works: Sequence[Work]) -> Iterator[Ending]:
-    """Yield the ending of every recording as it comes; one that lost too many workers failed.
+def outcomes(client: Client, works: Sequence[Work]) -> Iterator[BatchOutcome]:
+    """Yield the outcome of every recording as it ends; one that lost too many workers has failed.
 
     Raises
     ------
@@ -162,4 +162,4 @@ def endings(client: Client, works: Sequence[Work]) -> Iterator[Ending]:
             )  # fmt: skip
         else:
             problem = f"{_LOST_WORKERS} workers were lost over it: {future.exception()}"
-            yield Ending(futures[future].name, "failed", problem)
+            yield BatchOutcome(futures[future].name, "failed", problem)

@@ -52,7 +52,7 @@ _BUSY = "is at work in this run folder"
 # Time between two attempts at a run folder that another process still holds, and how long to try, s.
 _WAIT_S, _PATIENCE_S = 2.0, 120.0
 # Lines of a failed run's error output that are kept.
-_TOLD_LINES = 4
+_STDERR_LINES = 4
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class Work:
 
 
 @dataclass(frozen=True)
-class Ending:
-    """How a recording of a batch ended.
+class BatchOutcome:
+    """How the run of one recording of a batch ended.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Ending:
         Empty when it completed.
     metrics : tuple of (name, value, unit)
     warnings : tuple of str
-        What the reader mended and what stages warn of: a completed run that wants a look.
+        What the reader corrected and what stages warn of: look at the run before its figures are used.
     """
 
     name: str
@@ -88,15 +88,15 @@ class Ending:
     warnings: tuple[str, ...] = ()
 
 
-def run_one(work: Work) -> Ending:
-    """Run one recording; whatever happens to it becomes an ending, never an error of the batch."""
-    code, told = _run(work)
+def run_one(work: Work) -> BatchOutcome:
+    """Run one recording; whatever happens is reported in the outcome and is never an error of the batch."""
+    code, stderr = _run(work)
     until = time.monotonic() + _PATIENCE_S
-    while code == _REFUSED and _BUSY in told and time.monotonic() < until:
-        # A lost worker's process may hold the folder until the system has ended it.
+    while code == _REFUSED and _BUSY in stderr and time.monotonic() < until:
+        # The process of a lost worker may hold the folder until the system has ended it.
         time.sleep(_WAIT_S)
-        code, told = _run(work)
-    return ending_of(work, code, told)
+        code, stderr = _run(work)
+    return outcome_of(work, code, stderr)
 
 
 def _run(work: Work) -> tuple[int, str]:
@@ -109,18 +109,18 @@ def _run(work: Work) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-def ending_of(work: Work, code: int, told: str) -> Ending:
+def outcome_of(work: Work, code: int, stderr: str) -> BatchOutcome:
     """Return how a run ended, from its exit status, what it said, and the record that it left."""
     record = _record(work.folder)
-    if code and (record is None or not record.get("problem") or record["problem"] not in told):
-        # The record is of an earlier call, or could not be brought up to date: the disk may be the cause.
-        last = " ".join(told.strip().splitlines()[-_TOLD_LINES:]) or f"it ended with status {code}"
-        return Ending(work.name, "refused" if code == _REFUSED else "failed", last)
+    if code and (record is None or not record.get("problem") or record["problem"] not in stderr):
+        # The record belongs to an earlier call, or could not be updated because the disk is full.
+        last = " ".join(stderr.strip().splitlines()[-_STDERR_LINES:]) or f"it ended with status {code}"
+        return BatchOutcome(work.name, "refused" if code == _REFUSED else "failed", last)
     if record is None:
-        return Ending(work.name, "failed", "the run left no record")
+        return BatchOutcome(work.name, "failed", "the run left no record")
     metrics = tuple((m["name"], m["value"], m["unit"]) for m in record.get("metrics", ()))
     warnings = tuple(map(str, (*record.get("reader_warnings", ()), *record.get("warnings", ()))))
-    return Ending(work.name, str(record["state"]), str(record.get("problem", "")), metrics, warnings)
+    return BatchOutcome(work.name, str(record["state"]), str(record.get("problem", "")), metrics, warnings)
 
 
 def _record(folder: Path) -> dict[str, Any] | None:
@@ -134,7 +134,7 @@ def _record(folder: Path) -> dict[str, Any] | None:
 SHOWN_METRICS = ("inspected length", "wall seen", "mean diameter", "defects", "deepest defect")
 
 
-def write_summary(endings: Iterable[Ending], folder: Path) -> None:
+def write_summary(outcomes: Iterable[BatchOutcome], folder: Path) -> None:
     """Write batch.json and batch.html; the order is that of the names, whoever came first.
 
     Raises
@@ -142,7 +142,7 @@ def write_summary(endings: Iterable[Ending], folder: Path) -> None:
     InputError
         When the disk is full or cannot be written.
     """
-    ordered = sorted(endings, key=lambda e: e.name)
+    ordered = sorted(outcomes, key=lambda e: e.name)
     runs: list[Json] = [_document(e) for e in ordered]
     rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
     warned = sum(bool(e.warnings) for e in ordered)
@@ -154,13 +154,13 @@ def write_summary(endings: Iterable[Ending], folder: Path) -> None:
         replace_text(folder / "batch.html", text)
 
 
-def _states(endings: list[Ending]) -> Counter[str]:
-    return Counter(e.state for e in endings)
+def _states(outcomes: list[BatchOutcome]) -> Counter[str]:
+    return Counter(e.state for e in outcomes)
 
 
-def _document(ending: Ending) -> Json:
-    metrics: list[Json] = [{"name": n, "value": v, "unit": u} for n, v, u in ending.metrics]
+def _document(outcome: BatchOutcome) -> Json:
+    metrics: list[Json] = [{"name": n, "value": v, "unit": u} for n, v, u in outcome.metrics]
     return {
-        "name": ending.name, "state": ending.state, "problem": ending.problem, "metrics": metrics,
-        "warnings": list(ending.warnings),
+        "name": outcome.name, "state": outcome.state, "problem": outcome.problem, "metrics": metrics,
+        "warnings": list(outcome.warnings),
     }  # fmt: skip

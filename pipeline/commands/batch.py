@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from pipeline.batch.cluster import Cluster, LocalWorkers, RunningScheduler, endings, read_cluster, workers
-from pipeline.batch.runs import Ending, Work, find_recordings, write_summary
+from pipeline.batch.cluster import Cluster, LocalWorkers, RunningScheduler, outcomes, read_cluster, workers
+from pipeline.batch.runs import BatchOutcome, Work, find_recordings, write_summary
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named
 from pipeline.machine.configuration import resolve
@@ -48,15 +48,15 @@ def batch(
     options = _options(probe, config, assignments or [])
     found = find_recordings(folder)
     console = Console(stderr=True)
-    done: list[Ending] = []
+    done: list[BatchOutcome] = []
     with disk_errors_named(output):
         output.mkdir(parents=True, exist_ok=True)
     works = [Work(n, p.resolve(), (output / n).resolve(), options) for n, p in found.items()]
     with workers(cluster) as client:
-        for ending in endings(client, works):
-            done.append(ending)
-            console.print(f"{len(done)}/{len(works)}  {ending.name}: {ending.state}", highlight=False)
-            with suppress(InputError):  # the runs go on where the disk is full; it is told at the end
+        for outcome in outcomes(client, works):
+            done.append(outcome)
+            console.print(f"{len(done)}/{len(works)}  {outcome.name}: {outcome.state}", highlight=False)
+            with suppress(InputError):  # a full disk does not stop the runs; it is reported at the end
                 write_summary(done, output)
     write_summary(done, output)
     typer.echo(f"Summary: {(output / 'batch.html').resolve()}")

@@ -1,4 +1,4 @@
-"""How figures of reports look, and what they become."""
+"""Style and rendering of the reports' figures."""
 
 from __future__ import annotations
 

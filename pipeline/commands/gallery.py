@@ -128,10 +128,10 @@ def gallery(
         ),
     ] = None,
 ) -> None:
-    """Show what each known effect does: its picture, its residual on the ring, its law, its size, its likes.
+    """Show each known effect: its picture, residual on the ring, law, size, and the effects that look alike.
 
-    All of the page is computed when it is made, which takes a few minutes for all effects. An effect takes
-    its catalogue's quantities, as in laser_tilt=0.6@40, or its typical size.
+    The page is computed when the command runs, which takes a few minutes for all effects. An effect takes the
+    quantities of the catalogue, as in laser_tilt=0.6@40, or its typical size.
     """
     console = Console(stderr=True)
     switches = parse_switches(effects or ()) or tuple(typical_switch(name) for name in EFFECTS)

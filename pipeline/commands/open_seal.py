@@ -16,7 +16,7 @@ def open_seal(
     recording: Annotated[Path, typer.Argument(help="Recording that simulate --seal wrote.")],
     truth: Annotated[Path, typer.Argument(help="Folder of its truth.")],
 ) -> None:
-    """Verify that truth and recording are what was sealed, and say what is concealed."""
+    """Verify that truth and recording are unchanged since the sealing, and print the concealed effects."""
     files = compare(recording, truth)
     for file in files:
         typer.echo(f"{file.file:<36} {file.problem or 'as sealed'}")

@@ -89,7 +89,7 @@ def _progress() -> Iterator[Progress]:
 
 
 def _show(made: Simulated) -> None:
-    """Tell what was checked, but of a sealed recording nothing that would betray what is in it."""
+    """Print what was checked; of a sealed recording nothing that would reveal its effects."""
     if not made.sealed:
         for premise in made.premises:
             typer.echo(f"{premise.name:<40} {premise.text}")

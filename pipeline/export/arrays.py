@@ -98,7 +98,7 @@ _FRAMES_PER_CHUNK = 64
 
 def write_rings(rings: RingSamples, folder: Path) -> None:
     """Write ``rings.zarr``: laser frames × azimuth, with the meaning of every array in its attributes."""
-    # zarr is slow to import: a run is under way by then.
+    # zarr is slow to import, so it is imported only when it is needed.
     import zarr
 
     group = zarr.open_group(folder / "rings.zarr", mode="w")

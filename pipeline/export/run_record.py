@@ -1,4 +1,4 @@
-"""run.json: what was run, on what, with which parameters, and how it stands."""
+"""run.json: recording, probe, parameters, versions, stages and state of a run."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def write_run_record(
 
 
 def _peak_mib() -> float:
-    # Linux hands a starting process its parent's ru_maxrss; VmHWM counts this program alone.
+    # On Linux a new process inherits its parent's ru_maxrss; VmHWM belongs to this process alone.
     status = Path("/proc/self/status")
     if not status.exists():
         return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1)

@@ -1,6 +1,6 @@
 """Coarse levels of the model: a grid over the radius map, photo and error colours shrunk level by level.
 
-Decimation would do no better here: what is left at a coarse level is a nearly even tube.
+A grid is as good as decimation here, because a coarse level is a nearly regular tube.
 """
 
 from __future__ import annotations

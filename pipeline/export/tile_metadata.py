@@ -1,4 +1,4 @@
-"""What is known of stretches and defects, as per-feature metadata of 3D Tiles 1.1.
+"""Facts of stretches and defects as per-feature metadata of 3D Tiles 1.1.
 
 OGC 22-025r4, "3D Tiles specification 1.1", with its 3D metadata specification (schema, binary table format);
 in glTF by the extensions EXT_mesh_features and EXT_structural_metadata. Properties' names end in their unit.
@@ -27,7 +27,7 @@ _NUMPY = {"UINT32": "<u4", "FLOAT64": "<f8", "FLOAT32": "<f4"}
 
 @dataclass(frozen=True)
 class StretchFacts:
-    """What is known of a stretch of wall; −1 where nothing was measured."""
+    """Facts of a stretch of wall; −1 where nothing was measured."""
 
     number: int = field(metadata={"kind": "U", "says": "number of the stretch in order of distance, from 0"})
     distance_from_mm: float = field(metadata={"kind": "D", "says": "where along the pipe it begins, mm"})
@@ -96,7 +96,7 @@ def near(defects: Sequence[Defect], from_mm: float, to_mm: float) -> list[Defect
 
 def defect_at(defects: Sequence[Defect], distance_mm: Float, azimuth_rad: Float) -> Int:
     """Return (N,) which of the defects holds each place in its outline, their number where none does."""
-    # matplotlib is slow to import: a run is under way by then.
+    # matplotlib is slow to import, so it is imported only when it is needed.
     from matplotlib.path import Path as Outline
 
     out = np.full(len(distance_mm), len(defects))

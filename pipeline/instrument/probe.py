@@ -72,7 +72,7 @@ class Probe:
         return replace(self, camera=camera, laser=laser, covariance=covariance)
 
     def as_found_in(self, trajectory: Trajectory) -> Probe:
-        """Return the probe as the motion estimate of a run bears it out."""
+        """Return the probe with the parameters that the motion estimate of a run gives it."""
         if trajectory.instrument is None or trajectory.instrument_covariance is None:
             return self
         return self.with_parameters(trajectory.instrument, trajectory.instrument_covariance)

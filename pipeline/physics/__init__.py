@@ -1,1 +1,1 @@
-"""The physics that is known to make a recording differ from the plain instrument: names, units, laws."""
+"""Known effects that make a recording differ from that of the ideal instrument: names, units, laws."""

@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class FixedTo(StrEnum):
-    """What an effect's pattern turns and travels with."""
+    """The part or frame that an effect's pattern is fixed to."""
 
     LASER = "laser"
     CAMERA = "camera"
@@ -27,7 +27,7 @@ class Channel(StrEnum):
 
 @dataclass(frozen=True)
 class Quantity:
-    """One number that sizes an effect: what the true instrument has beyond the stated one.
+    """One number that gives an effect's size: the true instrument minus the stated one.
 
     Attributes
     ----------

@@ -151,7 +151,7 @@ CAMERA_EFFECTS = (
 )  # fmt: skip
 
 
-# The dome of the typical figures: index 1.5, thickness 2 mm, radius 14 mm; only their product shows.
+# The dome of the catalogue's typical figures; only the product (n − 1) t / (n ρ²) has an effect.
 GLASS_INDEX, DOME_THICKNESS_MM, DOME_RADIUS_MM = 1.5, 2.0, 14.0
 
 WINDOW_EFFECTS = (

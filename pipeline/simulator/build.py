@@ -1,4 +1,4 @@
-"""Works a scene out: draws the true instrument, lays out the wall, sets the lights, switches effects on."""
+"""From a scene to its truth: draws the true instrument, builds the wall, sets the lights, applies effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the line lies in the image, by finding roots: without image or the renderer's kernels."""
+"""Exact image position of the laser line by root finding, without the renderer's kernels."""
 
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ _SHEET_NODES = 1440
 def exact_rings(truth: SceneTruth, frames: Sequence[int], azimuth_rad: Float, centre_px: Float) -> Float:
     """Return the image radius (F, A) of the line's mean about ``centre_px``, px, at image azimuths (A,).
 
-    The point of the sheet that is nearest to the laser and lies on the wall; NaN where there is none in
-    view. Whether the wall hides it from the camera is not asked. A rolling shutter is heeded row by row.
+    It is the first point of the sheet, counted from the laser, that lies on the wall; NaN where there is none
+    in view. The wall may hide the point from the camera, which is not tested. A rolling shutter is modelled
+    by row.
     """
     return np.stack([_ring(truth, frame, azimuth_rad, centre_px) for frame in frames])
 
@@ -88,13 +89,13 @@ def _on_sheet(instrument: TrueInstrument, origin: Float, ray: Float) -> Float:
     for _ in range(_NEWTON):
         h, k = (np.interp(psi, leaves, part, period=2 * np.pi) for part in (height, slope))
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = _meeting(origin, ray, h, k)
+            t = _distance_to_sheet(origin, ray, h, k)
         point = origin + t[:, None] * ray
         psi = np.arctan2(point[:, 1], point[:, 0])
     return np.where((t > 0)[:, None], point, np.nan)
 
 
-def _meeting(origin: Float, ray: Float, height: Float, slope: Float) -> Float:
+def _distance_to_sheet(origin: Float, ray: Float, height: Float, slope: Float) -> Float:
     """Return the way at which rays reach z = height + slope q, by steps of q."""
     t = (height - origin[:, 2]) / ray[:, 2]
     for _ in range(_NEWTON):

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.raycast import meet, normal_at
+from pipeline.simulator.raycast import first_hit, normal_at
 from pipeline.simulator.rays import part_ray_at, ray_at
 from pipeline.simulator.sheet import density_at, sheet_at
 from pipeline.simulator.surface import Texture, albedo_at, sheen_at
@@ -55,14 +55,14 @@ def _add_rows(
 
 @kernel
 def _near_line(view: View, line: Line, u: int, v: int, times: int, work: Work) -> bool:
-    """Tell whether a pixel's middle comes as near to the line as any of its parts may, at some moment."""
+    """Return whether some part of a pixel may see the line at some moment, judged by the pixel's middle."""
     c_ray, w_ray, hit, o, R, normal = work.c_ray, work.w_ray, work.hit, work.o, work.R, work.normal
     ray_at(view.rays, u, v, c_ray)
     if not (c_ray[5] > -0.5):
         return False
     for k in range(times):
         to_wall(view, v, k, c_ray, w_ray)
-        if not meet(view.surface, w_ray, view.distance_mm, _CLOSE_MM, o, R, hit):
+        if not first_hit(view.surface, w_ray, view.distance_mm, _CLOSE_MM, o, R, hit):
             continue
         x, y, z = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4], c_ray[2] + hit[0] * c_ray[5]
         height, slope, _ = sheet_at(line.sheet, 0.5, np.arctan2(y, x))
@@ -85,7 +85,7 @@ def _line_light(
     if not (c_ray[5] > -0.5):
         return
     to_wall(view, row, k, c_ray, w_ray)
-    if not meet(view.surface, w_ray, view.distance_mm, _CLOSE_MM, o, R, hit):
+    if not first_hit(view.surface, w_ray, view.distance_mm, _CLOSE_MM, o, R, hit):
         return
     x, y, z = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4], c_ray[2] + hit[0] * c_ray[5]
     q = np.sqrt(x * x + y * y)
@@ -113,7 +113,7 @@ def _line_light(
 
 @kernel
 def _sheen(texture: Texture, normal: Float, way: Float, ray: Float) -> float:
-    """Return what a partly glossy wall sends over what a dull one would, of light going ``way``."""
+    """Return the ratio of light that a partly glossy and a dull wall send to the camera."""
     a, b, c = -way[0] - ray[3], -way[1] - ray[4], -way[2] - ray[5]
     size = np.sqrt(a * a + b * b + c * c) + 1e-12
     return float(sheen_at(texture, (a * normal[0] + b * normal[1] + c * normal[2]) / size))

@@ -54,7 +54,7 @@ class Signal:
 
 
 def constant(value: float) -> Signal:
-    """Return a signal that stays."""
+    """Return a signal that does not change."""
     return Signal(np.zeros(1), np.array([value]))
 
 
@@ -142,7 +142,7 @@ class Odometer:
         return Encoder(clock, counted)
 
     def _with_play(self, way_mm: Float) -> Float:
-        """Return the wheel's way: it stays while the cable moves within the play."""
+        """Return the wheel's distance: it does not change while the cable moves within the play."""
         half, at = 0.5 * self.backlash_mm, np.empty_like(way_mm)
         state = way_mm[0]
         for i, way in enumerate(way_mm.tolist()):

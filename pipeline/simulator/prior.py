@@ -1,4 +1,4 @@
-"""Drawing scenes from a prior: pairs of a gauge run and an inspection with one probe and what it conceals."""
+"""Scenes drawn from a prior: pairs of gauge run and inspection with one probe and its concealed effects."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _draw_variations(
 
 
 def _draw_effects(prior: Prior, random: np.random.Generator) -> dict[str, dict[str, float]]:
-    """Return the concealed effects; none is drawn twice, and none beside one it cannot be told from."""
+    """Return the concealed effects; none is drawn twice, nor together with one that looks alike."""
     left = list(prior.effects)
     drawn: dict[str, dict[str, float]] = {}
     for _ in range(_weighted(random, prior.concealed)):

@@ -132,7 +132,7 @@ def _write_yaml(document: dict[str, object], file: Path) -> None:
 
 @dataclass(frozen=True)
 class Places:
-    """Where a recording and its truth go; ``sealed`` tells whether hashes go out with the recording."""
+    """Folders of a recording and its truth; ``sealed``: the recording contains hashes of its truth."""
 
     recording: Path
     truth: Path
@@ -140,7 +140,7 @@ class Places:
 
 
 def beside(recording: Path) -> Path:
-    """Return the folder of a recording's truth where none is named: beside it, never inside."""
+    """Return the default folder of a recording's truth: beside the recording, never inside."""
     return recording.with_name(f"{recording.name}-truth")
 
 
@@ -162,7 +162,7 @@ def produce(orders: Sequence[Order], progress: Callable[[Order, int], None]) -> 
     ----------
     orders : sequence of Order
     progress : callable
-        Told how many frames of an order are done.
+        Called with an order and the number of its frames that are done.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def _rendered(
 
 @contextmanager
 def _whole_or_nothing(places: Places) -> Iterator[Places]:
-    """Lend folders to write to, which take their names at the end, or are removed when something fails."""
+    """Yield temporary folders, which get their final names at the end and are removed on any failure."""
     new = replace(places, recording=_partial(places.recording), truth=_partial(places.truth))
     pairs = ((new.recording, places.recording), (new.truth, places.truth))
     try:

@@ -94,7 +94,7 @@ def radius_at(surface: Surface, s: float, psi: float) -> float:
 
 
 @kernel
-def meet(surface: Surface, ray: Float, s: float, close: float, o: Float, R: Float, hit: Float) -> bool:
+def first_hit(surface: Surface, ray: Float, s: float, close: float, o: Float, R: Float, hit: Float) -> bool:
     """Find where a ray from inside the pipe first meets the wall.
 
     Parameters

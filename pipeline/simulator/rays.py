@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.window import through
+from pipeline.simulator.window import refracted
 
 # Spacing of the table's nodes: see `ray_table` for the error of interpolating between them.
 _STEP_PX = 8
@@ -69,7 +69,7 @@ def viewing_rays(camera: TrueCamera, uv: Float) -> tuple[Float, Float]:
     origin = np.zeros_like(ray)
     origin[..., 2] = camera.pupil_shift_mm * (theta / np.maximum(np.sin(theta), 1e-12) - 1)
     origin[..., 2] = np.where(theta < 1e-6, 0.0, origin[..., 2])
-    return through(camera.windows, origin, ray)
+    return refracted(camera.windows, origin, ray)
 
 
 def _without_distortion(camera: TrueCamera, uv: Float) -> Float:

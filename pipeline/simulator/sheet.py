@@ -1,4 +1,4 @@
-"""Where the laser's light goes: its sheet as a table over azimuth, outside all windows, and its bounce."""
+"""The laser's light as tables over azimuth: the sheet outside all windows, and its reflection by the wall."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.simulator.instrument import LineProfile, TrueLaser
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.raycast import meet, normal_at
+from pipeline.simulator.raycast import first_hit, normal_at
 from pipeline.simulator.surface import Surface
-from pipeline.simulator.window import through
+from pipeline.simulator.window import refracted
 
 # Sheet rays around the turn: linear between nodes 0.25° apart errs by (0.25°)²/8 = 2.4e-6 of a first
 # harmonic.
@@ -60,7 +60,7 @@ def sheet_rays(laser: TrueLaser, azimuth_rad: Float) -> tuple[Float, Float]:
     ray = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad), slope], -1)
     origin = np.zeros_like(ray)
     origin[..., 2] = laser.sheet.height(azimuth_rad)
-    return through(laser.windows, origin, ray / np.linalg.norm(ray, axis=-1, keepdims=True))
+    return refracted(laser.windows, origin, ray / np.linalg.norm(ray, axis=-1, keepdims=True))
 
 
 def sheet_table(lasers: tuple[TrueLaser, ...]) -> SheetTable:
@@ -71,10 +71,10 @@ def sheet_table(lasers: tuple[TrueLaser, ...]) -> SheetTable:
 
 
 def ghost_table(surface: Surface, laser: TrueLaser, T_wc: Float, distance_mm: float) -> SheetTable | None:
-    """Return the light that the wall mirrors across the bore, as the camera at ``T_wc`` (3, 4) meets it.
+    """Return the light that the wall mirrors across the bore, for a camera at ``T_wc`` (3, 4).
 
-    Each ray of the sheet is mirrored where it meets the wall; its way from there is the ghost's. Its weight
-    is the line's, by the share mirrored and by how rays crowd in azimuth. None where nothing is mirrored.
+    Each ray of the sheet is mirrored where it hits the wall. Its weight is the line's, times the share
+    mirrored and the density of mirrored rays in azimuth. None where nothing is mirrored.
     """
     if laser.ghost_relative <= 0:
         return None
@@ -130,7 +130,7 @@ def _write_mirrored(
     o, R, normal = room[0], room[1:4], room[4]
     for n in range(rays.shape[0]):
         ray[:] = rays[n]
-        if not np.isfinite(ray.sum()) or not meet(surface, ray, s, _CLOSE_MM, o, R, hit):
+        if not np.isfinite(ray.sum()) or not first_hit(surface, ray, s, _CLOSE_MM, o, R, hit):
             continue
         normal_at(surface, hit, R, normal)
         sink = 2.0 * (ray[3] * normal[0] + ray[4] * normal[1] + ray[5] * normal[2])
@@ -138,7 +138,7 @@ def _write_mirrored(
             out[n, k] = ray[k] + hit[0] * ray[3 + k]
             ray[3 + k] -= sink * normal[k]
             ray[k] = out[n, k] + 0.02 * normal[k]
-        if not meet(surface, ray, hit[1], _CLOSE_MM, o, R, hit):
+        if not first_hit(surface, ray, hit[1], _CLOSE_MM, o, R, hit):
             continue
         for k in range(3):
             out[n, 3 + k] = ray[k] + hit[0] * ray[3 + k]

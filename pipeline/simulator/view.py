@@ -1,4 +1,4 @@
-"""What a frame's kernels need: rays, poses within the exposure, wall, light; which tiles hold the line."""
+"""Inputs of a frame's kernels: rays, poses within the exposure, wall, light; which tiles hold the line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation
 
 from pipeline.arrays import Bool, Float
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.raycast import meet
+from pipeline.simulator.raycast import first_hit
 from pipeline.simulator.rays import RayTable, ray_at
 from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
 from pipeline.simulator.surface import Surface, Texture
@@ -49,7 +49,7 @@ class View(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for what is computed of one ray: (6,) in C and in W, its hit, section, normal and vectors."""
+    """Work arrays of one ray: (6,) in C and in W, its hit, section frame, normal and vectors."""
 
     c_ray: Float
     w_ray: Float
@@ -117,7 +117,7 @@ def _write_heights(view: View, sheet: SheetTable, k: int, work: Work, out: Float
             if not (c_ray[5] > -0.5):
                 continue
             to_wall(view, i * TILE_PX, k, c_ray, w_ray)
-            if not meet(view.surface, w_ray, view.distance_mm, _CLOSE_MM, work.o, work.R, hit):
+            if not first_hit(view.surface, w_ray, view.distance_mm, _CLOSE_MM, work.o, work.R, hit):
                 continue
             x, y = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4]
             z = c_ray[2] + hit[0] * c_ray[5]

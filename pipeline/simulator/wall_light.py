@@ -10,7 +10,7 @@ from pipeline.arrays import Float, Float32
 from pipeline.simulator.instrument import LedRing
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.line_light import REFERENCE_MM
-from pipeline.simulator.raycast import meet, normal_at, radius_at
+from pipeline.simulator.raycast import first_hit, normal_at, radius_at
 from pipeline.simulator.rays import part_ray_at
 from pipeline.simulator.surface import Surface, albedo_at, sheen_at
 from pipeline.simulator.view import View, Work, new_work, to_wall
@@ -103,7 +103,7 @@ def _ray_light(
     if not (c_ray[5] > (-0.05 if lamps.ambient == 0.0 else -1.0)):
         return
     to_wall(view, row, k, c_ray, w_ray)
-    if not meet(view.surface, w_ray, view.distance_mm, _CLOSE_MM, work.o, work.R, hit):
+    if not first_hit(view.surface, w_ray, view.distance_mm, _CLOSE_MM, work.o, work.R, hit):
         return
     normal_at(view.surface, hit, work.R, normal)
     facing = -(w_ray[3] * normal[0] + w_ray[4] * normal[1] + w_ray[5] * normal[2])

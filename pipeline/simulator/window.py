@@ -17,7 +17,7 @@ class Window(Protocol):
     def index_beyond(self) -> float:
         """Refractive index outside."""
 
-    def meet(self, origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
+    def intersect(self, origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
         """Return points (..., 3) where rays from inside leave, and outward unit normals (..., 3) there."""
 
 
@@ -30,8 +30,8 @@ class CylinderWindow:
     point_c: tuple[float, float, float] = (0.0, 0.0, 0.0)
     axis_c: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
-    def meet(self, origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
-        """See `Window.meet`; rays along the axis never meet it: NaN."""
+    def intersect(self, origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
+        """See `Window.intersect`; rays along the axis never meet it: NaN."""
         axis = np.array(self.axis_c) / np.linalg.norm(self.axis_c)
         across = ray_c - (ray_c @ axis)[..., None] * axis
         place = origin_c - np.array(self.point_c)
@@ -50,22 +50,22 @@ class SphereWindow:
     index_beyond: float
     centre_c: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def meet(self, origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
-        """See `Window.meet`."""
+    def intersect(self, origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
+        """See `Window.intersect`."""
         place = origin_c - np.array(self.centre_c)
         b = _dot(place, ray_c)
         way = -b + np.sqrt(b * b + self.radius_mm**2 - _dot(place, place))
         return origin_c + way[..., None] * ray_c, (place + way[..., None] * ray_c) / self.radius_mm
 
 
-def through(windows: tuple[Window, ...], origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
+def refracted(windows: tuple[Window, ...], origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
     """Return origins and unit directions (..., 3) of rays behind all windows, by Snell's law.
 
-    A ray that never meets a surface, or is reflected totally, comes out as NaN.
+    A ray that does not hit a surface, or is totally reflected, becomes NaN.
     """
     index = 1.0
     for window in windows:
-        origin_c, normal = window.meet(origin_c, ray_c)
+        origin_c, normal = window.intersect(origin_c, ray_c)
         ray_c = _refract(ray_c, normal, index / window.index_beyond)
         index = window.index_beyond
     return origin_c, ray_c

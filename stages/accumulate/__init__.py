@@ -73,7 +73,7 @@ def accumulate_wall(
 
 def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
     radius_map = wall.radius_map
-    # Medians and means of some thousand rows are those of all.
+    # Medians and means of some thousand rows are close enough to those of all.
     some = slice(None, None, max(len(radius_map.distance_mm) // _REPORTED_ROWS, 1))
     radius, random = radius_map.radius_mm[some], radius_map.sigma_random_mm[some]
     context.report("wall points", len(wall.cloud.frame), "")

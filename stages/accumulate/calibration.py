@@ -1,4 +1,4 @@
-"""What the instrument's uncertainty does to the radius: common to all rings, it does not average away."""
+"""Effect of the instrument's uncertainty on the radius: common to all rings, it does not average away."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class CalibrationSpread:
 def calibration_spread(
     probe: Probe, rings: RingSamples, trajectory: Trajectory, survey: RingSurvey
 ) -> CalibrationSpread:
-    """Return what the instrument's uncertainty does to the radius, from some rings.
+    """Return the 1 σ of the radius from the instrument's uncertainty, computed for some rings.
 
     The first harmonic of each change is taken out, because the pipe's axis follows the rings' centres.
     """

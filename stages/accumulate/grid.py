@@ -112,8 +112,9 @@ def gridded(
 ) -> tuple[Float32, Float32, Int, Float32]:
     """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen.
 
-    The noise of single samples does not tell all: speckle is alike in neighbouring azimuths and each ring has
-    an error of its pose. What rings really differ by is measured from two maps, each of every other ring.
+    The noise of single samples is not the whole error: speckle is correlated between neighbouring azimuths,
+    and each ring has a pose error. The scatter of rings is therefore measured from two maps of every other
+    ring.
     """
     width = max(smoothing_mm, _WIDTH_IN_RINGS * _usual_spacing(columns))
     radius, sigma, count, misalignment = _map_of(columns, grid, width, largest_gap_mm)
@@ -145,7 +146,7 @@ def _map_of(
 
 
 def _excess(halves: list[tuple[Float32, Float32]]) -> np.float32:
-    """Return by how much two independent maps differ more than their σ says; at least 1."""
+    """Return the ratio of the difference of two independent maps to its stated σ; at least 1."""
     (a, sigma_a), (b, sigma_b) = halves
     ratio = np.abs(a - b) / np.hypot(sigma_a, sigma_b)
     ratio = ratio[np.isfinite(ratio)]
@@ -153,10 +154,10 @@ def _excess(halves: list[tuple[Float32, Float32]]) -> np.float32:
 
 
 def _roughness(radius: Float32, sigma: Float32) -> np.float32:
-    """Return by how much the map is rougher from cell to cell than its σ says; at least 1.
+    """Return the ratio of the map's roughness from cell to cell to its stated σ; at least 1.
 
-    Reflectance under the line displaces neighbouring rings alike, which no comparison of rings shows; what is
-    finer than a few cells cannot be told from it and counts as noise.
+    Reflectance under the line displaces neighbouring rings equally, so that comparing rings does not show it.
+    Relief finer than a few cells cannot be told from it and counts as noise.
     """
     filled = np.where(np.isfinite(radius), radius, np.nanmedian(radius))
     fine = radius - median_filter(filled, size=_FINE_CELLS, mode="nearest")

@@ -1,4 +1,4 @@
-"""A long wall made stretch by stretch, each from the rings that reach into it, so that memory stays flat."""
+"""A long wall computed stretch by stretch, each from the rings that reach into it, to bound the memory."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Stretch:
     from_row, to_row : int
         Rows worked out: its own rings lie on them whole.
     near : (n,) int
-        Rings that have a say in these rows.
+        Rings that contribute to these rows.
     own : (m,) int
         Rings whose middle lies on its own rows.
     """
@@ -79,7 +79,7 @@ def map_of(
 
 
 def empty_wall(grid: MapGrid, survey: RingSurvey, axis: PipeAxis, scratch: Scratch) -> Wall:
-    """Return room for a whole wall."""
+    """Return an empty wall of full size on scratch storage."""
     shape, points = (len(grid.distance_mm), len(grid.azimuth_rad)), int(survey.count.sum())
     single = np.float32
     radius, sigma, random, misalignment = (scratch.zeros(shape, single) for _ in range(4))

@@ -32,8 +32,8 @@ def centred(samples: WallSamples, shift: Float) -> WallSamples:
     return replace(samples, radius_mm=samples.radius_mm - along, xyz_p=samples.xyz_p - move)
 
 
-def slow(shift: Float) -> Float:
-    """Return the running median of shifts (F, 2), smoothed, so that a ring across a weld keeps its shape."""
+def smoothed_shift(shift: Float) -> Float:
+    """Return the smoothed running median of shifts (F, 2), so that a ring across a weld keeps its shape."""
     middle = median_filter(shift, size=(min(_RINGS, len(shift)), 1), mode="nearest")
     return np.asarray(uniform_filter1d(middle, _SMOOTH_RINGS, axis=0, mode="nearest"))
 
@@ -50,7 +50,7 @@ def first_harmonic(samples: WallSamples) -> Float:
     design = np.stack([np.cos(psi), np.sin(psi), np.ones_like(psi), np.cos(2 * psi), np.sin(2 * psi)], -1)
     usable = samples.valid.mean(1) > _FEWEST
     weight = samples.valid.astype(float)
-    ridge = 1e-6 * np.eye(design.shape[-1])  # a ring torn apart keeps a finite shape
+    ridge = 1e-6 * np.eye(design.shape[-1])  # keeps the solution finite for a ring with gaps
     shape = np.zeros((len(psi), design.shape[-1]))
     for _ in range(_ITERATIONS):
         weighted = design * weight[..., None]
@@ -104,11 +104,11 @@ def survey_of(rings: RingsOnWall) -> RingSurvey:
     parts = [_of(rings.samples(rows)) for rows in some_at_a_time(every)]
     harmonic, nearest, middle, farthest, count = (np.concatenate(p) for p in zip(*parts, strict=True))
     share = count / azimuths
-    return RingSurvey(slow(harmonic), nearest, middle, farthest, share, count.astype(np.int64))
+    return RingSurvey(smoothed_shift(harmonic), nearest, middle, farthest, share, count.astype(np.int64))
 
 
 def some_at_a_time(rows: Int) -> Iterator[Int]:
-    """Yield rows in batches that memory bears."""
+    """Yield rows in batches, to bound the memory."""
     for start in range(0, len(rows), _AT_ONCE):
         yield rows[start : start + _AT_ONCE]
 

@@ -13,12 +13,12 @@ from stages.mesh.surface import Surface
 
 # Decimation that removes less than a tenth of the triangles is not worth its time.
 _WORTHWHILE = 0.9
-_AGGRESSIVENESS = 5.0  # how fast dearer collapses are allowed: 7 errs 7 % more, 3 does not reach its goal
+_AGGRESSIVENESS = 5.0  # growth of the allowed collapse error: 7 errs 7 % more, 3 does not reach its goal
 
 
 @dataclass(frozen=True)
 class Decimated:
-    """A decimated surface and what it costs: largest and mean square distance of the original's vertices."""
+    """A decimated surface and its error: largest and mean square distance of the original's vertices."""
 
     surface: Surface
     original_faces: int

@@ -212,7 +212,7 @@ _Border = tuple[OpenMesh, Cut, Index]
 def _zipped(course: Course, first: _Border, second: _Border) -> tuple[OpenMesh, OpenMesh]:
     """Return both meshes with one sequence of vertices along the course."""
     mesh, cut, loop = second
-    back = loop[::-1]  # it runs against the course
+    back = loop[::-1]  # it runs opposite to the course
     at = _onward(course, mesh.vertex_p[cut.start[back]])
     knots, theirs = _knots(course, at)
     mine = np.searchsorted(knots, course.at_mm[:-1])

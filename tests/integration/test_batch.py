@@ -11,8 +11,8 @@ import time
 import pytest
 from typer.testing import CliRunner
 
-from pipeline.batch.cluster import LocalWorkers, RunningScheduler, endings, workers
-from pipeline.batch.runs import Ending, Work, ending_of, find_recordings, write_summary
+from pipeline.batch.cluster import LocalWorkers, RunningScheduler, outcomes, workers
+from pipeline.batch.runs import BatchOutcome, Work, find_recordings, outcome_of, write_summary
 from pipeline.cli import app
 from pipeline.errors import InputError
 from tests.bad_recordings import cut_sample
@@ -50,7 +50,7 @@ def test_a_lost_worker_loses_nothing(recordings, single, tmp_path):
         pids = list(client.run(os.getpid).values())
         kill = threading.Thread(target=lambda: (time.sleep(4), os.kill(pids[0], signal.SIGKILL)))
         kill.start()
-        ended = {e.name: e for e in endings(client, works)}
+        ended = {e.name: e for e in outcomes(client, works)}
         kill.join()
     assert {n: e.state for n, e in ended.items()} == {
         "one": "completed",
@@ -147,20 +147,20 @@ def test_a_scheduler_lost_is_told_and_the_batch_goes_on_later(recordings, single
 )
 def test_an_ending_is_that_of_this_call_not_of_an_earlier_one(tmp_path, code, told, record, expected):
     (tmp_path / "run.json").write_text(json.dumps(record))
-    ending = ending_of(Work("a", tmp_path, tmp_path, ()), code, told)
-    assert (ending.state, ending.problem) == expected
+    outcome = outcome_of(Work("a", tmp_path, tmp_path, ()), code, told)
+    assert (outcome.state, outcome.problem) == expected
 
 
 def test_a_summary_that_cannot_be_written_is_told(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
-        write_summary([Ending("a", "completed", "")], tmp_path / "file")
+        write_summary([BatchOutcome("a", "completed", "")], tmp_path / "file")
 
 
 def test_the_summary_tells_every_ending_in_the_order_of_names(tmp_path):
     made = [
-        Ending("b", "completed", "", (("defects", 3, ""),)),
-        Ending("<i>a</i>", "refused", "no <b>video</b>"),
+        BatchOutcome("b", "completed", "", (("defects", 3, ""),)),
+        BatchOutcome("<i>a</i>", "refused", "no <b>video</b>"),
     ]
     write_summary(made, tmp_path)
     told = json.loads((tmp_path / "batch.json").read_text())
@@ -175,15 +175,15 @@ def test_what_a_completed_run_warns_of_is_on_the_page(tmp_path):
     record = {"state": "completed", "problem": "", "warnings": ["motion: moved <6 σ>"],
               "reader_warnings": ["2 images are missing"]}  # fmt: skip
     (tmp_path / "run.json").write_text(json.dumps(record))
-    ending = ending_of(Work("a", tmp_path, tmp_path, ()), 0, "")
-    assert ending.warnings == ("2 images are missing", "motion: moved <6 σ>")
-    write_summary([ending, Ending("b", "completed", "")], tmp_path)
+    outcome = outcome_of(Work("a", tmp_path, tmp_path, ()), 0, "")
+    assert outcome.warnings == ("2 images are missing", "motion: moved <6 σ>")
+    write_summary([outcome, BatchOutcome("b", "completed", "")], tmp_path)
     runs = json.loads((tmp_path / "batch.json").read_text())["runs"]
-    assert [r["warnings"] for r in runs] == [list(ending.warnings), []]
+    assert [r["warnings"] for r in runs] == [list(outcome.warnings), []]
     page = (tmp_path / "batch.html").read_text()
     assert "1 with warnings" in page
     assert "<li>2 images are missing</li><li>motion: moved &lt;6 σ&gt;</li>" in page
-    write_summary([Ending("b", "completed", "")], tmp_path)
+    write_summary([BatchOutcome("b", "completed", "")], tmp_path)
     assert "with warnings" not in (tmp_path / "batch.html").read_text()
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.commands.follow import begun_anew, new_sections
+from pipeline.commands.follow import new_sections, restarted
 from pipeline.errors import Cancelled, InputError
-from pipeline.follow import Glimpse, glimpses
+from pipeline.follow import Snapshot, snapshots
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
@@ -101,21 +101,21 @@ def test_what_cannot_be_read_is_tried_again_until_the_recording_rests(
 ) -> None:
     """A drive that drops out, a file that the recorder is at: no end of following, but told at rest."""
     folder = copied(whole, tmp_path)
-    glimpse = Glimpse(open_recording(folder), "", resting=False)
+    snapshot = Snapshot(open_recording(folder), "", complete=False)
     spoil(folder / name)
-    assert new_sections(glimpse, None, -1) == ()
+    assert new_sections(snapshot, None, -1) == ()
     with pytest.raises(InputError, match=name):
-        new_sections(replace(glimpse, resting=True), None, -1)
+        new_sections(replace(snapshot, complete=True), None, -1)
 
 
 def test_a_recorder_that_starts_again_is_shown_from_its_start(whole: Path, tmp_path: Path) -> None:
     folder = copied(whole, tmp_path)
-    assert not begun_anew(Glimpse(open_recording(folder), "", resting=False), shown=20)
+    assert not restarted(Snapshot(open_recording(folder), "", complete=False), shown=20)
     cut_sample(tmp_path / "anew", frames=8)
     for file in (tmp_path / "anew").iterdir():
         shutil.copy(file, folder / file.name)
-    assert begun_anew(Glimpse(open_recording(folder), "", resting=False), shown=20)
-    assert not begun_anew(Glimpse(None, "not there", resting=False), shown=20)
+    assert restarted(Snapshot(open_recording(folder), "", complete=False), shown=20)
+    assert not restarted(Snapshot(None, "not there", complete=False), shown=20)
 
 
 def test_files_that_come_and_go_while_they_are_counted(tmp_path: Path) -> None:
@@ -131,7 +131,7 @@ def test_files_that_come_and_go_while_they_are_counted(tmp_path: Path) -> None:
     writer = threading.Thread(target=come_and_go)
     writer.start()
     try:
-        seen = glimpses(tmp_path, 60.0, 0.0, threading.Event())
+        seen = snapshots(tmp_path, 60.0, 0.0, threading.Event())
         assert all(next(seen).recording is None for _ in range(100))
     finally:
         stop.set()
@@ -139,8 +139,8 @@ def test_files_that_come_and_go_while_they_are_counted(tmp_path: Path) -> None:
 
 
 def test_what_is_not_there_yet_is_waited_for_and_told_at_rest(tmp_path: Path) -> None:
-    seen = list(glimpses(tmp_path / "none", 0.2, 0.05, threading.Event()))
-    assert [g.resting for g in seen] == [False, True]
+    seen = list(snapshots(tmp_path / "none", 0.2, 0.05, threading.Event()))
+    assert [g.complete for g in seen] == [False, True]
     assert all(g.recording is None and g.problem for g in seen)
 
 
@@ -148,4 +148,4 @@ def test_a_wish_to_stop_is_heard(tmp_path: Path) -> None:
     wish = threading.Event()
     wish.set()
     with pytest.raises(Cancelled):
-        next(glimpses(tmp_path, 1.0, 0.05, wish))
+        next(snapshots(tmp_path, 1.0, 0.05, wish))

@@ -12,7 +12,7 @@ from stages.diagnose.travel.jump import jump_of_reading, reading_jump
 from stages.diagnose.travel.lines import find_lines
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, fitted
 from stages.diagnose.travel.parts import second_predictions
-from stages.diagnose.travel.swings import swings_again
+from stages.diagnose.travel.swings import swing_agreements
 from stages.diagnose.travel.turns import turns_between
 from tests.travel_cases import read, seen, way
 
@@ -106,7 +106,7 @@ def swing(frequency: float) -> Float:
 
 def halves(places: Float) -> list[bool]:
     noise = 0.003 * np.random.default_rng(6).standard_normal((len(TIME_S), 2))
-    return [a.confirmation.agrees for a in swings_again(TIME_S, places + noise, LIT, 5.3)]
+    return [a.confirmation.agrees for a in swing_agreements(TIME_S, places + noise, LIT, 5.3)]
 
 
 def test_a_vibration_goes_on_in_step_in_both_halves_and_both_kinds_of_pictures() -> None:

@@ -20,7 +20,7 @@ EFFECT_FUNCTIONS: Mapping[str, EffectFunction] = MappingProxyType(
 
 
 def switch_on(truth: SceneTruth, switches: Sequence[Switch]) -> SceneTruth:
-    """Return the truth with effects switched on, whatever their order in the order of the catalogue.
+    """Return the truth with effects applied in the order of the catalogue, whatever order they are given in.
 
     Raises
     ------

@@ -13,13 +13,13 @@ from pipeline.simulator.truth import SceneTruth, cartesian, with_camera
 
 @dataclass(frozen=True)
 class Warming:
-    """Something goes over to its final state by 1 − exp(−(t − start)/t₀)."""
+    """An exponential approach to a final state: 1 − exp(−(t − start)/t₀)."""
 
     time_constant_s: float
     start_s: float
 
     def share(self, time_s: float) -> float:
-        """Return how much of the way is gone; none before the start."""
+        """Return the share of the final change that is reached at a time; 0 before the start."""
         return -math.expm1(-max(time_s - self.start_s, 0.0) / self.time_constant_s)
 
 
@@ -105,7 +105,7 @@ def rolling_shutter(truth: SceneTruth, readout_s: float) -> SceneTruth:
 
 
 def motion_blur(truth: SceneTruth, exposure_s: float) -> SceneTruth:
-    """Expose longer than stated, light gathered being the same; half of it after the frame's time."""
+    """Expose longer than stated with the same light in all; a frame's time is the exposure's middle."""
     shutter = truth.instrument.shutter
     longer = replace(shutter, exposure_s=shutter.exposure_s + exposure_s)
     moments = max(truth.rendering.time_samples, _BLUR_MOMENTS)
@@ -114,18 +114,18 @@ def motion_blur(truth: SceneTruth, exposure_s: float) -> SceneTruth:
 
 
 def baseline_drift(truth: SceneTruth, drift_mm: float, time_s: float) -> SceneTruth:
-    """Let the holder between camera and laser warm up."""
+    """Change the baseline while the holder between camera and laser warms up."""
     change = BaselineDrift(drift_mm, _warming(truth, time_s))
     return replace(truth, changes=(*truth.changes, change))
 
 
 def focal_drift(truth: SceneTruth, relative: float, time_s: float) -> SceneTruth:
-    """Let the lens warm up."""
+    """Change the focal length while the lens warms up."""
     return replace(truth, changes=(*truth.changes, FocalDrift(relative, _warming(truth, time_s))))
 
 
 def centre_drift(truth: SceneTruth, shift_px: float, direction_deg: float, time_s: float) -> SceneTruth:
-    """Let the sensor's holder warm up."""
+    """Move the optical axis in the image while the sensor's holder warms up."""
     change = CentreDrift(shift_px, direction_deg, _warming(truth, time_s))
     return replace(truth, changes=(*truth.changes, change))
 

@@ -50,7 +50,7 @@ def baseline(truth: SceneTruth, baseline_mm: float) -> SceneTruth:
 
 
 def beam_decentre(truth: SceneTruth, height_mm: float, direction_deg: float) -> SceneTruth:
-    """Let the beam meet the cone mirror beside its tip: height and brightness vary around the ring.
+    """Let the beam hit the cone mirror beside its tip: height and brightness vary around the ring.
 
     A 45° cone turns a decentre h into a height h cos(ψ − ψ₀). Of a Gaussian beam of 1/e² radius w it sends
     a share 1 + √(2π) (h/w) cos(ψ − ψ₀) towards ψ, to first order.

@@ -1,4 +1,4 @@
-"""Effects on the line's light: its profile, where it goes astray, and what the sensor makes of it."""
+"""Effects on the line's light: its profile, light on wrong paths, and the sensor's response."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _LINE_REFERENCE_MM = 50.0
 
 
 def albedo_bias(truth: SceneTruth, line_sigma_mm: float) -> SceneTruth:
-    """Make the line as wide as said: the wall's reflectance pulls a wide line's centroid."""
+    """Set the line's width: changes of the wall's reflectance pull the centroid of a wide line."""
     profile = replace(truth.instrument.laser.profile, sigma_mm=max(line_sigma_mm, 1e-3))
     return with_laser(truth, profile=profile)
 
 
 def slope_bias(truth: SceneTruth, gloss: float) -> SceneTruth:
-    """Make the wall glossy: slopes of its relief shine."""
+    """Make the wall glossy, so that slopes of its relief reflect towards the camera."""
     return replace(truth, wall=replace(truth.wall, gloss=gloss))
 
 

@@ -63,20 +63,20 @@ def encoder_scale(truth: SceneTruth, relative: float) -> SceneTruth:
 
 
 def encoder_slip(truth: SceneTruth, slip_mm: float, time_s: float) -> SceneTruth:
-    """Let the reading gain a distance at a moment after the first frame."""
+    """Add a distance to all readings from a time after the first frame on."""
     odometer = require_odometer(truth, "encoder_slip")
     slip = Slip(float(truth.frames.time_s[0]) + time_s, slip_mm)
     return with_odometer(truth, "encoder_slip", slips=(*odometer.slips, slip))
 
 
 def encoder_backlash(truth: SceneTruth, backlash_mm: float) -> SceneTruth:
-    """Give the encoder play, which it runs through at a reversal."""
+    """Give the encoder play, which is taken up at each reversal before the reading follows."""
     before = require_odometer(truth, "encoder_backlash").backlash_mm
     return with_odometer(truth, "encoder_backlash", backlash_mm=before + backlash_mm)
 
 
 def time_offset(truth: SceneTruth, delay_s: float) -> SceneTruth:
-    """Let the encoder tell late."""
+    """Delay the encoder's readings."""
     before = require_odometer(truth, "time_offset").delay_s
     return with_odometer(truth, "time_offset", delay_s=before + delay_s)
 

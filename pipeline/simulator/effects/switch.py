@@ -1,4 +1,4 @@
-"""An effect switched on: its name and its quantities, as text, as YAML and as truth lists it.
+"""An effect with its sizes, and how it is written on the command line, in YAML and in the truth.
 
 The text is ``NAME`` alone for the typical size, or ``NAME=VALUE`` followed by any of
 
@@ -73,7 +73,7 @@ class Switch:
 
     @property
     def truth(self) -> list[object]:
-        """``[name, [values...]]``, as the truth of a recording lists it."""
+        """``[name, [values...]]``, as truth.json contains it."""
         return [self.name, list(self.values)]
 
 

@@ -1,9 +1,10 @@
 """Effects of windows and media: refracting surfaces put before camera and laser, traced by Snell's law.
 
-A tube returns to air behind it, so surfaces add in any order; the medium outside comes last. Surfaces are
-met on a ray's line, also behind its last point: a tube whose outer surface lies within its inner one is the
-exact inverse of glass. Thus a wedge is what a tube has beyond the tube that the probe was calibrated in, and
-a tilt sets a tilted tube in place of the straight one.
+Behind a tube there is air again, so that tubes may be added in any order; the medium outside comes last. A
+ray is intersected with each surface on its whole line, also behind its last point, so that a tube whose outer
+surface lies inside its inner one is the exact inverse of glass. A wedge is therefore modelled as the
+difference from the straight tube that the probe was calibrated in, and a tilt as a tilted tube in place of
+the straight one.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ _AIR = 1.0
 
 
 def housing_glass(truth: SceneTruth, thickness_mm: float) -> SceneTruth:
-    """Put camera and laser into a coaxial glass tube that nobody stated."""
+    """Put camera and laser into a coaxial glass tube that the stated probe does not have."""
     inner = CylinderWindow(TUBE_OUTER_RADIUS_MM - thickness_mm, GLASS_INDEX)
     return _with_windows(truth, (inner, CylinderWindow(TUBE_OUTER_RADIUS_MM, _AIR)))
 

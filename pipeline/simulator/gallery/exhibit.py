@@ -82,7 +82,7 @@ def expected_px(truth: SceneTruth) -> float:
 
 # Directions around the ring, 2° apart: the catalogue's highest harmonic, 6, has 30 of them a wave.
 AZIMUTHS = 180
-# Less than a third of a micrometre around the ring is the rendering's own error.
+# Radius errors below a third of a micrometre are the rendering's own.
 NOTHING_MM = 3e-4
 # Channel of the laser's light in BGR pictures: the stated wavelength is green (520 nm).
 _GREEN = 1

@@ -1,4 +1,4 @@
-"""How alike effects look: the angle between what they do to the ring, or else to the line or the odometer."""
+"""Similarity of effects: the angle between their patterns on the ring, or else on line or odometer."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _COMPANIONS = {
 
 
 def surroundings(name: str) -> str:
-    """Return in words what the bench is dressed with to show an effect; empty for the plain bench."""
+    """Return in words what is added to the bench to show an effect; empty for the plain bench."""
     if name in _SHAKEN:
         return f"the camera moves at {_RATE_MM_S:.1f} mm/s to the lower right"
     if name in _ROUGH:
@@ -47,7 +47,7 @@ def surroundings(name: str) -> str:
 
 
 def scene_pair(switch: Switch, radius_mm: float) -> tuple[SceneTruth, SceneTruth]:
-    """Return the scene without and with an effect, at the moment when it is largest or typical."""
+    """Return the scene without and with an effect at a time when the effect is largest or typical."""
     base = _exposed(bench_truth(radius_mm, image_size=(SIDE_PX, SIDE_PX)))
     if switch.name in _ROUGH:
         base = replace(base, wall=_rough_wall(radius_mm))
@@ -96,7 +96,7 @@ _SPEED_MM_S, _LEG_S = 15.0, 4.0
 
 @dataclass(frozen=True)
 class Course:
-    """Something over time: ``time_s`` (N,), ``value_mm`` (N,) and what it is."""
+    """A quantity over time: ``time_s`` (N,), ``value_mm`` (N,), and its name."""
 
     time_s: Float
     value_mm: Float
@@ -125,7 +125,7 @@ def _of_ring(switch: Switch, time_s: Float) -> Course:
 
 
 def _against_encoder(switch: Switch) -> Course:
-    """Return true less read distance on a way forth, at rest, forth faster and back."""
+    """Return true minus read distance: the probe goes forward, rests, goes forward faster, and returns."""
     truth = switch_on(_driven(), [switch])
     encoder = truth.encoder()
     if encoder is None:

@@ -1,4 +1,4 @@
-"""Whether an effect exceeds the noise floor at all: the line without noise, and the odometer, both ways."""
+"""Whether each effect exceeds the noise floor: line and odometer are computed with and without it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the wall reflects: texture or a photograph, stains, and what defects and welds leave."""
+"""The wall's reflectance: texture or a photograph, stains, and traces of defects and welds."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def bare_wall(grid: Grid, surface: Surface, seeds: Seeds) -> Float32:
     if surface.mottle > 0:
         longest = surface.mottle_longest_mm
         grey += surface.mottle * field(grid, seeds.of("mottle"), longest_mm=longest, slope=0.7)
-    # a relative texture must not turn negative: its logarithm is what is Gaussian
+    # the logarithm of the texture is Gaussian, so that reflectance cannot become negative
     shade = surface.albedo * np.exp(grey - grey.var() / 2)
     return np.asarray(shade[..., None] * np.array(surface.tint, np.float32), np.float32)
 

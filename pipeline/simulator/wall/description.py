@@ -1,4 +1,4 @@
-"""What a scene says of its pipe; every length in mm, every angle in degrees."""
+"""The pipe's section of a scene file; every length in mm, every angle in degrees."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@ from pipeline.simulator.wall.grid import Grid
 
 @dataclass(frozen=True)
 class Seeds:
-    """Hands out generators; ``seed`` is the scene's."""
+    """Random generators by purpose; ``seed`` is the scene's."""
 
     seed: int
 
     def of(self, purpose: str, index: int = 0) -> np.random.Generator:
-        """Return the generator of a purpose; the same every time it is asked for."""
+        """Return a new generator of a purpose, in the same state at every call."""
         return np.random.default_rng([self.seed, zlib.crc32(purpose.encode()), index])
 
 

@@ -1,4 +1,4 @@
-"""The figures that a proof is held to, with their goals and intervals, as rows of one table."""
+"""The scores of a proof with their goals and intervals, as rows of one table."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from stages.diagnose.drill.score import Rate, Scores, Trial, score
 
-# Each figure of `Scores`, what it says and what it is held to; an empty goal: told only.
+# Each figure of `Scores`, its meaning and its goal; figures without a goal are only reported.
 _RATES: tuple[tuple[str, str, str], ...] = (
     ("false_alarms", "False alarms where nothing is hidden", "0"),
     ("detected", "Detected at SNR ≥ 8", "≥ 99 %"),

@@ -1,4 +1,4 @@
-"""How good diagnoses are: rates with their intervals, sizes, probabilities, and the confusion of names."""
+"""Scores of diagnoses: rates with their intervals, sizes, probabilities, and the confusion of names."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def score(trials: Iterable[Trial]) -> Scores:
     listed = list(trials)
     null = [t for t in listed if not t.concealed]
     known = [t for t in listed if t.concealed and not t.truth & set(t.left_out)]
-    # What no oracle would see cannot be called unknown either.
+    # An effect too small even for an oracle cannot be expected to be called unexplained.
     unknown = [t for t in listed if t.truth & set(t.left_out) and (t.snr is None or t.snr >= SNR)]
     single = [t for t in known if len(t.concealed) == 1]
     found = [t for t in single if t.found]

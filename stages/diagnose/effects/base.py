@@ -1,4 +1,4 @@
-"""What an effect must tell: by how much it moves each kind of measurement.
+"""Interface of an effect: by how much it moves each kind of measurement.
 
 An effect has *amplitudes*, in which predictions are linear near zero (Cartesian where the effect has a
 direction), and a *shape* (frequency, time constant, order) that is searched on a grid. All predictions are

@@ -58,7 +58,8 @@ class SensorTilt(Directed):
 
     name = "sensor_tilt"
     amplitudes = along_x_and_y(name, 5e-4)
-    # Drawn ones are sized 4 to 8 % small, though the law holds to 0.3 %: why is not known.
+    # In drawn cases this effect is estimated 4 to 8 % too small, although its law holds to 0.3 %. The
+    # reason is not known; the value covers the difference. Debt: data/debts.md.
     law_sigma = 0.06
     words = (
         "The sensor is tilted or the lenses are decentred: p = {p:.2e} beyond the stated, toward "
@@ -106,7 +107,7 @@ class PupilShift(Scalar):
 
 
 class RollingShutter(Scalar):
-    """Rows are exposed one after another; a row's time counts from the middle row's."""
+    """Rows are exposed one after another; the time of a row is counted from that of the middle row."""
 
     name = "rolling_shutter"
     amplitudes = one(name, 0.01)
@@ -166,7 +167,8 @@ class PixelLocking(Scalar):
 
     name = "pixel_locking"
     amplitudes = one(name, 0.02)
-    # The bins of a gauge's rings average over a part of the wave: drawn ones come out at half their size.
+    # The bins of a gauge's rings average over part of the wave: drawn cases are estimated at half their size.
+    # Debt: data/debts.md.
     law_sigma = 0.6
     words = "The line is found off by {amplitude_px:+.3f} px × sin 2πρ, with its image radius ρ in px."
 

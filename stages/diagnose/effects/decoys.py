@@ -1,6 +1,6 @@
-"""What is no physics but as flexible as physics: patterns that a true effect must beat before it is named.
+"""Decoys: patterns without physics but as flexible, which a true effect must beat before it is named.
 
-Drawn once and for all, so that they are the same in every diagnosis.
+They are drawn with a fixed seed, so that they are the same in every diagnosis.
 """
 
 from __future__ import annotations

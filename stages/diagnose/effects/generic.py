@@ -180,5 +180,5 @@ def _vocabulary() -> tuple[tuple[EffectModel, Shape], ...]:
     return (*moving, *wall, (RowTerm(), STEADY), (FractionTerm(), STEADY))
 
 
-# What an empirical formula is put together from: patterns in (r, ψ, t, s, speed, row).
+# The patterns that an empirical formula is made of, in (r, ψ, t, s, speed, row).
 VOCABULARY: tuple[tuple[EffectModel, Shape], ...] = _vocabulary()

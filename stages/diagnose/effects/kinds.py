@@ -49,7 +49,7 @@ class Drifting(Worded):
     static: EffectModel
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return time constants from a step at the start to what is a straight line in this recording."""
+        """Return time constants from the shortest, a step at the start, to the longest, a straight line."""
         parts = np.array([0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4])
         return _within(effect(self.name).quantity("time_s"), duration_s * parts)
 
@@ -62,12 +62,12 @@ class Drifting(Worded):
         return np.asarray(-np.expm1(-time_s / shape[0]))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the static shift as far as it has come up."""
+        """Return the static shift times the share of its final size that is reached."""
         static = self.static.image_shift_px(points, (), amplitude)
         return np.asarray(self.course(points.time_s, shape)[:, None] * static)
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the static shift as far as it has come up."""
+        """Return the static shift times the share of its final size that is reached."""
         return np.asarray(
             self.course(points.time_s, shape) * self.static.sheet_shift_mm(points, (), amplitude)
         )
@@ -100,7 +100,7 @@ class Periodic(Worded):
         return _within(effect(self.name).quantity("frequency_hz"), frequencies)
 
     def shape_step(self, shape: Shape) -> float:
-        """Return a frequency that some seconds of recording tell from none."""
+        """Return the step of the frequency: the resolution of the recording's duration."""
         return 0.05
 
     def size_at(self, time_s: Float, shape: Shape, amplitude: Float) -> Float:
@@ -117,7 +117,7 @@ class Periodic(Worded):
         return self.moved_mm(points, self.size_at(points.time_s, shape, amplitude))
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return half the longer axis of the ellipse that is run through, its direction and the frequency."""
+        """Return the ellipse's longer half axis, its direction, and the frequency."""
         axes, size, _ = np.linalg.svd(np.asarray(amplitude).reshape(2, 2).T)
         return {
             effect(self.name).quantities[0].name: float(size[0]),

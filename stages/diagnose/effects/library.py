@@ -1,4 +1,4 @@
-"""All effects whose mark on positions or readings is predicted, by name."""
+"""All effects whose influence on positions or readings can be predicted, by name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stages.diagnose.effects.window import WINDOW_MODELS
 _MODELS = (*LASER_MODELS, *CAMERA_MODELS, *WINDOW_MODELS, *POSE_MODELS, *PHOTOMETRIC_MODELS)
 LIBRARY: Mapping[str, EffectModel] = MappingProxyType({model.name: model for model in _MODELS})
 
-# Effects of the catalogue that move no position in a way that can be told beforehand, and why.
+# Effects of the catalogue whose influence on positions cannot be predicted, and why.
 NOT_PREDICTED: Mapping[str, str] = MappingProxyType({
     "slope_bias": "needs the wall's slope and gloss everywhere: told by the profile's skewness and glints",
     "ghost_ring": "a second peak, which a profile shows; its pull on the line depends on the estimator",

@@ -1,4 +1,4 @@
-"""Patterns that are in no catalogue: what decoys and the generic basis have in common."""
+"""Patterns without a known cause: what decoys and the generic basis have in common."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Nameless(EffectModel):
         return f"A pattern without a known cause: {self.equation(shape, amplitude)}."
 
     def possible(self, shape: Shape, amplitude: Float) -> bool:
-        """Return True: nothing bounds what has no cause."""
+        """Return True: a pattern without a cause has no bounds."""
         return True
 
 

@@ -1,4 +1,4 @@
-"""Effects on the line's light, as far as they move its centroid in a way that can be told beforehand."""
+"""Effects on the line's light, as far as the shift of its centroid can be predicted."""
 
 from __future__ import annotations
 

@@ -129,7 +129,7 @@ class EncoderBacklash(Scalar):
 
 
 class TimeOffset(Scalar):
-    """The encoder tells where the probe was a little earlier."""
+    """The encoder's readings are late: they state where the probe was a little earlier."""
 
     name = "time_offset"
     amplitudes = one(name, 0.02)

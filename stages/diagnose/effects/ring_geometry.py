@@ -1,4 +1,4 @@
-"""How the laser's line on the wall, and its image, answer to moves of the sheet and of the wall."""
+"""How the laser's line on the wall and its image move when the sheet or the wall moves."""
 
 from __future__ import annotations
 

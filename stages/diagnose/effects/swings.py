@@ -1,4 +1,4 @@
-"""Swings without a cause: patterns of the line at one frequency; a rocking laser is the known case."""
+"""Oscillations without a known cause: patterns of the line at one frequency, as of a rocking laser."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SwingTerm(Nameless):
         return tuple((float(f),) for f in np.arange(2 * step, frame_rate / 2 + step / 2, step))
 
     def shape_step(self, shape: Shape) -> float:
-        """Return a frequency that some seconds of recording tell from none."""
+        """Return the step of the frequency: the resolution of the recording's duration."""
         return 0.05
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:

@@ -17,7 +17,7 @@ from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.system import field_system
 from stages.diagnose.residual import RingResidual
 
-# Rings count so little less that poses and wall are those of the texture.
+# Factor on the rings' σ, so large that texture alone determines poses and wall.
 _RELAXED = 1e3
 _OUTLIER = 0.1
 

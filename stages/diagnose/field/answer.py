@@ -1,4 +1,4 @@
-"""What a field recording comes to by itself: a class of effects, never one name."""
+"""The answer of a field recording by itself: a class of effects, never one name."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.inference import Score, Stated, places_of, score
 from stages.diagnose.result import Location
 
-# Below this chance, corrected for all that was tried, something is there.
+# Something was left out when its probability by chance, corrected for all tried, is below this.
+# Debt: data/debts.md.
 DETECTED = 1e-4
-# Effects that explain almost as much as the best are not told from it: laws are good to a few per cent, and
-# what the recording's own unknowns take up differs little from one to the next.
+# Effects that explain almost as much as the best belong to its class: laws err by a few per cent, and the
+# recording's own unknowns absorb nearly the same of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0
 _SHOWN = 4
 

@@ -1,4 +1,4 @@
-"""Whether a field recording bears out an effect that the gauge names."""
+"""Whether a field recording confirms an effect that the gauge names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
-# The field tells something only when it knows the effect to this part of its size.
+# The field confirms or contradicts only when its 1 σ is below this share of the effect's size.
+# Debt: data/debts.md.
 _TELLING = 0.33
 
 

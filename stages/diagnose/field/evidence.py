@@ -1,4 +1,4 @@
-"""What a field recording says of left-out physics, and whether it bears out what the gauge says."""
+"""Evidence of left-out physics in a field recording, and whether it confirms the gauge's findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a field recording adds to the answer: it bears out the gauge, contradicts it, or speaks alone."""
+"""How a field recording changes the answer: it confirms the gauge, contradicts it, or stands alone."""
 
 from __future__ import annotations
 

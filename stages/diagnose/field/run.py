@@ -70,7 +70,7 @@ def field_run(
 ) -> FieldRun:
     """Measure rings and texture of a recording and adjust poses, pipe and wall to them.
 
-    The encoder has no say, so that it can be compared with what is seen.
+    The encoder is not used, so that it can be compared with the visual distance.
 
     Raises
     ------

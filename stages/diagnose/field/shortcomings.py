@@ -10,7 +10,7 @@ from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.evidence import ChannelEvidence, Evidence
 from stages.diagnose.field.run import FieldRun
 
-# Pipes are made to about 1 % of their diameter.
+# Relative error of a nominal diameter: pipes are made to about 1 %, of which this is 3 σ.
 _DIAMETER_SHARE = 0.03
 _SHORTEST_MM = 40.0
 _LOST_SHARE = 0.25

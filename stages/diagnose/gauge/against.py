@@ -15,7 +15,8 @@ from stages.diagnose.gauge.points import ring_points
 from stages.diagnose.gauge.run import GaugeRun, Term, ring_mm_per_px
 from stages.diagnose.residual import RingResidual
 
-# Rings weigh so little that fiducials place the probe, and enough that they size the effects.
+# Factor on the rings' weight: so small that fiducials determine the poses, and large enough for rings to size
+# the effects. Debt: data/debts.md.
 _RELAXED = 1e-4
 _OUTLIER = 0.1
 # Poses are carried over so many frames at most.

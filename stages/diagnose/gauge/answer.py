@@ -9,8 +9,8 @@ from stages.diagnose.gauge.examine import ADEQUATE, Examined
 from stages.diagnose.gauge.sizes import quantities
 from stages.diagnose.result import Candidate, EffectFound, Picture, Verdict
 
-# Likelihoods know nothing of laws that are a little off, or of how an image forms: odds of 1000 to 1 are
-# asked where 30 to 1 would do (a drawn focal length was called a cone at 0.99).
+# Likelihoods do not contain the small errors of laws and of image formation, so that odds of 1000 to 1 are
+# asked for instead of 30 to 1: a drawn focal length was once called a cone at 0.99. Debt: data/debts.md.
 CONFIDENT = 0.999
 _IN_CLASS = 0.01
 
@@ -95,6 +95,6 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.UNEXPLAINED
     sure = all(verdicts.chance_of(n) > CONFIDENT for n in best.names)
     confirmed = all(each for each in examined.confirmed)
-    # One of several that is contradicted is not what it is taken for; the others stand.
+    # An effect that is contradicted by the field is withdrawn; the others stay.
     doubted = any(contradicted) or bool(examined.unsplit)
     return Verdict.NAMED if sure and confirmed and not doubted else Verdict.CLASS

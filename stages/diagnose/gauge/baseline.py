@@ -1,4 +1,4 @@
-"""What ordinary image formation leaves in the measurements: smooth patterns of a hundredth of a pixel.
+"""Errors of ordinary image formation in the measurements: smooth patterns of a hundredth of a pixel.
 
 Compression, clipped peaks and line width over texture move rings and edges by about that much (shared notes
 on the recordings). They are unknowns of the recording, so that no effect is seen in what is only baseline.

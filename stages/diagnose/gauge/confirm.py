@@ -19,7 +19,7 @@ from stages.diagnose.inference import Stated, estimate
 from stages.diagnose.result import Confirmation
 
 # Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is
-# compared some five times over, and noise is to contradict it once in a thousand.
+# compared about five times, and noise may contradict it once in a thousand times.
 _AGREE = 2e-4
 _LEAST_FRAMES = 8
 

@@ -21,7 +21,7 @@ from pipeline.arrays import Bool, Float, Int
 POSE = 6
 RING, EDGE, ENCODER = 0, 1, 2
 _REACH = 4
-# A pose that nothing holds keeps its place, by this part of the best known one's information.
+# Information, relative to that of the best determined pose, that keeps an undetermined pose in its place.
 _HOLD = 1e-10
 
 

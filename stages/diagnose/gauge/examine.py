@@ -26,9 +26,10 @@ from stages.diagnose.gauge.sizes import Sized, sizes_of
 from stages.diagnose.inference import Stated, stated_belief
 from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
-# A gauge is straight and round: what only a pipe does is not asked about.
+# A gauge is straight and round, so that effects of the pipe's own shape are not tested.
 OF_A_PIPE = frozenset({"ovality", "pipe_bend"})
-# What a fit leaves must be no rarer than this when only noise is left.
+# A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
+# data/debts.md.
 ADEQUATE = 1e-5
 
 
@@ -102,7 +103,7 @@ def examine(
             table = feasibility(about, shapes, library, stated)
             groups = inseparable(table, about, shapes, library, stated)
             searched = search(measurements, nothing, library, stated)
-            # What the library does not know moves rings and fiducials all the same.
+            # Effects that the library lacks move rings and fiducials as well.
             beyond = patterns_p(searched.run, searched.nothing, stated)
             seen = Examined(searched, None, (), table, groups, patterns_p=beyond)
             if seen.global_p > DETECTED:

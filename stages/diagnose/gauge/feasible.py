@@ -1,4 +1,4 @@
-"""What a gauge run could show and what it could not tell apart, from its motion and bores alone.
+"""Which effects a gauge run can show and which it cannot tell apart, from its motion and bores alone.
 
 Only the information matrix is used, poses and the stated uncertainties taken out; the scores, which hold the
 residuals, are not looked at.
@@ -21,7 +21,7 @@ from stages.diagnose.inference import Stated, eliminated, instrument_places, pla
 from stages.diagnose.result import Feasible
 
 _SIGMAS = 5.0
-# Twice the log of the expected Bayes factor above which two effects are told apart.
+# Twice the logarithm of the expected Bayes factor (1000 to 1) from which two effects count as told apart.
 APART = 14.0
 _NEAR = 0.5
 

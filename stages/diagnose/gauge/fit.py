@@ -28,14 +28,15 @@ from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
 from stages.diagnose.inference import instrument_information
 
 _CONVERGED = 0.5
-# mm and rad: a pose's step squared, over the distance of the wall, is far below what a ring shows.
+# Step of a pose, mm and rad, below which it is still: its square over the distance of the wall is far below
+# what a ring can resolve.
 _STILL = 1e-3
 _PARTS = (1.0, 0.5, 0.2, 0.05)
 _ITERATIONS = 8
 _DELAY_SIGMA_S = 0.002
 _PLACEMENT_SIGMA_MM = 0.05
 _LEAST_BORE_SIGMA_MM = 1e-3
-# An effect may be many times its plausible size; the data say how large it is.
+# Prior 1 σ of an effect in plausible sizes: wide, so that the data determine the size. Debt: data/debts.md.
 _WIDE = 100.0
 
 

@@ -31,11 +31,13 @@ from stages.diagnose.inference import (
 )
 
 _MOST_TERMS = 4
-# A further term must be rarer than this by chance, corrected for all that were tried.
+# A further term is added when its probability by chance, corrected for all tried, is below this.
+# Debt: data/debts.md.
 _NEEDED = 1e-4
-# Laws are exact to a few tenths of a percent, and large patterns are seen far sharper than that.
+# Relative error of laws: large patterns are measured far more exactly than laws predict. Debt: data/debts.md.
 _SAME = 0.02
-# Directions seen less sharply than this part of the sharpest tell nothing of adequacy.
+# Directions with less information than this share of the best one are left out of the test of adequacy.
+# Debt: data/debts.md.
 _WEAK = 1e-3
 
 
@@ -70,7 +72,7 @@ def patterns_p(run: GaugeRun, nothing: Fit, stated: Stated) -> float:
 def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
     """Return whether a formula's pattern is, to within the accuracy of laws, one that the named effects make.
 
-    It is then those effects' own description, not a rival, however much of the noise it takes up besides.
+    Such a pattern describes those effects and is not a rival, even if it fits some of the noise besides.
     """
     terms = freed(run, named).terms
     equations = linearise(run, named.state, terms, [(t.model, t.shape) for t in formula.terms]).equations

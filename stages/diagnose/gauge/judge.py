@@ -24,8 +24,9 @@ from stages.diagnose.inference import PRIOR_PLAUSIBLE, Stated, estimate
 
 _STRETCHES = 2
 _LEAST_FRAMES = 8
-# Beforehand: each effect of the library is as likely as any other. A pattern without a cause that fits as
-# well as a law may be that very law, so that it counts little; whether a law is enough is tested apart.
+# Prior: all effects of the library are equally likely. A pattern without a cause that fits as well as a law
+# may be that law, so that it is given a fiftieth; whether a law suffices is tested separately. Debt:
+# data/debts.md.
 _NAMELESS = 1 / 50
 _PEAK = 2
 
@@ -133,7 +134,7 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     judged = [judged_of(run, f, regimes, stated, alike, beforehand(run, f, len(library))) for f in fits]
     of_formula = next(j for j in judged if j.fit is formula) if formula.terms else judged[0]
     nothing = next(j for j in judged if not j.fit.terms)
-    # What predicts other regimes worse than the stated instrument does explains nothing.
+    # A hypothesis that predicts held-out regimes worse than the stated instrument is discarded.
     allowed = np.array([j.heldout <= nothing.heldout for j in judged])
     total_surprise = np.array([j.surprise + j.beforehand for j in judged])
     allowed &= ~_redundant(run, judged, of_formula, total_surprise)

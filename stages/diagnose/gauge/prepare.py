@@ -20,9 +20,10 @@ from stages.diagnose.gauge.points import bin_widths
 from stages.diagnose.gauge.run import GaugeRun, Term, linearise
 
 _CAUCHY = 2.5
-# Jerk is not the same all along a run: what is learned as typical must not hold poses where it is larger.
+# Factor on the typical jerk: it varies along a run, and the prior must not hold poses where it is larger.
+# Debt: data/debts.md.
 _LOOSER = 5.0
-# The camera is let free while outliers are told from effects.
+# The camera's parameters are free while outliers are separated from effects.
 _FREE = GaugeParameters.model_validate(
     {
         "camera_prior_scale": 50.0,

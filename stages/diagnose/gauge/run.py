@@ -33,7 +33,7 @@ from stages.diagnose.gauge.points import edge_points, ring_points, speed_along
 _ROUNDS = 2
 _FAR_PX = 1.0
 _ENCODER_SIGMA_MM = 1.0
-# Encoder readings this many frames apart err apart.
+# Encoder readings this many frames apart are taken as independent. Debt: data/debts.md.
 _ENCODER_CELL = 8
 
 
@@ -121,7 +121,7 @@ def _baseline(edges: Edges, edge_at: ImagePoints, ring_at: ImagePoints, parts: S
     # The residual of a ring falls with its outward shift by the millimetres of a pixel.
     on_rings = -ring_mm_per_px(ring_at)[:, None] * ring_baseline(ring_at)
     count = len(parts[2].residual) if len(parts) > 2 else 0
-    # A point on the rim of what the camera model covers has no slope; it is asked nothing.
+    # At the edge of the camera model's domain the derivative does not exist; such points are left out.
     return np.nan_to_num(block_diag(on_edges, on_rings, np.zeros((count, 0))), posinf=0.0, neginf=0.0)
 
 
@@ -248,7 +248,7 @@ def _encoder_part(
     shift += [reading_columns(model, travel, shape) for model, shape in asked]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
     cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
-    # Loosely: what the encoder says is a matter of its own, and a slip must not move the poses.
+    # The weight is small: the encoder is examined separately, and a slip must not move the poses.
     weight = np.full(count, _ENCODER_SIGMA_MM**-2)
     residual = state.T_pc[:, 2, 3] - scale * reading - offset
     kind = np.full(count, ENCODER_ROW)

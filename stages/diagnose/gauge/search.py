@@ -16,16 +16,19 @@ from stages.diagnose.gauge.scan import Scored, scan
 from stages.diagnose.gauge.shapes import refined
 from stages.diagnose.inference import Stated
 
-# Below this chance, corrected for all that was tried, something is there.
+# Something was left out when its probability by chance, corrected for all tried, is below this.
+# Debt: data/debts.md.
 DETECTED = 1e-4
 _REFITTED = 4
 _MOST_EFFECTS = 3
 _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
 _RIVAL_ITERATIONS = 5
-# Rivals further off than this gain of χ² are out of the question.
+# Rivals whose χ² is worse by more than this are not considered; how often and which weights are recomputed.
+# Debt: data/debts.md.
 _FAR, _REWEIGHED, _WEIGHINGS = 100.0, 4, 3
-# A further effect smaller than this share of the first may be the first's imprecise prediction.
+# A further effect smaller than this share of the first may be an error of the first one's law.
+# Debt: data/debts.md.
 _LEAST_SHARE = 0.01
 
 
@@ -113,7 +116,7 @@ def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored], most: int = _REF
     """Return the fits with each of the most promising effects added, best first; no impossible sizes."""
     promising = sorted(scores, key=lambda s: -s.score.gain)[:most]
     worth = [s for s in promising if s.score.gain > _WORTH_REFITTING * promising[0].score.gain]
-    # A large effect promises more than its linear prediction keeps: start from none of it.
+    # The linear prediction of a large effect is wrong, so that its fit starts from size zero.
     terms = [Term(s.model, s.shape, 0 * s.score.amplitude) for s in worth]
     fits = [fit(run, found.state, (*found.terms, term), _RIVAL_ITERATIONS) for term in terms]
     possible = [f for f in fits if f.terms[-1].model.possible(f.terms[-1].shape, f.terms[-1].amplitude)]
@@ -121,7 +124,7 @@ def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored], most: int = _REF
 
 
 def alike(scores: Sequence[Scored]) -> float:
-    """Return by how much a gain of χ² is overrated because neighbours err alike."""
+    """Return by how much a gain of χ² is overestimated because neighbouring errors are correlated."""
     ratio = [s.score.gain / s.score.statistic for s in scores if s.score.statistic > 1]
     return float(max(np.median(ratio), 1.0)) if ratio else 1.0
 
@@ -150,7 +153,7 @@ def _extended(
 
 
 def _counts(found: Fit) -> bool:
-    """Return whether the last effect is no mere trifle beside the others."""
+    """Return whether the last effect is large enough beside the others to count."""
     sizes = [shift_px(found, t) for t in found.terms]
     return len(sizes) < 2 or sizes[-1] > _LEAST_SHARE * max(sizes[:-1])
 

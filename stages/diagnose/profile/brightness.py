@@ -15,11 +15,12 @@ from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.measure import LineProfiles
 from stages.diagnose.profile.regression import regress, tested
 
-# Of the line's height: light beside the line that black offsets and compression leave.
+# Light beside the line, relative to its height, that black level and compression may leave. Debt:
+# data/debts.md.
 STRAY_FLOOR = 2e-4
-# Of ln brightness: paint, gloss and markers that a recording happens to keep at one azimuth.
+# Change of ln brightness that paint, gloss and markers at one azimuth may cause. Debt: data/debts.md.
 DUST_FLOOR = 0.05
-# Of ln brightness: a pipe that reflects more on one side.
+# Change of ln brightness of a pipe that reflects more on one side. Debt: data/debts.md.
 DECENTRE_FLOOR = 0.05
 _SMOOTH_ORDER = 6
 _WIDTHS_DEG = (1.0, 2.0, 4.0, 8.0)
@@ -79,7 +80,7 @@ def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
 
 
 def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
-    """Return the finding of `beam_decentre` as far as brightness tells: its first harmonic, fixed in C."""
+    """Return the finding of `beam_decentre` by the brightness' first harmonic, fixed in C."""
     psi = np.broadcast_to(geometry.azimuth_rad, geometry.height.shape)
     group = np.full(len(geometry.steady), -1)
     for k, rows in enumerate(cells.frames):

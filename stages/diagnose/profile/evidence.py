@@ -88,7 +88,7 @@ def profile_evidence(
         When too few frames are lit by the laser alone, or the ring never holds still for long enough.
     """
     with warnings.catch_warnings():
-        # Frames and sectors without any line are all NaN, and so are their medians.
+        # Where frames and sectors have no line, all values and their median are NaN.
         warnings.simplefilter("ignore", RuntimeWarning)
         return _examined(recording, rings, probe, context)
 

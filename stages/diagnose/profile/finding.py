@@ -1,4 +1,4 @@
-"""What one test of the line's light says."""
+"""The result of one test of the line's light."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.agreement import Agreement
 
-# One in ten million by the estimate's own σ, and never less than this many σ of what image formation does.
+# A finding needs p below one in ten million by the estimate's own σ, and this many σ of the errors that image
+# formation may cause. Debt: data/debts.md.
 FOUND_P, FOUND_Z = 1e-7, 6.0
-# Looked for at the same pixels or azimuths of the image, while the pipe goes by.
+# Effects that are tested at fixed pixels or azimuths of the image while the pipe moves past.
 _OF_THE_SENSOR = frozenset({"fixed_pattern", "pixel_locking", "dust", "vignetting", "saturation"})
 
 
@@ -91,7 +92,7 @@ def finding(
     name: str, z: float, p_value: float, sizes: tuple[Size, ...], statement: str, curve: Curve | None = None,
     shift_px: Float | None = None, confirms: tuple[Size, ...] = (), alike: tuple[str, ...] = (),
 ) -> Finding:  # fmt: skip
-    """Return the finding of an effect; what it is fixed to only where its test is for that very thing."""
+    """Return the finding of an effect; what it is fixed to is stated only where the test shows that."""
     fixed_to = FixedTo.CAMERA if name in _OF_THE_SENSOR else None
     time = "speed" if name == "motion_blur" else None
     return Finding(name, z, p_value, sizes, fixed_to, time, statement, curve, shift_px, confirms, alike)

@@ -13,7 +13,7 @@ from stages.diagnose.profile.finding import Finding, Size
 
 Test = Callable[[Cells], tuple[Finding, ...]]
 _HALVES = ("first half of the frames", "second half of the frames")
-# A jackknife over fewer blocks tells no σ.
+# A jackknife over fewer blocks gives no usable σ.
 _LEAST_BLOCKS = 3
 
 
@@ -27,14 +27,14 @@ def with_halves(findings: tuple[Finding, ...], tests: Sequence[Test], cells: Cel
     if middle < _LEAST_BLOCKS:
         return findings
     halves = [_of_half(cells.of_blocks(*ends), tests) for ends in ((0, middle), (middle, count))]
-    return tuple(replace(f, agreements=_again(f, *halves)) if f.found else f for f in findings)
+    return tuple(replace(f, agreements=_halves_agree(f, *halves)) if f.found else f for f in findings)
 
 
 def _of_half(half: Cells, tests: Sequence[Test]) -> dict[str, Finding]:
     return {f.effect: f for test in tests for f in test(half)}
 
 
-def _again(
+def _halves_agree(
     whole: Finding, first: Mapping[str, Finding], second: Mapping[str, Finding]
 ) -> tuple[Agreement, ...]:
     """Return whether the halves agree on the first quantity; nothing where either tells too little."""

@@ -11,7 +11,8 @@ from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untes
 from stages.diagnose.profile.regression import Regression, regress, tested
 from stages.texture.light import irradiance
 
-# The pipe's reflectance may change along it, and LEDs are no perfect Lambert sources.
+# Errors of exponent and fall-off: the pipe's reflectance may change along it, and LEDs are not perfectly
+# Lambertian. Debt: data/debts.md.
 EXPONENT_FLOOR, FALLOFF_FLOOR = 0.05, 0.10
 _LOW_DEG, _HIGH_DEG, _STEP_DEG = 24.0, 64.0, 1.0
 _FRAMES, _GROUPS, _EVERY_PX = 48, 8, 3

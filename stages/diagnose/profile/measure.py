@@ -116,7 +116,7 @@ def _line(rings: RingSamples, row: int) -> tuple[Float, Float]:
 
 
 def _dark_level(image: Image) -> float:
-    """Return the grey level of the darkest place: tiles are averaged first, so that noise has no say."""
+    """Return the grey level of the darkest place: tiles are averaged first, so that noise does not decide."""
     size = (image.shape[1] // _TILE_PX, image.shape[0] // _TILE_PX)
     tiles = cv2.resize(image.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     return float(np.percentile(tiles, _DARK_PERCENT))

@@ -60,9 +60,9 @@ class Tested:
 
 
 def tested(estimate: float, random: float, floor: float, groups: int) -> Tested:
-    """Test an estimate whose 1 σ ``random`` was found from ``groups`` groups, on top of a known ``floor``.
+    """Test an estimate whose 1 σ ``random`` was estimated from ``groups`` groups; its ``floor`` is known.
 
-    Student's t with Welch and Satterthwaite's degrees of freedom: the floor has as many as one likes.
+    Student's t with Welch and Satterthwaite's degrees of freedom; the known floor has infinitely many.
     """
     variance = random**2 + floor**2
     sigma = float(np.sqrt(variance))

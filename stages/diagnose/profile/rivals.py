@@ -1,4 +1,4 @@
-"""Which of two effects on one profile a finding belongs to."""
+"""Which of two effects that change the profile alike explains a finding."""
 
 from __future__ import annotations
 

@@ -11,13 +11,16 @@ from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untes
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.ghost import Responses, SecondLine, bounced, copied, responses
 
-# Of the line's height: what compression leaves on one side and not on the other, in places and everywhere.
+# Light relative to the line's height that compression may leave on one side only: in places, and everywhere.
+# Debt: data/debts.md.
 BOUNCED_FLOOR, COPIED_FLOOR = 1e-3, 5e-4
-# px: by how much a faint line's place may be off; and relative, the radius being that of the stated sheet.
+# Error of a faint line's place, px; relative error, because the radius is that of the stated sheet.
+# Debt: data/debts.md.
 PLACE_FLOOR_PX, SCALE_FLOOR = 0.05, 0.01
 _LEAST_CELLS = 30
 _BETTER = 1.2
-# A constant distance has one parameter where the bounced line has three.
+# The copy is preferred at this share of the misfit, because it has one parameter and the bounced line has
+# three. Debt: data/debts.md.
 _SIMPLER = 0.95
 
 

@@ -1,4 +1,4 @@
-"""What is fixed to the sensor's pixels: locking of the line to them, and their own gains."""
+"""Errors fixed to the sensor's pixels: locking of the line to pixels, and unequal gains."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untes
 from stages.diagnose.profile.measure import LineProfiles
 from stages.diagnose.profile.regression import regress, tested
 
-# px: by how much pixel integration, rounding and compression lock a line to pixels.
+# Locking of a line to pixels by pixel integration, rounding and compression, px. Debt: data/debts.md.
 LOCKING_FLOOR_PX = 1.5e-3
-# Variance of gains that speckle of a still wall or compression may fake.
+# Variance of gains that speckle on a wall at rest, or compression, may imitate. Debt: data/debts.md.
 GAIN_FLOOR = 0.01
 _SMOOTH_AZIMUTHS = 41
 _LEAST_SEEN = 3.0e3

@@ -16,7 +16,7 @@ from stages.diagnose.profile.width import scale_law
 
 # Half a grey level of compression on one flank of a line 100 levels high, over its whole width.
 HERMITE_FLOOR = 1e-3
-# Of (line σ / stated)²: how far image formation may bend the width against the scale.
+# Change of (line σ / stated)² that image formation may cause across the image's scales. Debt: data/debts.md.
 WIDTH_FLOOR = 0.05
 _SMALLEST_BLUR_PX2 = 1 / 12
 _CLEARLY = 3.0

@@ -12,7 +12,8 @@ from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untes
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.regression import Regression, regress, tested
 
-# Of (line σ / stated)², and of exposure², s²: what compression and clipped neighbours may do to a width.
+# Changes of (line σ / stated)² and of exposure², s², that compression and clipped neighbours may cause.
+# Debt: data/debts.md.
 SCALE_FLOOR, EXPOSURE2_FLOOR = 0.03, 2e-5
 _LEAST_SCALE_SPREAD = 0.05
 

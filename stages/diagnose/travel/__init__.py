@@ -1,1 +1,1 @@
-"""Motion against encoder: scale, slips, play and delay, each with what the motion lets tell."""
+"""Motion against encoder: scale, slips, play and delay, each as far as the motion determines it."""

@@ -1,4 +1,4 @@
-"""Single events between encoder and sight: slips of the wheel, stray pictures, missing frames."""
+"""Single events between encoder and visual distance: slips of the wheel, stray pictures, missing frames."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ _MOST = 8
 _ENTERS = 1e-4
 # A step needs pictures on both of its sides, else it is one stray picture.
 _SIDE = 3
-# Rivals whose χ² differ by less are not told apart.
+# Explanations whose χ² differs by less than this (3 σ squared) are both kept.
 _APART = 9.0
-# So many frames in a row may be lost without their times telling; of a frame's time, how exact it is.
+# So many neighbouring frames may be lost without a trace in the time stamps; error of a stamp, frames.
+# Debt: data/debts.md.
 _UNNOTICED = 2
 _WITHIN, _TIMING = 3.0, 0.03
 
@@ -120,7 +121,7 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     event, sight = fit.events[place_in_list], fit.sight
     others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
     without = fitted(sight, encoder, others, fit.noise)
-    # The step itself is no speed.
+    # The step itself does not count as speed.
     speed = median_filter(np.gradient(sight.distance_mm, sight.time_s), 5)
     score, size = {}, {}
     for kind in EventKind:
@@ -144,7 +145,7 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     # Somewhere between two pictures; where the reading itself jumps, as long as a slip lasts.
     within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
     if again is not None and again.confirmation.agrees:
-        # Nothing that befalls pictures makes the reading jump.
+        # Errors of pictures cannot make the encoder's reading jump.
         rivals, within_s = (), SLIPS_WITHIN_S
     return StepFound(
         event.place, float(time_s), within_s / np.sqrt(12), float(fit.values[at]), sigma,

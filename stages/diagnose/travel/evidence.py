@@ -1,4 +1,4 @@
-"""What motion against encoder, and the motion itself, say of left-out physics."""
+"""Evidence of left-out physics in the difference of motion and encoder, and in the motion itself."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from stages.diagnose.travel.sight import Sight, quantum_mm
 _LEAST_FRAMES = 16
 _DETECTED = 5.0
 _INSEPARABLE = 0.95
-# A frame's time may be that of the exposure's begin, middle or end.
+# 1 σ of a frame's time stamp, which may be that of the exposure's begin, middle or end. Debt: data/debts.md.
 _STAMP_SIGMA_S = 1e-3
-# Where a counter turns back it may be off by up to a count, which is no play of the wheel.
+# At a reversal a counter may err by up to one count, which is not play of the wheel. Debt: data/debts.md.
 _QUANTUM_SHARE = 0.5
 _REPORTED = 1e-3
 _SELDOM = 0.02
@@ -182,7 +182,7 @@ def _estimates(
         quantity = effect(name).quantities[0]
         sigma, value = float(fit.sigma[k]), float(fit.values[k])
         total = float(np.hypot(sigma, allowed))
-        # What no encoder does is a motion too even to tell, not a find.
+        # A size that no encoder can have is not a finding: the speed was too uniform to determine it.
         told = np.isfinite(total) and LIBRARY[name].possible((), np.array([value]))
         p = float(2 * norm.sf(abs(value) / total)) if told else 1.0
         alike = tuple(
@@ -194,7 +194,8 @@ def _estimates(
         if k == SCALE and source == "field":
             # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.
             alike = (*alike, ("baseline", 1.0))
-        # At each turn the counter may be off anew; the wheel and the stamps are the same all along.
+        # The counter errs anew at each reversal; errors of wheel and time stamps are the same in all of the
+        # run.
         again = second_predictions(fit, k, turning if k == PLAY else 0.0) if p < _REPORTED else ()
         out.append(
             TravelEstimate(
@@ -273,7 +274,7 @@ def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str,
 
 
 def _blind(estimates: tuple[TravelEstimate, ...], sight: Sight) -> tuple[str, ...]:
-    """Return what the motion leaves undetermined, or determined only together."""
+    """Return the effects that this motion does not determine, or determines only together."""
     out = []
     for e in estimates:
         if not np.isfinite(e.sigma):

@@ -1,4 +1,4 @@
-"""A slip as the reading alone shows it: a jump against its own smooth motion, whatever the pictures say."""
+"""A slip as the encoder's reading alone shows it: a jump against its own smooth motion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
 
-# A wheel slips within so long; its speed is that of so many steps around.
+# Duration of a slip, and number of readings around it that its speed is taken from. Debt: data/debts.md.
 SLIPS_WITHIN_S = 0.03
 _AROUND = 8
 _TAIL = 2.275

@@ -14,7 +14,7 @@ from scipy.stats import f as fisher
 
 from pipeline.arrays import Bool, Float
 from stages.diagnose.agreement import Agreement
-from stages.diagnose.travel.swings import swings_again
+from stages.diagnose.travel.swings import swing_agreements
 from stages.diagnose.travel.wave import LEAST_SAMPLES, SLOWEST_HZ, amplitudes, shows_apart, wander
 
 _BANDWIDTH = 3.0
@@ -92,7 +92,7 @@ def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None
         line = _measured(time_s[use], left[use], lit[use], *found)
         if not line.amplitude_mm >= max(_LEAST_MM, _SIGNIFICANT * line.sigma_mm):
             break
-        again = swings_again(time_s[use], left[use], lit[use], line.frequency_hz)
+        again = swing_agreements(time_s[use], left[use], lit[use], line.frequency_hz)
         lines.append(replace(line, agreements=again))
         left = _without(time_s, left, lit, line)
     return tuple(lines)

@@ -1,4 +1,4 @@
-"""What may stand between encoder and sight: offset, scale, delay, play, and single events."""
+"""Model of the encoder against the visual distance: offset, scale, delay, play, and single events."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _AROUND = 10
 # less than this share tell nothing of a delay.
 _SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
 _WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
-# χ² of one number that chance exceeds once in 10⁵, with a margin for noise that is not quite normal.
+# χ² of one number exceeds 19.5 by chance once in 10⁵; 23 leaves a margin for noise that is not quite normal.
 _FAR_BETTER = 23.0
 
 
@@ -156,9 +156,9 @@ def _starts(delay_s: float, play_mm: float) -> list[tuple[tuple[int, ...], tuple
 
 
 def _simplest(ends: Sequence[_End], covariance_mm: Float) -> tuple[_End, bool]:
-    """Return the end that nothing beats by far, and whether it tells delay from play.
+    """Return the simplest solution that no other beats by far, and whether delay and play are told apart.
 
-    The two can stand in for each other, or cancel: each must earn its place.
+    Delay and play can imitate or cancel each other, so that each is kept only where it improves the fit much.
     """
     cost = [e.misfit(covariance_mm) + _FAR_BETTER * (2 - len(e.held)) for e in ends]
     best = int(np.argmin(cost))
@@ -178,7 +178,7 @@ def _refined(
         reading = readings_at(steady, sight.time_s + delay_s)
         smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
         columns = np.concatenate([smooth, of_events], 1)
-        # What is in the reading already is put back, so that every round gives the values in full.
+        # The effect already applied to the reading is added back, so that every round gives whole values.
         difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s + off
         found, free = np.zeros(columns.shape[1]), _free(columns, held)
         found[free] = robust_coefficients(difference, columns[:, free])
@@ -199,14 +199,14 @@ def _nearest_start(
     while width > _FINEST_S:
         cost = np.inf
         for delay in best + width * np.linspace(-1, 1, 2 * _SEARCHED + 1):
-            here, play = _astray(sight, steady, events, speed, float(delay))
+            here, play = _misfit_at_delay(sight, steady, events, speed, float(delay))
             if here < cost:
                 cost, nearest, play_mm = here, float(delay), play
         best, width = nearest, width / _SEARCHED
     return best, play_mm
 
 
-def _astray(
+def _misfit_at_delay(
     sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float, delay_s: float
 ) -> tuple[float, float]:
     """Return the sum of absolute increments left at a delay, and the play at which they are least."""

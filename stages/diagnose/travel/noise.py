@@ -1,4 +1,4 @@
-"""How encoder and sight err about each other: white noise of readings, and drift of sight with the way."""
+"""Noise between encoder and visual distance: white noise of readings, and drift of the visual distance."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.arrays import Float
 
 _LEAST_WHITE_MM = 0.002
 _LAGS = (2, 4, 8, 16, 32)
-# Of so many increments one step spoils no more than medians bear, nor do two.
+# Increments a lag needs at least: one or two steps among twelve do not move their median by much.
 _PER_LAG = 12
 _ROUNDS = 30
 

@@ -1,4 +1,4 @@
-"""One effect from disjoint parts of one recording's travel, each a prediction of the other.
+"""One effect estimated from disjoint parts of a recording's travel, so that each part predicts the other.
 
 A column is split by increments: what it adds between two pictures belongs to one part, so that a part keeps
 what it has gained. Everything else stays shared, and the difference of the parts has its true covariance.

@@ -1,4 +1,4 @@
-"""A swing of the camera from disjoint pictures: early against late ones, lit ones against the laser's."""
+"""An oscillation of the camera estimated from disjoint pictures: early and late ones, lit and laser ones."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.wave import LEAST_SAMPLES, amplitudes, shows_apart
 
 
-def swings_again(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float) -> tuple[Agreement, ...]:
-    """Return whether disjoint pictures show one swing: size, direction and phase at its frequency."""
+def swing_agreements(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float) -> tuple[Agreement, ...]:
+    """Return whether disjoint pictures show one oscillation: size, direction and phase at its frequency."""
     early = time_s <= (time_s[0] + time_s[-1]) / 2
     pairs = (
         (("first half of the pictures", early), ("second half of the pictures", ~early)),

@@ -30,7 +30,7 @@ def turns_between(sight: Sight, steady: Encoder, delay_s: float) -> Turns:
     before = np.flatnonzero(way[1:] != way[:-1])
     place, distance = [], []
     for turn in before:
-        # The direction is a mean over neighbours: the turn may be a picture later or earlier.
+        # The direction is a mean over neighbours, so that the reversal may be a picture later or earlier.
         first, last = max(int(turn) - 1, 0), min(int(turn) + 2, len(way) - 1)
         inside = (steady.time_s > sight.time_s[first] + delay_s) & (
             steady.time_s < sight.time_s[last] + delay_s

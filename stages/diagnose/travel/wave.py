@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 
-# Below this the way a towed probe wanders is made of lines itself.
+# Below this frequency the wander of a towed probe itself contains spectral lines. Debt: data/debts.md.
 SLOWEST_HZ = 1.5
 _WANDER_HZ = 1.2
 LEAST_SAMPLES = 48
