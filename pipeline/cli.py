@@ -107,8 +107,13 @@ def run(
         follow_recording(recording, output, probe, quiet_s, console)
     job = prepare(recording, output, probe=probe, configuration=parameters)
     _print_inputs(console, job.recording.name, job.recording.warnings)
-    with ProgressDisplay(console) as display:
-        outcome = run_job(job, Selection(from_stage, only, resume), display)
+    try:
+        with ProgressDisplay(console) as display:
+            outcome = run_job(job, Selection(from_stage, only, resume), display)
+    except UnusableError:
+        # What was wrong with the recording from the start is the likeliest reason: it is said again.
+        _print_inputs(console, job.recording.name, job.recording.warnings)
+        raise
     _print_outcome(outcome, output)
 
 
@@ -176,9 +181,11 @@ def _attach(command: _Attached) -> None:
 
 
 def _print_inputs(console: Console, name: str, warnings: tuple[str, ...]) -> None:
+    from rich.text import Text
+
     console.print(f"Recording {name}", highlight=False)
     for warning in warnings:
-        console.print(f"  noticed: {warning}", highlight=False)
+        console.print(Text.assemble(("  noticed", "bold yellow"), f": {warning}"))
 
 
 def _print_outcome(outcome: RunOutcome, folder: Path) -> None:

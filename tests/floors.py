@@ -20,7 +20,7 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "steps of a run",
         (
-            "stages.rings", "stages.triangulate", "stages.accumulate", "stages.texture", "stages.mesh",
+            "stages.premises", "stages.rings", "stages.triangulate", "stages.accumulate", "stages.texture", "stages.mesh",
             "stages.sections", "stages.defects", "stages.overlays",
         ),
     ),

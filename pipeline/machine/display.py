@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -16,7 +17,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from pipeline.machine.outcome import StageOutcome, State
+from pipeline.machine.outcome import StageOutcome, State, warnings_of
 
 
 class Display(Protocol):
@@ -87,3 +88,5 @@ class ProgressDisplay:
             self._progress.remove_task(self._tasks.pop(outcome.name))
         time = f"{outcome.seconds:8.1f} s" if outcome.state == State.COMPLETED else " " * 10
         self._console.print(f"  {outcome.name:<20} {outcome.state.value:<10}{time}", highlight=False)
+        for warning in warnings_of([outcome]):
+            self._console.print(f"  [bold yellow]warning[/]: {escape(warning)}", highlight=False)

@@ -16,7 +16,7 @@ from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.display import Display
 from pipeline.machine.exporter import Exporter, Writer, published_key, withdraw
-from pipeline.machine.outcome import Number, Results, RunOutcome, StageOutcome, State
+from pipeline.machine.outcome import WARNING, Number, Results, RunOutcome, StageOutcome, State
 from pipeline.machine.plan import Plan, Selection, Step
 from pipeline.machine.run_folder import RunFolder
 from pipeline.machine.scratch import Scratch
@@ -207,9 +207,13 @@ class Runner:
             self._logger.info("%s: %s = %s %s", step.stage.label, name, value, unit)
             numbers.append(Number(name, value, unit))
 
+        def warn(text: str) -> None:
+            self._logger.warning("%s: %s", step.stage.name, text)
+            numbers.append(Number(WARNING, text))
+
         random = np.random.default_rng(step.seed)
         scratch = Scratch(self._folder.internal)
-        return Context(self._logger, progress, report, random, self._workers, scratch)
+        return Context(self._logger, progress, report, random, self._workers, scratch, warn)
 
     def _stop_if_wished(self) -> None:
         if self._wish.is_set():

@@ -30,6 +30,13 @@ class Progress(Protocol):
         """Report ``done`` of ``total`` units of work."""
 
 
+class Warn(Protocol):
+    """Write-only sink of warnings for people: terminal, run.json, report and review show them."""
+
+    def __call__(self, text: str) -> None:
+        """Warn: ``text`` says what was found, in which frames, what it means and what to do."""
+
+
 class Report(Protocol):
     """Write-only sink of numbers for people; nothing computed may depend on it."""
 
@@ -49,6 +56,8 @@ class Context:
         To be called now and then; raises `pipeline.errors.Cancelled` when the user stopped the run.
     report
         Numbers for people.
+    warn
+        Warnings for people.
     random
         Generator seeded from the key of the result, so that a repeated run draws the same numbers.
     workers
@@ -63,6 +72,7 @@ class Context:
     random: np.random.Generator
     workers: int = 2
     scratch: Scratch = field(default_factory=Scratch)
+    warn: Warn = lambda text: None
 
 
 def quiet_context(seed: int = 0, workers: int = 2) -> Context:

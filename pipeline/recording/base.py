@@ -122,6 +122,9 @@ class Recording:
         What the reader noticed and mended, for the report.
     files
         What it is read from, as it was when it was opened: see `pipeline.recording.checks.refuse_changed`.
+    listed
+        All rows of the table of frames, also those for which there are no pictures; None where there is no
+        such table.
     """
 
     name: str
@@ -136,6 +139,7 @@ class Recording:
     content_key: str
     warnings: tuple[str, ...] = ()
     files: tuple[InputFile, ...] = ()
+    listed: FrameTable | None = None
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`."""

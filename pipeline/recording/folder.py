@@ -89,6 +89,7 @@ def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Record
             *described.warnings, *parts.warnings, *mended, *encoder_warnings(parts.encoder, frames)
         ),
         files=parts.files,
+        listed=parts.table,
     )  # fmt: skip
 
 

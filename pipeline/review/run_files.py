@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from pipeline.artefacts.checked_frames import CheckedFrames
 from pipeline.artefacts.findings import DefectKind, Defects, Sections
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
@@ -28,7 +29,7 @@ from pipeline.review.decisions.replay import Finding, Measured
 _Artefact = TypeVar("_Artefact")
 _MAKERS: dict[type, str] = {
     Overlays: "overlays", Trajectory: "motion", Wall: "accumulate", RingSamples: "rings",
-    Sections: "sections", WallTexture: "texture", RingPoints: "triangulate", Defects: "defects",
+    CheckedFrames: "premises", Sections: "sections", WallTexture: "texture", RingPoints: "triangulate", Defects: "defects",
 }  # fmt: skip
 # What a signature binds: the results and the record of how they came about.
 _BOUND = ("run.json", "defects.json", "radius_map.npz", "unrolled.png", "model.glb", "sections.csv")
@@ -94,7 +95,7 @@ class RunFiles:
         return next((str(s["key"]) for s in self.record()["stages"] if s["name"] == name), "")
 
     def recording(self) -> Recording:
-        """Return the recording that the run was made from.
+        """Return the recording that the run was made from, with its frames as the pictures show them.
 
         Raises
         ------
@@ -107,7 +108,10 @@ class RunFiles:
         # Of the files alone: a run may have been given other readings of the encoder beside them.
         made_from = record["recording"].get("files_sha256", record["input_sha256"]["recording"])
         _refuse_other(path, "recording", content_key(opened.files), made_from)
-        return opened
+        try:
+            return self.artefact(CheckedFrames).applied_to(opened)
+        except InputError:  # of a run made before its premises were checked
+            return opened
 
     def pipe(self) -> PipeFacts | None:
         """Return what the recording says of the pipe, None when there is no `recording` any more."""

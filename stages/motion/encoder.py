@@ -67,11 +67,11 @@ def encoder_at_frames(
     context.report("encoder jumps taken out", jumps, "")
     if known.mean() < _LEAST_COVERED or _usual(np.diff(at_frames)) > farthest_mm:
         context.report("encoder left out", "it does not fit the frames")
-        context.logger.warning(
-            "The encoder is not used: it covers %.0f %% of the frames and usually advances by %.3g mm from "
-            "one frame to the next, where a frame shows the wall up to %.3g mm ahead.",
-            100 * known.mean(), _usual(np.diff(at_frames)), farthest_mm,
-        )  # fmt: skip
+        context.warn(
+            f"the encoder is not used: it covers {100 * known.mean():.0f} % of the frames and usually advances by "
+            f"{_usual(np.diff(at_frames)):.3g} mm from one frame to the next, where a frame shows the wall up to "
+            f"{farthest_mm:.3g} mm ahead. What to do: check unit (mm) and clock (s, as in frames.csv) of encoder.csv"
+        )
         return None
     sigma = float(np.hypot(sigma_mm, _quantum(encoder.distance_mm) / np.sqrt(12)))
     return EncoderReadings(at_frames, sigma, known)
@@ -89,10 +89,11 @@ def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Conte
     if judged.sum() < _LEAST_STEPS or differs[judged].mean() < _CONTRADICTED:
         return False
     context.report("encoder left out", "the wall's texture contradicts it")
-    context.logger.warning(
-        "The encoder is not used: in %d of %d steps the wall's texture shows another motion.",
-        int(differs[judged].sum()), int(judged.sum()),
-    )  # fmt: skip
+    context.warn(
+        f"the encoder is not used: in {int(differs[judged].sum())} of {int(judged.sum())} steps the wall's texture "
+        "shows another motion, so that distance rests on the laser's baseline alone. What to do: check the "
+        "encoder's scale and clock, and whether its wheel slipped"
+    )
     return True
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from pipeline.recording.checked_frames import CheckedFrames
 
 from pipeline.arrays import Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
@@ -222,8 +223,9 @@ def _require_convergence(radius_mm: float, estimate: Estimate) -> None:
 def _report_steps(context: Context, steps: int, unsettled: int) -> None:
     context.report("steps of the joint adjustment", steps, "")
     if unsettled:
-        context.logger.warning(
-            "The adjustment of the motion stopped after its largest number of steps, before it had settled."
+        context.warn(
+            "the adjustment of the motion stopped after its largest number of steps, before it had settled: "
+            "poses may be off by more than their σ. What to do: raise motion.iterations"
         )
 
 
@@ -240,10 +242,23 @@ def _report(context: Context, estimate: RunEstimate, texture: TrackedTexture, tr
     context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")
 
 
+def _motion_of_run(
+    recording: Recording,
+    frames: CheckedFrames,
+    probe: Probe,
+    rings: RingSamples,
+    points: RingPoints,
+    parameters: MotionParameters,
+    context: Context,
+) -> Trajectory:
+    """Estimate the motion from frames and encoder as the pictures bear them out."""
+    return estimate_motion(frames.applied_to(recording), probe, rings, points, parameters, context)
+
+
 MOTION = Stage(
     "motion",
     "4",
     MotionParameters,
-    estimate_motion,
+    _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",
 )

@@ -9,7 +9,6 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import PipeAxis, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
 from pipeline.instrument.probe import Probe
-from pipeline.machine.outcome import WARNING
 from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES
@@ -65,8 +64,7 @@ def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) ->
     if farthest > _TOO_FAR:
         sigma = np.sqrt(np.diagonal(probe.covariance))
         most = int(np.argmax(np.divide(np.abs(change), sigma, out=np.zeros_like(change), where=sigma > 0)))
-        context.report(
-            WARNING,
+        context.warn(
             f"the stated probe does not fit this recording: it had to be moved by {farthest:.0f} times its "
             f"stated σ, most of all {probe.parameter_names[most]} by {change[most]:+.3g}; radii "
             "and distances may be wrong by more than their σ. Run boresight diagnose, or "

@@ -1,12 +1,32 @@
 """Texture: lit frames, motion and wall to the wall's photo as a flat picture."""
 
-from pipeline.machine.stage import Stage
+from __future__ import annotations
+
+from pipeline.artefacts.checked_frames import CheckedFrames
+from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
+from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context, Stage
+from pipeline.recording.base import Recording
 from stages.texture.texture import TextureParameters, photograph_wall
+
+
+def _texture_of_run(
+    recording: Recording,
+    frames: CheckedFrames,
+    probe: Probe,
+    trajectory: Trajectory,
+    wall: Wall,
+    parameters: TextureParameters,
+    context: Context,
+) -> WallTexture:
+    """Photograph the wall from the frames that the pictures show to be lit."""
+    return photograph_wall(frames.applied_to(recording), probe, trajectory, wall, parameters, context)
+
 
 TEXTURE = Stage(
     "texture",
     "3",
     TextureParameters,
-    photograph_wall,
+    _texture_of_run,
     "lit frames to the wall's reflectance as a flat picture, light divided out",
 )

@@ -111,7 +111,9 @@ def _report_light(lights: LightChain, context: Context) -> None:
     if rejected < len(gain):
         context.report("spread of exposure between frames", float(np.nanstd(np.log(gain))), "relative")
     else:
-        context.logger.warning("no lit frame shows the wall: the model has no texture")
+        context.warn(
+            "no lit frame shows the wall: the model has no texture. What to do: record with the LEDs on"
+        )
 
 
 def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, context: Context) -> WallTexture:

@@ -134,12 +134,37 @@ def lights_swapped(lines: list[str]) -> list[str]:
 
 UNUSABLES: dict[str, Spoil] = {
     "no ring": repainted(lambda n, p: black(n, p) if is_laser(n) else p),
+    "most of the video lost": noised(0.2, 200_000),
+}
+
+
+ALIKE: dict[str, Spoil] = {
     "not in a pipe": repainted(noise),
     "flat pictures": repainted(lambda n, p: np.full_like(p, 90)),
     "saturated pictures": repainted(lambda n, p: np.full_like(p, 255)),
-    "laser and LED taken for each other": rewritten("frames.csv", lights_swapped),
-    "most of the video lost": noised(0.2, 200_000),
 }
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_recordings_without_lights(
+    name: str, good: Path, tmp_path: Path, boresight: Callable[..., Told]
+) -> None:
+    told = boresight("run", spoilt(good, tmp_path, ALIKE[name]), "-o", tmp_path / "run", *QUICK)
+    assert told.code == UNUSABLE, told.err
+    assert "states two lights" in told.err
+    assert "all pictures look alike" in told.err
+    assert "What to do" in told.err
+
+
+def test_laser_and_led_taken_for_each_other_are_put_right(
+    good: Path, tmp_path: Path, boresight: Callable[..., Told]
+) -> None:
+    recording = spoilt(good, tmp_path, rewritten("frames.csv", lights_swapped))
+    for stage in ("premises", "rings"):
+        told = boresight("run", recording, "-o", tmp_path / "run", "--only", stage, *QUICK)
+        assert told.code == 0, told.err
+    assert "is not what 24 pictures show: frame 0, 1, 2" in told.err
+    assert counts(tmp_path / "run", "rings")["ring samples rejected: frame_rejected"] == 0
 
 
 @pytest.mark.parametrize("name", UNUSABLES)
@@ -169,8 +194,10 @@ def counts(run: Path, stage: str) -> dict[str, float]:
 def test_frames_that_cannot_be_used_are_counted(
     spoil: Spoil, rejected: int, good: Path, tmp_path: Path, boresight: Callable[..., Told]
 ) -> None:
-    told = boresight("run", spoilt(good, tmp_path, spoil), "-o", tmp_path / "run", "--only", "rings", *QUICK)
-    assert told.code == 0, told.err
+    recording = spoilt(good, tmp_path, spoil)
+    for stage in ("premises", "rings"):
+        told = boresight("run", recording, "-o", tmp_path / "run", "--only", stage, *QUICK)
+        assert told.code == 0, told.err
     assert counts(tmp_path / "run", "rings")["ring samples rejected: frame_rejected"] == rejected * 360
 
 
@@ -190,7 +217,7 @@ def test_what_was_mended_is_told(
     spoil: Spoil, noticed: str, good: Path, tmp_path: Path, boresight: Callable[..., Told]
 ) -> None:
     recording = spoilt(good, tmp_path, spoil)
-    told = boresight("run", recording, "-o", tmp_path / "run", "--only", "rings", *QUICK)
+    told = boresight("run", recording, "-o", tmp_path / "run", "--only", "premises", *QUICK)
     assert told.code == 0, told.err
     assert noticed in told.err
     warnings = json.loads((tmp_path / "run" / "run.json").read_text())["reader_warnings"]

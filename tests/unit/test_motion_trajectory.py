@@ -30,7 +30,11 @@ def told(stated: Probe, change: np.ndarray | None) -> dict[str, object]:
         np.arange(3), np.arange(3) / 30, poses, np.zeros((3, 6, 6)), axis, 50.0, 1.0, 0.001, 0.0005, (), found
     )
     numbers: dict[str, object] = {}
-    context = replace(quiet_context(), report=lambda name, value, unit="": numbers.update({name: value}))
+    context = replace(
+        quiet_context(),
+        report=lambda name, value, unit="": numbers.update({name: value}),
+        warn=lambda text: numbers.update({"warning": text}),
+    )
     report_instrument(stated, trajectory, context)
     return numbers
 

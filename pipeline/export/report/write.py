@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pipeline.artefacts.checked_frames import CheckedFrames
 from pipeline.artefacts.findings import Defect, Defects, Sections
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
@@ -36,8 +37,9 @@ def write_report_page(results: Results, recording: Recording, probe: Probe, fold
 
 
 def _summary(results: Results, recording: Recording, probe: Probe) -> RunSummary:
+    checked = results.of(CheckedFrames)
     return RunSummary(
-        recording=recording,
+        recording=recording if checked is None else checked.applied_to(recording),
         probe=probe,
         created=datetime.now(UTC).isoformat(timespec="minutes"),
         rings=results.of(RingSamples),

@@ -1,0 +1,45 @@
+"""What the pictures say of a recording's tables: which light each frame was taken in, and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays import Float, Int
+from pipeline.recording.base import Encoder, FrameTable, Recording
+
+
+@dataclass(frozen=True)
+class CheckedFrames:
+    """The table of frames and the encoder's unit after they were held against the pictures.
+
+    Attributes
+    ----------
+    frame : (N,) int
+        Numbers of the pictures that are used: all of the recording's but repeated ones.
+    time_s : (N,)
+        When each was taken: the recording's own times, or those of the rows that belong to the pictures.
+    illumination : (N,) str
+        `Illumination` values as the pictures show them.
+    encoder_factor : float
+        By which the encoder's readings are to be multiplied: 1 unless its unit or sign was wrong.
+    relabelled, retimed : int
+        In how many frames light and time differ from the recording's table.
+    """
+
+    frame: Int
+    time_s: Float
+    illumination: NDArray[np.str_]
+    encoder_factor: float = 1.0
+    relabelled: int = 0
+    retimed: int = 0
+
+    def applied_to(self, recording: Recording) -> Recording:
+        """Return the recording with these frames, and its encoder in mm and with the motion's sign."""
+        table = FrameTable(self.frame, self.time_s, self.illumination)
+        encoder = recording.encoder
+        if encoder is not None and self.encoder_factor != 1.0:
+            encoder = Encoder(encoder.time_s, encoder.distance_mm * self.encoder_factor)
+        return replace(recording, frames=table, encoder=encoder)

@@ -1,0 +1,251 @@
+"""Premises: what the tables of a recording state, held against its pictures before anything relies on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from pipeline.arrays import Bool, Float, Int
+from pipeline.artefacts.checked_frames import CheckedFrames
+from pipeline.errors import UnusableError
+from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.recording.base import FrameTable, Illumination, Recording
+from stages.premises.light import Light, alike, light_seen, pattern_breaks
+from stages.premises.lost import repeated, rhythm_of, row_times, rows_by_motion, steps_of_wall
+from stages.premises.pictures import Pictures, look_at_pictures
+from stages.premises.rows import Lights, Story, cheapest_story
+from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm
+
+_LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
+Labels = NDArray[np.str_]
+_SHOWN = 8
+# A light that pictures do not bear out is a slip of the pen in fewer than a third of the rows, no more.
+_MOST_ROWS = 2 / 3
+# Lights that change more often than this from picture to picture are switched on purpose.
+_SWITCHED = 0.1
+
+
+class PremisesParameters(Parameters):
+    """Parameters of the premises."""
+
+    mend: bool = Field(
+        True,
+        description="mend lights and times of frames that the pictures contradict; false: stop instead",
+    )
+
+
+def check_premises(
+    recording: Recording, probe: Probe, parameters: PremisesParameters, context: Context
+) -> CheckedFrames:
+    """Hold lights, times, diameter and encoder of a recording against its pictures; mend and warn.
+
+    Raises
+    ------
+    UnusableError
+        When what is stated cannot be right and cannot be mended, or is not to be.
+    """
+    pictures = look_at_pictures(recording, probe, context)
+    table = _table(recording)
+    light = _light(recording.frames, pictures)
+    story = _story(recording.frames, table, pictures, light)
+    label = _labels(table, story, light, pictures)
+    steps = steps_of_wall(pictures, light)
+    row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder)
+    time_s = row_times(table, row)
+    changes = _Changes(recording.frames, label, row, story.swapped)
+    _refuse_unmended(changes, parameters)
+    _warn_of_frames(changes, pictures, light, table, context)
+    radius_mm = radius_seen_mm(pictures, probe)
+    check_diameter(radius_mm, recording.pipe, context)
+    factor = encoder_factor(recording, time_s, steps, radius_mm, context)
+    _warn_of_clock(time_s, recording, context)
+    _report(pictures, radius_mm, changes, context)
+    keep = np.concatenate([[True], np.diff(row) > 0])
+    return CheckedFrames(
+        recording.frames.frame[keep], time_s[keep], label[keep], factor,
+        int(changes.relabelled.sum()), int(changes.retimed.sum()),
+    )  # fmt: skip
+
+
+def _table(recording: Recording) -> FrameTable:
+    """Return all rows of the table of frames, where those of the pictures are its first."""
+    frames, listed = recording.frames, recording.listed
+    whole = listed is not None and np.array_equal(listed.frame[: len(frames.frame)], frames.frame)
+    return listed if whole and listed is not None else frames
+
+
+def _lights_of(illumination: Labels) -> Int:
+    return np.where(illumination == _LASER, int(Light.LINE), int(Light.WALL))
+
+
+def _light(frames: FrameTable, pictures: Pictures) -> Int:
+    """Return the `Light` (F,) of every picture.
+
+    Where all look alike although the table states two lights, it is the one that most rows state.
+    """
+    light, stated = light_seen(pictures), _lights_of(frames.illumination)
+    _refuse_one_light(frames, stated, light)
+    line, wall = stated == Light.LINE, stated == Light.WALL
+    if np.any(light != Light.UNKNOWN) or not (line.any() and wall.any()) or not alike(pictures, line, wall):
+        return light
+    if max(line.mean(), wall.mean()) < _MOST_ROWS:
+        raise UnusableError(
+            "premises",
+            f"frames.csv states two lights, {line.sum()} times laser and {wall.sum()} times led or both, but "
+            "all pictures look alike",
+            hint="state in frames.csv which light was on in each frame",
+        )
+    return np.where(pictures.seen, Light.LINE if line.mean() > 0.5 else Light.WALL, Light.UNKNOWN)
+
+
+def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:
+    """Refuse a table that states one light of pictures in two that are switched on purpose."""
+    names, known = np.unique(frames.illumination), light[light != Light.UNKNOWN]
+    if len(names) != 1 or names[0] == _BOTH or not known.size or np.mean(np.diff(known) != 0) < _SWITCHED:
+        return
+    wrong = frames.frame[(light != Light.UNKNOWN) & (light != stated)]
+    other = "the lit wall" if names[0] == _LASER else "a laser line in the dark"
+    raise UnusableError(
+        "premises",
+        f"frames.csv says {names[0]} of every frame, but {len(wrong)} pictures show {other}",
+        frames=wrong.tolist(),
+        hint="state in frames.csv which light was on in each frame: laser, led or both",
+    )
+
+
+def _story(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int) -> Story:
+    """Return which row belongs to which picture; as they come where the table knows one light."""
+    count, stated = len(frames.frame), _lights_of(table.illumination)
+    wrong = (light != Light.UNKNOWN) & (light != stated[:count])
+    if not wrong.any() or len(np.unique(stated)) < 2:
+        return Story(np.arange(count), np.zeros(count, bool))
+    return cheapest_story(Lights(light, stated, pattern_breaks(light), repeated(pictures, light)))
+
+
+def _labels(table: FrameTable, story: Story, light: Int, pictures: Pictures) -> Labels:
+    """Return the illumination (F,) of every picture: as it shows, else as its row states."""
+    stated = table.illumination[np.minimum(story.row, len(table.frame) - 1)]
+    led, both = stated == _LED, stated == _BOTH
+    wall = _LED if led.sum() >= both.sum() else _BOTH
+    if led.any() and both.any() and alike(pictures, led, both):
+        stated = np.where(stated == _LASER, _LASER, wall)
+    believed = np.where(story.swapped, np.where(stated == _LASER, wall, _LASER), stated)
+    if len(np.unique(_lights_of(table.illumination))) < 2:
+        return np.asarray(believed)
+    shown = np.where(light == Light.LINE, _LASER, np.where(believed == _LASER, wall, believed))
+    return np.asarray(np.where(light == Light.UNKNOWN, believed, shown))
+
+
+@dataclass(frozen=True)
+class _Changes:
+    """What differs between the recording's frames and what the pictures show."""
+
+    frames: FrameTable
+    label: Labels
+    row: Int
+    swapped: Bool
+
+    @property
+    def relabelled(self) -> Bool:
+        return np.asarray(self.label != self.frames.illumination)
+
+    @property
+    def retimed(self) -> Bool:
+        return np.asarray(self.row != np.arange(len(self.row)))
+
+    def lost(self) -> list[tuple[int, int]]:
+        """Return (frame, number) wherever pictures were lost before a frame."""
+        skipped = np.diff(self.row, prepend=-1) - 1
+        return [(int(self.frames.frame[k]), int(skipped[k])) for k in np.flatnonzero(skipped > 0)]
+
+
+def _refuse_unmended(changes: _Changes, parameters: PremisesParameters) -> None:
+    wrong = changes.frames.frame[changes.relabelled | changes.retimed]
+    if wrong.size and not parameters.mend:
+        raise UnusableError(
+            "premises",
+            f"from frame {wrong[0]} on, lights or times of frames.csv do not belong to the pictures",
+            frames=wrong.tolist(),
+            hint="correct frames.csv, or let premises.mend be true",
+        )
+
+
+def _warn_of_frames(
+    changes: _Changes, pictures: Pictures, light: Int, table: FrameTable, context: Context
+) -> None:
+    """Tell of lost pictures, wrong labels, a video cut short and pictures that show nothing."""
+    frame, lost = changes.frames.frame, changes.lost()
+    if lost:
+        context.warn(
+            f"{sum(n for _, n in lost)} pictures were lost without frames.csv knowing: before "
+            f"{_listed([f'frame {f} ({n})' for f, n in lost])}. Times and lights of the "
+            f"{changes.retimed.sum()} frames behind were taken from the rows that belong to them. What to "
+            "do: nothing, if the recorder is known to drop frames; else correct frames.csv"
+        )
+    wrong = frame[changes.relabelled & ~changes.retimed]
+    if wrong.size:
+        context.warn(
+            f"the illumination in frames.csv is not what {len(wrong)} pictures show: {_numbers(wrong)}. The "
+            "pictures are believed. What to do: correct the column illumination"
+        )
+    left = len(table.frame) - 1 - int(changes.row[-1])
+    if left > 0:
+        context.warn(
+            f"the video ends early: frames.csv lists {left} of {len(table.frame)} frames more than there are "
+            "pictures. Only what was filmed is measured. What to do: copy the video again, it may be cut off"
+        )
+    again = frame[np.diff(changes.row, prepend=-1) < 1]
+    _warn_of(again, "repeat the picture before and are left out", "nothing, or repair the recorder", context)
+    _warn_of(frame[~pictures.seen], "cannot be decoded", "copy the video again", context)
+    dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
+    _warn_of(
+        frame[dark], "show neither a closed laser line in the dark nor a lit wall, and count as stated",
+        "look at them: a covered lens, a lamp that failed, daylight", context,
+    )  # fmt: skip
+
+
+def _warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
+    if frame.size:
+        context.warn(f"{len(frame)} pictures {what}: {_numbers(frame)}. What to do: {hint}")
+
+
+def _numbers(frame: Int) -> str:
+    return f"frame {_listed([str(f) for f in frame])}"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
+
+
+def _warn_of_clock(time_s: Float, recording: Recording, context: Context) -> None:
+    """Tell when frames do not follow each other at the stated rate."""
+    if len(time_s) < 2:
+        return
+    rate = 1 / float(np.median(np.diff(time_s)))
+    if max(rate / recording.frame_rate, recording.frame_rate / rate) > 1.2:
+        context.warn(
+            f"by frames.csv {rate:.3g} frames were taken a second, recording.yaml states "
+            f"{recording.frame_rate:g}. What to do: check the unit (s) of time_s; speeds and the encoder's "
+            "match rest on it"
+        )
+
+
+def _report(pictures: Pictures, radius_mm: float, changes: _Changes, context: Context) -> None:
+    context.report("pictures looked at", int(pictures.seen.sum()), "frames")
+    context.report("frames whose light was mended", int(changes.relabelled.sum()), "frames")
+    context.report("frames whose time was mended", int(changes.retimed.sum()), "frames")
+    context.report("pipe radius by ring and stated probe", radius_mm, "mm")
+
+
+PREMISES = Stage(
+    "premises",
+    "1",
+    PremisesParameters,
+    check_premises,
+    "lights, times, encoder and diameter as stated, held against the pictures and mended",
+)

@@ -1,0 +1,193 @@
+"""One look at every picture: how bright its wall is, whether a laser line closes in it, how far it moved."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from pipeline.arrays import Bool, Float, Float32, Image
+from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
+from pipeline.recording.base import Recording
+
+# Rays of the polar picture: a line that closes is told from chance by tens of them already.
+_RAYS = 128
+# A line is closed when it goes round more than half of the circle.
+CLOSED = 0.5
+# Part of the way from the centre to the nearer edge of the picture that is looked at.
+_NEAREST, _FARTHEST = 0.15, 0.98
+# A laser line is thinner than this part of the picture's height, or it could not be measured to a tenth of
+# a millimetre; twice as much is left around it for blur and ghosts.
+_THICKEST_LINE = 0.03
+# Polar angles between which the wall is unrolled to see the motion; as in motion, with less at either end.
+_NEAR_DEG, _FAR_DEG = 76.0, 35.0
+_ROWS, _COLUMNS = 128, 256
+# Rows that are enough to see motion, share of a row that a line may cover, breadth of the lamps' light.
+_LEAST_ROWS, _MOST_COVERED, _BROAD = 24, 0.1, 8.0
+# A light that comes round again within so many frames finds the picture it is to be compared with.
+_KEPT = 8
+# Two pictures are taken in the same light when their brightness differs by less than this part.
+_SAME_LIGHT = 0.3
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What was seen in the F pictures of a recording, in the order of its frames.
+
+    Attributes
+    ----------
+    brightness : (F,)
+        Square root of the mean grey level without thin lines, so that shot noise is alike everywhere; NaN
+        where a picture cannot be decoded.
+    closed : (F,)
+        Share of neighbouring rays on which the strongest thin line lies at the same radius.
+    line_px : (F, R) float32
+        Radius of the strongest thin line on each ray.
+    azimuth_rad : (R,)
+        Of the rays.
+    partner : (F,) int
+        The latest picture before in like light, −1 without one.
+    change : (F,)
+        Mean difference to it, grey levels.
+    step : (F,)
+        Motion along the pipe since the partner was taken, in pipe radii; NaN without partner.
+    """
+
+    brightness: Float
+    closed: Float
+    line_px: Float32
+    azimuth_rad: Float
+    partner: np.ndarray[tuple[int], np.dtype[np.int64]]
+    change: Float
+    step: Float
+
+    @property
+    def seen(self) -> Bool:
+        """(F,) true where the picture could be decoded."""
+        return np.isfinite(self.brightness)
+
+
+def look_at_pictures(recording: Recording, probe: Probe, context: Context) -> Pictures:
+    """Look once at every picture of a recording."""
+    polar = _PolarView(recording.source.image_size, probe.camera.centre_px)
+    motion = _AxialMotion(probe.camera, polar.line_width_px)
+    count = len(recording.frames.frame)
+    seen = _empty(count, polar.azimuth_rad)
+    for place, (_, image) in enumerate(recording.read(recording.frames.frame, "grey")):
+        if image is not None:
+            wall, line = polar.wall_and_line(image)
+            seen.brightness[place] = np.sqrt(float(wall.mean()))
+            seen.closed[place], seen.line_px[place] = polar.closed_line(line)
+            ring = seen.line_px[place] if seen.closed[place] > CLOSED else None
+            compared = motion.since(place, seen.brightness[place], image, ring)
+            seen.partner[place], seen.change[place], seen.step[place] = compared
+        context.progress(place + 1, count)
+    return seen
+
+
+def _empty(count: int, azimuth_rad: Float) -> Pictures:
+    nothing = (np.full(count, np.nan) for _ in range(4))
+    brightness, closed, change, step = nothing
+    line = np.full((count, len(azimuth_rad)), np.nan, np.float32)
+    return Pictures(brightness, closed, line, azimuth_rad, np.full(count, -1), change, step)
+
+
+class _PolarView:
+    """A picture resampled along rays from the centre: rows are rays, columns radii."""
+
+    def __init__(self, image_size: tuple[int, int], centre_px: Float) -> None:
+        half = min(image_size) / 2
+        self.azimuth_rad = np.linspace(-np.pi, np.pi, _RAYS, endpoint=False)
+        self._radius = np.arange(_NEAREST * half, _FARTHEST * half, dtype=np.float32)
+        direction = np.stack([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)]).astype(np.float32)
+        self._uv = np.asarray(centre_px, np.float32)[:, None, None] + direction[..., None] * self._radius
+        self.line_width_px = round(_THICKEST_LINE * 2 * half) | 1
+
+    def wall_and_line(self, image: Image) -> tuple[Image, Image]:
+        """Return the wall without what is thinner than a line, and what was taken off (a top-hat)."""
+        polar = np.asarray(cv2.remap(image, self._uv[0], self._uv[1], cv2.INTER_LINEAR), np.uint8)
+        wall = cv2.morphologyEx(polar, cv2.MORPH_OPEN, np.ones((1, self.line_width_px), np.uint8))
+        return np.asarray(wall, np.uint8), np.asarray(cv2.subtract(polar, wall), np.uint8)
+
+    def closed_line(self, line: Image) -> tuple[float, Float32]:
+        """Return the share of neighbouring rays with the strongest line at one radius, and the radii (R,)."""
+        strongest = line.argmax(1)
+        beside = np.abs(strongest - np.roll(strongest, 1)) <= self.line_width_px // 2
+        there = line.max(1) > 0
+        return float((beside & there).mean()), self._radius[strongest]
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """An unrolled wall: number of its picture, brightness, grey levels, and the rows without a laser line."""
+
+    place: int
+    brightness: float
+    grey: Float32
+    first: int
+    end: int
+
+
+class _AxialMotion:
+    """How far the unrolled wall moves between pictures in like light."""
+
+    def __init__(self, camera: Camera, line_width_px: int) -> None:
+        near, far = (1 / np.tan(np.radians(a)) for a in (_NEAR_DEG, _FAR_DEG))
+        z = np.linspace(near, far, _ROWS)
+        psi = np.linspace(-np.pi, np.pi, _COLUMNS, endpoint=False)
+        wall = np.stack(np.broadcast_arrays(np.cos(psi), np.sin(psi), z[:, None]), -1)
+        self._uv = camera.project(wall).uv.astype(np.float32)
+        from_centre = self._uv - np.asarray(camera.centre_px, np.float32)
+        self._radius_px = np.hypot(from_centre[..., 0], from_centre[..., 1])
+        self._ray = np.arange(_COLUMNS) * _RAYS // _COLUMNS
+        self._line_width_px = line_width_px
+        self._radii_per_row = float(z[1] - z[0])
+        self._kept: deque[_Strip] = deque(maxlen=_KEPT)
+
+    def since(
+        self, place: int, brightness: float, image: Image, line_px: Float32 | None
+    ) -> tuple[int, float, float]:
+        """Return the latest picture in like light, the difference to it, and the motion in pipe radii.
+
+        Rows with a laser line, at ``line_px`` on each ray, are left out: it does not move with the wall.
+        """
+        grey = cv2.remap(image, self._uv[..., 0], self._uv[..., 1], cv2.INTER_LINEAR).astype(np.float32)
+        strip = _Strip(place, brightness, grey, *self._free_rows(line_px))
+        before = next((k for k in reversed(self._kept) if _in_like_light(k, strip)), None)
+        self._kept.append(strip)
+        if before is None:
+            return -1, np.nan, np.nan
+        change = float(np.abs(grey - before.grey).mean())
+        rows = slice(max(strip.first, before.first), min(strip.end, before.end))
+        if rows.stop - rows.start < _LEAST_ROWS:
+            return before.place, change, np.nan
+        one, other = (_levelled(s.grey[rows]) for s in (before, strip))
+        window = cv2.createHanningWindow(one.shape[::-1], cv2.CV_32F)
+        (_, moved), _ = cv2.phaseCorrelate(one, other, window)
+        return before.place, change, -moved * self._radii_per_row
+
+    def _free_rows(self, line_px: Float32 | None) -> tuple[int, int]:
+        """Return the longest run of rows of which the laser line covers a tenth at most."""
+        if line_px is None:
+            return 0, _ROWS
+        on_line = np.abs(self._radius_px - line_px[self._ray]) < self._line_width_px / 2
+        covered = np.flatnonzero(on_line.mean(1) > _MOST_COVERED)
+        edges = np.concatenate([[-1], covered, [_ROWS]])
+        longest = int(np.argmax(np.diff(edges)))
+        return int(edges[longest]) + 1, int(edges[longest + 1])
+
+
+def _in_like_light(one: _Strip, other: _Strip) -> bool:
+    brighter = max(one.brightness, other.brightness)
+    return abs(one.brightness - other.brightness) < _SAME_LIGHT * brighter
+
+
+def _levelled(strip: Float32) -> Float32:
+    """Return a strip freed of the lamps' light: without what is broad, every row of spread 1."""
+    fine = strip - cv2.GaussianBlur(strip, (0, 0), _BROAD)
+    fine -= fine.mean(1, keepdims=True)
+    return np.asarray(fine / np.maximum(fine.std(1, keepdims=True), 1.0), np.float32)

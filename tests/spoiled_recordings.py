@@ -1,0 +1,141 @@
+"""Recordings whose tables do not fit their pictures, made of good ones without coding a picture again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.arrays import Image, Int
+from pipeline.artefacts.checked_frames import CheckedFrames
+from pipeline.recording.base import FrameSource, FrameTable, Planes, Recording
+
+
+@dataclass(frozen=True)
+class KeptFrames:
+    """Delivers, under new numbers, the frames ``kept`` (N,) of a source; some may come twice."""
+
+    source: FrameSource
+    kept: Int
+
+    @property
+    def image_size(self) -> tuple[int, int]:
+        return self.source.image_size
+
+    def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
+        wanted = self.kept[np.asarray(frames)]
+        images = self.source.read(np.unique(wanted), planes)
+        held: tuple[int, Image | None] = (-1, None)
+        for frame, number in zip(frames, wanted, strict=True):
+            if held[0] != number:
+                number_read, image = next(images)
+                held = (number_read, None if image is None else image.copy())
+            yield int(frame), held[1]
+
+
+@dataclass(frozen=True)
+class Spoiled:
+    """A recording with a wrong table, and what its table should be."""
+
+    recording: Recording
+    right: FrameTable
+
+    def wrong(self, found: CheckedFrames) -> tuple[int, int]:
+        """Return in how many frames light and time are wrong; a tenth of a period does not count."""
+        tenth = 0.1 * float(np.median(np.diff(self.right.time_s)))
+        lights = self.right.illumination[found.frame] != found.illumination
+        times = np.abs(self.right.time_s[found.frame] - found.time_s) > tenth
+        return int(lights.sum()), int(times.sum())
+
+
+Spoiler = Callable[[Recording, np.random.Generator], Spoiled]
+
+
+def first_frames(recording: Recording, count: int) -> Recording:
+    """Return the beginning of a recording."""
+    return replace(recording, frames=_rows(recording.frames, slice(count)), listed=None)
+
+
+def unspoiled(recording: Recording, random: np.random.Generator) -> Spoiled:
+    return Spoiled(recording, recording.frames)
+
+
+def lost(count: int, *, together: bool = False, table_cut: bool = False) -> Spoiler:
+    """Return a spoiler: pictures are lost and the table goes on; perhaps it ends when the pictures do."""
+
+    def spoil(recording: Recording, random: np.random.Generator) -> Spoiled:
+        frames = len(recording.frames.frame)
+        inside = np.arange(10, frames - 10)
+        first = int(random.choice(inside))
+        gone = first + np.arange(count) if together else random.choice(inside, count, replace=False)
+        return _kept(recording, np.setdiff1d(np.arange(frames), gone), table_cut=table_cut)
+
+    return spoil
+
+
+def repeated(recording: Recording, random: np.random.Generator) -> Spoiled:
+    """One picture comes twice and the table does not know it."""
+    frames = len(recording.frames.frame)
+    return _kept(recording, np.sort(np.append(np.arange(frames), random.integers(10, frames - 10))))
+
+
+def cut_short(recording: Recording, random: np.random.Generator) -> Spoiled:
+    """Only the first quarter of the pictures is there."""
+    return _kept(recording, np.arange(len(recording.frames.frame) // 4))
+
+
+def swapped_from(recording: Recording, random: np.random.Generator) -> Spoiled:
+    """Laser and led are taken for each other from some frame on."""
+    frames = len(recording.frames.frame)
+    return _relabelled(recording, np.arange(frames) >= random.integers(10, frames - 10))
+
+
+def wrong_at_random(recording: Recording, random: np.random.Generator) -> Spoiled:
+    """One light in ten is wrong."""
+    frames = len(recording.frames.frame)
+    wrong = np.zeros(frames, bool)
+    wrong[random.choice(frames, frames // 10, replace=False)] = True
+    return _relabelled(recording, wrong)
+
+
+def wrong_and_lost(recording: Recording, random: np.random.Generator) -> Spoiled:
+    """One light in ten is wrong, and a picture is lost."""
+    wrong = wrong_at_random(recording, random).recording
+    seen = lost(1)(wrong, random)
+    kept = seen.recording.source.kept  # type: ignore[attr-defined]
+    return replace(seen, right=_rows(recording.frames, kept))
+
+
+def _relabelled(recording: Recording, wrong: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Spoiled:
+    light = recording.frames.illumination.astype("U8")
+    other = np.where(light == "laser", "led", "laser")
+    table = replace(recording.frames, illumination=np.where(wrong, other, light))
+    return Spoiled(replace(recording, frames=table, listed=table), recording.frames)
+
+
+def _kept(recording: Recording, kept: Int, *, table_cut: bool = False) -> Spoiled:
+    listed, count = recording.frames, min(len(kept), len(recording.frames.frame))
+    frames = _rows(listed, slice(count))
+    source = KeptFrames(recording.source, kept)
+    spoiled = replace(recording, frames=frames, listed=frames if table_cut else listed, source=source)
+    right = replace(_rows(listed, kept[:count]), frame=np.arange(count))
+    return Spoiled(spoiled, right)
+
+
+def _rows(table: FrameTable, rows: slice | Int) -> FrameTable:
+    return FrameTable(table.frame[rows], table.time_s[rows], table.illumination[rows])
+
+
+SPOILERS: dict[str, Spoiler] = {
+    "as it is": unspoiled,
+    "1 frame lost, not shifted": lost(1),
+    "5 frames lost, not shifted": lost(5),
+    "2 neighbours lost, not shifted": lost(2, together=True),
+    "1 frame lost, table cut": lost(1, table_cut=True),
+    "labels swapped from a frame on": swapped_from,
+    "10 % wrong at random": wrong_at_random,
+    "10 % wrong and 1 frame lost": wrong_and_lost,
+    "1 frame twice": repeated,
+    "a quarter left": cut_short,
+}

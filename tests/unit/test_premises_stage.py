@@ -1,0 +1,206 @@
+"""Tables that do not fit the pictures are found out and mended; right ones are left alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UnusableError
+from pipeline.machine.stage import quiet_context
+from pipeline.recording.base import Encoder, FrameTable, PipeFacts
+from stages.premises import PremisesParameters, check_premises
+from tests.drawn_run import BASELINE, RADIUS, drawn_run
+from tests.ring_images import MemorySource
+from tests.spoiled_recordings import SPOILERS, Spoiled, lost, repeated, swapped_from, wrong_at_random
+
+COUNT, STEP_MM = 60, 1.0
+
+
+@pytest.fixture(scope="module")
+def run():
+    return drawn_run(STEP_MM * np.arange(COUNT), np.zeros(COUNT))
+
+
+@pytest.fixture(scope="module")
+def good(run):
+    """A drawn recording, laser and led by turns, with a closed line in the dark in its laser frames."""
+    lines = {int(f): ring_image(run.probe, seed=int(f)) for f in run.rings.frame}
+    source = MemorySource({**run.recording.source.images, **lines}, run.probe.camera.image_size)
+    return replace(run.recording, source=source)
+
+
+def ring_image(probe, seed=0):
+    width, height = probe.camera.image_size
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    seen = probe.camera.project(np.array([RADIUS, 0.0, BASELINE])).uv[0] - probe.camera.centre_px[0]
+    off = np.hypot(u - probe.camera.centre_px[0], v - probe.camera.centre_px[1]) - seen
+    noise = np.random.default_rng(seed).standard_normal(off.shape)
+    return np.clip(np.rint(4 + 180 * np.exp(-0.5 * (off / 1.2) ** 2) + noise), 0, 255).astype(np.uint8)
+
+
+def checked(recording, probe, **parameters):
+    told = []
+    context = replace(quiet_context(), warn=told.append)
+    return check_premises(recording, probe, PremisesParameters(**parameters), context), told
+
+
+def test_a_right_recording_is_left_alone(good, run):
+    found, told = checked(good, run.probe)
+    assert told == []
+    assert found.encoder_factor == 1.0
+    assert (found.relabelled, found.retimed) == (0, 0)
+    np.testing.assert_array_equal(found.time_s, good.frames.time_s)
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in SPOILERS if n not in ("as it is", "2 neighbours lost, not shifted")]
+)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_lights_and_times_are_mended(name, seed, good, run):
+    spoiled = SPOILERS[name](good, np.random.default_rng(seed))
+    found, told = checked(spoiled.recording, run.probe)
+    assert spoiled.wrong(found) == (0, 0)
+    assert told
+    assert all("What to do" in t for t in told)
+
+
+def test_the_spoilings_spoil(good):
+    """Without mending, what is counted as wrong is there."""
+    from pipeline.artefacts.checked_frames import CheckedFrames
+
+    for spoil in (lost(1), swapped_from, wrong_at_random):
+        spoiled = spoil(good, np.random.default_rng(1))
+        frames = spoiled.recording.frames
+        believed = CheckedFrames(frames.frame, frames.time_s, frames.illumination)
+        assert max(spoiled.wrong(believed)) > 4
+
+
+def test_a_loss_that_leaves_the_rhythm_whole_is_seen_by_the_motion(good, run):
+    spoiled = lost(2, together=True)(good, np.random.default_rng(1))
+    found, told = checked(spoiled.recording, run.probe)
+    lights, times = spoiled.wrong(found)
+    assert lights == 0
+    assert times <= 1  # before or after the laser picture between the two of the wall
+    assert "2 pictures were lost" in told[0]
+
+
+def test_the_frame_from_which_they_were_lost_is_named(good, run):
+    kept = np.delete(np.arange(COUNT), 31)
+    spoiled = lost(1)(good, _Chosen(31))
+    np.testing.assert_array_equal(spoiled.recording.source.kept, kept)
+    _, told = checked(spoiled.recording, run.probe)
+    assert "before frame 31 (1)" in told[0]
+
+
+class _Chosen:
+    """Chooses one frame in place of a random one."""
+
+    def __init__(self, frame):
+        self.frame = frame
+
+    def choice(self, _, size=None, replace=True):
+        return self.frame if size is None else np.array([self.frame])
+
+
+def test_what_is_not_to_be_mended_stops_the_run_with_the_frame(good, run):
+    spoiled = swapped_from(good, np.random.default_rng(1))
+    first = int(np.flatnonzero(spoiled.recording.frames.illumination != good.frames.illumination)[0])
+    with pytest.raises(UnusableError, match=f"from frame {first} on"):
+        checked(spoiled.recording, run.probe, mend=False)
+
+
+def relabelled(recording, lights):
+    table = FrameTable(recording.frames.frame, recording.frames.time_s, np.array(lights, "U8"))
+    return replace(recording, frames=table, listed=None)
+
+
+def rearranged(good, order, lights):
+    """Return a recording of some pictures (numbers of ``good``), as many as there are rows in the table."""
+    images = {k: good.source.images[n] for k, n in enumerate(order)}
+    table = FrameTable(np.arange(len(order)), np.arange(len(order)) / 30, np.array(lights, "U8"))
+    source = MemorySource(images, good.source.image_size)
+    return replace(good, frames=table, listed=None, source=source, encoder=None)
+
+
+def test_one_light_is_left_alone(good, run):
+    for light, first in (("laser", 0), ("led", 1), ("both", 1)):
+        order = np.arange(first, COUNT, 2)
+        found, told = checked(rearranged(good, order, [light] * len(order)), run.probe)
+        assert (found.relabelled, found.retimed, told) == (0, 0, [])
+
+
+def test_an_irregular_order_that_the_table_knows_is_left_alone(good, run):
+    lasers, leds = iter(range(0, COUNT, 2)), iter(range(1, COUNT, 2))
+    lights = ["led" if k % 3 == 2 else "laser" for k in range(30)] + ["led", "led", "laser", "led"] * 3
+    order = [next(leds if light == "led" else lasers) for light in lights]
+    found, told = checked(rearranged(good, order, lights), run.probe)
+    assert (found.relabelled, found.retimed, told) == (0, 0, [])
+
+
+def test_a_table_of_one_light_is_refused_where_two_alternate(good, run):
+    with pytest.raises(UnusableError, match=r"frames\.csv says laser of every frame, but 30 pictures show"):
+        checked(relabelled(good, ["laser"] * COUNT), run.probe)
+
+
+def test_a_table_of_two_lights_is_refused_where_all_look_alike(good, run):
+    order = [2 * (k // 2) for k in range(COUNT)]
+    with pytest.raises(UnusableError, match="all pictures look alike"):
+        checked(rearranged(good, order, ["laser", "led"] * (COUNT // 2)), run.probe)
+
+
+def test_covered_lens_counts_as_stated_and_is_told(good, run):
+    dark = np.random.default_rng(0).integers(2, 6, good.source.images[0].shape).astype(np.uint8)
+    images = {k: dark if k < 6 else image for k, image in good.source.images.items()}
+    covered = replace(good, source=MemorySource(images, good.source.image_size))
+    found, told = checked(covered, run.probe)
+    assert (found.relabelled, found.retimed) == (0, 0)
+    assert any("neither a closed laser line" in t and "frame 0, 1, 2, 3, 4, 5" in t for t in told)
+
+
+@pytest.mark.parametrize(
+    ("factor", "message"),
+    [
+        (1 / 25.4, "in inch"),
+        (1 / 1000, "in m "),
+        (-1.0, "its sign reversed"),
+        (-0.1, "in cm in place of mm and"),
+    ],
+)
+def test_the_encoder_is_brought_to_mm_and_to_the_sense_of_the_motion(factor, message, good, run):
+    encoder = Encoder(good.encoder.time_s, good.encoder.distance_mm * factor)
+    found, told = checked(replace(good, encoder=encoder), run.probe)
+    assert found.encoder_factor == pytest.approx(1 / factor)
+    assert message in told[0]
+    repaired = found.applied_to(replace(good, encoder=encoder)).encoder
+    np.testing.assert_allclose(repaired.distance_mm, good.encoder.distance_mm)
+
+
+@pytest.mark.parametrize(
+    ("diameter_mm", "message"), [(2 * RADIUS / 25.4, "stated in inch"), (RADIUS, "the radius were stated")]
+)
+def test_a_diameter_that_the_ring_contradicts_ends_the_run(diameter_mm, message, good, run):
+    with pytest.raises(UnusableError, match=message):
+        checked(replace(good, pipe=PipeFacts(diameter_mm)), run.probe)
+
+
+def test_a_baseline_in_metres_ends_the_run(good, run):
+    laser = replace(run.probe.laser, baseline_mm=BASELINE / 1000)
+    with pytest.raises(UnusableError, match="baseline were stated in m"):
+        checked(good, replace(run.probe, laser=laser))
+
+
+def test_another_diameter_and_another_clock_are_told(good, run):
+    table = replace(good.frames, time_s=good.frames.time_s * 1000)
+    _, told = checked(replace(good, frames=table, pipe=PipeFacts(2.3 * RADIUS)), run.probe)
+    assert any("diameter is 100" in t for t in told)
+    assert any("check the unit (s) of time_s" in t for t in told)
+
+
+def test_repeated_pictures_are_left_out(good, run):
+    spoiled: Spoiled = repeated(good, np.random.default_rng(1))
+    found, told = checked(spoiled.recording, run.probe)
+    assert len(found.frame) == len(spoiled.recording.frames.frame) - 1
+    assert np.all(np.diff(found.time_s) > 0)
+    assert any("repeat the picture before" in t for t in told)
