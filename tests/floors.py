@@ -20,8 +20,8 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "steps of a run",
         (
-            "stages.premises", "stages.rings", "stages.triangulate", "stages.accumulate", "stages.texture", "stages.mesh",
-            "stages.sections", "stages.defects", "stages.overlays",
+            "stages.premises", "stages.rings", "stages.triangulate", "stages.accumulate", "stages.texture",
+            "stages.mesh", "stages.sections", "stages.defects", "stages.overlays",
         ),
     ),
     ("steps built on others", ("stages.motion", "stages.calibrate", "stages.preview", "stages.compare")),

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Image, Int
-from pipeline.artefacts.checked_frames import CheckedFrames
 from pipeline.recording.base import FrameSource, FrameTable, Planes, Recording
+from pipeline.recording.checked_frames import CheckedFrames
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from pipeline.artefacts.checked_frames import CheckedFrames
 from pipeline.artefacts.findings import DefectKind, Defects, Sections
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
@@ -23,13 +22,15 @@ from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.run_folder import RunFolder
 from pipeline.recording import open_recording
 from pipeline.recording.base import PipeFacts, Recording
+from pipeline.recording.checked_frames import CheckedFrames
 from pipeline.recording.input_file import content_key
 from pipeline.review.decisions.replay import Finding, Measured
 
 _Artefact = TypeVar("_Artefact")
 _MAKERS: dict[type, str] = {
     Overlays: "overlays", Trajectory: "motion", Wall: "accumulate", RingSamples: "rings",
-    CheckedFrames: "premises", Sections: "sections", WallTexture: "texture", RingPoints: "triangulate", Defects: "defects",
+    CheckedFrames: "premises", Sections: "sections", WallTexture: "texture", RingPoints: "triangulate",
+    Defects: "defects",
 }  # fmt: skip
 # What a signature binds: the results and the record of how they came about.
 _BOUND = ("run.json", "defects.json", "radius_map.npz", "unrolled.png", "model.glb", "sections.csv")

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from pipeline.recording.checked_frames import CheckedFrames
 
 from pipeline.arrays import Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
@@ -21,6 +20,7 @@ from pipeline.geometry.axis import distance_along
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import FrameTable, Recording
+from pipeline.recording.checked_frames import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from pipeline.arrays import Bool, Float, Int
-from pipeline.artefacts.checked_frames import CheckedFrames
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
+from pipeline.recording.checked_frames import CheckedFrames
 from stages.premises.light import Light, alike, light_seen, pattern_breaks
 from stages.premises.lost import repeated, rhythm_of, row_times, rows_by_motion, steps_of_wall
 from stages.premises.pictures import Pictures, look_at_pictures

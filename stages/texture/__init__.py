@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pipeline.artefacts.checked_frames import CheckedFrames
 from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
+from pipeline.recording.checked_frames import CheckedFrames
 from stages.texture.texture import TextureParameters, photograph_wall
 
 

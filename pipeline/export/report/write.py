@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from pipeline.artefacts.checked_frames import CheckedFrames
 from pipeline.artefacts.findings import Defect, Defects, Sections
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
@@ -24,6 +23,7 @@ from pipeline.files.provenance import program_version
 from pipeline.instrument.probe import Probe
 from pipeline.machine.outcome import Results, warnings_of
 from pipeline.recording.base import Recording
+from pipeline.recording.checked_frames import CheckedFrames
 
 # Libraries that the results stand on, named with their versions.
 _STANDS_ON = ("numpy", "scipy", "opencv-contrib-python-headless", "av")
