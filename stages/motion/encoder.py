@@ -69,9 +69,9 @@ def encoder_at_frames(
         context.report("encoder left out", "it does not fit the frames")
         context.warn(
             f"the encoder is not used: it covers {100 * known.mean():.0f} % of the frames and usually "
-            f"advances by {_usual(np.diff(at_frames)):.3g} mm from one frame to the next, where a frame shows the "
-            f"wall up to {farthest_mm:.3g} mm ahead. What to do: check unit (mm) and clock (s, as in frames.csv) "
-            "of encoder.csv"
+            f"advances by {_usual(np.diff(at_frames)):.3g} mm from one frame to the next, where a frame "
+            f"shows the wall up to {farthest_mm:.3g} mm ahead. What to do: check unit (mm) and clock (s, as in "
+            "frames.csv) of encoder.csv"
         )
         return None
     sigma = float(np.hypot(sigma_mm, _quantum(encoder.distance_mm) / np.sqrt(12)))
@@ -92,8 +92,8 @@ def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Conte
     context.report("encoder left out", "the wall's texture contradicts it")
     context.warn(
         f"the encoder is not used: in {int(differs[judged].sum())} of {int(judged.sum())} steps the wall's "
-        "texture shows another motion, so that distance rests on the laser's baseline alone. What to do: check "
-        "the encoder's scale and clock, and whether its wheel slipped"
+        "texture shows another motion, so that distance rests on the laser's baseline alone. What to do: "
+        "check the encoder's scale and clock, and whether its wheel slipped"
     )
     return True
 
