@@ -70,8 +70,8 @@ def encoder_at_frames(
         context.warn(
             f"the encoder is not used: it covers {100 * known.mean():.0f} % of the frames and usually "
             f"advances by {_usual(np.diff(at_frames)):.3g} mm from one frame to the next, where a frame "
-            f"shows the wall up to {farthest_mm:.3g} mm ahead. What to do: check unit (mm) and clock (s, as in "
-            "frames.csv) of encoder.csv"
+            f"shows the wall up to {farthest_mm:.3g} mm ahead. What to do: check unit (mm) and clock (s, as "
+            "in frames.csv) of encoder.csv"
         )
         return None
     sigma = float(np.hypot(sigma_mm, _quantum(encoder.distance_mm) / np.sqrt(12)))
