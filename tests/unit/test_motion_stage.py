@@ -9,7 +9,7 @@ from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import quiet_context
-from stages.motion import MotionParameters, estimate_motion
+from stages.motion import MotionParameters, adjust_at_once, estimate_motion, measure_run
 from tests.drawn_run import DrawnRun, drawn_run, without_encoder
 
 STEP = 0.8
@@ -49,6 +49,30 @@ def test_pose_lies_within_its_sigma(steady: DrawnRun, encoder: bool) -> None:
     assert got.radius_mm == pytest.approx(50, abs=0.05)
     assert np.isfinite(got.encoder_scale) == encoder
     assert got.events == ()
+
+
+def test_the_diagnosis_takes_the_same_way_as_the_run(steady: DrawnRun) -> None:
+    """Measured without the encoder and adjusted at once, a short run is what the stage makes of it."""
+    parts = steady.recording, steady.probe, steady.rings, steady.points, PARAMETERS, quiet_context()
+    run = measure_run(*parts, use_encoder=False)
+    assert run.encoder is None
+    assert measure_run(*parts).encoder is not None, "the control: it has one"
+    measured = run.measured(run.whole, PARAMETERS)
+    start, frames = run.start(run.whole, measured, PARAMETERS), steady.recording.frames
+    got = adjust_at_once(start, measured, frames, run.texture.grid.radius_mm, PARAMETERS, quiet_context())
+    wanted = estimated(without_encoder(steady))
+    assert got.trajectory.T_pc.tobytes() == wanted.T_pc.tobytes()
+    assert got.trajectory.covariance.tobytes() == wanted.covariance.tobytes()
+    assert got.trajectory.T_pc.tobytes() != estimated(steady).T_pc.tobytes(), "the control: the encoder tells"
+
+
+def test_an_adjustment_that_leaves_the_rings_is_refused(steady: DrawnRun) -> None:
+    points = steady.recording, steady.probe, steady.rings, steady.points
+    run = measure_run(*points, PARAMETERS, quiet_context(), use_encoder=False)
+    measured = run.measured(run.whole, PARAMETERS)
+    start, frames = run.start(run.whole, measured, PARAMETERS), steady.recording.frames
+    with pytest.raises(UnusableError, match="does not converge"):
+        adjust_at_once(start, measured, frames, 60.0, PARAMETERS, quiet_context())
 
 
 def test_distance_0_and_roll_0_are_the_first_camera(steady: DrawnRun) -> None:

@@ -51,7 +51,7 @@ class Verdict(Enum):
 
     SAME = "the same wall"
     PLAIN = "too little texture"
-    ALIKE = "the wall looks alike elsewhere too"
+    ALIKE = "the wall looks the same elsewhere too"
     OTHER = "the wall is not recognised"
     UNREAD = "a frame could not be read"
     CONTRADICTED = "contradicted by the motion or by other places"
@@ -148,9 +148,9 @@ def register(
         return found
     apart = 2 * parameters.patch_half_px
     rivals = [p.height for p in peaks if np.max(np.abs(p.shift - best.shift)) > apart]
-    return (
-        Registration.refused(Verdict.ALIKE) if max(rivals, default=0.0) > _MOST_RIVAL * best.height else found
-    )
+    if max(rivals, default=0.0) > _MOST_RIVAL * best.height:
+        return Registration.refused(Verdict.ALIKE)
+    return found
 
 
 def _peaks(
