@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: setup run test lock clean
+.PHONY: setup run test docs lock clean
 
 setup: $(READY)
 
@@ -21,7 +21,11 @@ test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses=2 --dist=loadfile --cov --cov-report=term:skip-covered
+
+# The pages of `import boresight`, into build/docs.
+docs: setup
+	$(BIN)/pdoc --docformat numpy --output-directory build/docs boresight
 
 # The lock holds exact versions and hashes for every platform; run this after a change of pyproject.toml.
 lock:
