@@ -12,7 +12,8 @@ from pathlib import Path
 FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("words", ("pipeline", "stages", "pipeline.errors", "pipeline.arrays", "pipeline.pages")),
     ("disk and system", ("pipeline.files", "pipeline.system")),
-    ("machine and mathematics", ("pipeline.machine", "pipeline.geometry", "pipeline.adjustment")),
+    ("machine and geometry", ("pipeline.machine", "pipeline.geometry")),
+    ("adjustment", ("pipeline.adjustment",)),
     ("what is measured, what is known", ("pipeline.artefacts", "pipeline.physics")),
     ("instrument", ("pipeline.instrument",)),
     ("recording", ("pipeline.recording",)),

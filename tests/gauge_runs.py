@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.adjustment.motion_priors import LOOSE
 from pipeline.arrays import Float, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
@@ -31,7 +32,6 @@ from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import PosedFrames, poses_of_all_frames
 from stages.calibrate.gauge.result import GaugeCalibration, calibration_of
-from stages.calibrate.gauge.smooth import LOOSE
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
 from stages.calibrate.gauge.start import FirstPose
 

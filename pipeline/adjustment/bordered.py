@@ -14,6 +14,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.elimination import add_landmarks, add_rows
+from pipeline.adjustment.marginal import marginalised
 from pipeline.adjustment.robust import Loss, Squares
 from pipeline.adjustment.sums import BLOCK, Sums
 from pipeline.arrays import Float, Int
@@ -233,6 +234,10 @@ class Factor:
         border = cho_solve(self.corner, self.right_border - self.border.T @ direct)
         return (direct - self.solved_border @ border).reshape(-1, BLOCK), border
 
+    def border_right(self) -> Float:
+        """Return the border's right side (B,), the frames eliminated."""
+        return self.right_border - self.border.T @ self.band.solve(self.right[:, None])[:, 0]
+
     def border_covariance(self) -> Float:
         """Return (B, B)."""
         return np.asarray(cho_solve(self.corner, np.eye(self.border.shape[1])))
@@ -251,17 +256,35 @@ class Factor:
         each = np.arange(len(frames))
         return np.asarray(self.joint_covariance(frames)[each, :, each])
 
+    def border_information(self) -> Float:
+        """Return (B, B), the frames eliminated."""
+        upper = np.triu(self.corner[0])
+        return np.asarray(upper.T @ upper)
+
+    def border_rows(self, rows: Rows) -> Float:
+        """Return how residuals (M, B) of equations of one frame each follow the border when frames do."""
+        frames = self.solved_border.reshape(-1, BLOCK, self.border.shape[1])[rows.frame[:, 0]]
+        return np.asarray(rows.by_border - np.einsum("mi,mib->mb", rows.by_frame[:, 0], frames))
+
+    def frames_after(self, border: Float) -> Float:
+        """Return the step (N, 7) of the frames to their best place when the border steps by (B,)."""
+        direct = self.band.solve(self.right[:, None])[:, 0]
+        return np.asarray((direct - self.solved_border @ border).reshape(-1, BLOCK))
+
+    def frames_follow(self, border: Float) -> Float:
+        """Return how frames (N, 7, S) follow S directions (B, S) of the border."""
+        return np.asarray((-self.solved_border @ border).reshape(-1, BLOCK, border.shape[1]))
+
     def response(self, which: Int) -> tuple[Float, Float]:
         """Return how frames (N, 7, S) and border (B, S) follow when S numbers of the border are moved.
 
         All other unknowns take their best values for them.
         """
-        information = np.triu(self.corner[0]).T @ np.triu(self.corner[0])
+        information = self.border_information()
         other = np.setdiff1d(np.arange(len(information)), which)
-        border = np.zeros((len(information), len(which)))
-        border[which, np.arange(len(which))] = 1
-        border[other] = -np.linalg.solve(information[np.ix_(other, other)], information[np.ix_(other, which)])
-        return (-self.solved_border @ border).reshape(-1, BLOCK, len(which)), border
+        border = marginalised(information, np.zeros(len(information)), other).follow
+        border = border[:, np.argsort(np.argsort(which))]
+        return self.frames_follow(border), border
 
 
 def landmark_steps(

@@ -32,10 +32,10 @@ class Sums:
     right_border: Float
 
     @staticmethod
-    def empty(frames: int, border: int, lags: int) -> Sums:
-        """Return sums of nothing."""
-        size = BLOCK * frames
-        shapes = (frames, lags, BLOCK, BLOCK), (size, border), (border, border), (size,), (border,)
+    def empty(frames: int, border: int, lags: int, block: int = BLOCK) -> Sums:
+        """Return sums of nothing, of frames with ``block`` unknowns each."""
+        size = block * frames
+        shapes = (frames, lags, block, block), (size, border), (border, border), (size,), (border,)
         return Sums(*(np.zeros(shape) for shape in shapes))
 
     def like(self) -> Sums:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from pipeline.adjustment.marginal import covariance_of, log_determinant, marginalised
 from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import EffectModel, Shape
@@ -52,10 +53,8 @@ def instrument_information(probe: Probe) -> Float:
     sigma = np.sqrt(np.diag(probe.covariance))
     scale = np.where(sigma > 0, sigma, 1e-6)
     scaled = probe.covariance / np.outer(scale, scale) + np.diag(np.where(sigma > 0, 0.0, 1.0))
-    value, vector = np.linalg.eigh(scaled)
     # Parameters stated as one number (both focal lengths) differ by next to nothing.
-    inverse = (vector / np.maximum(value, _TIED)) @ vector.T
-    return np.asarray(inverse / np.outer(scale, scale))
+    return np.asarray(covariance_of(scaled, _TIED) / np.outer(scale, scale))
 
 
 @dataclass(frozen=True)
@@ -111,14 +110,12 @@ def eliminated(evidence: Evidence, stated: Stated, block: Int, free: Int) -> tup
     a, b = evidence.information, evidence.right
     free = free[np.diag(a)[free] > 0]
     prior = stated.over(evidence.columns)[np.ix_(free, free)]
-    within = a[np.ix_(free, free)] + prior
-    scale = np.sqrt(np.diag(within))
-    scaled = np.linalg.lstsq(
-        within / np.outer(scale, scale), a[np.ix_(free, block)] / scale[:, None], rcond=1e-13
-    )[0]
-    response = np.asarray(scaled / scale[:, None], np.float64)
-    own = a[np.ix_(block, block)] - a[np.ix_(block, free)] @ response
-    return (own + own.T) / 2, b[block] - response.T @ b[free], response.T @ prior @ response
+    both, out = np.concatenate([free, block]), np.arange(len(free))
+    information = a[np.ix_(both, both)]
+    information[: len(free), : len(free)] += prior
+    left = marginalised(information, b[both], out, rcond=1e-13)
+    response = left.follow[out]
+    return left.information, left.right, response.T @ prior @ response
 
 
 def instrument_places(evidence: Evidence) -> Int:
@@ -154,16 +151,7 @@ def estimate(evidence: Evidence, stated: Stated, prior_sigma: Float) -> Estimate
     """
     prior = stated.over(evidence.columns) + np.diag(np.where(np.isinf(prior_sigma), 0.0, prior_sigma**-2.0))
     total = evidence.information + prior
-    scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
-    value, vector = np.linalg.eigh(total / np.outer(scale, scale))
-    value = np.maximum(value, 1e-14)
-    covariance = (vector / value) @ vector.T / np.outer(scale, scale)
+    covariance = covariance_of(total)
     best = covariance @ evidence.right
-    occam = float(np.sum(np.log(value)) + 2 * np.sum(np.log(scale))) - _log_det(prior)
+    occam = log_determinant(total) - log_determinant(prior)
     return Estimate(best, covariance, evidence.misfit - float(evidence.right @ best) + occam)
-
-
-def _log_det(matrix: Float) -> float:
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    value = np.linalg.eigvalsh(matrix / np.outer(scale, scale))
-    return float(np.sum(np.log(np.maximum(value, 1e-14))) + 2 * np.sum(np.log(scale)))

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from pipeline.adjustment.motion_priors import LOOSE
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.rigid import inverse, transform
@@ -32,7 +33,6 @@ from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.edges import Edges, joined, predicted_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.smooth import LOOSE
 from stages.calibrate.gauge.solve import RingSource, first_unknowns
 
 _AZIMUTHS = 360

@@ -43,11 +43,11 @@ def test_step_by_schur_complement_is_the_dense_step():
     f, v = free.count, len(views)
     dense = np.zeros((f + 6 * v, f + 6 * v))
     dense[:f, :f] = system.shared
-    gradient = np.concatenate([system.shared_gradients.sum(0), system.pose_gradient.ravel()])
+    gradient = np.concatenate([system.shared_gradients.sum(0), system.block_gradient.ravel()])
     for i in range(v):
         part = slice(f + 6 * i, f + 6 * i + 6)
         dense[part, part], dense[:f, part], dense[part, :f] = (
-            system.pose[i], system.coupling[i], system.coupling[i].T,
+            system.block[i], system.coupling[i], system.coupling[i].T,
         )  # fmt: skip
     dense += damping * np.diag(np.diag(dense))
     scale = 1 / np.sqrt(np.diag(dense))
@@ -63,7 +63,7 @@ def test_gradient_is_that_of_the_cost():
     estimate = replace(start(views, KANNALA_BRANDT.image_size), shape_mm=np.array([0.2, -0.1, 0.3]))
     estimate = replace(estimate, camera=KANNALA_BRANDT)
     system = linearise(estimate, corners, free, 0.7)
-    analytic = np.concatenate([2 * system.shared_gradients.sum(0), 2 * system.pose_gradient.ravel()])
+    analytic = np.concatenate([2 * system.shared_gradients.sum(0), 2 * system.block_gradient.ravel()])
     for i, step in enumerate([1e-4] * 4 + [1e-7] * 4 + [1e-5] * 3 + [1e-7, 1e-7, 1e-7, 1e-5, 1e-5, 1e-5] * 3):
         move = np.zeros(len(analytic))
         move[i] = step

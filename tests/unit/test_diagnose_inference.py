@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from pipeline.adjustment.bordered import Rows
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.evidence import INSTRUMENT, Column, Evidence, total
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.elimination import (
     Equations,
-    MotionPrior,
     OwnUnknowns,
     Part,
     eliminate_globals,
@@ -40,21 +40,22 @@ def equations(random: np.random.Generator, rows: int = 200) -> Equations:
     )  # fmt: skip
 
 
-def motion(random: np.random.Generator) -> MotionPrior:
+def motion(random: np.random.Generator) -> Rows:
     frame = np.arange(FRAMES - 3)[:, None] + np.arange(4)
     shape = (len(frame), 4, 6)
-    return MotionPrior(
-        frame, random.normal(size=shape), random.normal(size=len(frame)), random.uniform(1, 2, len(frame))
-    )
+    return Rows(
+        frame, random.normal(size=shape), np.zeros((len(frame), 0)), random.normal(size=len(frame)),
+        random.uniform(0.7, 1, len(frame)),
+    )  # fmt: skip
 
 
-def dense(e: Equations, m: MotionPrior) -> tuple[np.ndarray, np.ndarray]:
+def dense(e: Equations, m: Rows) -> tuple[np.ndarray, np.ndarray]:
     """Return all weighted rows over poses and globals, and their residuals."""
     of_poses = np.zeros((len(e.frame), FRAMES, 6))
     of_poses[np.arange(len(e.frame)), e.frame] = e.by_pose
     tied = np.zeros((len(m.frame), FRAMES, 6))
     for k in range(4):
-        tied[np.arange(len(m.frame)), m.frame[:, k]] += m.by_pose[:, k]
+        tied[np.arange(len(m.frame)), m.frame[:, k]] += m.by_frame[:, k]
     measured = np.concatenate([of_poses.reshape(len(e.frame), -1), e.by_global], 1)
     prior = np.concatenate([tied.reshape(len(m.frame), -1), np.zeros((len(m.frame), GLOBALS))], 1)
     weight = np.sqrt(np.concatenate([e.weight, m.weight]))
@@ -69,8 +70,8 @@ def test_eliminating_poses_and_globals_is_dense_least_squares():
     e, m = equations(random), motion(random)
     reduced = eliminate_poses(e, m, FRAMES)
     none = np.zeros(2)
-    own = OwnUnknowns(np.array([3, 4]), np.array([0, 1, 2]), none, none, none)
-    left = eliminate_globals(reduced, own)
+    own = OwnUnknowns(np.array([3, 4]), none, none, none)
+    left, misfit = eliminate_globals(reduced, own)
     rows, residual = dense(e, m)
     nuisance = [*range(6 * FRAMES), 6 * FRAMES + 3, 6 * FRAMES + 4]
     free = np.linalg.qr(rows[:, nuisance])[0]
@@ -79,7 +80,7 @@ def test_eliminating_poses_and_globals_is_dense_least_squares():
     rest = residual - free @ (free.T @ residual)
     assert left.information == pytest.approx(kept.T @ kept, rel=1e-6)
     assert left.right == pytest.approx(-kept.T @ rest, rel=1e-6, abs=1e-6)
-    assert left.misfit == pytest.approx(rest @ rest, rel=1e-8)
+    assert misfit == pytest.approx(rest @ rest, rel=1e-8)
 
 
 def test_a_part_with_frames_unseen_can_still_be_eliminated():
@@ -88,7 +89,7 @@ def test_a_part_with_frames_unseen_can_still_be_eliminated():
     frames = np.arange(FRAMES) < 2
     part = e.of(Part(frames, (0, 1)))
     assert set(part.frame) == {0, 1}
-    assert np.isfinite(eliminate_poses(part, replace(m, weight=0 * m.weight), FRAMES).information).all()
+    assert np.isfinite(eliminate_poses(part, replace(m, sigma=np.inf * m.sigma), FRAMES).information).all()
 
 
 def evidence_of(

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.adjustment.marginal import Marginal
 from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.swings import SWINGS
-from stages.diagnose.gauge.elimination import Left, Reduced, score_inflation
+from stages.diagnose.gauge.elimination import Reduced, score_inflation
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.shapes import FreeShape
 from stages.diagnose.gauge.sizes import Sized, quantities
@@ -49,7 +50,7 @@ def test_scores_of_a_large_effect_are_not_widened_by_the_effect_itself():
     reduced = Reduced(
         np.eye(GLOBALS), np.zeros(GLOBALS), 0.0, np.zeros((FRAMES, 6, GLOBALS)), np.zeros((FRAMES, 6))
     )
-    left = Left(np.eye(GLOBALS), np.zeros(GLOBALS), 0.0, np.eye(GLOBALS), np.zeros(GLOBALS))
+    left = Marginal(np.eye(GLOBALS), np.zeros(GLOBALS), np.eye(GLOBALS), np.zeros(GLOBALS), 0.0)
     alone = score_inflation(e, reduced, left, np.full(GLOBALS, -1))
     explained = score_inflation(e, reduced, left, np.array([-1, -1, 0, -1, -1]))
     assert alone[2] > 5

@@ -70,9 +70,9 @@ def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None
 
 
 def _unknowns(run: GaugeRun) -> tuple[Unknowns, RingSource]:
+    from pipeline.adjustment.motion_priors import LOOSE
     from stages.calibrate.gauge.adjust import Measurements
     from stages.calibrate.gauge.poses import poses_of_all_frames
-    from stages.calibrate.gauge.smooth import LOOSE
 
     T_pc = poses_of_all_frames(run.recording, run.posed, run.rings, run.stated)
     source = RingSource(run.rings, run.rings.frame, run.gauge)

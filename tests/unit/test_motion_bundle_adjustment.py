@@ -8,12 +8,13 @@ from scipy.optimize import least_squares
 
 from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.bordered import BorderedSystem, LandmarkRows, Rows, Step, landmark_steps
+from pipeline.adjustment.levenberg_marquardt import Damping
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
-from stages.motion.bundle_adjustment.solver import Damping, adjust
+from stages.motion.bundle_adjustment.solver import adjust
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 from tests.motion_scene import displaced, scene

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.motion_priors import smooth_motion_rows, third_difference_coefficients
 from pipeline.adjustment.robust import GemanMcClure
 from pipeline.arrays import Float
 from stages.motion.bundle_adjustment import residuals
@@ -84,7 +85,7 @@ def test_axis_and_prior_rows(given) -> None:
 
 def test_smooth_rows(given) -> None:
     measured, state = given
-    make = lambda s: residuals.smooth_rows(s, measured.time_s, measured.smooth_sigma)  # noqa: E731
+    make = lambda s: smooth_motion_rows(s.T_pc, measured.time_s, measured.smooth_sigma, s.border_size)  # noqa: E731
     # Rotations are taken as a vector space here: exact to the rotation between neighbours, about 0.03 rad.
     check_rows(make, state, 1e-9, frame_atol=0.1 / 60)
     rows = make(state)
@@ -96,7 +97,7 @@ def test_smooth_rows(given) -> None:
 
 def test_third_difference_is_blind_to_parabolas_at_any_spacing() -> None:
     t = np.array([[0.0, 0.1, 0.25, 0.3], [1.0, 2.0, 3.0, 4.0]])
-    coefficient = residuals._third_difference(t)
+    coefficient = third_difference_coefficients(t)
     np.testing.assert_allclose(coefficient[1], [-1, 3, -3, 1], atol=1e-12)
     for power in range(3):
         np.testing.assert_allclose(np.sum(coefficient * (t - t[:, :1]) ** power, 1), 0, atol=1e-12)

@@ -1,19 +1,22 @@
-"""Least squares over one camera and many board poses: Levenberg-Marquardt on the camera's Schur complement.
+"""Least squares over one camera and many board poses: residuals, their derivatives, and the covariance.
 
-Each pose couples only to its own view and to the camera, so eliminating the 6 × 6 pose blocks leaves a dense
-system of the camera's few parameters (W. Triggs et al., "Bundle adjustment - a modern synthesis", 2000, § 6).
-Residuals are weighted after Huber by iterated reweighting. A plane board may be bent: the same quadratic
-sag in all views, as in mrcal's board warp.
+Each pose couples only to its own view and to the camera: `pipeline.adjustment.marginal.ArrowEquations`.
+Residuals are weighted after Huber by iterated reweighting. A plane board may be bent: the same quadratic sag
+in all views, as in the board warp of mrcal.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
+from pipeline.adjustment.clusters import cluster_covariance
+from pipeline.adjustment.levenberg_marquardt import Stop, minimise
+from pipeline.adjustment.marginal import ArrowEquations, covariance_of
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, skew
 from pipeline.instrument.camera.base import Camera
@@ -21,10 +24,7 @@ from pipeline.instrument.camera.calibration import BoardView
 
 POSE = 6
 _OUT_OF_MODEL_PX = 1e4
-_MOST_STEPS = 300
-_SMALLEST_GAIN = 1e-10
-_STEADY_STEPS = 3
-_LARGEST_DAMPING = 1e12
+_STOP = Stop(trials=300, enough=1e-10)
 
 
 @dataclass(frozen=True)
@@ -109,30 +109,31 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class NormalEquations:
-    """Gauss-Newton system: shared (F, F), coupling (V, F, 6) and pose (V, 6, 6) blocks, gradients by view."""
+class Linearised:
+    """An estimate with its robust cost, and the normal equations there when they are asked for."""
 
-    shared: Float
-    coupling: Float
-    pose: Float
-    shared_gradients: Float
-    pose_gradient: Float
+    estimate: Estimate
+    corners: Corners
+    free: Free
+    huber_px: float
+
+    @cached_property
+    def cost(self) -> float:
+        """Huber's cost."""
+        return cost(self.estimate.residuals(self.corners), self.huber_px)
+
+    @cached_property
+    def normal(self) -> ArrowEquations:
+        """The weighted normal equations."""
+        return linearise(self.estimate, self.corners, self.free, self.huber_px)
 
     def step(self, damping: float) -> tuple[Float, Float]:
         """Return the damped step of the shared parameters (F,) and of the poses (V, 6)."""
-        pose = self.pose + damping * _diagonals(self.pose)
-        shared = self.shared + damping * np.diag(np.diag(self.shared))
-        solved = np.linalg.solve(pose, np.swapaxes(self.coupling, 1, 2))
-        solved_gradient = np.linalg.solve(pose, self.pose_gradient[..., None])[..., 0]
-        reduced = shared - np.einsum("vfp,vpg->fg", self.coupling, solved)
-        gradient = self.shared_gradients.sum(0) - np.einsum("vfp,vp->f", self.coupling, solved_gradient)
-        shared_step = -_solve_scaled(reduced, gradient)
-        return shared_step, -solved_gradient - np.einsum("vpf,f->vp", solved, shared_step)
+        return self.normal.step(damping)
 
-    def shared_information(self) -> Float:
-        """Return the information (F, F) of the shared parameters with the poses marginalised."""
-        solved = np.linalg.solve(self.pose, np.swapaxes(self.coupling, 1, 2))
-        return np.asarray(self.shared - np.einsum("vfp,vpg->fg", self.coupling, solved))
+    def decrease(self, step: tuple[Float, Float]) -> float:
+        """Return the promised decrease of the cost."""
+        return self.normal.decrease(step)
 
 
 def solve(start: Estimate, corners: Corners, free: Free, huber_px: float) -> Estimate:
@@ -145,23 +146,17 @@ def solve(start: Estimate, corners: Corners, free: Free, huber_px: float) -> Est
     huber_px
         Residual length beyond which a corner counts linearly.
     """
-    estimate, damping, steady = start, 1e-3, 0
-    value = cost(estimate.residuals(corners), huber_px)
-    for _ in range(_MOST_STEPS):
-        system = linearise(estimate, corners, free, huber_px)
-        while damping < _LARGEST_DAMPING:
-            candidate = estimate.moved(free, *system.step(damping))
-            following = cost(candidate.residuals(corners), huber_px)
-            if following <= value:
-                break
-            damping *= 10
-        else:
-            return estimate
-        steady = steady + 1 if value - following <= _SMALLEST_GAIN * value else 0
-        estimate, value, damping = candidate, following, max(damping / 10, 1e-14)
-        if steady >= _STEADY_STEPS:
-            break
-    return estimate
+
+    def linearised(estimate: Estimate, _: None) -> Linearised:
+        return Linearised(estimate, corners, free, huber_px)
+
+    def moved(estimate: Estimate, step: tuple[Float, Float]) -> Estimate:
+        return estimate.moved(free, *step)
+
+    def as_given(equations: Linearised) -> tuple[Linearised, None]:
+        return equations, None
+
+    return minimise(start, linearised, moved, as_given, _STOP).state
 
 
 def cost(residual: Float, huber_px: float) -> float:
@@ -176,7 +171,7 @@ def weights(residual: Float, huber_px: float) -> Float:
     return np.nan_to_num(huber_px / np.maximum(length, huber_px), nan=0.0)
 
 
-def linearise(estimate: Estimate, corners: Corners, free: Free, huber_px: float) -> NormalEquations:
+def linearise(estimate: Estimate, corners: Corners, free: Free, huber_px: float) -> ArrowEquations:
     """Return the weighted normal equations at an estimate."""
     points = estimate.points(corners)
     residual = estimate.residuals(corners)
@@ -194,7 +189,7 @@ def linearise(estimate: Estimate, corners: Corners, free: Free, huber_px: float)
     blocks = np.stack([_gram(rows[part]) for part in corners.slices()])
     f = free.count
     pose = slice(f, f + POSE)
-    return NormalEquations(
+    return ArrowEquations(
         blocks[:, :f, :f].sum(0), blocks[:, :f, pose], blocks[:, pose, pose] + 1e-12 * np.eye(POSE),
         blocks[:, :f, -1], blocks[:, pose, -1],
     )  # fmt: skip
@@ -212,20 +207,18 @@ def covariance(estimate: Estimate, corners: Corners, free: Free, huber_px: float
     squares = float(np.nansum(weight * np.sum(residual**2, -1)))
     freedom = 2 * int(np.count_nonzero(weight)) - free.count - POSE * corners.views
     variance = squares / max(freedom, 1)
-    system = linearise(estimate, corners, free, huber_px)
-    inverse = _inverse_scaled(system.shared_information())
-    return variance * _togetherness(system, inverse, variance) * inverse, float(np.sqrt(variance))
+    information, gradients = linearise(estimate, corners, free, huber_px).marginal()
+    inverse = covariance_of(information)
+    return variance * _togetherness(gradients, inverse, variance) * inverse, float(np.sqrt(variance))
 
 
-def _togetherness(system: NormalEquations, inverse: Float, variance: float) -> float:
-    """Return the mean scatter of the pictures' gradients against that of independent corners, at least 1."""
-    views, count = system.shared_gradients.shape
+def _togetherness(gradients: Float, inverse: Float, variance: float) -> float:
+    """Return the scatter of the pictures' gradients (V, F) against independent corners', at least 1."""
+    views, count = gradients.shape
     if views < 2 or count == 0 or variance == 0:
         return 1.0
-    solved = np.linalg.solve(system.pose, system.pose_gradient[..., None])[..., 0]
-    gradients = system.shared_gradients - np.einsum("vfp,vp->vf", system.coupling, solved)
-    scatter = float(np.einsum("vf,fg,vg->", gradients, inverse, gradients)) / variance / count
-    return float(max(scatter * views / (views - 1), 1.0))
+    scatter = np.trace(inverse @ cluster_covariance(gradients, np.arange(views)))
+    return float(max(scatter / variance / count, 1.0))
 
 
 def _sag(xyz_b: Float) -> Float:
@@ -238,21 +231,3 @@ def _sag(xyz_b: Float) -> Float:
 def _gram(rows: Float) -> Float:
     flat = rows.reshape(-1, rows.shape[-1])
     return np.asarray(flat.T @ flat)
-
-
-def _diagonals(blocks: Float) -> Float:
-    return np.asarray(np.eye(blocks.shape[-1]) * np.diagonal(blocks, axis1=-2, axis2=-1)[..., None, :])
-
-
-def _solve_scaled(matrix: Float, vector: Float) -> Float:
-    """Solve with unit diagonal: the parameters' scales differ by ten powers of ten and more."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix * scale * scale[:, None]
-    return np.asarray(scale * np.linalg.lstsq(scaled, scale * vector, rcond=1e-15)[0])
-
-
-def _inverse_scaled(matrix: Float) -> Float:
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    return np.asarray(
-        np.linalg.pinv(matrix * scale * scale[:, None], hermitian=True) * scale * scale[:, None]
-    )

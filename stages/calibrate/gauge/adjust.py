@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor
+from pipeline.adjustment.clusters import cluster_covariance
+from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
-from stages.calibrate.gauge.smooth import smooth_rows
 from stages.calibrate.gauge.state import Unknowns
 from stages.calibrate.gauge.terms import (
     Equations,
@@ -95,7 +96,7 @@ def _linearised(state: Unknowns, measured: Measurements, parameters: GaugeParame
     system = BorderedSystem(len(state.T_pc), state.border_size, _REACH)
     system.add(edges.rows)
     system.add(rings.rows)
-    system.add(smooth_rows(state, measured.time_s, measured.smooth_sigma))
+    system.add(smooth_motion_rows(state.T_pc, measured.time_s, measured.smooth_sigma, state.border_size))
     system.add(slip_origin(state, measured.encoder is not None))
     if measured.encoder is not None:
         for rows in encoder_equations(state, measured.time_s, measured.encoder, parameters):
@@ -129,14 +130,7 @@ def instrument_covariance(solution: Solution) -> Float:
 
 
 def _cluster_scores(equations: Equations, factor: Factor) -> Float:
-    """Return Σ s sᵀ over clusters of the border's score s, the frames having been eliminated."""
+    """Return the covariance (B, B) of the border's scores, the frames having been eliminated."""
     rows = equations.rows
-    block = rows.by_frame.shape[2]
-    pose = factor.solved_border.reshape(-1, block, factor.solved_border.shape[1])[rows.frame[:, 0]]
-    own = rows.by_border - np.einsum("mi,mib->mb", rows.by_frame[:, 0], pose)
-    own *= (rows.weight * rows.residual)[:, None]
-    place = np.unique(equations.cluster, return_inverse=True)[1]
-    total = np.zeros((int(place.max(initial=-1)) + 1, own.shape[1]))
-    np.add.at(total, place, own)
-    count = max(len(total), 2)
-    return np.asarray(total.T @ total * count / (count - 1))
+    scores = factor.border_rows(rows) * (rows.weight * rows.residual)[:, None]
+    return cluster_covariance(scores, equations.cluster)

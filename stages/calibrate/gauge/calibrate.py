@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from pipeline.adjustment.motion_priors import LOOSE
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
@@ -22,7 +23,6 @@ from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import PosedFrames, frame_index, posed_frames, poses_of_all_frames
 from stages.calibrate.gauge.result import Finding, GaugeCalibration, calibration_of
-from stages.calibrate.gauge.smooth import LOOSE
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
 from stages.calibrate.gauge.start import first_pose
 from stages.calibrate.gauge.state import Unknowns

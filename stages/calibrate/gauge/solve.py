@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
@@ -20,7 +21,6 @@ from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.result import Finding
 from stages.calibrate.gauge.rings import BoreRings, bore_rings
-from stages.calibrate.gauge.smooth import learned_sigma
 from stages.calibrate.gauge.state import SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
 
@@ -63,7 +63,7 @@ def solve(
     loose = adjust(start, measured, parameters)
     state = loose.state
     on_bore = source.on_bore(state.T_pc, state.probe, parameters)
-    measured = replace(measured, rings=on_bore, smooth_sigma=learned_sigma(state.T_pc, posed))
+    measured = replace(measured, rings=on_bore, smooth_sigma=third_difference_sigma(state.T_pc, posed))
     smooth = adjust(state, measured, parameters)
     rings, fiducials = wrong_rings(smooth, measured), wrong_fiducials(smooth)
     if len(rings) or len(fiducials):

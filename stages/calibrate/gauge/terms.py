@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.motion_priors import slip_drift_rows
 from pipeline.adjustment.robust import Cauchy, robust_spread
 from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float, Int
@@ -100,12 +101,8 @@ def encoder_equations(
     residual = state.T_pc[:, 2, 3] - scale * reading - offset - state.slip
     sigma = parameters.encoder_sigma_mm
     readings = Rows(np.arange(count)[:, None], by_frame, by_border, residual, np.full(count, sigma), Cauchy())
-    pair = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
-    by_pair = np.zeros((count - 1, 2, BLOCK))
-    by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
-    slip_sigma = np.full(count - 1, parameters.encoder_slip_sigma_mm)
-    none = np.zeros((count - 1, state.border_size))
-    return readings, Rows(pair, by_pair, none, np.diff(state.slip), slip_sigma, Cauchy())
+    drift = slip_drift_rows(state.slip, parameters.encoder_slip_sigma_mm, state.border_size)
+    return readings, drift
 
 
 def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.adjustment.clusters import cluster_sums
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.instrument.laser import LaserPlane
@@ -78,11 +79,11 @@ def _covariance(xyz_c: Float, group: Int, weight: Float, residual: Float, tangen
 
 def _togetherness(gradient: Float, group: Int, inverse: Float, variance: float) -> float:
     """Return the scatter of the groups' gradients (N, 3) against that of independent points, at least 1."""
-    groups = int(group.max()) + 1
+    summed = cluster_sums(gradient, group)
+    groups = len(summed)
     freedom = _NUMBERS_PER_LINE * groups - _UNKNOWNS
     if groups == 1 or freedom < 1 or variance == 0:
         return 1.0
-    summed = np.stack([np.bincount(group, column, groups) for column in gradient.T], 1)
     scatter = float(np.einsum("gi,ij,gj->", summed, inverse, summed)) / variance / _UNKNOWNS
     return max(scatter * _NUMBERS_PER_LINE * groups / freedom, 1.0)
 

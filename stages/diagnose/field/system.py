@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.bordered import LandmarkRows, Rows
+from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.adjustment.robust import Squares
 from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float, Int
@@ -94,7 +95,7 @@ def _pose_rows(run: FieldRun) -> list[Rows]:
     state = run.state
     return [
         residuals.origin_rows(state),
-        residuals.smooth_rows(state, run.measured.time_s, run.measured.smooth_sigma),
+        smooth_motion_rows(state.T_pc, run.measured.time_s, run.measured.smooth_sigma, state.border_size),
         residuals.turn_rows(state, run.parameters.turn_sigma_rad),
         residuals.axis_rows(state, run.parameters.axis_bend_sigma),
     ]

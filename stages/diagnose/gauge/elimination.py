@@ -1,9 +1,7 @@
 """Elimination of poses and other unknowns of one recording from its linearised measurements.
 
 What is left is the evidence over the shared columns. B. Triggs et al., "Bundle adjustment: a modern
-synthesis", 2000, § 6; the scores' true covariance after H. White, "Asymptotic theory for econometricians",
-1984, ch. 6, over cells of wall and over frames (A. Cameron et al., "Robust inference with multiway
-clustering", 2011).
+synthesis", 2000, § 6. Scores err alike in cells of wall and in frames: `pipeline.adjustment.clusters`.
 """
 
 from __future__ import annotations
@@ -13,9 +11,13 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
-from scipy.sparse import csr_matrix
 
+from pipeline.adjustment.banded_cholesky import BandedCholesky
+from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.clusters import two_way_variance
+from pipeline.adjustment.elimination import add_rows
+from pipeline.adjustment.marginal import Marginal, marginalised
+from pipeline.adjustment.sums import Sums
 from pipeline.arrays import Bool, Float, Int
 
 POSE = 6
@@ -68,16 +70,6 @@ class Equations:
 
 
 @dataclass(frozen=True)
-class MotionPrior:
-    """Rows that tie four frames: ``frame`` (S, 4), ``by_pose`` (S, 4, 6), ``residual``, ``weight``."""
-
-    frame: Int
-    by_pose: Float
-    residual: Float
-    weight: Float
-
-
-@dataclass(frozen=True)
 class Reduced:
     """Poses eliminated: normal equations over the globals.
 
@@ -97,8 +89,11 @@ class Reduced:
     pose_step: Float
 
 
-def eliminate_poses(equations: Equations, motion: MotionPrior, frames: int) -> Reduced:
-    """Return the normal equations over the globals at the best poses."""
+def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
+    """Return the normal equations over the globals at the best poses.
+
+    ``motion`` are equations of the poses alone, with 6 numbers a frame.
+    """
     size = equations.by_global.shape[1]
     corner = np.zeros((size + 1, size + 1))
     blocks, mixed = np.zeros((frames, POSE, POSE)), np.zeros((frames, POSE, size + 1))
@@ -113,40 +108,27 @@ def eliminate_poses(equations: Equations, motion: MotionPrior, frames: int) -> R
             if len(own):
                 blocks[k] += by_pose[own].T @ by_pose[own]
                 mixed[k][:, used] += by_pose[own].T @ wide[own]
-    band, pull, motion_misfit = _band(blocks, motion)
+    band, pull = _band(blocks, motion)
     mixed[:, :, -1] += pull
-    factor = cholesky_banded(band, lower=True, check_finite=False)
     flat = mixed.reshape(-1, size + 1)
-    solved = cho_solve_banded((factor, True), flat, check_finite=False)
+    solved = BandedCholesky.of_band(band).solve(flat)
     corner = corner - flat.T @ solved
     by_global = solved.reshape(frames, POSE, size + 1)
+    misfit = float(corner[-1, -1] + motion.weight @ motion.residual**2)
     return Reduced(
-        (corner[:-1, :-1] + corner[:-1, :-1].T) / 2, -corner[:-1, -1], float(corner[-1, -1]) + motion_misfit,
+        (corner[:-1, :-1] + corner[:-1, :-1].T) / 2, -corner[:-1, -1], misfit,
         by_global[..., :-1], -by_global[..., -1],
     )  # fmt: skip
 
 
-def _band(blocks: Float, motion: MotionPrior) -> tuple[Float, Float, float]:
-    """Return the poses' information in lower banded form, the prior's pull (N, 6), and its sum of squares."""
-    frames = len(blocks)
-    full = np.zeros((frames, _REACH, POSE, POSE))
-    full[:, 0] = blocks
-    pull = np.zeros((frames, POSE))
-    for i in range(_REACH):
-        np.add.at(pull, motion.frame[:, i], motion.by_pose[:, i] * (motion.weight * motion.residual)[:, None])
-        for j in range(i + 1):
-            part = np.einsum("s,si,sj->sij", motion.weight, motion.by_pose[:, i], motion.by_pose[:, j])
-            np.add.at(full[:, i - j], motion.frame[:, j], part)
-    largest = np.einsum("nii->ni", full[:, 0]).max(axis=0, initial=0.0)
-    full[:, 0] += np.diag(_HOLD * (1 + largest))
-    band = np.zeros((POSE * _REACH, POSE * frames))
-    row, column = np.meshgrid(np.arange(POSE), np.arange(POSE), indexing="ij")
-    for gap in range(_REACH):
-        below = POSE * gap + row - column
-        use = below >= 0
-        for k in range(frames - gap):
-            band[below[use], POSE * k + column[use]] = full[k, gap][use]
-    return band, pull, float(np.sum(motion.weight * motion.residual**2))
+def _band(blocks: Float, motion: Rows) -> tuple[Float, Float]:
+    """Return the poses' information as the block band of `BandedCholesky`, and the prior's pull (N, 6)."""
+    sums = Sums.empty(len(blocks), 0, _REACH, POSE)
+    add_rows(motion.frame, motion.by_frame, motion.by_border, motion.residual, motion.weight, *sums.arrays)
+    sums.band[:, 0] += blocks
+    largest = np.einsum("nii->ni", sums.band[:, 0]).max(axis=0, initial=0.0)
+    sums.band[:, 0] += np.diag(_HOLD * (1 + largest))
+    return sums.band, -sums.right.reshape(-1, POSE)
 
 
 @dataclass(frozen=True)
@@ -155,56 +137,28 @@ class OwnUnknowns:
 
     Attributes
     ----------
-    out, kept : (O,), (K,) int
-        Places of these globals, and of all others.
+    out : (O,) int
+        Their places.
     prior, pull, value : (O,)
         Information of their prior, its product with their present value, and this value.
     """
 
     out: Int
-    kept: Int
     prior: Float
     pull: Float
     value: Float
 
 
-@dataclass(frozen=True)
-class Left:
-    """What is left after elimination.
-
-    Attributes
-    ----------
-    information, right : (K, K), (K,)
-    misfit : float
-    follow : (G, K)
-        How all globals follow those kept.
-    step : (G,)
-        Step of those eliminated, the others staying.
-    """
-
-    information: Float
-    right: Float
-    misfit: float
-    follow: Float
-    step: Float
+def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> tuple[Marginal, float]:
+    """Return what is left without the recording's own globals, and its misfit."""
+    information, right = reduced.information.copy(), reduced.right.copy()
+    information[own.out, own.out] += own.prior
+    right[own.out] -= own.pull
+    left = marginalised(information, right, own.out)
+    return left, reduced.misfit + float(own.value @ own.pull) - left.gain
 
 
-def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> Left:
-    """Eliminate the recording's own globals."""
-    information, right = reduced.information, reduced.right
-    factor = cho_factor(information[np.ix_(own.out, own.out)] + np.diag(own.prior))
-    response = cho_solve(factor, information[np.ix_(own.out, own.kept)])
-    pulled = right[own.out] - own.pull
-    best = cho_solve(factor, pulled)
-    follow, step = np.zeros((len(right), len(own.kept))), np.zeros(len(right))
-    follow[own.kept, np.arange(len(own.kept))] = 1
-    follow[own.out], step[own.out] = -response, best
-    left = information[np.ix_(own.kept, own.kept)] - information[np.ix_(own.kept, own.out)] @ response
-    misfit = reduced.misfit + float(own.value @ own.pull - pulled @ best)
-    return Left((left + left.T) / 2, right[own.kept] - response.T @ pulled, misfit, follow, step)
-
-
-def score_inflation(equations: Equations, reduced: Reduced, left: Left, group: Int) -> Float:
+def score_inflation(equations: Equations, reduced: Reduced, left: Marginal, group: Int) -> Float:
     """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1.
 
     Columns of one ``group`` (K,) are one effect: what they explain together is no error of theirs, else a
@@ -221,9 +175,7 @@ def score_inflation(equations: Equations, reduced: Reduced, left: Left, group: I
     residual = equations.residual + step
     plain = equations.weight @ follow**2
     scores = follow * (equations.weight[:, None] * _unexplained(equations.weight, follow, residual, group))
-    cells, frames = (np.unique(x, return_inverse=True)[1] for x in (equations.cell, equations.frame))
-    both = np.unique(cells * (frames.max(initial=0) + 1) + frames, return_inverse=True)[1]
-    robust = _clustered(scores, cells) + _clustered(scores, frames) - _clustered(scores, both)
+    robust = two_way_variance(scores, equations.cell, equations.frame)
     return np.asarray(np.sqrt(np.maximum(robust / np.maximum(plain, 1e-300), 1.0)))
 
 
@@ -250,10 +202,3 @@ def _by_frame(equations: Equations, frames: int) -> Iterator[tuple[Int, Float]]:
     bounds = np.searchsorted(equations.frame[order], np.arange(frames + 1))
     for first, end in pairwise(bounds):
         yield order[first:end], equations.by_pose[order[first:end]]
-
-
-def _clustered(scores: Float, place: Int) -> Float:
-    count = int(place.max(initial=-1)) + 1
-    member = csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(count, len(place)))
-    summed = np.asarray(member @ scores)
-    return np.asarray(np.square(summed).sum(0) * count / max(count - 1, 1))

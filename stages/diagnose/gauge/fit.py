@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.adjustment.bordered import Rows
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns
@@ -16,7 +17,6 @@ from stages.diagnose.gauge.baseline import BASELINE_SIZE, SIGMA_PX
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
     Equations,
-    MotionPrior,
     OwnUnknowns,
     Part,
     Reduced,
@@ -127,17 +127,17 @@ def _reduced(
     found: Fit,
     asked: Sequence[tuple[EffectModel, Shape]],
     equations: Equations,
-    motion: MotionPrior,
+    motion: Rows,
 ) -> Evidence:
     """Return the evidence of equations, all but the shared columns eliminated."""
     reduced = eliminate_poses(equations, motion, len(found.state.T_pc))
     own = own_unknowns(run, found, equations.by_global.shape[1])
-    left = eliminate_globals(reduced, own)
+    left, misfit = eliminate_globals(reduced, own)
     names, value = kept_columns(found, asked)
     inflation = score_inflation(equations, reduced, left, _by_effect(names))
     information, right = left.information, left.right
     # From the linearisation's place back to nothing beyond the stated.
-    misfit = left.misfit + float(2 * right @ value + value @ information @ value)
+    misfit += float(2 * right @ value + value @ information @ value)
     known = np.array([k for k, name in enumerate(names) if name is not None])
     pick = np.ix_(known, known)
     return Evidence(
@@ -165,7 +165,7 @@ def own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
         all_of_them[: len(first)] = first
     wide[0][size - BASELINE_SIZE :] = SIGMA_PX**-2
     out = np.r_[1:ENCODER, at.bore, at.marker, size - BASELINE_SIZE : size]
-    return OwnUnknowns(out, np.setdiff1d(np.arange(size), out), *(x[out] for x in wide))
+    return OwnUnknowns(out, *(x[out] for x in wide))
 
 
 def kept_columns(found: Fit, asked: Sequence[tuple[EffectModel, Shape]]) -> tuple[list[Column | None], Float]:

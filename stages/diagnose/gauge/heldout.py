@@ -77,7 +77,7 @@ def _rms_px(
         use = part.frames[about.equations.frame] & np.isin(about.equations.kind, part.kinds)
         equations = about.equations.of(part)
         reduced = eliminate_poses(equations, about.motion, len(judged.fit.state.T_pc))
-        left = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.by_global.shape[1]))
+        left, _ = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.by_global.shape[1]))
         step = left.step + left.follow @ rule(Shared(columns, value, left.information, left.right))
         residual = _residual(equations, reduced.pose_step - reduced.pose_by_global @ step, step)
         # What is off the camera model has no weight, and no residual either.

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.adjust import adjust
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.rings import BoreRings
-from stages.calibrate.gauge.smooth import learned_sigma
 from stages.calibrate.gauge.state import SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.gauge.fit import own_parameters
@@ -45,7 +45,7 @@ def prepare(measured_run: MeasuredRun) -> tuple[GaugeRun, Unknowns]:
     measured = replace(measured, rings=_between(measured.rings, posed))
     loose = adjust(_freed(measured_run.start), measured, _FREE).state
     rings = _between(source.on_bore(loose.T_pc, loose.probe, _FREE), posed)
-    sigma = learned_sigma(loose.T_pc, posed)
+    sigma = third_difference_sigma(loose.T_pc, posed)
     smooth = adjust(loose, replace(measured, rings=rings, smooth_sigma=sigma), _FREE).state
     rings = _between(source.on_bore(smooth.T_pc, smooth.probe, _FREE), posed)
     run = GaugeRun(

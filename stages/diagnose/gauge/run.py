@@ -10,11 +10,11 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.rings import BoreRings
-from stages.calibrate.gauge.smooth import smooth_rows
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.calibrate.gauge.terms import edge_equations, ring_equations
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
@@ -26,7 +26,7 @@ from stages.diagnose.effects.predict import (
     texture_shift_px,
 )
 from stages.diagnose.gauge.baseline import edge_baseline, ring_baseline
-from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations, MotionPrior
+from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import edge_points, ring_points, speed_along
 
@@ -80,7 +80,7 @@ class Linearised:
     """Measurements as equations, the motion's prior, and what the effects were predicted at."""
 
     equations: Equations
-    motion: MotionPrior
+    motion: Rows
     rings: ImagePoints
     edges: ImagePoints
 
@@ -104,8 +104,8 @@ def linearise(
         joined["by_global"] = np.concatenate(
             [joined["by_global"], _baseline(edges, edge_at, ring_at, parts)], 1
         )
-    smooth = smooth_rows(state, run.time_s, run.motion_sigma)
-    motion = MotionPrior(smooth.frame, smooth.by_frame[..., :POSE], smooth.residual, smooth.weight)
+    smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
+    motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
     return Linearised(Equations(**joined), motion, ring_at, edge_at)
 
 

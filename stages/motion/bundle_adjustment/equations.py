@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
 from pipeline.adjustment.elimination import by_point_and_pose
+from pipeline.adjustment.motion_priors import LOOSE, smooth_motion_rows
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, robust_spread
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import inverse, transform
@@ -24,9 +25,6 @@ from stages.motion.tracking.landmarks import Tracks
 MATCH_BIASES = 2
 """Corrections of texture matching, last of the instrument's: radial, constant and linear in the polar
 angle."""
-LOOSE_SMOOTHNESS = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
-"""1 σ, mm and rad, of third differences before the motion's smoothness is known: far more than any probe's,
-so that the first adjustment follows texture and rings alone. Not measured."""
 _RADIUS_SHARE = 0.1
 """1 σ of radius and ovality beforehand, as a share of the radius: rings tell far more."""
 _FINEST_WALL_MM = 0.02
@@ -82,7 +80,7 @@ class Measurements:
     ) -> Measurements:
         """Return measurements of a motion whose smoothness is not known yet."""
         unsure = probe.principal_uncertainties()
-        return Measurements(tracks, rings, time_s, encoder, probe, unsure, LOOSE_SMOOTHNESS)
+        return Measurements(tracks, rings, time_s, encoder, probe, unsure, LOOSE)
 
     def camera_at(self, state: State) -> Camera:
         """Return the camera with the corrections found so far."""
@@ -181,7 +179,7 @@ def linearised(
     """Return all equations at a state, weighted by given scales."""
     rows = [
         residuals.origin_rows(state),
-        residuals.smooth_rows(state, measured.time_s, measured.smooth_sigma),
+        smooth_motion_rows(state.T_pc, measured.time_s, measured.smooth_sigma, state.border_size),
     ]
     rows.append(residuals.turn_rows(state, parameters.turn_sigma_rad))
     if measured.encoder is None:

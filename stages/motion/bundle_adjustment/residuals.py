@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.motion_priors import slip_drift_rows
 from pipeline.adjustment.robust import Cauchy, Loss, Squares
 from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float
@@ -26,8 +27,6 @@ window cannot move them, yet not exactly, so that the equations stay regular."""
 _VIEW_RAD = 0.2
 """1 σ of the angle between the first camera and the pipe: centring skids lean by less than 11°. Not
 measured."""
-_JERK_SIGMAS = 5.0
-"""Third differences of so many σ weigh half: probes also jerk. Not measured."""
 _WEAK_CURVATURE = 100.0
 """How much weaker the prior on the axis' curvature is than the one on its change from knot to knot: 0.2 per
 mm by default, which no pipe has; it only keeps the equations regular where no ring was seen."""
@@ -68,26 +67,6 @@ def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     return Rows(rings.frame[:, None], by_frame, by_border, residual, rings.sigma_mm, loss)
 
 
-def smooth_rows(state: State, time_s: Float, sigma: Float) -> Rows:
-    """Return the equations: third differences of the pose are 0 ± ``sigma`` (6,), at even time steps."""
-    n = len(time_s)
-    first = np.arange(n - 3)
-    frame = first[:, None] + np.arange(4)
-    coefficient = _third_difference(time_s[frame])
-    T, second_T = state.T_pc[frame], state.T_pc[first + 1]
-    turn = vector_from_rotation(np.swapaxes(second_T[:, :3, :3], 1, 2)[:, None] @ T[..., :3, :3])
-    pose = np.concatenate([T[..., :3, 3], turn], -1)
-    residual = np.einsum("mk,mki->mi", coefficient, pose)
-    by_frame = np.zeros((n - 3, 6, 4, BLOCK))
-    for i in range(6):
-        by_frame[:, i, :, i] = coefficient
-    return Rows(
-        np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK),
-        np.zeros((6 * (n - 3), state.border_size)), residual.reshape(-1), np.tile(sigma, n - 3),
-        Cauchy(_JERK_SIGMAS),
-    )  # fmt: skip
-
-
 def turn_rows(state: State, sigma_rad: float) -> Rows:
     """Return the equations: turns from frame to frame are small; they matter where no texture shows turns."""
     n = len(state.T_pc)
@@ -116,12 +95,7 @@ def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -
     residual = s - scale * encoder.distance_mm - state.slip
     sigma = np.where(encoder.known, encoder.sigma_mm, np.inf)
     reading = Rows(np.arange(n)[:, None], by_frame, by_border, residual, sigma)
-    pair = np.stack([np.arange(n - 1), np.arange(1, n)], -1)
-    by_pair = np.zeros((n - 1, 2, BLOCK))
-    by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
-    none = np.zeros((n - 1, state.border_size))
-    creep = np.full(n - 1, slip_sigma_mm)
-    return reading, Rows(pair, by_pair, none, np.diff(state.slip), creep, Cauchy())
+    return reading, slip_drift_rows(state.slip, slip_sigma_mm, state.border_size)
 
 
 def no_slip_rows(state: State) -> Rows:
@@ -178,10 +152,3 @@ def _border_only(by_border: Float, residual: Float, sigma: Float, loss: Loss) ->
     count = len(residual)
     none = np.zeros((count, 0), np.int64)
     return Rows(none, np.zeros((count, 0, BLOCK)), by_border, residual, sigma, loss)
-
-
-def _third_difference(time_s: Float) -> Float:
-    """Return coefficients (M, 4) of the third divided difference; −1, 3, −3, 1 for even spacing."""
-    t = (time_s - time_s[:, :1]) / np.maximum(time_s[:, 3:] - time_s[:, :1], 1e-12) * 3
-    gap = t[:, :, None] - t[:, None, :] + np.eye(4)
-    return np.asarray(6 / np.prod(gap, -1))

@@ -1,0 +1,149 @@
+"""Dense normal equations: solution, covariance, and marginalisation by the Schur complement.
+
+Unknowns of one system may differ by ten powers of ten (focal lengths in px, distortions of the fourth order),
+so all matrices are brought to a unit diagonal first. B. Triggs et al., "Bundle adjustment: a modern
+synthesis", 2000, § 6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from pipeline.arrays import Float, Int
+
+_SMALLEST = 1e-300
+
+
+def solved(matrix: Float, right: Float, rcond: float = 1e-15) -> Float:
+    """Return the solution (N, ...) of a semidefinite system (N, N); directions unseen stay 0."""
+    scale = unit_scale(matrix)
+    column = scale.reshape(-1, *(1,) * (right.ndim - 1))
+    scaled = matrix * scale * scale[:, None]
+    return np.asarray(column * np.linalg.lstsq(scaled, column * right, rcond=rcond)[0])
+
+
+def spectrum(information: Float, least: float) -> tuple[Float, Float, Float]:
+    """Return scale (N,), eigenvalues (N,) and eigenvectors (N, N) of the matrix with a unit diagonal.
+
+    Eigenvalues below ``least`` are rounding: they are raised to it, so that what is not seen stays uncertain.
+    """
+    scale = unit_scale(information)
+    value, vector = np.linalg.eigh(information * scale * scale[:, None])
+    return scale, np.maximum(value, least), vector
+
+
+def covariance_of(information: Float, least: float = 1e-14) -> Float:
+    """Return the inverse (N, N) of an information matrix."""
+    scale, value, vector = spectrum(information, least)
+    return np.asarray((vector / value) @ vector.T * scale * scale[:, None])
+
+
+def log_determinant(information: Float, least: float = 1e-14) -> float:
+    """Return the natural logarithm of the determinant of an information matrix."""
+    scale, value, _ = spectrum(information, least)
+    return float(np.sum(np.log(value)) - 2 * np.sum(np.log(scale)))
+
+
+def unit_scale(matrix: Float) -> Float:
+    """Return the factors (N,) that bring a matrix to a unit diagonal."""
+    return np.asarray(1 / np.sqrt(np.maximum(np.diag(matrix), _SMALLEST)))
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """Normal equations of K unknowns, the other N − K eliminated at their best values.
+
+    Attributes
+    ----------
+    information, right : (K, K), (K,)
+        The Schur complement, and what is left of the right side.
+    follow : (N, K)
+        How all unknowns follow those kept.
+    step : (N,)
+        Step of those eliminated, the others staying.
+    gain : float
+        By how much that step lowers the sum of squares.
+    """
+
+    information: Float
+    right: Float
+    follow: Float
+    step: Float
+    gain: float
+
+
+def marginalised(information: Float, right: Float, out: Int, rcond: float | None = None) -> Marginal:
+    """Eliminate the unknowns at ``out`` (O,) from normal equations (N, N), (N,).
+
+    Parameters
+    ----------
+    rcond
+        Where given, unknowns tied to each other leave by least squares, and directions weaker than this part
+        of the strongest do not move; else they must all be determined.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When those to be eliminated are not determined.
+    """
+    kept = np.setdiff1d(np.arange(len(right)), out)
+    own, cross = information[np.ix_(out, out)], information[np.ix_(out, kept)]
+    sides = np.column_stack([cross, right[out]])
+    moved = cho_solve(cho_factor(own), sides) if rcond is None else solved(own, sides, rcond)
+    response, best = moved[:, :-1], moved[:, -1]
+    left = information[np.ix_(kept, kept)] - cross.T @ response
+    follow, step = np.zeros((len(right), len(kept))), np.zeros(len(right))
+    follow[kept, np.arange(len(kept))] = 1
+    follow[out], step[out] = -response, best
+    return Marginal(
+        (left + left.T) / 2, right[kept] - response.T @ right[out], follow, step, float(right[out] @ best)
+    )
+
+
+@dataclass(frozen=True)
+class ArrowEquations:
+    """Normal equations of F shared unknowns and V blocks of P, each coupled to the shared ones alone.
+
+    Attributes
+    ----------
+    shared : (F, F)
+    coupling : (V, F, P)
+    block : (V, P, P)
+    shared_gradients : (V, F)
+        Of each block's equations.
+    block_gradient : (V, P)
+    """
+
+    shared: Float
+    coupling: Float
+    block: Float
+    shared_gradients: Float
+    block_gradient: Float
+
+    def step(self, damping: float) -> tuple[Float, Float]:
+        """Return the step of the shared unknowns (F,) and of the blocks (V, P), damped relatively."""
+        block = self.block * (1 + damping * np.eye(self.block.shape[-1]))
+        shared = self.shared * (1 + damping * np.eye(len(self.shared)))
+        response = np.linalg.solve(block, np.swapaxes(self.coupling, 1, 2))
+        best = np.linalg.solve(block, self.block_gradient[..., None])[..., 0]
+        reduced = shared - np.einsum("vfp,vpg->fg", self.coupling, response)
+        gradient = self.shared_gradients.sum(0) - np.einsum("vfp,vp->f", self.coupling, best)
+        step = -solved(reduced, gradient)
+        return step, -best - np.einsum("vpf,f->vp", response, step)
+
+    def decrease(self, step: tuple[Float, Float]) -> float:
+        """Return by how much a step would lower the sum of squares, if the equations were linear."""
+        shared, block = step
+        slope = self.shared_gradients.sum(0) @ shared + np.sum(self.block_gradient * block)
+        curve = shared @ self.shared @ shared + np.einsum("vp,vpq,vq->", block, self.block, block)
+        return float(-2 * slope - curve - 2 * np.einsum("f,vfp,vp->", shared, self.coupling, block))
+
+    def marginal(self) -> tuple[Float, Float]:
+        """Return information (F, F) and gradients (V, F) of the shared unknowns, the blocks eliminated."""
+        response = np.linalg.solve(self.block, np.swapaxes(self.coupling, 1, 2))
+        information = self.shared - np.einsum("vfp,vpg->fg", self.coupling, response)
+        gradients = self.shared_gradients - np.einsum("vpf,vp->vf", response, self.block_gradient)
+        return information, gradients

@@ -1,0 +1,113 @@
+"""Priors of a motion: it is smooth, and what an encoder slips hardly changes from frame to frame.
+
+The prior of smooth motion is a random process: the third differences of position and turn from frame to frame
+are independent and normal, 1 σ ``sigma``. Acceleration is then a random walk, and jerk is white.
+
+How large ``sigma`` is, a run shows in the frames where its poses are well known, say every h-th. The third
+difference over h frames is that of every frame, summed three times over h frames in a row,
+
+    (1 − L^h)³ = (1 + L + … + L^(h−1))³ (1 − L)³    (L takes the value of the frame before),
+
+so its variance is ``sigma``² times the sum of squares of the cube's coefficients (for h = 2 these are
+1, 3, 3, 1, and the sum is 20). The cube reads the same backwards, so the sum is the middle coefficient of its
+square, ((1 − L^h) / (1 − L))⁶, which the binomial series gives:
+
+    C(3h + 2, 5) − 6 C(2h + 2, 5) + 15 C(h + 2, 5) = (11 h⁵ + 5 h³ + 4 h) / 20.
+
+For large h the 1 σ grows as 0.74 h^2.5, the law of jerk that is white in continuous time; at h = 2 it is
+4.47 times as large, between 2² and 2^2.5.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.robust import Cauchy, robust_spreads
+from pipeline.adjustment.sums import BLOCK
+from pipeline.arrays import Float, Int
+from pipeline.geometry.rigid import vector_from_rotation
+
+LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
+"""1 σ (6,) of a third difference, mm and rad, while nothing is known of the motion yet."""
+
+_SMOOTHEST = np.array([1e-4] * 3 + [1e-6] * 3)
+"""Smallest 1 σ, mm and rad, of third differences that is believed: far below that of any pose."""
+_JERK_SIGMAS = 5.0
+"""Third differences of so many σ weigh half: probes also jerk. Not measured."""
+_FEWEST_FRAMES = 8
+"""Known frames below which the smoothness of the motion is not estimated. Not measured."""
+
+
+def third_difference_growth(stride: float) -> float:
+    """Return by how much third differences over ``stride`` frames exceed those over one, in 1 σ."""
+    return float(np.sqrt((11 * stride**5 + 5 * stride**3 + 4 * stride) / 20))
+
+
+def third_difference_sigma(T_pc: Float, known: Int) -> Float:
+    """Return the robust 1 σ (6,) of the third differences of position, mm, and turn, rad,.
+
+    With fewer than eight frames that know their pose it is `LOOSE`.
+
+    Parameters
+    ----------
+    T_pc : (N, 4, 4)
+        Poses of all frames.
+    known : (K,) int
+        Frames whose poses are measured; the median of their gaps counts as their stride.
+    """
+    if len(known) < _FEWEST_FRAMES:
+        return LOOSE
+    window = known[np.arange(len(known) - 3)[:, None] + np.arange(4)]
+    third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _position_and_turn(T_pc[window]))
+    growth = third_difference_growth(float(np.median(np.diff(known))))
+    return np.asarray(np.maximum(robust_spreads(third, axis=0) / growth, _SMOOTHEST))
+
+
+def smooth_motion_rows(T_pc: Float, time_s: Float, sigma: Float, border: int) -> Rows:
+    """Hold third differences of position and turn of neighbouring frames to 0 ± ``sigma`` (6,).
+
+    Parameters
+    ----------
+    T_pc : (N, 4, 4)
+    time_s : (N,)
+        The differences are divided ones, so that uneven spacing does not matter.
+    sigma : (6,)
+        1 σ for even spacing, mm and rad.
+    border : int
+        Number of global unknowns.
+    """
+    first = np.arange(max(len(time_s) - 3, 0))
+    frame = first[:, None] + np.arange(4)
+    coefficient = third_difference_coefficients(time_s[frame])
+    residual = np.einsum("mk,mki->mi", coefficient, _position_and_turn(T_pc[frame]))
+    by_frame = np.zeros((len(first), 6, 4, BLOCK))
+    for i in range(6):
+        by_frame[:, i, :, i] = coefficient
+    none = np.zeros((6 * len(first), border))
+    return Rows(
+        np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK), none, residual.ravel(),
+        np.tile(sigma, len(first)), Cauchy(_JERK_SIGMAS),
+    )  # fmt: skip
+
+
+def slip_drift_rows(slip: Float, sigma_mm: float, border: int) -> Rows:
+    """Hold the change of the slip (N,), mm, from frame to frame to 0 ± ``sigma_mm``; jumps weigh little."""
+    count = len(slip) - 1
+    pair = np.stack([np.arange(count), np.arange(1, count + 1)], -1)
+    by_pair = np.zeros((count, 2, BLOCK))
+    by_pair[:, 0, 6], by_pair[:, 1, 6] = -1, 1
+    return Rows(pair, by_pair, np.zeros((count, border)), np.diff(slip), np.full(count, sigma_mm), Cauchy())
+
+
+def third_difference_coefficients(time_s: Float) -> Float:
+    """Return coefficients (M, 4) of the third divided difference at times (M, 4); −1, 3, −3, 1 when even."""
+    t = 3 * (time_s - time_s[:, :1]) / np.maximum(time_s[:, 3:] - time_s[:, :1], 1e-12)
+    gap = t[:, :, None] - t[:, None, :] + np.eye(4)
+    return np.asarray(6 / np.prod(gap, -1))
+
+
+def _position_and_turn(T_pc: Float) -> Float:
+    """Return position and turn (M, 4, 6), the turn from the second of four poses (M, 4, 4, 4)."""
+    turn = vector_from_rotation(np.swapaxes(T_pc[:, 1:2, :3, :3], -1, -2) @ T_pc[..., :3, :3])
+    return np.concatenate([T_pc[..., :3, 3], turn], -1)

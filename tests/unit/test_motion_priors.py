@@ -1,0 +1,92 @@
+"""The priors of motion against simulated motion: the stride law, derivatives, spacing, drift."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.adjustment.motion_priors import (
+    LOOSE,
+    slip_drift_rows,
+    smooth_motion_rows,
+    third_difference_growth,
+    third_difference_sigma,
+)
+from pipeline.arrays import Float
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
+
+SIGMA = np.array([0.02, 0.03, 0.05, 3e-5, 4e-5, 5e-5])
+FRAMES = 6000
+
+
+def white_jerk(seed: int, frames: int = FRAMES) -> Float:
+    """Return poses whose third differences from frame to frame are independent, 1 σ ``SIGMA``."""
+    third = np.random.default_rng(seed).standard_normal((frames, 6)) * SIGMA
+    # Turns only about as far as a vector of rotation adds up.
+    third[:, 3:] -= third[:, 3:].mean(0)
+    return poses(np.cumsum(np.cumsum(np.cumsum(third, 0), 0), 0))
+
+
+def poses(path: Float) -> Float:
+    return from_parts(rotation_from_vector(path[:, 3:]), path[:, :3])
+
+
+def learned(stride: int) -> Float:
+    """Return what every ``stride``-th frame shows of the process, relative to what it was made with."""
+    T_pc = white_jerk(1)
+    return third_difference_sigma(T_pc, np.arange(0, FRAMES, stride))[:3] / SIGMA[:3]
+
+
+@pytest.mark.parametrize("stride", [1, 2, 3, 5])
+def test_every_stride_shows_the_same_process(stride: int) -> None:
+    error = 1.2 / np.sqrt(FRAMES / (3 * stride - 2))  # a robust 1 σ of values that overlap
+    np.testing.assert_allclose(learned(stride), 1, atol=4 * error)
+
+
+@pytest.mark.parametrize("power", [2.0, 2.5])
+def test_a_power_of_the_stride_would_be_refused(power: float) -> None:
+    """At stride 2, σ × stride² and σ × stride^2.5 are 12 % and 27 % off: the test above can tell."""
+    found = np.mean(learned(2)) * third_difference_growth(2) / 2**power
+    assert abs(found - 1) > 0.08
+
+
+@pytest.mark.parametrize("stride", range(1, 9))
+def test_growth_is_the_length_of_the_running_sums_taken_three_times(stride: int) -> None:
+    one = np.ones(stride)
+    thrice = np.convolve(np.convolve(one, one), one)
+    assert third_difference_growth(stride) == pytest.approx(np.linalg.norm(thrice))
+
+
+def test_few_frames_show_nothing() -> None:
+    np.testing.assert_array_equal(third_difference_sigma(white_jerk(2, 60), np.arange(0, 35, 5)), LOOSE)
+
+
+def test_outliers_do_not_loosen_the_motion() -> None:
+    T_pc = white_jerk(3)
+    T_pc[::50, :3, 3] += 40.0
+    np.testing.assert_allclose(third_difference_sigma(T_pc, np.arange(FRAMES))[:3] / SIGMA[:3], 1, atol=0.2)
+
+
+def test_rows_are_third_differences_with_their_derivatives() -> None:
+    random = np.random.default_rng(4)
+    path = random.standard_normal((9, 6)) * [1, 1, 1, 0.01, 0.01, 0.01]
+    time_s = np.cumsum(random.uniform(0.05, 0.15, 9))
+    rows = smooth_motion_rows(poses(path), time_s, SIGMA, 5)
+    assert rows.by_border.shape == (36, 5)
+    for i in range(3):
+        moved = path.copy()
+        moved[4, i] += 1e-4
+        slope = (smooth_motion_rows(poses(moved), time_s, SIGMA, 5).residual - rows.residual) / 1e-4
+        np.testing.assert_allclose(
+            np.sum(np.where(rows.frame == 4, rows.by_frame[:, :, i], 0), 1), slope, atol=1e-6
+        )
+    steady = np.outer(time_s**2, [3.0, -2.0, 5.0, 0, 0, 0])
+    np.testing.assert_allclose(smooth_motion_rows(poses(steady), time_s, SIGMA, 5).residual, 0, atol=1e-9)
+
+
+def test_drift_is_the_change_of_slip_and_jumps_weigh_little() -> None:
+    slip = np.array([0.0, 0.01, 0.02, 5.0, 5.01])
+    rows = slip_drift_rows(slip, 0.02, 3)
+    np.testing.assert_allclose(rows.residual, np.diff(slip))
+    np.testing.assert_allclose(np.einsum("mfi,mf->m", rows.by_frame, slip[rows.frame]), np.diff(slip))
+    assert rows.weight[2] < 1e-3 * rows.weight[0]
