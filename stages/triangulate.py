@@ -10,7 +10,6 @@ from scipy.ndimage import median_filter
 
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
-from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.system.threads import in_threads
@@ -31,8 +30,8 @@ class TriangulateParameters(Parameters):
         0.2,
         gt=0,
         le=100,
-        description="a sample is not used that lies farther from the median distance of its nine neighbours "
-        "from the camera's axis than this part of it: an edge of texture taken for the line",
+        description="largest departure of a sample's distance from the camera's axis from the median of its "
+        "nine neighbours, as a share of that median; beyond it are edges of texture taken for the line",
     )
 
 
@@ -98,13 +97,6 @@ def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
     return out
 
 
-def untilted_sheet(laser: LaserSheet) -> LaserSheet:
-    """Return the seed paper's assumption of ``laser``: the plane z = baseline, parallel to the image."""
-    return replace(
-        LaserSheet(laser.baseline_mm), line_sigma_mm=laser.line_sigma_mm, wavelength_nm=laser.wavelength_nm
-    )
-
-
 def calibration_covariance(by_parameters: Float, covariance: Float) -> Float:
     """Return J Σ Jᵀ as (..., 6) entries xx, xy, xz, yy, yz, zz of Jacobians (..., 3, P) and Σ (P, P)."""
     flat = by_parameters.reshape(-1, len(covariance))  # one large product instead of many small ones
@@ -123,7 +115,7 @@ def _triangulate_chunk(
     by_pixel, by_parameters = probe.triangulate_jacobian(uv)
     sigma = rings.sigma_px[frames][usable].astype(float)
     noise = np.einsum("nij,nj->ni", by_pixel, directions) * sigma[:, None]
-    flat = replace(probe, laser=untilted_sheet(probe.laser))
+    flat = replace(probe, laser=probe.laser.untilted())
     xyz, uncorrected = probe.triangulate(uv), flat.triangulate(uv)
     covariance = calibration_covariance(by_parameters, probe.covariance)
     xyz_c, flat_c = _spread(xyz, usable), _spread(uncorrected, usable)

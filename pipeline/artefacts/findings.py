@@ -169,12 +169,6 @@ def clock_of_azimuth(azimuth_rad: Float | float) -> Float:
     return np.asarray(np.where(hours >= 12, 0.0, hours))
 
 
-def azimuth_of_clock(clock_hours: Float | float) -> Float:
-    """Return azimuths (...), rad in [−π, π), of clock positions (...) in hours."""
-    degrees = 30 * np.asarray(clock_hours, float) - 90
-    return np.asarray(np.radians(np.mod(degrees + 180, 360) - 180))
-
-
 # Angles from the pipe's axis below and above which a crack is called longitudinal or circumferential.
 # Chosen.
 _LONGITUDINAL, _CIRCUMFERENTIAL = np.radians(30), np.radians(60)

@@ -66,6 +66,12 @@ class LaserSheet:
         lead = dict(zip(self.PARAMETER_NAMES[:6], map(float, parameters[:6]), strict=True))
         return replace(self, **lead, waviness=tuple(float(p) for p in parameters[6:]))
 
+    def untilted(self) -> LaserSheet:
+        """Return the seed paper's assumption of this sheet: the plane z = baseline, parallel to the image."""
+        return LaserSheet(
+            self.baseline_mm, line_sigma_mm=self.line_sigma_mm, wavelength_nm=self.wavelength_nm
+        )
+
     def slope(self, azimuth_rad: Float) -> Float:
         """Return dz/dq (...) of the sheet's rays at azimuth ψ (...) in C."""
         return np.asarray(self._slope_basis(azimuth_rad) @ self._slope_coefficients())

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
-from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 
 
@@ -73,8 +72,7 @@ def wall_samples(
     ray = probe.camera.unproject(pixels).ray
     xyz_p = _placed(T_pc, probe.laser.intersect(ray))
     s, psi, radius = to_pipe(trajectory.axis, xyz_p)
-    square = replace(LaserSheet(probe.laser.baseline_mm), line_sigma_mm=probe.laser.line_sigma_mm)
-    uncorrected = to_pipe(trajectory.axis, _placed(T_pc, square.intersect(ray)))[2]
+    uncorrected = to_pipe(trajectory.axis, _placed(T_pc, probe.laser.untilted().intersect(ray)))[2]
     section = frames_at(trajectory.axis, np.where(np.isfinite(s), s, 0.0))[1]
     outward = section[..., :, 0] * np.cos(psi)[..., None] + section[..., :, 1] * np.sin(psi)[..., None]
     noise_p = np.einsum("fij,faj->fai", T_pc[:, :3, :3], points.noise_direction[rows].astype(float))

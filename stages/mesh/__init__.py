@@ -31,7 +31,8 @@ class MeshParameters(Parameters):
     """How the surface is made, thinned out and textured."""
 
     surface: Literal["auto", "grid", "poisson"] = Field(
-        "auto", description="grid: one vertex a cell; poisson: walls that fold over; auto: as the cloud asks"
+        "auto",
+        description="grid: one vertex a cell; poisson: for walls that fold over; auto: chosen by the cloud",
     )
     folded_cell_mm: float = Field(2.0, ge=0.5, le=20, description="mm; cells in which auto looks for folds")
     fold: float = Field(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -139,11 +139,6 @@ def error_budget(
 def parameter_names(probe: Probe) -> tuple[str, ...]:
     """Return the names of everything systematic sources move: probe parameters, then disturbances."""
     return (*probe.parameter_names, *DISTURBANCE_NAMES)
-
-
-def with_covariance(probe: Probe, given: Mapping[str, float]) -> Probe:
-    """Return a probe whose stated σ are replaced by the given ones, correlations kept."""
-    return replace(probe, covariance=_stated_covariance(probe, given))
 
 
 def _check(probe: Probe, given: Mapping[str, float]) -> None:

@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.simulator.instrument import Dust
+from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.truth import SceneTruth, with_laser, with_sensor
-
-# Distance at which `TrueLaser.power_mm` counts.
-_LINE_REFERENCE_MM = 50.0
 
 
 def albedo_bias(truth: SceneTruth, line_sigma_mm: float) -> SceneTruth:
@@ -94,7 +92,7 @@ def line_peak(truth: SceneTruth) -> float:
     laser = truth.instrument.laser
     low, high = laser.profile.reach_mm()
     density = float(laser.profile.density(np.linspace(low, high, 2001)).max())
-    return laser.power_mm * density * mean_albedo(truth) * _LINE_REFERENCE_MM / mean_radius_mm(truth)
+    return laser.power_mm * density * mean_albedo(truth) * REFERENCE_MM / mean_radius_mm(truth)
 
 
 def mean_albedo(truth: SceneTruth) -> float:
