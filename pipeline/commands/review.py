@@ -16,10 +16,10 @@ import uvicorn
 
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named
+from pipeline.review.guard import Guard
 from pipeline.review.review import FOLDER, Review, open_review
 from pipeline.review.run_files import RunFiles
-from pipeline.review.server.app import application
-from pipeline.review.server.guard import Guard
+from pipeline.review.server import application
 
 if TYPE_CHECKING:
     from pipeline.review.compared import Compared

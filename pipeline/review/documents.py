@@ -15,8 +15,7 @@ from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.json_file import parse_json, read_json
 from pipeline.review.assessment import strength
 from pipeline.review.decisions.ledger import Entry
-from pipeline.review.decisions.overlap import covered
-from pipeline.review.decisions.replay import GONE, Finding
+from pipeline.review.decisions.replay import GONE, Finding, covered
 from pipeline.review.flat_tiles import FlatPicture
 from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State

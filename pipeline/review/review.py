@@ -15,7 +15,7 @@ from pipeline.review.decisions.actions import Action
 from pipeline.review.decisions.carry import carried, same_findings
 from pipeline.review.decisions.ledger import Entry, Ledger, Signature
 from pipeline.review.decisions.replay import Finding, counting, replay
-from pipeline.review.measuring.outline import OutlineGauge
+from pipeline.review.measuring import OutlineGauge
 from pipeline.review.run_files import RunFiles, measured_findings
 
 FOLDER = "review"

@@ -23,8 +23,8 @@ from pipeline.recording.tables import read_encoder, read_frame_table
 from pipeline.recording.video import open_video
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.model_stretches import read_model
-from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.run_files import RunFiles, measured_findings
+from pipeline.review.server import Deed, Measuring, Signing, parsed
 from pipeline.simulator.prior import read_prior
 from pipeline.simulator.scene import read_scene
 from stages.catalogue import PIPELINE

@@ -18,7 +18,7 @@ from pypdf import PdfReader
 from pypdf.generic import DictionaryObject
 
 from pipeline.review.decisions import actions as do
-from pipeline.review.papers.catalogue import PAPERS, paper_of
+from pipeline.review.papers.report import PAPERS, paper_of
 from pipeline.review.review import Review, open_review
 from pipeline.review.run_files import RunFiles
 

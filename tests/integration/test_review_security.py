@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import InputError
+from pipeline.review.guard import HEADERS
 from pipeline.review.run_files import RunFiles
-from pipeline.review.server.guard import HEADERS
 from tests.review_server import ReviewServer
 
 HOSTILE = "<img src=x onerror=alert(1)><script>alert(2)</script>"

@@ -20,12 +20,11 @@ from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.reproduce import read_run_record
 from pipeline.recording import tables
 from pipeline.recording.tables import read_encoder, read_frame_table
-from pipeline.review import model_stretches, quality
+from pipeline.review import guard, model_stretches, quality
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.model_stretches import read_model
-from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.run_files import RunFiles, measured_findings
-from pipeline.review.server import guard
+from pipeline.review.server import Deed, Measuring, Signing, parsed
 from stages.compare import reference
 from stages.compare.reference import read_wall_map
 from tests.fuzz.targets import TARGETS

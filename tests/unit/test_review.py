@@ -10,10 +10,8 @@ from pipeline.errors import InputError
 from pipeline.review.assessment import b31g, strength
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.ledger import Ledger, StaleError
-from pipeline.review.decisions.overlap import covered
-from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, replay
-from pipeline.review.measuring.outline import OutlineGauge
-from pipeline.review.measuring.tools import readings
+from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, covered, replay
+from pipeline.review.measuring import OutlineGauge, readings
 
 SQUARE = ((48.0, 0.1), (52.0, 0.1), (52.0, 0.2), (48.0, 0.2))
 SIZE = Measured(48, 52, 3, 4, 4, 5, 1.0, 0.1)

@@ -1,10 +1,110 @@
-"""What the report page shows, as its template takes it: texts, tables and pictures ready to be placed."""
+"""What the report page shows, as its template takes it: texts, tables, pictures and line plots."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.export.report.plots import Plot, Tick
+import numpy as np
+
+from pipeline.arrays import Float
+
+WIDTH, HEIGHT = 900.0, 220.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 12.0, 10.0, 34.0
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve: ``style`` names its look in the page, ``sigma`` gives it a band of ±1 σ."""
+
+    name: str
+    style: str
+    y: Float
+    sigma: Float | None = None
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A curve in the plot's coordinates: polylines, broken where nothing was measured, and bands."""
+
+    name: str
+    style: str
+    lines: tuple[str, ...]
+    bands: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A tick's place in the plot and its text."""
+
+    at: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot, ready to be drawn."""
+
+    title: str
+    unit: str
+    curves: tuple[Drawn, ...]
+    x_ticks: tuple[Tick, ...]
+    y_ticks: tuple[Tick, ...]
+    width: float = WIDTH
+    height: float = HEIGHT
+    left: float = _LEFT
+    bottom: float = HEIGHT - _BOTTOM
+    right: float = WIDTH - _RIGHT
+
+
+def plot(title: str, unit: str, x: Float, curves: Sequence[Curve]) -> Plot | None:
+    """Lay curves over ``x`` (N,) out; None when there is nothing to draw."""
+    edges = [c.y + k * (c.sigma if c.sigma is not None else 0) for c in curves for k in (-1, 1)]
+    values = np.concatenate(edges)
+    if not np.isfinite(values).any() or len(x) < 2:
+        return None
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    margin = max(0.06 * (high - low), 1e-3 * max(abs(high), 1e-6))
+    low, high = low - margin, high + margin
+    place_x = _LEFT + (x - x[0]) / (x[-1] - x[0]) * (WIDTH - _LEFT - _RIGHT)
+
+    def place_y(y: Float) -> Float:
+        return np.asarray(_TOP + (high - y) / (high - low) * (HEIGHT - _TOP - _BOTTOM))
+
+    drawn = tuple(_drawn(c, place_x, place_y(c.y), high - low) for c in curves)
+    x_values, y_values = round_ticks(float(x[0]), float(x[-1]), 10), round_ticks(low, high, 5)
+    at_x = _LEFT + (x_values - x[0]) / (x[-1] - x[0]) * (WIDTH - _LEFT - _RIGHT)
+    x_ticks = tuple(Tick(float(a), f"{v:g}") for a, v in zip(at_x, x_values, strict=True))
+    y_ticks = tuple(Tick(float(a), f"{v:g}") for a, v in zip(place_y(y_values), y_values, strict=True))
+    return Plot(title, unit, drawn, x_ticks, y_ticks)
+
+
+def _drawn(curve: Curve, x: Float, y: Float, range_y: float) -> Drawn:
+    known = np.isfinite(y)
+    breaks = np.flatnonzero(np.diff(known.astype(int))) + 1
+    runs = [r for r in np.split(np.arange(len(y)), breaks) if known[r[0]]]
+    lines = tuple(_points(x[r], y[r]) for r in runs)
+    if curve.sigma is None:
+        return Drawn(curve.name, curve.style, lines, ())
+    band = np.nan_to_num(curve.sigma) / range_y * (HEIGHT - _TOP - _BOTTOM)
+    bands = tuple(
+        _points(np.concatenate([x[r], x[r][::-1]]), np.concatenate([(y - band)[r], (y + band)[r][::-1]]))
+        for r in runs
+    )
+    return Drawn(curve.name, curve.style, lines, bands)
+
+
+def _points(x: Float, y: Float) -> str:
+    return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+
+
+def round_ticks(low: float, high: float, about: int) -> Float:
+    """Return round values within [low, high], roughly ``about`` of them."""
+    raw = (high - low) / about
+    power = 10.0 ** np.floor(np.log10(raw))
+    step = power * next(f for f in (1, 2, 2.5, 5, 10) if f * power >= raw * 0.999)
+    return np.asarray(np.round(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step, 10) + 0.0)
+
 
 _MOST_NUMBERED = 40
 

@@ -17,8 +17,7 @@ from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.export.pictures import display_colours
-from pipeline.export.report.page import Flat, Legend, Mark, Strip
-from pipeline.export.report.plots import Tick, round_ticks
+from pipeline.export.report.page import Flat, Legend, Mark, Strip, Tick, round_ticks
 from pipeline.export.report.summary import RunSummary
 
 TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2

@@ -12,12 +12,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from pipeline.artefacts.findings import Defect, Defects, Sections
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
-from pipeline.export.report import cards
-from pipeline.export.report.page import Finding, Page
+from pipeline.export.report.page import Curve, Finding, Page, Plot, plot
 from pipeline.export.report.pictures import Gallery, gallery
-from pipeline.export.report.plots import Curve, Plot, plot
 from pipeline.export.report.summary import RunSummary
-from pipeline.export.report.tables import tables
+from pipeline.export.report.tables import cards, tables, verdict
 from pipeline.files.codec import digest
 from pipeline.files.provenance import program_version
 from pipeline.instrument.probe import Probe
@@ -82,8 +80,8 @@ def page_of(summary: RunSummary) -> Page:
     note = f"Pictures of the {_PICTURED} largest only; {left_out} more without." if left_out > 0 else ""
     return Page(
         title=f"Pipe inspection {summary.recording.name}",
-        verdict=cards.verdict(summary),
-        cards=cards.cards(summary),
+        verdict=verdict(summary),
+        cards=cards(summary),
         findings=findings,
         findings_note=note,
         flats=pictures.flats(),

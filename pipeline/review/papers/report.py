@@ -1,4 +1,4 @@
-"""The report of a review: one set of data, as HTML that opens offline and as a paged PDF."""
+"""What an inspector takes away: the report as PDF and HTML, tables and pictures, all from one set of data."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import base64
 import json
 import tempfile
 import zipfile
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
@@ -17,10 +18,11 @@ import typst
 from jinja2 import Environment, StrictUndefined
 
 from pipeline.artefacts.model import Overlays
+from pipeline.errors import InputError
 from pipeline.review.decisions.replay import REJECTED, Finding
 from pipeline.review.documents import cleaned, run_document
 from pipeline.review.papers.pictures import finding_picture, section_plot
-from pipeline.review.papers.tables import clock_text, findings_table
+from pipeline.review.papers.tables import POF_COLUMNS, clock_text, csv_text, findings_table, pof_rows
 from pipeline.review.review import Review, State
 
 _HEADLINE_METRICS = 14
@@ -105,3 +107,53 @@ def _with_pictures(review: Review, state: State) -> dict[str, Any]:
     shown = {f.id for f in pictured(state)}
     data = report_data(review, state)
     return data | {"findings": [row | {"pictured": row["id"] in shown} for row in data["findings"]]}
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A file to take away; ``shown`` when a browser is to show rather than to save it."""
+
+    name: str
+    media_type: str
+    content: bytes
+    shown: bool = False
+
+
+def paper_of(name: str, review: Review, state: State) -> Paper:
+    """Return a paper of a review.
+
+    Raises
+    ------
+    InputError
+        When there is none of that name.
+    """
+    if name not in PAPERS:
+        raise InputError("papers", f"there is no {name[:40]!r}", expected=", ".join(PAPERS))
+    media_type, shown, make = PAPERS[name]
+    return Paper(name, media_type, make(review, state), shown)
+
+
+def _csv(review: Review, state: State) -> bytes:
+    return csv_text(findings_table(review, state)).encode("utf-8-sig")
+
+
+def _json(review: Review, state: State) -> bytes:
+    return json.dumps(report_data(review, state), indent=1, ensure_ascii=False, allow_nan=False).encode()
+
+
+def _pof(review: Review, state: State) -> bytes:
+    return csv_text(pof_rows(findings_table(review, state), state), POF_COLUMNS).encode("utf-8-sig")
+
+
+def _html(review: Review, state: State) -> bytes:
+    return html_report(review, state).encode()
+
+
+PAPERS: dict[str, tuple[str, bool, Callable[[Review, State], bytes]]] = {
+    "report.pdf": ("application/pdf", True, pdf_report),
+    "report.html": ("text/html", False, _html),
+    "findings.csv": ("text/csv", False, _csv),
+    "findings.json": ("application/json", False, _json),
+    "pof.csv": ("text/csv", False, _pof),
+    "pictures.zip": ("application/zip", False, pictures_archive),
+}

@@ -1,4 +1,4 @@
-"""The addresses of the review's server: the page, the run, the review, tiles, frames, reports."""
+"""The review's local web server: what may be asked of it, at which address, and what it answers."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import json
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -18,18 +19,68 @@ from starlette.staticfiles import StaticFiles
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import BoresightError, InputError
 from pipeline.review import documents
-from pipeline.review.decisions.actions import action_of
+from pipeline.review.decisions.actions import Point, action_of
 from pipeline.review.decisions.ledger import StaleError
 from pipeline.review.flat_tiles import FlatPicture, picture_of
 from pipeline.review.frames import UnseenError, finder_of
-from pipeline.review.measuring.tools import readings
+from pipeline.review.measuring import Tool, readings
 from pipeline.review.model_stretches import model_of
 from pipeline.review.quality import quality_document
-from pipeline.review.requests import Deed, Measuring, Signing, parsed
 from pipeline.review.review import Review
 
 if TYPE_CHECKING:  # a review of one run alone need not wait for it
     from pipeline.review.compared import Compared
+
+_Request = TypeVar("_Request", bound=BaseModel)
+_Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*\S[^\x00-\x1f\x7f]*$")]
+_Revision = Annotated[int, Field(ge=0, le=2**53)]
+
+
+class Deed(BaseModel):
+    """An action, by whom, and the number of the last one that its author saw."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    action: dict[str, Any]
+    who: _Name
+    revision: _Revision
+
+
+class Signing(BaseModel):
+    """A signature of the state at a revision."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: _Name
+    standard: Annotated[str, Field(max_length=200)]
+    remarks: Annotated[str, Field(max_length=4000)]
+    revision: _Revision
+
+
+class Measuring(BaseModel):
+    """A tool at points of the wall."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    tool: Tool
+    points: Annotated[tuple[Point, ...], Field(min_length=1, max_length=2000)]
+
+
+def parsed(kind: type[_Request], body: bytes) -> _Request:
+    """Return the request of a JSON body.
+
+    Raises
+    ------
+    InputError
+        When it is not one.
+    """
+    try:
+        return kind.model_validate_json(body)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputError("request", first["msg"], place=place, expected=kind.__name__.lower()) from error
+
 
 _CONFLICT, _REFUSED, _MISSING = 409, 422, 404
 Handler = Callable[[Request], Awaitable[Response]]
@@ -171,7 +222,7 @@ class ReviewApp:
 
     def _paper(self, request: Request, _: bytes) -> Response:
         # It draws with matplotlib, for which the first view need not wait.
-        from pipeline.review.papers.catalogue import paper_of
+        from pipeline.review.papers.report import paper_of
 
         paper = paper_of(request.path_params["name"], self.review, self.review.state())
         disposition = f'{"inline" if paper.shown else "attachment"}; filename="{paper.name}"'
@@ -181,7 +232,7 @@ class ReviewApp:
 
 
 def application(review: Review, page: Path, compared: Compared | None = None) -> Starlette:
-    """Return the server's application, unguarded: see `pipeline.review.server.guard`."""
+    """Return the server's application, unguarded: see `pipeline.review.guard`."""
     return Starlette(routes=ReviewApp(review, page, compared).routes())
 
 

@@ -1,1 +1,0 @@
-"""The review's local web server: loopback only, one token, nothing from anywhere else."""
