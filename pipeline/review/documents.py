@@ -142,9 +142,7 @@ def _finding(finding: Finding, state: State, bore_mm: float) -> dict[str, Any]:
     loss = 100 * size.depth_mm / wall if wall and is_loss and size.depth_mm > 0 else None
     remaining = None
     if wall and state.assumed.yield_mpa and is_loss:
-        remaining = strength(
-            size.depth_mm, size.depth_sigma_mm, size.length_mm, bore_mm, wall, state.assumed.yield_mpa
-        )
+        remaining = strength(size.depth_mm, size.length_mm, bore_mm, wall, state.assumed.yield_mpa)
     judged = {
         "size": vars(size),
         "wall_loss_percent": loss,

@@ -14,7 +14,7 @@ from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.actions import Action
 from pipeline.review.decisions.carry import carried, same_findings
 from pipeline.review.decisions.ledger import Entry, Ledger, Signature
-from pipeline.review.decisions.replay import Finding, counting, replay
+from pipeline.review.decisions.replay import Finding, ImpossibleError, counting, replay
 from pipeline.review.measuring import OutlineGauge
 from pipeline.review.run_files import RunFiles, measured_findings
 
@@ -119,6 +119,8 @@ class Review:
         ImpossibleError
             When the action does not fit the findings.
         """
+        if isinstance(action, do.Reject) and not action.reason.strip():
+            raise ImpossibleError("a rejection needs a reason")
         basis, findings = self._basis()
         known, _ = carried(
             self.ledger.entries(), basis, self._translations(self.ledger.entries(), basis, findings)

@@ -52,6 +52,23 @@ def test_the_tables_tell_the_same_numbers(compared: Compared) -> None:
             assert change["depth_rate_sigma_mm_per_year"] == pytest.approx(rate, abs=1e-3)
 
 
+def test_a_second_opening_computes_nothing(compared: Compared) -> None:
+    pair = compared.pair
+    kept = pair.now.files.path / "review" / "comparison" / ".boresight"
+
+    def written() -> dict[str, int]:
+        return {str(f): f.stat().st_mtime_ns for f in kept.rglob("manifest.json")}
+
+    first, before = compared.document(), written()
+    assert len(before) == 2
+    again = Compared(run_pair(pair.now, pair.earlier.files), StagedComparison.configured(None, ()), 2.0)
+    assert again.document() == first
+    assert written() == before
+    stricter = StagedComparison.configured(None, ("register.least_share=0.5",))
+    assert Compared(pair, stricter, 2.0).document() == first
+    assert len(written()) == 4, "another parameter is another result"
+
+
 def test_every_layer_is_there_for_the_page_and_for_the_copy(compared: Compared, tmp_path: Path) -> None:
     later = compared.pair.now.files.path
     earlier = compared.pair.earlier.files.path

@@ -90,10 +90,22 @@ def test_the_pdf_shows_those_numbers(papers: dict[str, bytes]) -> None:
         assert found, line
     for f in data["findings"]:
         if f["b31g_mpa"] is not None and f["status"] != "rejected":
-            assert f"fails at {shown(f['b31g_mpa'])} MPa (B31G), {shown(f['modified_b31g_mpa'])} MPa" in text
+            assert f"pressure {shown(f['b31g_mpa'])} MPa (B31G), {shown(f['modified_b31g_mpa'])} MPa" in text
     for metric in data["metrics"]:
         assert f"{metric['name']} {shown(metric['value'])} {metric['unit']}".strip() in text
     assert data["sha256"] in text.replace(" ", "")
+
+
+def test_the_papers_count_what_was_decided_not_what_was_measured(papers: dict[str, bytes]) -> None:
+    data = json.loads(papers["findings.json"])
+    told = {m["name"]: m["value"] for m in data["metrics"]}
+    status = [f["status"] for f in data["findings"]]
+    assert told["findings rejected"] == status.count("rejected") > 0
+    assert told["findings accepted"] == status.count("accepted")
+    assert told["findings undecided"] == status.count("open")
+    left = [abs(f["depth_mm"]) for f in data["findings"] if f["status"] != "rejected"]
+    assert told["largest depth or height not rejected"] == max(left)
+    assert not {"defects", "deepest defect"} & set(told)
 
 
 def test_html_and_pof_show_those_numbers(papers: dict[str, bytes]) -> None:

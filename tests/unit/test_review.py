@@ -103,6 +103,6 @@ def test_a_pit_of_known_depth_is_measured_against_the_wall_around_it():
 def test_strength_falls_from_sound_pipe_to_the_barlow_pressure_of_what_is_left():
     assert b31g(0.0, 5.0) == 1.0
     assert b31g(0.5, 1e9) == 0.5
-    assert strength(-1, 0.1, 10, 100, 6, 240) is None
-    shallow, deep = (strength(d, 0.1, 50, 100, 6, 240) for d in (1.0, 3.0))
+    assert strength(-1, 10, 100, 6, 240) is None
+    shallow, deep = (strength(d, 50, 100, 6, 240) for d in (1.0, 3.0))
     assert shallow.b31g_mpa > deep.b31g_mpa > 0

@@ -6,6 +6,7 @@ import base64
 import json
 import tempfile
 import zipfile
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from importlib.resources import files
@@ -19,13 +20,16 @@ from jinja2 import Environment, StrictUndefined
 
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
-from pipeline.review.decisions.replay import REJECTED, Finding
+from pipeline.review.assessment import ASSUMPTIONS
+from pipeline.review.decisions.replay import ACCEPTED, OPEN, REJECTED, Finding
 from pipeline.review.documents import cleaned, run_document
 from pipeline.review.papers.pictures import finding_picture, section_plot
 from pipeline.review.papers.tables import POF_COLUMNS, clock_text, csv_text, findings_table, pof_rows
 from pipeline.review.review import Review, State
 
 _HEADLINE_METRICS = 14
+# Headline numbers of the run as measured: the papers tell those of the findings as decided.
+_OF_FINDINGS = ("defects", "deepest defect")
 
 
 def report_data(review: Review, state: State) -> dict[str, Any]:
@@ -38,15 +42,32 @@ def report_data(review: Review, state: State) -> dict[str, Any]:
         "name": run["name"],
         "nominal_diameter_mm": run["nominal_diameter_mm"],
         "distance_mm": run["distance_mm"],
-        "metrics": run["metrics"][:_HEADLINE_METRICS],
+        "metrics": [*_of_the_run(run["metrics"]), *_decided(rows)],
         "program": run["program"],
         "diagnosis": run["diagnosis"],
+        "strength_assumptions": ASSUMPTIONS,
         "assumed": state.assumed.model_dump(exclude={"do"}),
         "findings": [row | {"statement": said.get(row["id"], "")} for row in rows],
         "signed": seal.signed,
         "signature": asdict(seal.signature) if seal.signature else None,
         "sha256": seal.sha256,
     })  # fmt: skip
+
+
+def _of_the_run(metrics: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the run's headline numbers without those of its findings, which decisions may have changed."""
+    return [m for m in metrics[:_HEADLINE_METRICS] if m["name"] not in _OF_FINDINGS]
+
+
+def _decided(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return how many findings were decided how, and the deepest of those not rejected."""
+    count = Counter(row["status"] for row in rows)
+    told = [("accepted", ACCEPTED), ("rejected", REJECTED), ("undecided", OPEN)]
+    out = [{"name": f"findings {word}", "value": count[status], "unit": ""} for word, status in told]
+    depths = [abs(r["depth_mm"]) for r in rows if r["status"] != REJECTED and r["depth_mm"] is not None]
+    if depths:
+        out.append({"name": "largest depth or height not rejected", "value": max(depths), "unit": "mm"})
+    return out
 
 
 def pictures(review: Review, state: State) -> dict[str, bytes]:

@@ -78,8 +78,8 @@ def _row(finding: Finding, document: dict[str, Any], bore_mm: float, state: Stat
         "depth_mm": _rounded(size["depth_mm"], 3), "depth_sigma_mm": _rounded(size["depth_sigma_mm"], 3),
         "wall_loss_percent": _rounded(document["wall_loss_percent"], 1), "pof_class": pof,
         "pacp": pacp_suggestion(kind, direction), "en13508": en13508_suggestion(kind),
-        "b31g_mpa": _rounded(strength.get("b31g_mpa"), 2),
-        "modified_b31g_mpa": _rounded(strength.get("modified_mpa"), 2),
+        "b31g_mpa": _rounded(strength.get("b31g_mpa"), 1),
+        "modified_b31g_mpa": _rounded(strength.get("modified_mpa"), 1),
         "edited": finding.edited, "decided_by": finding.decided_by, "decided_at": finding.decided_at,
         "reason": finding.reason, "remarks": " | ".join(f"{r.who}: {r.text}" for r in finding.remarks),
     }  # fmt: skip

@@ -41,6 +41,19 @@ def test_decisions_by_keyboard_alone(page: Tab) -> None:
     assert page.finding(page.js("boresight.session.selected"))["status"] == "open"
 
 
+def test_a_finding_is_not_rejected_without_a_reason(page: Tab) -> None:
+    page.choose("1")
+    before = page.revision
+    page.keys("r")
+    assert "Why reject finding 1?" in page.page.locator("form.reason").inner_text()
+    for text in ("", "   "):
+        page.page.fill("#reason", text)
+        page.keys("Enter")
+        page.page.wait_for_timeout(300)
+        assert page.revision == before
+    page.keys("Escape")
+
+
 def test_without_a_name_nothing_is_decided(page: Tab) -> None:
     page.page.fill("#who", "")
     page.page.locator("#who").press("Tab")

@@ -15,8 +15,21 @@ def test_the_quality_page_tells_how_good_the_run_is(page: Tab) -> None:
     for word in ("Wall seen", "1 σ of the radius", "Diameter", "Drift", "not used"):
         assert word in captions
     text = shown.inner_text()
-    for word in ("laser frames rejected whole", "probe file written", "Left-out physics", "SHA-256"):
+    for word in ("laser frames rejected whole", "probe file written", "Instrument diagnosis", "SHA-256"):
         assert word in text
+
+
+def test_who_signs_with_findings_undecided_must_say_so(page: Tab) -> None:
+    page.keys("3")
+    shown = page.page.locator(".page:visible")
+    assert "undecided. Sign nevertheless" in shown.inner_text()
+    page.page.fill("#sign-name", "Ada")
+    page.page.uncheck("#sign-undecided")
+    page.page.click('button:text-is("Sign")')
+    page.page.wait_for_timeout(500)
+    assert page.js("boresight.session.seal.signature") is None
+    for words in ("Pipe data", "Downloads"):
+        assert words in shown.locator("h2").all_inner_texts()
 
 
 def test_any_later_change_shows_as_unsigned(page: Tab) -> None:
@@ -24,6 +37,7 @@ def test_any_later_change_shows_as_unsigned(page: Tab) -> None:
     page.page.fill("#sign-name", "Ada Lovelace")
     page.page.fill("#sign-standard", "POF 100")
     page.page.fill("#sign-remarks", "dry pipe")
+    page.page.check("#sign-undecided")
     page.page.click('button:text-is("Sign")')
     badge = "document.querySelector('.badge').textContent === '{}'"
     page.until(badge.format("signed"))
@@ -41,6 +55,7 @@ def test_any_later_change_shows_as_unsigned(page: Tab) -> None:
 def test_a_file_of_the_run_changed_behind_its_back_shows_as_unsigned(page: Tab, run: Path) -> None:
     page.keys("3")
     page.page.fill("#sign-name", "Ada")
+    page.page.check("#sign-undecided")
     page.page.click('button:text-is("Sign")')
     page.until("boresight.session.seal?.signed")
     table = run / "sections.csv"

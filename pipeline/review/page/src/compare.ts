@@ -33,7 +33,7 @@ function parts(session: Session, found: Comparison, view: CompareView): HTMLElem
   return [
     element("section", {}, element("h2", {}, `${session.run.name} against ${found.earlier}`), element("p", {}, found.statement)),
     view.root,
-    element("section", {}, element("h2", {}, "What became of each finding"),
+    element("section", {}, element("h2", {}, "Outcome of each finding"),
       element("p", { class: "quiet" }, "Depths are read on both walls with one method within one outline; growth is positive into the wall. Its σ holds noise as clean wall beside it shows it, the maps' resolution, registration and calibration. p is after Holm over all findings; ◆ marks what is declared a change."),
       element("div", { class: "scroll" }, growthTable(found, view)),
       element("p", {}, element("a", { href: `${folder}growth.csv`, download: "growth.csv" }, "growth.csv"), " ", element("a", { href: `${folder}growth.json`, download: "growth.json" }, "growth.json"))),

@@ -112,7 +112,7 @@ export class FindingsPanel {
       finding.covers.length ? element("p", { class: "caution" }, `Its outline also covers ${finding.covers.join(", ")}, so that its depth and extent may be theirs. Redraw it, or merge them too.`) : "",
       this.table(finding),
       wrong && finding.edited ? element("p", { class: "original" }, `As measured: ${wrong.statement}`)
-        : element("p", {}, wrong?.statement ?? "Made by hand."),
+        : element("p", {}, wrong?.statement ?? "Drawn manually."),
       element("p", { class: "quiet" }, wrong ? [wrong.pof_class && `POF ${wrong.pof_class}`, wrong.pacp_suggestion && `PACP ${wrong.pacp_suggestion}`,
         wrong.en13508_suggestion && `EN 13508-2 ${wrong.en13508_suggestion}`].filter(Boolean).join(" · ") : ""),
       this.lacking(finding), this.remarks(finding), this.curves(finding));
@@ -137,8 +137,9 @@ export class FindingsPanel {
     ];
     if (finding.wall_loss_percent !== null) rows.push(["wall loss", measured(finding.wall_loss_percent, finding.wall_loss_sigma_percent, "%")]);
     if (finding.strength) {
-      rows.push(["fails at, B31G", measured(finding.strength.b31g_mpa, finding.strength.b31g_sigma_mpa, "MPa")]);
-      rows.push(["fails at, modified B31G", measured(finding.strength.modified_mpa, finding.strength.modified_sigma_mpa, "MPa")]);
+      rows.push(["estimated failure pressure, B31G", `${number(finding.strength.b31g_mpa, 1)} MPa`]);
+      rows.push(["estimated failure pressure, modified B31G", `${number(finding.strength.modified_mpa, 1)} MPa`]);
+      rows.push(["these assume", finding.strength.assumptions]);
     }
     if (finding.decided_by) rows.push(["decided", `${finding.decided_by}, ${moment(finding.decided_at)}`]);
     if (finding.reason) rows.push(["reason", finding.reason]);
@@ -174,7 +175,7 @@ export class FindingsPanel {
   private askReason(): void {
     const finding = this.session.finding;
     if (!finding || this.detail.querySelector(".reason")) return;
-    const text = element("input", { type: "text", maxlength: "4000", id: "reason", list: "reasons", autocomplete: "off" });
+    const text = element("input", { type: "text", required: true, pattern: ".*\\S.*", title: "a reason, in words", maxlength: "4000", id: "reason", list: "reasons", autocomplete: "off" });
     const usual = element("datalist", { id: "reasons" }, ...REASONS.map((value) => element("option", { value })));
     const leave = () => { form.remove(); this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus(); };
     const form = element("form", {
@@ -184,7 +185,7 @@ export class FindingsPanel {
         void this.session.act({ do: "reject", finding: finding.id, reason: text.value.trim() });
       },
       keydown: (e) => { if ((e as KeyboardEvent).key === "Escape") leave(); },
-    }, element("label", { for: "reason" }, `Why is ${finding.id} no defect?`), text, usual,
+    }, element("label", { for: "reason" }, `Why reject finding ${finding.id}?`), text, usual,
       element("button", { class: "accept" }, "Reject"), element("button", { type: "button", click: leave }, "Cancel"));
     this.detail.querySelector(".buttons")?.after(form);
     text.focus();

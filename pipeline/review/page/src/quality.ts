@@ -18,9 +18,9 @@ export function qualityPage(session: Session): HTMLElement {
   const root = element("div", { class: "page" },
     element("section", {}, element("h2", {}, "The run in figures"), element("table", { class: "wide" }, ...rows(run.metrics))),
     measured,
-    element("section", {}, element("h2", {}, "Left-out physics"), element("p", {}, run.diagnosis
+    element("section", {}, element("h2", {}, "Instrument diagnosis"), element("p", {}, run.diagnosis
       ? `${run.diagnosis.verdict}: ${run.diagnosis.statement}`
-      : "Not asked for. boresight diagnose compares this recording with what the stated probe predicts; lay its diagnosis.json and diagnosis.html into the run folder."), pictures),
+      : "Not run. boresight diagnose compares this recording with what the stated probe predicts; lay its diagnosis.json and diagnosis.html into the run folder."), pictures),
     run.warnings.length ? element("section", {}, element("h2", {}, "Noticed while reading"), element("ul", {}, ...run.warnings.map((w) => element("li", {}, w)))) : null,
     element("details", {}, element("summary", {}, "What every stage reports"), element("div", { class: "columns" }, ...stages)),
     element("section", {}, element("h2", {}, "Made from"), element("table", {},

@@ -1,4 +1,4 @@
-/** Sign-off: what is assumed, who signs by which standard, history, and the papers. */
+/** Sign-off: what is assumed, who signs by which standard, history, and the downloads. */
 import type { Session } from "./session";
 import { element, moment } from "./words";
 
@@ -34,12 +34,12 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
       element("p", { class: seal?.signed ? "signed" : "unsigned" }, standing),
       last?.remarks ? element("p", {}, `Remarks: ${last.remarks}`) : null,
       element("p", { class: "quiet" }, `Inputs and decisions: SHA-256 ${seal?.sha256 ?? "…"}`),
-      open ? element("p", {}, `${open} findings are not decided yet; a signature covers them as undecided.`) : null,
       signing),
   ];
+  signing?.dispatchEvent(new CustomEvent("undecided", { detail: open }));
   if (assumed) made.unshift(assumed); // before the signature, which a later change would undo
   const folder = session.source.readOnly ? "" : "/api/papers/";
-  made.push(element("section", {}, element("h2", {}, "Papers"), element("ul", { class: "papers" },
+  made.push(element("section", {}, element("h2", {}, "Downloads"), element("ul", { class: "papers" },
     ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: folder + file, target: "_blank", rel: "noopener" }, name))))));
   const lost = state.lost.map((e) => element("li", {}, `${e.who}: ${e.action.do} ${String(e.action["finding"] ?? "")}`));
   if (lost.length) made.push(element("section", {}, element("h2", {}, "Decisions without their finding"),
@@ -51,7 +51,7 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
 
 function told(action: Record<string, unknown> & { do: string }): string {
   const about = action["finding"] ?? (Array.isArray(action["findings"]) ? (action["findings"] as string[]).join(" + ") : "");
-  if (action.do === "assume") return `takes for known wall ${String(action["wall_thickness_mm"] ?? "–")} mm, yield ${String(action["yield_mpa"] ?? "–")} MPa`;
+  if (action.do === "assume") return `sets wall thickness ${String(action["wall_thickness_mm"] ?? "–")} mm, yield strength ${String(action["yield_mpa"] ?? "–")} MPa`;
   const more = action["text"] ?? action["kind"] ?? action["reason"] ?? "";
   return [action.do, about, more].filter((t) => t !== "").map(String).join(" ");
 }
@@ -60,12 +60,23 @@ function signature(session: Session): HTMLElement {
   const name = element("input", { type: "text", required: true, maxlength: "200", value: session.who, id: "sign-name" });
   const standard = element("input", { type: "text", maxlength: "200", id: "sign-standard", placeholder: "such as POF 100, EN 13508-2" });
   const remarks = element("textarea", { maxlength: "4000", rows: "3", id: "sign-remarks" });
-  return element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.sign(name.value.trim(), standard.value.trim(), remarks.value.trim()); } },
+  // Who signs with findings undecided says so, each time their number changes.
+  const agreed = element("input", { type: "checkbox", id: "sign-undecided" });
+  const count = element("label", { for: "sign-undecided" });
+  const undecided = element("p", { class: "wide caution" }, agreed, " ", count);
+  const ask = (e: Event) => {
+    const open = (e as CustomEvent<number>).detail;
+    const text = `${open === 1 ? "1 finding is" : `${open} findings are`} undecided. Sign nevertheless, leaving ${open === 1 ? "it" : "them"} undecided.`;
+    if (count.textContent !== text) agreed.checked = false;
+    count.textContent = text;
+    agreed.required = !(undecided.hidden = open === 0);
+  };
+  return element("form", { class: "sign", undecided: ask, submit: (e) => { e.preventDefault(); void session.sign(name.value.trim(), standard.value.trim(), remarks.value.trim()); } },
     element("p", { class: "quiet wide" }, "A signature binds the run's files and every decision as they are now. Any later change shows as unsigned."),
     element("label", { for: "sign-name" }, "Name"), name,
     element("label", { for: "sign-standard" }, "Standard applied"), standard,
     element("label", { for: "sign-remarks" }, "Remarks"), remarks,
-    element("button", { class: "accept" }, "Sign"));
+    undecided, element("button", { class: "accept" }, "Sign"));
 }
 
 function assumptions(session: Session): HTMLElement {
@@ -73,7 +84,7 @@ function assumptions(session: Session): HTMLElement {
   const wall = element("input", { type: "number", min: "0.1", max: "1000", step: "any", id: "wall", value: String(assumed.wall_thickness_mm ?? session.run.wall_thickness_mm ?? "") });
   const strength = element("input", { type: "number", min: "1", max: "5000", step: "any", id: "yield", value: String(assumed.yield_mpa ?? "") });
   const value = (input: HTMLInputElement) => (input.value ? Number(input.value) : null);
-  return element("section", {}, element("h2", {}, "Taken for known"),
+  return element("section", {}, element("h2", {}, "Pipe data"),
     element("p", { class: "quiet" }, "Before signing. Wall thickness gives wall loss and POF class; with the yield strength also the failure pressure by B31G. Empty: not known."),
     element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "assume", wall_thickness_mm: value(wall), yield_mpa: value(strength) }); } },
       element("label", { for: "wall" }, "Wall thickness, mm"), wall,

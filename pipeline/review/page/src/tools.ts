@@ -71,7 +71,7 @@ export class ToolBar {
     this.buttons.replaceChildren(toggles.length ? "Measure " : "", ...toggles, add ?? "",
       session.tool === "add" ? this.kind : "", drawing ? element("button", { class: "accept", click: () => void this.finish() }, "Done") : "",
       session.tool === "split" ? element("button", { click: () => this.nextPart() }, "Next part") : "",
-      session.tool !== "none" ? element("button", { click: () => this.leave() }, "Leave") : "");
+      session.tool !== "none" ? element("button", { click: () => this.leave() }, "Cancel") : "");
     if (session.tool === "none") this.place();
     else this.status.textContent = (HELP[session.tool] ?? "") + KEYS_HINT;
   }

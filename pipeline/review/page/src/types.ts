@@ -32,7 +32,7 @@ export interface Size {
   width_mm: number; depth_mm: number | null; depth_sigma_mm: number | null;
 }
 
-export interface Strength { b31g_mpa: number; b31g_sigma_mpa: number; modified_mpa: number; modified_sigma_mpa: number }
+export interface Strength { b31g_mpa: number; modified_mpa: number; assumptions: string }
 
 export type Status = "open" | "accepted" | "rejected" | "gone";
 
