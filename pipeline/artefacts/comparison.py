@@ -18,8 +18,7 @@ from pipeline.artefacts.wall_map import WallMap
 
 # Corners (distance mm, azimuth rad) of a closed polygon; the azimuth runs on beyond ±π rather than jumping.
 Outline = tuple[tuple[float, float], ...]
-# Probability that any one of all changes is declared where nothing changed: chosen, as 1 % is usual for a
-# statement on which a dig may be ordered.
+# Probability that any one of all changes is declared where nothing changed. Chosen.
 FAMILY_ERROR = 0.01
 
 
@@ -29,8 +28,7 @@ class SurveyedWall:
 
     Attributes
     ----------
-    wall : WallMap
-    texture : WallTexture
+    wall, texture
     smoothing_mm : float
         1 σ with which the map was smoothed.
     ring_spacing_mm : float
@@ -64,7 +62,7 @@ class WallPair:
 
 @dataclass(frozen=True)
 class OutlinedFinding:
-    """A finding as its run's review left it; ``depth_mm`` and its 1 σ are those that the run reports."""
+    """A finding as its run's review left it, with the depth that the run reports."""
 
     id: str
     kind: DefectKind
@@ -97,8 +95,7 @@ class Registration:
     ----------
     at_mm : (K,)
         Stations, distances of the earlier run, increasing.
-    shift_mm, shift_sigma_mm : (K,)
-    roll_rad, roll_sigma_rad : (K,)
+    shift_mm, shift_sigma_mm, roll_rad, roll_sigma_rad : (K,)
     scale, scale_sigma : float
         Slope of s_now over s_earlier, over all.
     blocks, agreeing : int
@@ -172,7 +169,7 @@ class RegisteredWalls:
 
     Attributes
     ----------
-    registration : Registration
+    registration
     diameter : Value
         Growth of the mean diameter over all rings that both saw, mm.
     limit_mm : float
@@ -271,8 +268,7 @@ class Change:
 
     Attributes
     ----------
-    place : Place
-    fate : Fate
+    place, fate
     seen_now, seen_earlier : float
         Share of it that each run saw.
     growth : Growth or None
