@@ -15,6 +15,8 @@ _MIDDLE = 1 / 3
 # Two lights are told apart where they lie further apart than this many of their own spreads, and where hardly
 # any picture lies between them: a single light that slowly changes fills the middle.
 _APART, _MOST_BETWEEN = 3.0, 0.05
+# Dark pictures are those of the laser only where more than this part of them shows its line.
+_MOST_DARK = 0.5
 # The brightness of either light is followed over so many frames on both sides, as lamps warm up.
 _AROUND = 8
 # Least distance within these frames, as a part of that in the whole run, at which both lights are among them.
@@ -34,8 +36,8 @@ class Light(IntEnum):
 def light_seen(pictures: Pictures) -> Int:
     """Return the `Light` (F,) of every picture; all unknown where the recording has only one light.
 
-    A picture that cannot be decoded, that lies between the lights, or that is dark without a closed line (a
-    covered lens, a lamp that failed) is unknown.
+    So they are where its dark pictures show no line. A picture that cannot be decoded, that lies between the
+    lights, or that is dark without a closed line (a covered lens, a lamp that failed) is unknown.
     """
     out = np.full(len(pictures.brightness), Light.UNKNOWN, np.int64)
     seen = np.flatnonzero(pictures.seen)
@@ -43,9 +45,10 @@ def light_seen(pictures: Pictures) -> Int:
     if split is None:
         return out
     height = _height(pictures.brightness[seen], *split)
-    out[seen[height > (1 + _MIDDLE) / 2]] = Light.WALL
-    closed = pictures.closed[seen] > CLOSED
-    out[seen[(height < (1 - _MIDDLE) / 2) & closed]] = Light.LINE
+    dark, closed = height < (1 - _MIDDLE) / 2, pictures.closed[seen] > CLOSED
+    if closed[dark].mean() > _MOST_DARK:
+        out[seen[height > (1 + _MIDDLE) / 2]] = Light.WALL
+        out[seen[dark & closed]] = Light.LINE
     return out
 
 
