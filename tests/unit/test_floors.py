@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.floors import (
+    FLOORS,
     IMPORTS_STILL_THERE,
     PRIVATE_STILL_THERE,
     against_the_floors,
@@ -30,6 +31,12 @@ def program(folder: Path, **texts: str) -> Path:
 
 def test_imports_lead_downwards() -> None:
     assert against_the_floors(imports_below(ROOT), IMPORTS_STILL_THERE) == []
+
+
+def test_the_architecture_shows_the_same_floors() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
+    rows = [f"| {name} | {', '.join(f'`{room}`' for room in rooms)} |" for name, rooms in FLOORS]
+    assert "\n".join(rows) in text, "bring the table of ARCHITECTURE.md in line with FLOORS"
 
 
 def test_private_names_stay_where_they_are() -> None:
