@@ -146,15 +146,20 @@ class Defects:
     Attributes
     ----------
     items : tuple of Defect
+        Each shown by two rings, or by one and the photo.
     false_alarm_rate : float
-        Expected number of false reports that the wall's noise and roughness make in this recording.
+        Expected number of false ones among them: by the wall's noise and roughness, and by two of those that
+        single rings show meeting in one place.
     smallest_depth_mm : float
         Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
+    unconfirmed : tuple of Defect
+        What one ring alone shows: to be looked at, not to be counted.
     """
 
     items: tuple[Defect, ...]
     false_alarm_rate: float
     smallest_depth_mm: float
+    unconfirmed: tuple[Defect, ...] = ()
 
     @property
     def deepest(self) -> Defect | None:

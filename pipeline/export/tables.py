@@ -33,15 +33,16 @@ def write_sections(sections: Sections, folder: Path) -> None:
 
 
 def write_defects(defects: Defects, folder: Path) -> None:
-    """Write ``defects.csv`` and ``defects.json``: a list of defects in order of distance."""
-    records = [_record(d) for d in defects.items]
-    (folder / "defects.json").write_text(
-        json.dumps(records, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
-    with (folder / "defects.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_TABLE)
-        writer.writerows([_cell(record[name]) for name in _TABLE] for record in records)
+    """Write ``defects`` and ``unconfirmed``, each as .csv and .json: lists in order of distance."""
+    for name, items in (("defects", defects.items), ("unconfirmed", defects.unconfirmed)):
+        records = [_record(d) for d in items]
+        (folder / f"{name}.json").write_text(
+            json.dumps(records, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
+        with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(_TABLE)
+            writer.writerows([_cell(record[column]) for column in _TABLE] for record in records)
 
 
 def _number(value: float) -> str:

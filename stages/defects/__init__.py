@@ -5,14 +5,15 @@
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
 4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
-5. Kind from named features as a probability; codes; words (`classify`, `codes`, `describe`).
+5. What neither a second ring nor the photo confirms is set apart (`corroborate`).
+6. Kind from named features as a probability; codes; words (`classify`, `codes`, `describe`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,7 @@ from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from stages.defects.clean import clean_wall
+from stages.defects.corroborate import chance_meetings, is_corroborated
 from stages.defects.depth import measure_depth
 from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, detect
@@ -60,15 +62,23 @@ def find_defects(
     scene = Scene(texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
-    found = _described(measured, regions, scene, parameters, context)
-    items = tuple(replace(defect, id=n) for n, defect in enumerate(found, 1))
+    found = tuple(_described(measured, regions, scene, parameters, context))
+    confirmed, unconfirmed = ([d for d, sure in found if sure is wanted] for wanted in (True, False))
+    items, alone = _numbered(confirmed, 1), _numbered(unconfirmed, len(confirmed) + 1)
     context.report("defects", len(items), "")
+    context.report("unconfirmed: neither a second ring nor the photo shows them", len(alone), "detections")
     context.report(
         "rejected: shallower than the smallest depth or between rings",
-        len(regions) - len(items),
+        len(regions) - len(found),
         "detections",
     )
-    return Defects(items, parameters.false_alarms, _smallest_depth(seeds, parameters))
+    by_chance = chance_meetings(alone, relief.extent_mm, measured.spacing_mm)
+    expected = parameters.false_alarms + by_chance
+    return Defects(items, expected, _smallest_depth(seeds, parameters), alone)
+
+
+def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
+    return tuple(replace(defect, id=n) for n, defect in enumerate(found, first))
 
 
 def _described(
@@ -77,17 +87,21 @@ def _described(
     scene: Scene,
     parameters: DefectParameters,
     context: Context,
-) -> Iterator[Defect]:
-    """Yield the defects among the regions: those that were measured and are as deep as is worth reporting."""
+) -> Iterator[tuple[Defect, bool]]:
+    """Yield the regions that were measured and are as deep as is worth reporting, and which are confirmed."""
     clean = clean_wall(wall, regions)
     for done, region in enumerate(regions, 1):
-        surface, here = wall.surface_about(region)
-        if not _is_measured(surface, here):
-            continue
-        depth = measure_depth(here, surface, clean, parameters.draws, context.random)
+        # Of what the sure points do not show, it is told what all points show.
+        for every_point in (False, True):
+            surface, here = wall.surface_about(region, every_point)
+            if not _is_measured(surface, here):
+                continue
+            depth = measure_depth(here, surface, clean, parameters.draws, context.random)
+            if region.sign * depth.depth_mm >= parameters.min_depth_mm:
+                confirmed = is_corroborated(here, depth, surface, scene.texture)
+                yield describe(here, depth, surface, scene), confirmed
+                break
         context.progress(len(regions) + done, 2 * len(regions))
-        if region.sign * depth.depth_mm >= parameters.min_depth_mm:
-            yield describe(here, depth, surface, scene)
 
 
 def _is_measured(surface: Surface, region: Region) -> bool:
@@ -119,5 +133,5 @@ def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float
 
 
 DEFECTS = Stage(
-    "defects", "3", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
+    "defects", "4", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
 )

@@ -17,6 +17,9 @@ from stages.defects.surface import Surface
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0
 _BELL_MISFIT = 0.12
+# A bell whose height the points leave open by more than this share of it tells nothing: what the rings
+# themselves show is the depth then, and its σ that of a peak between them.
+_BELL_UNKNOWN = 0.5
 _SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 
 
@@ -76,6 +79,8 @@ def _between_rings(
     bell = fit_bell(relief, region, points)
     if bell is None or bell.residual_mm > _BELL_MISFIT * bell.height_mm:
         return depth_mm, sigma_mm
+    if bell.sigma_mm > _BELL_UNKNOWN * bell.height_mm:
+        return depth_mm, float(np.hypot(sigma_mm, _SHARPENING * depth_mm))
     return bell.height_mm, float(np.hypot(bell.sigma_mm, _SHARPENING * (bell.height_mm - depth_mm)))
 
 

@@ -19,10 +19,11 @@ from pipeline.artefacts.findings import (
 )
 from pipeline.artefacts.measured import PointCloud, WallTexture
 from stages.defects.classify import Features, features_of, probabilities
+from stages.defects.corroborate import darkness
 from stages.defects.depth import Depth
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
-from stages.defects.surface import Surface
+from stages.defects.surface import Surface, cells_of
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
         ),
         pacp_suggestion=pacp_suggestion(kind, features.direction_rad),
         en13508_suggestion=en13508_suggestion(kind),
-        statement=_statement(features, likely, depth, _darkness(scene.texture, relief, region)),
+        statement=_statement(features, likely, depth, darkness(scene.texture, relief, region)),
     )
 
 
@@ -84,20 +85,8 @@ def _clock(relief: Relief, region: Region) -> tuple[float, float]:
     return float(hours[0]), float(hours[1])
 
 
-def _cells_of(points: PointCloud, relief: Relief) -> tuple[Int, Int]:
-    """Return row (M,) and column (M,) in the map of points."""
-    step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
-    row = np.rint((points.distance_mm - relief.distance_mm[0]) / relief.cell_mm[0]).astype(np.int64)
-    column = np.rint((points.azimuth_rad - relief.azimuth_rad[0]) / step).astype(np.int64)
-    return row, column % len(relief.azimuth_rad)
-
-
 def _frames(points: PointCloud, relief: Relief, region: Region) -> Int:
-    row, column = _cells_of(points, relief)
-    row, column = row - region.row, (column - region.column) % len(relief.azimuth_rad)
-    near = (row >= 0) & (row < region.mask.shape[0]) & (column < region.mask.shape[1])
-    inside = region.mask[row[near], column[near]]
-    return np.asarray(np.unique(points.frame[near][inside]), np.int64)
+    return np.asarray(np.unique(points.frame[cells_of(points, relief, region)[2]]), np.int64)
 
 
 def _outline(relief: Relief, region: Region) -> Float:
@@ -129,25 +118,6 @@ def _polygon(mask: Byte) -> Float:
 def _contour(mask: Byte) -> Int:
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return np.asarray(max(contours, key=len))
-
-
-def _darkness(texture: WallTexture, relief: Relief, region: Region) -> float:
-    """Return by which fraction the photo is darker inside than in a frame around; NaN where unknown."""
-    margin = max(4, min(region.mask.shape) // 2)
-    rows = np.arange(region.row - margin, region.row + region.mask.shape[0] + margin)
-    columns = np.arange(region.column - margin, region.column + region.mask.shape[1] + margin)
-    s = relief.distance_mm[0] + rows * relief.cell_mm[0]
-    psi = relief.azimuth_rad[0] + columns * (relief.azimuth_rad[1] - relief.azimuth_rad[0])
-    i = np.rint((s - texture.distance_from_mm) / texture.mm_per_px).astype(int)
-    j = np.rint((psi - texture.azimuth_from_rad) / texture.rad_per_px).astype(int)
-    j %= max(1, round(2 * np.pi / texture.rad_per_px))
-    known = np.ix_((i >= 0) & (i < texture.bgra.shape[0]), j < texture.bgra.shape[1])
-    photo = texture.bgra[np.ix_(i[known[0][:, 0]], j[known[1][0]])]
-    inside = np.pad(region.mask, margin)[known]
-    grey, seen = photo[..., :3].mean(-1), photo[..., 3] > 0
-    if not (inside & seen).any() or not (~inside & seen).any():
-        return float("nan")
-    return float(1 - grey[inside & seen].mean() / max(1.0, float(grey[~inside & seen].mean())))
 
 
 def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth, darkness: float) -> str:

@@ -48,6 +48,10 @@ class Region:
         """Return the region with its rows counted from another row of the map."""
         return replace(self, row=self.row - row)
 
+    def turned(self, columns: int) -> Region:
+        """Return the region so many columns further around the pipe."""
+        return replace(self, column=self.column + columns)
+
     def cut(self, image: Float) -> Float:
         """Return the window (H, W) of a map (S, A)."""
         columns = np.arange(self.column, self.column + self.mask.shape[1]) % image.shape[1]

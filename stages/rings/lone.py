@@ -13,13 +13,14 @@ import numba
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread, robust_spreads
-from pipeline.arrays import Bool, Float, Float32
+from pipeline.arrays import Bool, Float, Float32, Int
 from stages.rings.around import slow_around
 
 # Rings on either side that have a say: two of five may be wrong, and a run is confirmed by a next one, which
-# itself is measured against two more.
+# itself is measured against two more; how much clutter there is, is counted over two on either side.
 WALL_RINGS = 2
-SAYING_RINGS = WALL_RINGS + 1
+_CLUTTER_RINGS = 2
+SAYING_RINGS = WALL_RINGS + 1 + _CLUTTER_RINGS
 # A run is as wide as its samples leave the wall by 2.5 σ, and counts when one leaves it by 5 σ: of a hundred
 # thousand samples of noise less than one does.
 _RUN_SIGMAS, _SEED_SIGMAS = 2.5, 5.0
@@ -30,8 +31,9 @@ _NEAR_SECTORS, _GAP_SECTORS = 2, 4
 # ring's own runs have 1. Glaring runs are glints even where a second ring shows one in the same place; what
 # three of five rings show is the wall and no run.
 _ODD_RUN, _GLARING_RUN = 3.0, 6.0
-# Nothing is known of a lone sample: it is the wall or not with equal chances.
-_CHANCE = 0.5
+# One in five of a glint's samples has the profile of a line, and in a recording without any, one in ten
+# lone samples is taken to be no wall all the same. Both are judgements: nothing has measured them yet.
+_CLUTTER_ORDINARY, _CLUTTER_PRIOR = 0.25, 0.1
 _LEAST_WIDTH_SPREAD, _LEAST_BRIGHTNESS_SPREAD = 0.03, 0.1
 
 
@@ -48,8 +50,10 @@ def lone_runs(
     odd = _oddness(np.log(width_px), _LEAST_WIDTH_SPREAD) ** 2
     odd += _oddness(np.log(amplitude), _LEAST_BRIGHTNESS_SPREAD) ** 2
     odd = _mean_over_runs(runs > 0, odd)
-    glint = ((runs == 2) & (odd > _ODD_RUN**2)) | (odd > _GLARING_RUN**2)
-    unsure = np.hypot(sigma_px, np.sqrt(_CHANCE) * np.where(runs == 2, np.abs(away), 0.0))
+    lone = runs == 2
+    glint = (lone & (odd > _ODD_RUN**2)) | (odd > _GLARING_RUN**2)
+    chance = _chance_of_clutter((lone & glint).sum(1), (lone & ~glint).sum(1))
+    unsure = np.hypot(sigma_px, np.sqrt(chance) * np.where(lone, np.abs(away), 0.0))
     return glint & np.isfinite(radius_px), np.asarray(unsure, np.float32)
 
 
@@ -61,6 +65,18 @@ def _oddness(value: Float32, least_spread: float) -> Float:
         spread = robust_spread(beyond) if np.isfinite(beyond).any() else 0.0
         row[:] = np.maximum(beyond, 0.0) / max(spread, least_spread)
     return out
+
+
+def _chance_of_clutter(glints: Int, ordinary: Int) -> Float:
+    """Return the chance (F, 1) that a lone sample with an ordinary profile is no wall.
+
+    ``glints`` and ``ordinary`` (F,) are the lone samples of every ring with either profile: where there are
+    glints, some of them look like a line.
+    """
+    near = np.ones(2 * _CLUTTER_RINGS + 1)
+    odd, plain = (np.convolve(n, near)[_CLUTTER_RINGS : len(n) + _CLUTTER_RINGS] for n in (glints, ordinary))
+    chance = (_CLUTTER_PRIOR + _CLUTTER_ORDINARY * odd) / (1 + plain)
+    return np.clip(chance, _CLUTTER_PRIOR, 0.5)[:, None]
 
 
 def _spread_of(away: Float) -> Float:

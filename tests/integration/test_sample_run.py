@@ -25,6 +25,8 @@ FILES = (
     "sections.csv",
     "defects.csv",
     "defects.json",
+    "unconfirmed.csv",
+    "unconfirmed.json",
     "report.html",
 )
 

@@ -59,7 +59,19 @@ def test_a_line_that_one_ring_alone_shows_stays_and_is_unsure(drawn):
     drawn[0][5, RUN] += 3.0
     rejected, sigma = lone_runs(*drawn)
     assert rejected.sum() == 0
-    assert np.allclose(sigma[5, RUN], 3 * np.sqrt(0.5), rtol=0.15)
+    assert np.allclose(sigma[5, RUN], 3 * np.sqrt(0.1), rtol=0.15)
+
+
+def test_where_there_are_glints_a_lone_line_is_no_more_likely_than_not(drawn):
+    radius, _, width, amplitude = drawn
+    radius[5, RUN] += 3.0
+    for row, first in ((4, 300), (5, 400), (5, 500), (6, 600)):
+        glint = slice(first, first + 16)
+        radius[row, glint] -= 5.0
+        width[row, glint] *= 1.4
+        amplitude[row, glint] *= 2
+    _, sigma = lone_runs(*drawn)
+    assert np.all(sigma[5, RUN] > 1.5 * 3 * np.sqrt(0.1))
 
 
 def test_a_step_of_the_bore_is_no_glint(drawn):

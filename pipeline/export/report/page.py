@@ -207,6 +207,7 @@ class Page:
     cards: tuple[Card, ...]
     findings: tuple[Finding, ...]
     findings_note: str
+    unconfirmed: tuple[Finding, ...]
     flats: tuple[Flat, ...]
     plots: tuple[Plot, ...]
     tables: tuple[Table, ...]

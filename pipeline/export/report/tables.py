@@ -101,9 +101,14 @@ def _found(summary: RunSummary) -> Card:
         return Card("What was found", "not searched", ())
     lines = [
         f"nine of ten defects of 3 mm × 3 mm are found from {defects.smallest_depth_mm:.2f} mm depth on",
-        f"the wall's noise and roughness would make {defects.false_alarm_rate:g} false reports in this "
-        "recording; what is taken for the line and is not, such as bright texture beside it, comes on top",
+        f"of the findings of such a recording, {defects.false_alarm_rate:.2g} are expected to be false: by "
+        "the wall's noise and roughness, and where two single rings err in one place",
     ]
+    if defects.unconfirmed:
+        lines.append(
+            f"{len(defects.unconfirmed)} more are shown by one ring alone and by no photo: they are listed "
+            "apart as unconfirmed and not counted"
+        )
     if not defects.items:
         return Card("What was found", "no defect", tuple(lines))
     return Card("What was found", f"{len(defects.items)} findings", (_counted(defects.items), *lines))

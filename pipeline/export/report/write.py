@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -75,7 +76,8 @@ def write_report(summary: RunSummary, folder: Path) -> None:
 def page_of(summary: RunSummary) -> Page:
     """Return what the page shows of a run."""
     pictures = gallery(summary)
-    findings = _findings(summary, pictures)
+    found = summary.defects
+    findings = _findings(found.items if found else (), pictures)
     left_out = len(findings) - _PICTURED
     note = f"Pictures of the {_PICTURED} largest only; {left_out} more without." if left_out > 0 else ""
     return Page(
@@ -84,6 +86,7 @@ def page_of(summary: RunSummary) -> Page:
         cards=cards(summary),
         findings=findings,
         findings_note=note,
+        unconfirmed=_findings(found.unconfirmed if found else (), pictures),
         flats=pictures.flats(),
         plots=_plots(summary.sections, summary.recording.pipe.nominal_diameter_mm),
         tables=tables(summary),
@@ -91,8 +94,7 @@ def page_of(summary: RunSummary) -> Page:
     )
 
 
-def _findings(summary: RunSummary, pictures: Gallery) -> tuple[Finding, ...]:
-    found = summary.defects.items if summary.defects is not None else ()
+def _findings(found: Sequence[Defect], pictures: Gallery) -> tuple[Finding, ...]:
     largest = {d.id for d in sorted(found, key=lambda d: -abs(d.depth_mm))[:_PICTURED]}
     return tuple(_finding(d, *(pictures.crops(d) if d.id in largest else ("", ""))) for d in found)
 

@@ -1,0 +1,87 @@
+"""What speaks for a defect besides the ring that shows it: a second ring, or the photo of the wall.
+
+A glint, a splash or a piece of texture taken for the line shows in one ring. A place of the wall shows in
+every ring that crosses it, whichever pass of the probe that ring is of, and often in the photo, which is
+taken under another light.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline.artefacts.findings import Defect
+from pipeline.artefacts.measured import WallTexture
+from stages.defects.depth import Depth
+from stages.defects.relief import Relief
+from stages.defects.segment import Region
+from stages.defects.surface import Surface, cells_of, sure_of_themselves
+
+_LEAST_RINGS = 2
+# A ring speaks for a defect where a fifth of its samples there are off the wall by a quarter of the depth, as
+# beside the deepest place of a bell, and by two σ of the wall's own unevenness.
+_TOP_SHARE, _DEPTH_SHARE, _NOISE_SIGMAS = 0.2, 0.25, 2.0
+_LEAST_SAMPLES = 3
+# The photo speaks for it where it is darker or brighter there than at all of so many places beside it: by
+# chance once in 41 times for either.
+_PLACES = 40
+
+
+def is_corroborated(region: Region, depth: Depth, surface: Surface, texture: WallTexture) -> bool:
+    """Whether two rings, or one and the photo, show the defect."""
+    rings = rings_behind(region, depth.depth_mm, surface)
+    return rings >= _LEAST_RINGS or photo_stands_out(texture, surface.relief, region)
+
+
+def rings_behind(region: Region, depth_mm: float, surface: Surface) -> int:
+    """Return how many rings whose samples are sure of themselves show a defect of this depth."""
+    relief, points = surface.relief, surface.near
+    i, j, inside = cells_of(points, relief, region)
+    inside &= sure_of_themselves(points)
+    deviation = points.radius_mm[inside] - relief.shape_at(i[inside], j[inside])
+    limit = max(_DEPTH_SHARE * abs(depth_mm), _NOISE_SIGMAS * relief.typical.sigma_mm)
+    frame, ring, count = np.unique(points.frame[inside], return_inverse=True, return_counts=True)
+    showing = np.bincount(ring, np.sign(depth_mm) * deviation > limit, len(frame))
+    return int(np.sum(showing >= np.maximum(_TOP_SHARE * count, _LEAST_SAMPLES)))
+
+
+def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bool:
+    """Whether the photo differs in the region more from what is around than at all places beside it."""
+    if region.all_round:
+        return False
+    turns = np.arange(1, _PLACES + 1) * len(relief.azimuth_rad) // (_PLACES + 1)
+    here = abs(darkness(texture, relief, region))
+    beside = [abs(darkness(texture, relief, region.turned(int(turn)))) for turn in turns]
+    return bool(np.isfinite(here) and here > np.nanmax(beside, initial=0.0))
+
+
+def darkness(texture: WallTexture, relief: Relief, region: Region) -> float:
+    """Return by which fraction the photo is darker inside than in a frame around; NaN where unknown."""
+    margin = max(4, min(region.mask.shape) // 2)
+    rows = np.arange(region.row - margin, region.row + region.mask.shape[0] + margin)
+    columns = np.arange(region.column - margin, region.column + region.mask.shape[1] + margin)
+    s = relief.distance_mm[0] + rows * relief.cell_mm[0]
+    psi = relief.azimuth_rad[0] + columns * (relief.azimuth_rad[1] - relief.azimuth_rad[0])
+    i = np.rint((s - texture.distance_from_mm) / texture.mm_per_px).astype(int)
+    j = np.rint((psi - texture.azimuth_from_rad) / texture.rad_per_px).astype(int)
+    j %= max(1, round(2 * np.pi / texture.rad_per_px))
+    known = np.ix_((i >= 0) & (i < texture.bgra.shape[0]), j < texture.bgra.shape[1])
+    photo = texture.bgra[np.ix_(i[known[0][:, 0]], j[known[1][0]])]
+    inside = np.pad(region.mask, margin)[known]
+    grey, seen = photo[..., :3].mean(-1), photo[..., 3] > 0
+    if not (inside & seen).any() or not (~inside & seen).any():
+        return float("nan")
+    return float(1 - grey[inside & seen].mean() / max(1.0, float(grey[~inside & seen].mean())))
+
+
+def chance_meetings(unconfirmed: Sequence[Defect], wall_mm: tuple[float, float], spacing_mm: float) -> float:
+    """Return how many false findings to expect of what single rings show: two of them in one place by chance.
+
+    Places are uniform and independent over a wall of length and circumference ``wall_mm``; two meet when
+    their rings are neighbours (``spacing_mm`` apart), their widths overlap and they are of one sign.
+    """
+    width = sum(d.width_mm for d in unconfirmed)
+    neighbours, one_sign = 2 * spacing_mm / wall_mm[0], 0.5
+    pairs_overlapping = max(len(unconfirmed) - 1, 0) * width / wall_mm[1]
+    return neighbours * one_sign * pairs_overlapping
