@@ -21,6 +21,7 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 
 # A quarter of the preview's 360 azimuths: a circle through less is badly determined.
 _LEAST_POINTS = 90
+_TRIANGULATE = TriangulateParameters(largest_departure=0.2)
 # Correlation length of a line's errors around the ring, degrees. Debt: data/debts.md.
 _ALIKE = 8.0
 
@@ -60,7 +61,7 @@ def preliminary_sections(
         rings = extract_rings(later, probe, parameters, context)
     except UnusableError:
         return ()
-    points = triangulate_rings(rings, probe, TriangulateParameters.model_validate({}), context)
+    points = triangulate_rings(rings, probe, _TRIANGULATE, context)
     times = dict(zip(later.frames.frame.tolist(), later.frames.time_s.tolist(), strict=True))
     return tuple(
         _section(int(frame), times[int(frame)], _reading(recording, times[int(frame)]), xyz)

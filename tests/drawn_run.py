@@ -14,9 +14,9 @@ from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
 from stages.triangulate import TriangulateParameters, triangulate_rings
+from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 from tests.unit.drawn_pipe import led_light
 

@@ -3,33 +3,44 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 from rich.console import Console
 
-from pipeline.commands.diagnose_apply import apply_correction, consequence
-from pipeline.commands.diagnose_files import write_files
-from pipeline.commands.diagnose_image import image_of
+from pipeline.api.job import (
+    Job,
+    probe_record,
+    probe_source,
+    recording_record,
+    recording_source,
+    result_of,
+    value_source,
+)
+from pipeline.commands.diagnose_apply import Uncorrected, apply_correction, consequence
 from pipeline.commands.diagnose_report import Shown, write_page
-from pipeline.commands.diagnose_resimulate import resimulate
+from pipeline.commands.working import Assignments, ConfigFile, worked
 from pipeline.errors import InputError
-from pipeline.files.codec import digest
-from pipeline.files.disk import disk_errors_named, require_writable, written_together
+from pipeline.files.codec import Json
+from pipeline.files.disk import disk_errors_named, require_writable
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
-from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.configuration import resolve
-from pipeline.machine.stage import quiet_context
+from pipeline.instrument.probe_file import ProbeSource, read_probe, read_with_source, write_probe
+from pipeline.machine.configuration import Configuration, resolve
+from pipeline.machine.exporter import Exporter
+from pipeline.machine.plan import Source
+from pipeline.machine.reproduce import RunRecord, check_inputs_unchanged, read_run_record
+from pipeline.machine.stage import Stage
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
-from pipeline.recording.checks import check_probe_fits, refuse_changed
+from pipeline.recording.checks import check_probe_fits
 from stages.catalogue import PIPELINE
-from stages.diagnose.diagnose import diagnose as diagnose_recordings
+from stages.diagnose.diagnose import Diagnosed, Noticed, diagnosis_stages
 from stages.diagnose.drill.cases import ANSWER
 from stages.diagnose.result import Diagnosis, to_json
 
@@ -53,49 +64,101 @@ def diagnose(
     apply: Annotated[
         bool, typer.Option("--apply", help="reconstruct the inspection with the corrected probe")
     ] = False,
+    run: Annotated[
+        Path | None,
+        typer.Option("--run", metavar="RUN", help="run of FIELD whose results and parameters are taken over"),
+    ] = None,
+    config: ConfigFile = None,
+    assignments: Assignments = None,
 ) -> None:
     """Find what physics was left out, from an inspection and a gauge run of one probe; either may be missing.
 
     Writes diagnosis.json, diagnosis.html, arrays.npz, and probe.yaml with what was found put in; with --apply
     also the inspection reconstructed with that probe, in run.
     """
+    record = read_run_record(run) if run is not None else None
+    field = field or (record.recording if record is not None else None)
     if field is None and gauge is None:
         raise InputError("diagnose", "is given no recording", hint="give FIELD, or --gauge GAUGE, or both")
     if apply and (field is None or gauge is None):
         raise InputError("diagnose", "--apply needs an inspection and a gauge run", hint="give both")
+    asked = _asked(field, gauge, probe or (record.probe if record is not None else None))
+    if record is not None and asked.field is not None:
+        now = {"recording": asked.field.content_key, "probe": probe_source(asked.probe).key}
+        check_inputs_unchanged(record, now)
+    stages = diagnosis_stages(asked.field is not None, asked.gauge is not None)
+    assigned = [*(assignments or ())]
+    assigned += [f"diagnosis.without={json.dumps(list(without))}"] if without else []
+    configuration = _configuration(stages, config, assigned, record, run)
+    require_writable(output)
+    job = Job(
+        "diagnose", asked.sources(), stages, EXPORTERS, configuration, output, asked.record(),
+        tuple(path for path in (run, output / "run-stated") if path is not None), at_once=1,
+    )  # fmt: skip
+    console = Console(stderr=True)
+    worked(job, console)
+    done = result_of(job, Diagnosed)
+    _show(done.found, output, console)
+    if apply and asked.field is not None:
+        same = run if _same_run(record, configuration) else None
+        before = Uncorrected(asked.field, asked.file.path, configuration, same)
+        change = apply_correction(done.found.effects, before, output, console)
+        with disk_errors_named(output):
+            write_page(done.found, Shown(done.simulated, change, done.image), output)
+        console.print(consequence(change))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """The recordings and the stated probe, and what was noticed of them."""
+
+    field: Recording | None
+    gauge: Recording | None
+    probe: Probe
+    file: ProbeSource
+    noticed: str
+
+    def sources(self) -> tuple[Source, ...]:
+        roles = (("field", self.field), ("gauge", self.gauge))
+        recordings = [recording_source(r, role) for role, r in roles if r is not None]
+        noticed = Source(Noticed, Noticed(), "")
+        if self.noticed:
+            noticed = value_source(Noticed((self.noticed,)))
+        return (*recordings, probe_source(self.probe), noticed)
+
+    def record(self) -> Mapping[str, Json]:
+        given = [(role, r) for role, r in (("field", self.field), ("gauge", self.gauge)) if r is not None]
+        about: dict[str, Json] = {role: recording_record(r) for role, r in given}
+        warnings: list[Json] = [w for _, r in given for w in r.warnings]
+        return about | {"probe": probe_record(self.file), "reader_warnings": warnings}
+
+
+def _asked(field: Path | None, gauge: Path | None, probe: Path | None) -> _Asked:
     recordings = [open_recording(path) if path is not None else None for path in (field, gauge)]
-    file = _probe_file(recordings, probe)
-    stated = read_probe(file)
+    stated, file = read_with_source(_probe_file(recordings, probe))
     foreign = _of_another_probe(recordings[1], stated) if field is not None and probe is None else ""
     if foreign:
         recordings[1] = None
     for recording in (r for r in recordings if r is not None):
         check_probe_fits(recording, stated)
-    require_writable(output)
-    console = Console(stderr=True)
-    with console.status("comparing the recordings with the stated instrument"):
-        examination = diagnose_recordings(
-            recordings[0], recordings[1], stated, quiet_context(), tuple(without or ())
-        )
-        simulated = resimulate(examination)
-    for recording in (r for r in recordings if r is not None):
-        refuse_changed(recording)
-    found = examination.found
-    if foreign:
-        found = replace(found, shortcomings=(foreign, *found.shortcomings))
-    made_by = _made_by(recordings, stated, tuple(without or ()))
-    shown = Shown(simulated, None, image_of(examination))
-    with written_together(output, last=ANSWER) as folder:
-        write_files(examination, stated, made_by, folder)
-        write_page(found, shown, folder)
-        (folder / ANSWER).write_text(_answer(found, made_by), "utf-8")
-    _show(found, output, console)
-    if apply and recordings[0] is not None and recordings[1] is not None:
-        configuration = resolve(PIPELINE, None, ())
-        change = apply_correction(examination, recordings[0], file, configuration, output, console)
-        with disk_errors_named(output):
-            write_page(found, replace(shown, change=change), output)
-        console.print(consequence(change))
+    return _Asked(recordings[0], recordings[1], stated, file, foreign)
+
+
+def _configuration(
+    stages: Sequence[Stage], config: Path | None, assigned: Sequence[str],
+    record: RunRecord | None, run: Path | None,
+) -> Configuration:  # fmt: skip
+    """Return the parameters of all stages; those of a run of the field stand for defaults."""
+    every = (*PIPELINE, *stages)
+    if record is None or run is None:
+        return resolve(every, config, assigned)
+    return resolve(every, config, assigned, record.configuration, run / "run.json")
+
+
+def _same_run(record: RunRecord | None, configuration: Configuration) -> bool:
+    """Return whether a run of the field was made with the very parameters of this call."""
+    now = configuration.tree()
+    return record is not None and all(now[s.name] == record.configuration.get(s.name) for s in PIPELINE)
 
 
 def _probe_file(recordings: Sequence[Recording | None], probe: Path | None) -> Path:
@@ -129,15 +192,34 @@ def _of_another_probe(gauge: Recording | None, stated: Probe) -> str:
     )
 
 
-def _made_by(recordings: Sequence[Recording | None], stated: Probe, without: Sequence[str]) -> MadeBy:
-    given = zip(("field", "gauge"), recordings, strict=True)
-    inputs = {name: r.content_key for name, r in given if r is not None} | {"probe": digest(stated)}
-    return MadeBy("diagnose", inputs, {"without": list(without)})
+def write_diagnosis(done: Diagnosed, made_by: MadeBy, folder: Path) -> None:
+    """Write the answer, its page, the corrected probe, and the residuals as arrays."""
+    write_probe(done.probe, folder / "probe.yaml", made_by)
+    write_page(done.found, Shown(done.simulated, None, done.image), folder)
+    arrays = _arrays(done.found)
+    if arrays:
+        # Named as a stream: savez would else append .npz to a name of its own.
+        with (folder / "arrays.npz").open("wb") as stream:
+            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    document = to_json(done.found) | {"made_by": made_by.document()}
+    (folder / ANSWER).write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
 
 
-def _answer(found: Diagnosis, made_by: MadeBy) -> str:
-    document = to_json(found) | {"made_by": made_by.document()}
-    return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
+EXPORTERS = (Exporter("diagnosis", write_diagnosis),)
+
+
+def _arrays(found: Diagnosis) -> dict[str, NDArray[Any]]:
+    """Return residuals over azimuth and frame, and over the unrolled wall, in mm, before and after."""
+    out: dict[str, NDArray[Any]] = {}
+    if found.ring_picture is not None:
+        p = found.ring_picture
+        out |= {"frame": p.frame, "azimuth_c_rad": p.azimuth_rad}
+        out |= {"before_mm": p.before_mm, "after_mm": p.after_mm}
+    if found.wall_picture is not None:
+        w = found.wall_picture
+        out |= {"wall_distance_mm": w.distance_mm, "wall_azimuth_p_rad": w.azimuth_rad}
+        out |= {"wall_before_mm": w.before_mm, "wall_after_mm": w.after_mm}
+    return out
 
 
 def _show(found: Diagnosis, output: Path, console: Console) -> None:

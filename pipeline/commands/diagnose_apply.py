@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,18 +11,17 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from pipeline.api.job import Job, recording_job, run_job
+from pipeline.api.job import Job, recording_job
 from pipeline.arrays import Float
+from pipeline.commands.working import worked
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.files.codec import digest
 from pipeline.instrument.probe_file import read_with_source
 from pipeline.machine.configuration import Configuration
-from pipeline.machine.display import ProgressDisplay
-from pipeline.machine.plan import Selection
 from pipeline.recording.base import Recording
 from stages.catalogue import PIPELINE
-from stages.diagnose.diagnose import Examination
 from stages.diagnose.encoder import encoder_effects, with_true_readings
+from stages.diagnose.result import EffectFound
 
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
 _EVEN = 0.2
@@ -61,27 +61,49 @@ class GeometryChange:
     defects: tuple[DefectChange, ...]
 
 
+@dataclass(frozen=True)
+class Uncorrected:
+    """The inspection with the stated instrument.
+
+    Attributes
+    ----------
+    recording : Recording
+    probe_file : Path
+        Of the stated probe.
+    configuration : Configuration
+    run : Path or None
+        A run of it with that very probe and configuration; without one it is reconstructed.
+    """
+
+    recording: Recording
+    probe_file: Path
+    configuration: Configuration
+    run: Path | None
+
+
 def apply_correction(
-    examination: Examination, field: Recording, stated_file: Path, configuration: Configuration,
-    folder: Path, console: Console,
-) -> GeometryChange:  # fmt: skip
-    """Reconstruct the field with the stated and the corrected instrument, into run-stated and run.
+    effects: Sequence[EffectFound], field: Uncorrected, folder: Path, console: Console
+) -> GeometryChange:
+    """Reconstruct the field with the corrected instrument into run, and with the stated one into run-stated.
+
+    What the diagnosis or an earlier run of the field holds is not computed again.
 
     Raises
     ------
     BoresightError
         As a run raises it.
     """
-    stated = _job(field, stated_file, configuration, folder / "run-stated")
+    stated = _job(field.recording, field.probe_file, field.configuration, folder / "run-stated")
     stated = replace(
-        stated, stages=tuple(s for s in PIPELINE if s.name in _GEOMETRY),
+        stated, stages=tuple(s for s in PIPELINE if s.name in _GEOMETRY), lent=(folder,),
         exporters=tuple(e for e in EXPORTERS if e.name in _FILES),
     )  # fmt: skip
-    corrected = _job(_true_field(examination, field), folder / "probe.yaml", configuration, folder / "run")
-    with ProgressDisplay(console) as display:
-        run_job(stated, Selection(), display)
-        run_job(corrected, Selection(), display)
-    return geometry_change(stated.folder, corrected.folder)
+    true = _true_field(effects, field.recording)
+    corrected = _job(true, folder / "probe.yaml", field.configuration, folder / "run")
+    if field.run is None:
+        worked(stated, console)
+    worked(replace(corrected, lent=(folder,)), console)
+    return geometry_change(field.run or stated.folder, corrected.folder)
 
 
 def _job(recording: Recording, probe_file: Path, configuration: Configuration, folder: Path) -> Job:
@@ -89,9 +111,9 @@ def _job(recording: Recording, probe_file: Path, configuration: Configuration, f
     return recording_job(recording, probe, source, PIPELINE, EXPORTERS, configuration, folder)
 
 
-def _true_field(examination: Examination, field: Recording) -> Recording:
+def _true_field(effects: Sequence[EffectFound], field: Recording) -> Recording:
     """Return the field with its encoder's readings put right."""
-    of_encoder = encoder_effects(examination.found.effects)
+    of_encoder = encoder_effects(effects)
     if not of_encoder:
         return field
     true = with_true_readings(field, of_encoder)

@@ -8,9 +8,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from pipeline.arrays import Float
-from pipeline.commands.diagnose_image import OnImage
-from pipeline.commands.diagnose_resimulate import Resimulated
 from pipeline.commands.figure import rendered, tidy
+from stages.diagnose.on_image import OnImage
+from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import Candidate, Picture, WallPicture
 
 _SHOWN = 10

@@ -17,10 +17,10 @@ from pipeline.commands.diagnose_figures import (
     simulated_figure,
     wall_figure,
 )
-from pipeline.commands.diagnose_image import OnImage
-from pipeline.commands.diagnose_resimulate import Resimulated
 from pipeline.files.disk import replace_text
 from pipeline.pages import page_template
+from stages.diagnose.on_image import OnImage
+from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import Diagnosis, Verdict, to_json
 
 _HEADLINES = {

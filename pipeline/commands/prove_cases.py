@@ -11,6 +11,8 @@ from pathlib import Path
 
 from pipeline.commands.prove_geometry import WallErrors, wall_errors
 from pipeline.errors import BoresightError, InputError
+from pipeline.files.disk import remove
+from pipeline.machine.run_folder import RunFolder
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.truth_files import SEAL_FILE, open_seal
 from pipeline.system.stopping import end_with_parent
@@ -137,7 +139,11 @@ def worked(case: Case, output: Path, truth: Path, leave_out: bool) -> Worked:
         second = output / ANSWERS_WITHOUT / case.name
         failures += _answered(case, second, without)
         trials.append(trial_of(case, second, truth, without))
-    return Worked(tuple(trials), _seconds(answer), tuple(failures), wall_errors(case, answer, truth))
+    done = Worked(tuple(trials), _seconds(answer), tuple(failures), wall_errors(case, answer, truth))
+    # What the diagnoses measured is of no more use, and large: a proof may have thousands of cases.
+    for folder in (answer, output / ANSWERS_WITHOUT / case.name):
+        remove(RunFolder(folder).internal)
+    return done
 
 
 def _answered(case: Case, answer: Path, without: tuple[str, ...]) -> list[str]:

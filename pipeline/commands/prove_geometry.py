@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from pipeline.adjustment.robust import spread_about_median
+from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.files.disk import replace_json
@@ -16,14 +18,16 @@ from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.stage import quiet_context
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.plan import Selection
 from pipeline.recording import open_recording
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.exact import room_mm, wall_radius
 from pipeline.simulator.scene import read_scene
 from pipeline.simulator.truth import SceneTruth
 from stages.diagnose.drill.cases import Case
-from stages.rings import RingParameters, extract_rings
+from stages.rings import RINGS
 
 _SCENE = "truth_scene.yaml"
 _CACHE = "wall_errors.json"
@@ -62,7 +66,8 @@ def wall_errors(case: Case, answer: Path, truth: Path) -> WallErrors | None:
     scene_file = truth / case.field.name / _SCENE
     if not scene_file.is_file():
         return None
-    found = _errors(case.field, read_probe(probe_file), build_truth(read_scene(scene_file), scene_file))
+    truth_scene = build_truth(read_scene(scene_file), scene_file)
+    found = _errors(case.field, read_probe(probe_file), truth_scene, answer)
     replace_json(kept, vars(found))
     return found
 
@@ -75,9 +80,8 @@ def _kept(file: Path) -> WallErrors | None:
         return None
 
 
-def _errors(field: Path, corrected: Probe, truth: SceneTruth) -> WallErrors:
-    recording = open_recording(field)
-    rings = extract_rings(recording, truth.stated, RingParameters.model_validate({}), quiet_context())
+def _errors(field: Path, corrected: Probe, truth: SceneTruth, folder: Path) -> WallErrors:
+    rings = measured_rings(field, truth.stated, folder)
     uv = _uv(rings)
     oracle = np.stack([-room_mm(truth, int(frame), uv[k]) for k, frame in enumerate(rings.frame)])
     each = [oracle, *(_by_probe(truth, rings.frame, uv, probe) for probe in (truth.stated, corrected))]
@@ -86,6 +90,15 @@ def _errors(field: Path, corrected: Probe, truth: SceneTruth) -> WallErrors:
     usable &= np.abs(oracle) < _OUTLYING * spread
     oracle_mm, stated_mm, corrected_mm = (float(np.sqrt(np.mean(e[usable] ** 2))) for e in each)
     return WallErrors(stated_mm, corrected_mm, oracle_mm)
+
+
+def measured_rings(field: Path, stated: Probe, folder: Path) -> RingSamples:
+    """Return the rings of an inspection; the diagnosis in ``folder`` has measured them already."""
+    sources = (recording_source(open_recording(field)), probe_source(stated))
+    with TemporaryDirectory(dir=folder, prefix=".rings-") as own:
+        job = Job("prove", sources, (RINGS,), (), resolve((RINGS,)), Path(own), lent=(folder,))
+        run_job(job, Selection(), SilentDisplay())
+        return result_of(job, RingSamples)
 
 
 def _uv(rings: RingSamples) -> Float:

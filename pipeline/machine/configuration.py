@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import yaml
@@ -60,7 +61,11 @@ class _Setting:
 
 
 def resolve(
-    stages: Sequence[Stage], file: Path | None = None, assignments: Sequence[str] = ()
+    stages: Sequence[Stage],
+    file: Path | None = None,
+    assignments: Sequence[str] = (),
+    earlier: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+    earlier_file: Path = Path("run.json"),
 ) -> Configuration:
     """Return the configuration: defaults, overridden by ``file``, overridden by ``assignments``.
 
@@ -72,6 +77,8 @@ def resolve(
         YAML: a mapping of stage names to mappings of parameter names to values, and perhaps `CLUSTER`.
     assignments
         ``stage.parameter=value`` each, the value in YAML.
+    earlier, earlier_file
+        Parameters of an earlier run by stage, which take the place of the defaults, and where they stand.
 
     Raises
     ------
@@ -79,7 +86,11 @@ def resolve(
         For a file that cannot be read, an unknown key (naming the nearest right one) or a value of the
         wrong type or out of range.
     """
-    settings = [*(_settings_of_file(file) if file else ()), *(_setting_of(a) for a in assignments)]
+    settings = [
+        *(_Setting(earlier_file, f"{s}.{name}", v) for s, own in earlier.items() for name, v in own.items()),
+        *(_settings_of_file(file) if file else ()),
+        *(_setting_of(a) for a in assignments),
+    ]
     known = [f"{s.configured_as}.{p}" for s in stages for p in s.parameters.model_fields]
     for setting in settings:
         _check_known(setting, known)

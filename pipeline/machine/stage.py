@@ -75,17 +75,6 @@ class Context:
     warn: Warn = lambda text: None
 
 
-def quiet_context(seed: int = 0, workers: int = 2) -> Context:
-    """Return a context without any display."""
-    return Context(
-        logging.getLogger("boresight"),
-        lambda done, total: None,
-        lambda name, value, unit="": None,
-        np.random.default_rng(seed),
-        workers,
-    )
-
-
 @dataclass(frozen=True)
 class Of:
     """Which of several recordings an artefact is of: ``Annotated[RingSamples, Of("gauge")]``."""

@@ -4,82 +4,181 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
+
+from pydantic import Field
 
 from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
-from pipeline.machine.stage import Context
+from pipeline.machine.stage import Context, Of, Parameters, Stage
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Recording
-from stages.calibrate.gauge.calibrate import measure_gauge
-from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.diagnose.compared import Compared, compared, with_pictures
+from stages.diagnose.channels import (
+    FIDUCIALS,
+    FREE_MOTION,
+    LINE_PROFILE,
+    FreeMotion,
+    GaugeMeasured,
+    LineProfile,
+)
+from stages.diagnose.compared import compared, with_pictures
 from stages.diagnose.compose import composed
 from stages.diagnose.correct import Correction, correction_by_gauge
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import without as library_without
-from stages.diagnose.field.evidence import field_evidence, travel_of_run
+from stages.diagnose.field.evidence import FieldEvidence, field_evidence, travel_of_run
 from stages.diagnose.field.join import with_field
 from stages.diagnose.field.run import FieldRun, with_probe
+from stages.diagnose.field.shortcomings import nothing_said
 from stages.diagnose.gauge.examine import examine
 from stages.diagnose.inference import stated_belief
-from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
+from stages.diagnose.on_image import OnImage, image_of
+from stages.diagnose.profile.evidence import ProfileEvidence
+from stages.diagnose.resimulate import Resimulated, resimulate
 from stages.diagnose.result import Diagnosis
 from stages.diagnose.second_line import held_against_rings, sheet_by_rings
 from stages.diagnose.seen import Seen
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.diagnose.travel.gauge import gauge_travel
-from stages.rings import RingParameters, extract_rings
+from stages.rings import RINGS
+from stages.triangulate import TRIANGULATE
 
+_STEPS = 5
 # What motion against encoder tells better than rings and fiducials do.
 TRAVEL_EFFECTS = frozenset(
     {"probe_vibration", "encoder_scale", "encoder_slip", "encoder_backlash", "time_offset"}
 )
 
 
+class DiagnosisParameters(Parameters):
+    """What the diagnosis lets the user choose."""
+
+    without: tuple[str, ...] = Field((), description="effects that are left out of the library")
+
+
 @dataclass(frozen=True)
-class Examination:
-    """A diagnosis with what it rests on.
+class Noticed:
+    """What the command noticed of the recordings, to be told with the answer."""
+
+    sentences: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A diagnosis with what its files show.
 
     Attributes
     ----------
     found : Diagnosis
-    correction : Correction or None
-        None without a gauge run that tells the instrument.
-    compared : Compared or None
-        Residuals before and after.
-    field, gauge : Seen or None
-    corrected : FieldRun or None
-        The field adjusted anew with the corrected probe.
+    probe : Probe
+        As corrected; as stated without a gauge run that tells the instrument.
+    simulated : Resimulated or None
+        The gauge run simulated again with and without what was found.
+    image : OnImage or None
+        The residual on one picture.
     """
 
     found: Diagnosis
-    correction: Correction | None
-    compared: Compared | None
-    field: Seen | None
-    gauge: Seen | None
-    corrected: FieldRun | None
+    probe: Probe
+    simulated: Resimulated | None
+    image: OnImage | None
 
 
-def diagnose(
-    field: Recording | None,
-    gauge: Recording | None,
+@dataclass(frozen=True)
+class FieldMeasured:
+    """An inspection with all that was measured of it."""
+
+    recording: Recording
+    rings: RingSamples
+    profile: LineProfile
+    motion: FreeMotion
+
+
+@dataclass(frozen=True)
+class GaugeRecorded:
+    """A gauge run with all that was measured of it."""
+
+    recording: Recording
+    profile: LineProfile
+    measured: GaugeMeasured
+
+
+def diagnose_both(
+    field: Annotated[Recording, Of("field")],
+    rings: Annotated[RingSamples, Of("field")],
+    profile: Annotated[LineProfile, Of("field")],
+    motion: Annotated[FreeMotion, Of("field")],
+    gauge: Annotated[Recording, Of("gauge")],
+    gauge_profile: Annotated[LineProfile, Of("gauge")],
+    fiducials: Annotated[GaugeMeasured, Of("gauge")],
     probe: Probe,
+    noticed: Noticed,
+    *,
+    parameters: DiagnosisParameters,
     context: Context,
-    without: Collection[str] = (),
-) -> Examination:
+) -> Diagnosed:
+    """Diagnose an inspection and a gauge run of one probe: see `diagnosed`."""
+    of_field = FieldMeasured(field, rings, profile, motion)
+    of_gauge = GaugeRecorded(gauge, gauge_profile, fiducials)
+    return diagnosed(of_field, of_gauge, probe, noticed, parameters, context)
+
+
+def diagnose_field(
+    field: Annotated[Recording, Of("field")],
+    rings: Annotated[RingSamples, Of("field")],
+    profile: Annotated[LineProfile, Of("field")],
+    motion: Annotated[FreeMotion, Of("field")],
+    probe: Probe,
+    noticed: Noticed,
+    *,
+    parameters: DiagnosisParameters,
+    context: Context,
+) -> Diagnosed:
+    """Diagnose an inspection alone: see `diagnosed`."""
+    of_field = FieldMeasured(field, rings, profile, motion)
+    return diagnosed(of_field, None, probe, noticed, parameters, context)
+
+
+def diagnose_gauge(
+    gauge: Annotated[Recording, Of("gauge")],
+    profile: Annotated[LineProfile, Of("gauge")],
+    fiducials: Annotated[GaugeMeasured, Of("gauge")],
+    probe: Probe,
+    noticed: Noticed,
+    *,
+    parameters: DiagnosisParameters,
+    context: Context,
+) -> Diagnosed:
+    """Diagnose a gauge run alone: see `diagnosed`."""
+    of_gauge = GaugeRecorded(gauge, profile, fiducials)
+    return diagnosed(None, of_gauge, probe, noticed, parameters, context)
+
+
+def diagnosed(
+    field: FieldMeasured | None,
+    gauge: GaugeRecorded | None,
+    probe: Probe,
+    noticed: Noticed,
+    parameters: DiagnosisParameters,
+    context: Context,
+) -> Diagnosed:
     """Compare recordings of one probe with what the stated instrument predicts.
 
-    Effects ``without`` which the library has to do may be seen, but not named.
+    Effects ``parameters.without`` which the library has to do may be seen, but not named.
 
     Raises
     ------
     InputError
         When the catalogue lacks one of them.
     """
+    without = parameters.without
     library = library_without(without)
-    of_gauge = examine_gauge(gauge, probe, library, context, without) if gauge is not None else None
-    of_field = examine_field(field, probe, library, context) if field is not None else None
+    context.progress(0, _STEPS)
+    of_gauge = examine_gauge(gauge, probe, library, without) if gauge is not None else None
+    context.progress(1, _STEPS)
+    of_field = examine_field(field, probe, library) if field is not None else None
+    context.progress(2, _STEPS)
     correction = _correction(of_gauge, probe)
     corrected = _corrected(of_field, correction, context)
     if of_field is not None and corrected is not None:
@@ -90,10 +189,19 @@ def diagnose(
     sheet = sheet_by_rings(of_gauge, correction, probe)
     if sheet is not None:
         of_gauge, of_field = (held_against_rings(s, sheet) if s else None for s in (of_gauge, of_field))
+    context.progress(3, _STEPS)
     found = with_field(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe, library)
     run = of_field.field.run if of_field is not None and of_field.field is not None else None
     seen = compared(run, corrected, of_gauge, correction)
-    return Examination(with_pictures(found, seen), correction, seen, of_field, of_gauge, corrected)
+    found = with_pictures(found, seen)
+    context.progress(4, _STEPS)
+    simulated = resimulate(of_gauge)
+    image = image_of(seen, field.recording if field else None, gauge.recording if gauge else None)
+    context.report("verdict", str(found.verdict))
+    return Diagnosed(
+        replace(found, shortcomings=(*noticed.sentences, *found.shortcomings)),
+        correction.probe if correction is not None else probe, simulated, image,
+    )  # fmt: skip
 
 
 def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
@@ -130,47 +238,38 @@ def _corrected(field: Seen | None, correction: Correction | None, context: Conte
 
 
 def examine_gauge(
-    recording: Recording,
-    probe: Probe,
-    library: Mapping[str, EffectModel],
-    context: Context,
-    without: Collection[str] = (),
+    gauge: GaugeRecorded, probe: Probe, library: Mapping[str, EffectModel], without: Collection[str] = ()
 ) -> Seen:
     """Return what a gauge run's rings, fiducials, motion and line profile say."""
-    missing: list[str] = []
-    rings = extract_rings(recording, probe, RingParameters.model_validate({}), context)
-    profile = _profile(recording, rings, probe, context, missing)
+    recording, run, profile = gauge.recording, gauge.measured.run, gauge.profile.evidence
+    missing, problem = _profile_problem(gauge.profile), gauge.measured.problem
     geometry, travel = None, None
-    try:
-        run = measure_gauge(recording, rings, probe, GaugeParameters.model_validate({}), context)
-        geometry = examine(run, _of_geometry(library, profile), probe, without)
-        travel = gauge_travel(recording, run, geometry.searched.found.state)
-        missing += travel.shortcomings
-    except UnusableError as error:
-        missing.append(f"Rings and fiducials of the gauge run tell nothing: {error.problem}.")
-    return Seen(recording, geometry, travel, profile, tuple(missing))
+    if run is not None:
+        try:
+            geometry = examine(run, _of_geometry(library, profile), probe, without)
+            travel = gauge_travel(recording, run, geometry.searched.found.state)
+            missing += travel.shortcomings
+        except UnusableError as error:
+            problem = error.problem
+    if problem:
+        missing += (f"Rings and fiducials of the gauge run tell nothing: {problem}.",)
+    return Seen(recording, geometry, travel, profile, missing)
 
 
-def examine_field(
-    recording: Recording, probe: Probe, library: Mapping[str, EffectModel], context: Context
-) -> Seen:
+def examine_field(field: FieldMeasured, probe: Probe, library: Mapping[str, EffectModel]) -> Seen:
     """Return what an inspection's rings, texture, motion and line profile say."""
-    missing: list[str] = []
-    rings = extract_rings(recording, probe, RingParameters.model_validate({}), context)
-    profile = _profile(recording, rings, probe, context, missing)
-    found = field_evidence(recording, probe, context, _of_geometry(library, profile), rings)
-    missing += found.channel.shortcomings
-    return Seen(recording, None, found.travel, profile, tuple(missing), found)
+    recording, profile = field.recording, field.profile.evidence
+    run = field.motion.run(recording, probe, field.rings)
+    if run is None:
+        found = FieldEvidence(None, None, nothing_said(recording, field.motion.problem))
+    else:
+        found = field_evidence(run, _of_geometry(library, profile))
+    missing = (*_profile_problem(field.profile), *found.channel.shortcomings)
+    return Seen(recording, None, found.travel, profile, missing, found)
 
 
-def _profile(
-    recording: Recording, rings: RingSamples, probe: Probe, context: Context, missing: list[str]
-) -> ProfileEvidence | None:
-    try:
-        return profile_evidence(recording, rings, probe, context)
-    except UnusableError as error:
-        missing.append(f"The line's profile tells nothing: {error.problem}.")
-        return None
+def _profile_problem(profile: LineProfile) -> tuple[str, ...]:
+    return (f"The line's profile tells nothing: {profile.problem}.",) if profile.problem else ()
 
 
 def _of_geometry(
@@ -188,3 +287,18 @@ def _of_geometry(
         if name not in TRAVEL_EFFECTS
         and (effect(name).family != "photometric" or shown is None or name in shown)
     }
+
+
+_SUMMARY = "what physics was left out, where it shows, and what bears it out"
+_DIAGNOSIS = Stage("diagnosis", "1", DiagnosisParameters, diagnose_both, _SUMMARY)
+OF_FIELD = tuple(s.for_role("field") for s in (RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION))
+OF_GAUGE = tuple(s.for_role("gauge") for s in (RINGS, LINE_PROFILE, FIDUCIALS))
+
+
+def diagnosis_stages(with_field: bool, with_gauge: bool) -> tuple[Stage, ...]:
+    """Return the stages of a diagnosis of an inspection, a gauge run, or both."""
+    if not with_field:
+        return (*OF_GAUGE, replace(_DIAGNOSIS, function=diagnose_gauge))
+    if not with_gauge:
+        return (*OF_FIELD, replace(_DIAGNOSIS, function=diagnose_field))
+    return (*OF_FIELD, *OF_GAUGE, _DIAGNOSIS)

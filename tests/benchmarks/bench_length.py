@@ -39,7 +39,7 @@ from pipeline.export.pictures import write_overlays, write_unrolled
 from pipeline.export.tileset import write_tileset
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.scratch import Scratch
-from pipeline.machine.stage import Context, quiet_context
+from pipeline.machine.stage import Context
 from pipeline.machine.store import Provenance, Store
 from pipeline.recording import open_recording
 from pipeline.recording.base import FrameTable, Recording
@@ -64,6 +64,7 @@ from tests.benchmarks.long_inputs import (
 )
 from tests.benchmarks.watch import Watch
 from tests.long_motion import long_motion
+from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording
 
 MEMORY_BYTES = 4 << 30

@@ -22,7 +22,7 @@ from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.stage import Context, quiet_context
+from pipeline.machine.stage import Context
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.simulator.produce import Order, Places, produce
@@ -33,6 +33,7 @@ from stages.motion.tracking.strips import Strip, StripGrid, WallView
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.benchmarks.loop_scenes import SCENES_BY_NAME, WELD_SPACING_MM
+from tests.quiet import quiet_context
 from tests.truth_comparison import compare_wall
 
 _WINDOWS = {"window_frames": 150, "overlap_frames": 40}

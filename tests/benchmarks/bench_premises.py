@@ -16,9 +16,9 @@ import numpy as np
 
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from stages.premises import PremisesParameters, check_premises
+from tests.quiet import quiet_context
 from tests.spoiled_recordings import SPOILERS, first_frames
 
 

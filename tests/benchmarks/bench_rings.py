@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from stages.rings import RingParameters, extract_rings
 from stages.rings.profile import Response, fit_line
 from stages.rings.sectors import cut_sectors
+from tests.quiet import quiet_context
 from tests.ring_images import exposed, off_centre, ring_light
 
 SIZE, CENTRE, AZIMUTHS, WIDTH, AMPLITUDE, BLACK = (640, 480), (318.7, 241.3), 720, 1.2, 90.0, 16.0

@@ -157,8 +157,6 @@ def test_a_recording_that_changes_while_it_is_measured_gives_no_result(
     kept = (recording / name).read_bytes()
     for command in ("calibrate", "diagnose"):
         (recording / name).write_bytes(kept)
-        monkeypatch.setattr(diagnosing, "diagnose_recordings", meddling)
-        monkeypatch.setattr(diagnosing, "resimulate", lambda examination: None)
         output = recording.parent / f"out-{command}"
         done = CliRunner().invoke(app, [command, str(recording), "-o", str(output)])
         assert isinstance(done.exception, InputError), done.output
@@ -193,6 +191,9 @@ def meddle_with_calibration(monkeypatch: pytest.MonkeyPatch, meddling: Callable[
     monkeypatch.setattr(calibrating, "STAGES", (stage,))
     monkeypatch.setattr(calibrating, "EXPORTERS", ())
     monkeypatch.setattr(calibrating, "result_of", unexpectedly)
+    monkeypatch.setattr(diagnosing, "diagnosis_stages", lambda *_: (stage.for_role("field"),))
+    monkeypatch.setattr(diagnosing, "EXPORTERS", ())
+    monkeypatch.setattr(diagnosing, "result_of", unexpectedly)
 
 
 def test_a_recording_that_is_only_touched_is_no_fault(

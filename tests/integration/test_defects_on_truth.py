@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pipeline.export.tables import write_defects
-from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
+from tests.quiet import quiet_context
 from tests.shared_data import shared
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 

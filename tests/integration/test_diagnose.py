@@ -2,19 +2,28 @@
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
 from pipeline.cli import app
+from pipeline.errors import InputError
 from pipeline.instrument.probe_file import read_probe, read_with_source
-from pipeline.machine.stage import quiet_context
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.plan import Selection, Source
 from pipeline.recording import open_recording
 from pipeline.simulator.scene import scene_from
-from stages.diagnose.diagnose import diagnose
+from stages.diagnose.diagnose import Diagnosed, Noticed, diagnosis_stages
 from stages.diagnose.result import Verdict
+from tests.shared_data import PROJECT_ROOT
 from tests.simulated import SCENES, rendered, shipped, smaller
 
 pytestmark = pytest.mark.slow
@@ -80,6 +89,99 @@ def test_page_arrays_and_corrected_probe_are_there(diagnosed, pair):
     assert found.calibrated_from == open_recording(pair[1]).name
 
 
+ANSWERS = ("diagnosis.json", "diagnosis.html", "probe.yaml", "arrays.npz")
+
+
+def states(folder):
+    """Return how each stage stands by run.json."""
+    stages = json.loads((folder / "run.json").read_text())["stages"]
+    return {stage["name"]: stage["state"] for stage in stages}
+
+
+def contents(folder):
+    return {name: (folder / name).read_bytes() for name in ANSWERS}
+
+
+def test_a_second_diagnosis_computes_nothing(diagnosed, pair):
+    before = contents(diagnosed)
+    words = ["diagnose", str(pair[0]), "--gauge", str(pair[1]), "-o", str(diagnosed)]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    assert set(states(diagnosed).values()) == {"reused"}
+    assert len(states(diagnosed)) == 8
+    assert contents(diagnosed) == before
+
+
+def wait_for_stage(name, folder, process):
+    """Wait until a stage's result is whole."""
+    while process.poll() is None and not list(folder.glob(f".boresight/{name}-*/manifest.json")):
+        time.sleep(0.01)
+
+
+def test_killed_and_resumed_it_ends_in_the_same_bytes(diagnosed, pair, tmp_path):
+    words = ["diagnose", str(pair[0]), "--gauge", str(pair[1]), "-o", str(tmp_path / "out")]
+    command = [sys.executable, "-m", "pipeline.cli", *words]
+    first = subprocess.Popen(command, cwd=PROJECT_ROOT, stderr=subprocess.DEVNULL)
+    # Killed in the middle of a stage: the one before it is whole.
+    while first.poll() is None and not list(
+        (tmp_path / "out").glob(".boresight/line_profile-*/manifest.json")
+    ):
+        time.sleep(0.01)
+    first.kill()
+    assert first.wait() == -signal.SIGKILL
+    assert not (tmp_path / "out" / "diagnosis.json").exists()
+    subprocess.run(command, cwd=PROJECT_ROOT, stderr=subprocess.DEVNULL, check=True)
+    assert states(tmp_path / "out")["field rings"] == "reused"
+    assert states(tmp_path / "out")["diagnosis"] == "completed"
+    assert contents(tmp_path / "out") == contents(diagnosed)
+
+
+def test_ctrl_c_ends_it_with_130(pair, tmp_path):
+    command = [sys.executable, "-m", "pipeline.cli", "diagnose", str(pair[0]), "-o", str(tmp_path / "out")]
+    first = subprocess.Popen(command, cwd=PROJECT_ROOT, stderr=subprocess.DEVNULL)
+    wait_for_stage("rings", tmp_path / "out", first)
+    first.send_signal(signal.SIGINT)
+    assert first.wait() == 130
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "cancelled"
+
+
+def test_what_a_run_of_the_field_holds_is_taken_over(pair, tmp_path):
+    run, out = tmp_path / "run", tmp_path / "out"
+    option = ["--set", "rings.azimuths=480"]
+    assert CliRunner().invoke(app, ["run", str(pair[0]), "-o", str(run), *option]).exit_code == 0
+    words = ["diagnose", "--run", str(run), "--gauge", str(pair[1]), "-o", str(out), "--apply"]
+    for expected in ("completed", "reused"):
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, done.output
+        assert states(out)["field rings"] == states(out)["field triangulate"] == "reused"
+        assert states(out)["diagnosis"] == expected
+        assert set(states(out / "run").values()) == {expected}
+    assert not (out / "run-stated").exists()
+    assert json.loads((out / "run.json").read_text())["configuration"]["rings"]["azimuths"] == 480
+
+
+def test_a_run_of_another_recording_is_refused_by_name(pair, tmp_path):
+    record = {
+        "state": "completed", "recording": {"path": str(pair[0])}, "configuration": {},
+        "probe": {"path": str(pair[0] / "probe.yaml")}, "input_sha256": {"recording": "0" * 64},
+    }  # fmt: skip
+    (tmp_path / "run.json").write_text(json.dumps(record))
+    words = ["diagnose", str(pair[0]), "--run", str(tmp_path), "-o", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, words)
+    assert isinstance(done.exception, InputError)
+    assert "the recording is not what the run was made from" in str(done.exception)
+    (tmp_path / "run.json").write_text(json.dumps(record | {"configuration": {"rings": {"gone": 1}}}))
+    open_field = open_recording(pair[0])
+    same = {
+        "recording": open_field.content_key,
+        "probe": probe_source(read_probe(pair[0] / "probe.yaml")).key,
+    }
+    old = record | {"configuration": {"rings": {"gone": 1}}, "input_sha256": same}
+    (tmp_path / "run.json").write_text(json.dumps(old))
+    done = CliRunner().invoke(app, words)
+    assert isinstance(done.exception, InputError)
+    assert "rings.gone" in str(done.exception)
+
+
 class Still:
     """A source whose laser and lit frames never change."""
 
@@ -134,10 +236,14 @@ def of_another_size(recording):
         (of_another_size, Verdict.CLASS, "not of 76.2 mm as stated"),
     ],
 )
-def test_what_a_recording_lacks_is_told_and_nothing_is_guessed(pair, spoilt, verdict, said):
+def test_what_a_recording_lacks_is_told_and_nothing_is_guessed(pair, spoilt, verdict, said, tmp_path):
     recording = spoilt(open_recording(pair[0]))
     probe = read_probe(pair[0] / "probe.yaml")
-    found = diagnose(recording, None, probe, quiet_context()).found
+    stages = diagnosis_stages(with_field=True, with_gauge=False)
+    sources = (recording_source(recording, "field"), probe_source(probe), Source(Noticed, Noticed(), ""))
+    job = Job("diagnose", sources, stages, (), resolve(stages), tmp_path / "out", at_once=1)
+    run_job(job, Selection(), SilentDisplay())
+    found = result_of(job, Diagnosed).found
     assert found.verdict is verdict
     assert not found.effects
     assert any(said in s for s in found.shortcomings), found.shortcomings

@@ -20,11 +20,11 @@ from pipeline.commands.follow import new_sections, restarted
 from pipeline.errors import Cancelled, InputError
 from pipeline.follow import Snapshot, snapshots
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from stages.preview import preliminary_sections
 from stages.rings import RingParameters
 from tests.bad_recordings import cut_sample
+from tests.quiet import quiet_context
 from tests.shared_data import PROJECT_ROOT
 
 QUICK = ("--set", "rings.azimuths=360")
@@ -103,9 +103,9 @@ def test_what_cannot_be_read_is_tried_again_until_the_recording_rests(
     folder = copied(whole, tmp_path)
     snapshot = Snapshot(open_recording(folder), "", complete=False)
     spoil(folder / name)
-    assert new_sections(snapshot, None, -1) == ()
+    assert new_sections(snapshot, None, -1, quiet_context()) == ()
     with pytest.raises(InputError, match=name):
-        new_sections(replace(snapshot, complete=True), None, -1)
+        new_sections(replace(snapshot, complete=True), None, -1, quiet_context())
 
 
 def test_a_recorder_that_starts_again_is_shown_from_its_start(whole: Path, tmp_path: Path) -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.camera.formats import read_camera
-from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import detect
 from stages.calibrate.boards.parameters import BoardCalibrationParameters
@@ -15,6 +14,7 @@ from stages.calibrate.boards.targets import Chessboard
 from stages.calibrate.laser.calibrate import LaserPicture, calibrate_laser_plane, line_on_board
 from stages.calibrate.laser.parameters import LaserPlaneParameters
 from stages.calibrate.laser.plane import fit_plane
+from tests.quiet import quiet_context
 from tests.shared_data import shared
 
 RED_NM = 650.0

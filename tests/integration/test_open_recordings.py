@@ -14,12 +14,12 @@ from pipeline.artefacts.measured import Trajectory, Wall
 from pipeline.export.arrays import write_radius_map
 from pipeline.export.tables import write_trajectory
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.stage import quiet_context
 from pipeline.recording.folder import open_folder
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings
+from tests.quiet import quiet_context
 from tests.shared_data import PROJECT_ROOT, shared
 from tests.truth_comparison import compare_motion, compare_wall
 

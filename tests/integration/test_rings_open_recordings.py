@@ -13,10 +13,10 @@ from scipy.ndimage import map_coordinates
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.stage import quiet_context
 from pipeline.recording import open_recording
 from pipeline.recording.base import FrameTable
 from stages.rings import RingParameters, extract_rings
+from tests.quiet import quiet_context
 from tests.shared_data import shared
 
 

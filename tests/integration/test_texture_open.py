@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pipeline.export.pictures import write_unrolled
-from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import FrameTable
 from stages.texture.texture import TextureParameters, photograph_wall
+from tests.quiet import quiet_context
 from tests.shared_data import shared
 from tests.truth_run import true_radius_map, truth_run
 

@@ -13,11 +13,11 @@ from pipeline.errors import UnusableError
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
-from pipeline.machine.stage import quiet_context
 from stages.accumulate import AccumulateParameters, accumulate_wall, stretch, survey
 from stages.accumulate.grid import _regress
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
+from tests.quiet import quiet_context
 
 RINGS, STEP = 40, 0.5
 SIGMA_PX = 0.05

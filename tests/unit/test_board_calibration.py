@@ -9,13 +9,13 @@ from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
-from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.compare import displacement_map, uncertainty_map
 from stages.calibrate.boards.fit import adjust, held_out_residuals
 from stages.calibrate.boards.parameters import MODEL_NAMES, BoardCalibrationParameters
 from stages.calibrate.boards.start import pose, start
 from tests.board_scene import facing_pose, varied_poses, views_of
+from tests.quiet import quiet_context
 from tests.unit.camera_samples import CAMERAS
 
 CAMERA = KannalaBrandt((640, 480), (146.0, 145.6), (318.9, 236.8), (-0.0118, 0.0008, -0.0008, 0.0001))

@@ -7,13 +7,13 @@ import pytest
 
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
-from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.parameters import BoardCalibrationParameters
 from stages.calibrate.boards.start import start
 from stages.calibrate.boards.survey import applied, nominal_board, placed, survey_board
 from stages.calibrate.boards.targets import grid
 from tests.board_scene import varied_poses
+from tests.quiet import quiet_context
 
 CAMERA = KannalaBrandt((640, 480), (146.0, 145.6), (318.9, 236.8), (-0.0118, 0.0008, -0.0008, 0.0001))
 SURVEYED = BoardCalibrationParameters(board_shape="surveyed")

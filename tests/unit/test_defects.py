@@ -9,9 +9,9 @@ import pytest
 
 from pipeline.artefacts.findings import pof_class
 from pipeline.errors import UnusableError
-from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
 from stages.defects.grow import millimetre_mean
+from tests.quiet import quiet_context
 from tests.synthetic_wall import (
     DrawnDefect,
     bare_recording,

@@ -9,11 +9,11 @@ from scipy.ndimage import label
 
 from pipeline.machine import scratch as scratch_module
 from pipeline.machine.scratch import Scratch
-from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects, grow, segment, stretch
 from stages.defects.detect import detect
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Patches
+from tests.quiet import quiet_context
 from tests.synthetic_wall import DrawnDefect, bare_recording, grey_texture, relief, smooth_noise, wall_of
 
 RADIUS, COLUMNS = 38.0, 240

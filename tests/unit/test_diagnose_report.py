@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pipeline.commands.diagnose_apply import DefectChange, GeometryChange
-from pipeline.commands.diagnose_image import OnImage
 from pipeline.commands.diagnose_report import Shown, headline, write_page
-from pipeline.commands.diagnose_resimulate import Resimulated
+from stages.diagnose.on_image import OnImage
+from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import (
     Candidate,
     Confirmation,

@@ -10,7 +10,6 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from pipeline.machine.stage import quiet_context
 from stages.calibrate.boards.detect import detect
 from stages.calibrate.boards.targets import Chessboard
 from stages.calibrate.laser.calibrate import LaserPicture, calibrate_laser_plane, line_on_board
@@ -18,6 +17,7 @@ from stages.calibrate.laser.parameters import LaserPlaneParameters
 from stages.calibrate.laser.peaks import fit_peaks
 from stages.calibrate.laser.plane import fit_plane, fit_plane_robustly
 from tests.board_scene import chessboard_picture, facing_pose, render
+from tests.quiet import quiet_context
 
 CAMERA = KannalaBrandt((640, 480), (230.0, 229.5), (318.3, 241.2), (-0.0118, 0.0008, -0.0008, 0.0001))
 BOARD = Chessboard(8, 6, 20.0)

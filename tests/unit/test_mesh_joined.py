@@ -8,13 +8,13 @@ import pytest
 
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.measured import Wall
-from pipeline.machine.stage import quiet_context
 from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.join import OpenMesh, clip, join
 from stages.mesh.poisson import joined_pieces, piece_cuts, poisson_surface, seen_part
 from stages.mesh.surface import Surface, weld
 from stages.overlays import OverlayParameters, overlays_of
+from tests.quiet import quiet_context
 from tests.unit.small_wall import RADIUS, small_wall, smooth_photo, tee
 
 LENGTH, CELL, REACH = 120.0, 1.6, 3.0

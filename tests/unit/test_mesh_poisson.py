@@ -6,11 +6,11 @@ import pytest
 from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import TexturedMesh
 from pipeline.errors import UnusableError
-from pipeline.machine.stage import quiet_context
 from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
 from stages.mesh.poisson import folded_cells
 from stages.overlays import OverlayParameters, overlays_of
+from tests.quiet import quiet_context
 from tests.unit.small_wall import RADIUS, small_wall, smooth_photo, tee
 
 

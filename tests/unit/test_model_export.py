@@ -15,10 +15,10 @@ from pipeline.artefacts.model import VARIANTS, TexturedMesh
 from pipeline.export.arrays import write_cloud
 from pipeline.export.glb import write_model
 from pipeline.export.pictures import write_overlays
-from pipeline.machine.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
 from tests.model_picture import inside_view, render
+from tests.quiet import quiet_context
 from tests.unit.small_wall import RADIUS, small_wall, smooth_photo
 
 

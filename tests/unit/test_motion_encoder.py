@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import Encoder, FrameTable
 from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames
 from stages.motion.tracking.landmarks import TrackedPoses
+from tests.quiet import quiet_context
 
 RATE = 30.0
 SPEED = 18.0

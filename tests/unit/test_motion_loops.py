@@ -9,7 +9,6 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.machine.scratch import Scratch
-from pipeline.machine.stage import quiet_context
 from stages.motion import estimate_motion
 from stages.motion.loops.loop_closure import LoopReport, ShiftPredictor, close_loops
 from stages.motion.loops.revisits import (
@@ -26,6 +25,7 @@ from stages.motion.parameters import MotionParameters
 from stages.motion.windows.submap_joining import JoinedRun
 from tests.drawn_run import drawn_run, without_encoder
 from tests.looped_run import FRAMES, GRID, DrawnView, LoopedRun, looped_run, rough_wall
+from tests.quiet import quiet_context
 
 PARAMETERS = MotionParameters.model_validate({"max_track_frames": 40})
 WALL = rough_wall()

@@ -8,9 +8,9 @@ import pytest
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
-from pipeline.machine.stage import quiet_context
 from stages.motion import MotionParameters, adjust_at_once, estimate_motion, measure_run
 from tests.drawn_run import DrawnRun, drawn_run, without_encoder
+from tests.quiet import quiet_context
 
 STEP = 0.8
 PARAMETERS = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)

@@ -12,8 +12,8 @@ from pipeline.geometry.axis import PipeAxis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.machine.stage import quiet_context
 from stages.motion.trajectory import report_instrument
+from tests.quiet import quiet_context
 
 COUNT = 20
 

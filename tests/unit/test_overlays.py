@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.machine.stage import quiet_context
 from stages.overlays import OverlayParameters, draw_overlays, fitted_pipe, overlays_of
+from tests.quiet import quiet_context
 from tests.unit.small_wall import PIT, RADIUS, small_wall
 
 

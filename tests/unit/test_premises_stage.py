@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.machine.stage import quiet_context
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from stages.premises import PremisesParameters, check_premises
 from tests.drawn_run import BASELINE, RADIUS, drawn_run
+from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 from tests.spoiled_recordings import SPOILERS, Spoiled, lost, repeated, swapped_from, wrong_at_random
 

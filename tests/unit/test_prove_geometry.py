@@ -50,7 +50,7 @@ def errors(concealed, folder, monkeypatch, changes):
     """Return the wall errors when the diagnosis writes a probe with ``changes`` to the sheet."""
     scene, _, rings = concealed
     monkeypatch.setattr(prove_geometry, "open_recording", lambda path: path)
-    monkeypatch.setattr(prove_geometry, "extract_rings", lambda *_: rings)
+    monkeypatch.setattr(prove_geometry, "measured_rings", lambda *_: rings)
     (folder / "truth" / "a-field").mkdir(parents=True)
     write_scene(scene, folder / "truth" / "a-field" / "truth_scene.yaml")
     stated = probe_from(

@@ -18,10 +18,10 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.outcome import Number, StageOutcome, State
-from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
 from stages.overlays import OverlayParameters, draw_overlays
 from stages.sections import SectionParameters, measure_sections
+from tests.quiet import quiet_context
 from tests.synthetic_wall import DrawnDefect, bare_recording, grey_texture, relief, smooth_noise, wall_of
 
 HOSTILE = '<script>alert("x")</script>&"\'>'

@@ -11,9 +11,9 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.machine.stage import quiet_context
 from stages.rings import RINGS, RingParameters, extract, extract_rings
 from stages.rings.validity import contradicted
+from tests.quiet import quiet_context
 from tests.ring_images import exposed, memory_recording, off_centre, ring_light
 
 SIZE, CENTRE = (640, 480), (318.7, 241.3)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.machine.stage import quiet_context
 from stages.sections import SectionParameters, measure_sections
+from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, smooth_noise, wall_of
 
 PARAMETERS = SectionParameters()

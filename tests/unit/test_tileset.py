@@ -20,9 +20,9 @@ from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import VARIANTS, TexturedMesh
 from pipeline.export.tileset import write_tileset
-from pipeline.machine.stage import quiet_context
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
+from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording
 from tests.unit.small_wall import PIT, RADIUS, small_wall, smooth_photo
 

@@ -9,8 +9,8 @@ from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from pipeline.machine.stage import quiet_context
 from stages.triangulate import TRIANGULATE, TriangulateParameters, off_the_ring, triangulate_rings
+from tests.quiet import quiet_context
 
 CAMERA = KannalaBrandt((1600, 1200), (366.1, 365.8), (796.9, 591.8), (-0.0118, 0.0008, -0.0008, 0.0))
 SHEET = LaserSheet(23.4, 0.008, -0.006, 0.002, 0.05, -0.03, (1e-4, -2e-4, 0.0, 1e-4, 0.0, 0.0))

@@ -8,21 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import RingSamples
-from pipeline.errors import UnusableError
 from pipeline.geometry.axis import to_pipe
-from pipeline.instrument.probe import Probe
-from pipeline.machine.stage import Context
 from pipeline.physics.effect import Channel
-from pipeline.recording.base import Recording
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.kinds import Periodic
-from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.evidence import ChannelEvidence, Evidence
 from stages.diagnose.field.parts import part_of
 from stages.diagnose.field.points import ring_points
 from stages.diagnose.field.reduce import evidence_of, reduced
-from stages.diagnose.field.run import FieldRun, field_run
+from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.shortcomings import nothing_said, shortcomings_of
 from stages.diagnose.field.system import OWN, Asked, field_system
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
@@ -60,28 +54,18 @@ class FieldEvidence:
         return _evidence(self.run, asked, _slips(self.run, self.travel))
 
 
-def field_evidence(
-    recording: Recording,
-    probe: Probe,
-    context: Context,
-    library: Mapping[str, EffectModel] = LIBRARY,
-    rings: RingSamples | None = None,
-) -> FieldEvidence:
+def field_evidence(run: FieldRun, library: Mapping[str, EffectModel]) -> FieldEvidence:
     """Return what a field recording says of every effect whose columns it can have.
 
     Poses, landmarks, the pipe's radius, ovality and axis, errors of matching and the encoder's creep are
     eliminated; the stated instrument's parameters stay as columns, without prior.
     """
-    try:
-        run = field_run(recording, probe, context, rings)
-    except UnusableError as error:
-        return FieldEvidence(None, None, nothing_said(recording, error))
     travel = travel_of_run(run)
     asked, slips = asked_of(library, run, travel), _slips(run, travel)
     try:
         whole = _evidence(run, asked, slips)
     except np.linalg.LinAlgError:
-        return FieldEvidence(run, travel, nothing_said(recording, None))
+        return FieldEvidence(run, travel, nothing_said(run.recording, ""))
     regimes = tuple(_regimes(run, asked, slips))
     missing = (*(travel.shortcomings if travel else ()), *shortcomings_of(run))
     anomalies = travel.anomalies if travel else ()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Int
-from pipeline.artefacts.measured import RingSamples, Trajectory
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
@@ -21,13 +21,10 @@ from stages.motion import (
     MotionParameters,
     State,
     adjust_at_once,
-    circles_in_rings,
     encoder_at_frames,
     measure_run,
     ring_bins,
 )
-from stages.rings import RingParameters, extract_rings
-from stages.triangulate import TriangulateParameters, triangulate_rings
 
 
 @dataclass(frozen=True)
@@ -66,9 +63,14 @@ class FieldRun:
 
 
 def field_run(
-    recording: Recording, probe: Probe, context: Context, rings: RingSamples | None = None
+    recording: Recording,
+    probe: Probe,
+    rings: RingSamples,
+    points: RingPoints,
+    parameters: MotionParameters,
+    context: Context,
 ) -> FieldRun:
-    """Measure rings and texture of a recording and adjust poses, pipe and wall to them.
+    """Measure the texture of a recording and adjust poses, pipe and wall to rings and texture.
 
     The encoder is not used, so that it can be compared with the visual distance.
 
@@ -77,10 +79,6 @@ def field_run(
     UnusableError
         When rings and texture alone do not determine the motion.
     """
-    parameters = MotionParameters.model_validate({})
-    if rings is None:
-        rings = extract_rings(recording, probe, RingParameters.model_validate({}), context)
-    points = triangulate_rings(rings, probe, TriangulateParameters.model_validate({}), context)
     run = measure_run(recording, probe, rings, points, parameters, context, use_encoder=False)
     grid, frames = run.texture.grid, recording.frames
     measured = run.measured(run.whole, parameters)
@@ -112,8 +110,8 @@ def _adjusted_with(run: FieldRun, probe: Probe, context: Context) -> JointEstima
     parameters, before, frames = run.parameters, run.measured, run.recording.frames
     bins = ring_bins(run.rings, run.ring_frames, probe, parameters.ring_bins, parameters.surface_sigma_mm)
     measured = Measurements.of(before.tracks, bins, before.time_s, None, probe)
-    points = triangulate_rings(run.rings, probe, TriangulateParameters.model_validate({}), context)
-    radius_mm = circles_in_rings(points).usual_radius_mm
+    # Convergence is judged by the pipe's radius; the stated probe's is near enough.
+    radius_mm = float(run.state.globals[0])
     start = replace(run.state, instrument=np.zeros(measured.unsure.shape[1] + MATCH_BIASES))
     return adjust_at_once(start, measured, frames, radius_mm, parameters, context)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.errors import UnusableError
 from pipeline.physics.effect import Channel
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.evidence import ChannelEvidence, Evidence
@@ -18,10 +17,10 @@ _LEAST_OFFSET_MM = 0.5
 _LEAST_ROLL_RAD = np.radians(5.0)
 
 
-def nothing_said(recording: Recording, error: UnusableError | None) -> ChannelEvidence:
+def nothing_said(recording: Recording, problem: str) -> ChannelEvidence:
     """Return empty evidence of a recording whose motion rings and texture do not determine, and why."""
     lit = len(recording.frames.of(Illumination.LED, Illumination.BOTH))
-    why = "its equations leave the motion open" if error is None else str(error.problem)
+    why = problem or "its equations leave the motion open"
     sentences = [f"The field recording tells nothing of the instrument by itself: {why}."]
     if not lit:
         sentences.append(

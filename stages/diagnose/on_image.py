@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Byte, Float
-from stages.diagnose.diagnose import Examination
+from pipeline.recording.base import Recording
+from stages.diagnose.compared import Compared
 
 
 @dataclass(frozen=True)
@@ -30,17 +31,16 @@ class OnImage:
     after_px: Float
 
 
-def image_of(examination: Examination) -> OnImage | None:
+def image_of(seen: Compared | None, field: Recording | None, gauge: Recording | None) -> OnImage | None:
     """Return the ring frame with the most usable bins, or None where there is none."""
-    seen = examination.compared
     if seen is None or not seen.before.usable.any():
         return None
-    source = examination.field if seen.before.source == "field" else examination.gauge
-    if source is None:
+    recording = field if seen.before.source == "field" else gauge
+    if recording is None:
         return None
     frames, count = np.unique(seen.before.frame[seen.before.usable], return_counts=True)
     number = int(frames[np.argmax(count)])
-    picture = next(iter(source.recording.read([number], "grey")))[1]
+    picture = next(iter(recording.read([number], "grey")))[1]
     if picture is None:
         return None
     before, after = (r.usable & (r.frame == number) for r in (seen.before, seen.after))

@@ -31,9 +31,9 @@ from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.grid import Wall, WallGrid
 from stages.calibrate.gauge.geometry import gauge_of
-from stages.diagnose.diagnose import Examination
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.seen import Seen
 
 _HELD_OUT = 12
 _RELAXED, _UNHEARD = 1e-4, 1e-8
@@ -74,9 +74,8 @@ class Resimulated:
         return before, after
 
 
-def resimulate(examination: Examination) -> Resimulated | None:
+def resimulate(gauge: Seen | None) -> Resimulated | None:
     """Simulate held-out rings of the gauge run anew; None where nothing was found in one."""
-    gauge = examination.gauge
     examined = gauge.geometry if gauge is not None else None
     if gauge is None or examined is None or examined.best is None or not examined.best.fit.terms:
         return None
