@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -80,6 +80,11 @@ class Job:
 
     def plan(self) -> Plan:
         """Return the wired plan; raises `PipelineError` when stages do not fit together."""
+        return self._plan
+
+    @cached_property
+    def _plan(self) -> Plan:
+        """Made once: keys follow the program's text, which may be mended while a job is at work."""
         return make_plan(self.stages, self.configuration, self.sources)
 
 
