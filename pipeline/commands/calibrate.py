@@ -18,9 +18,10 @@ from pipeline.instrument.probe_file import write_probe
 from pipeline.machine.configuration import resolve
 from pipeline.machine.exporter import Exporter
 from stages.calibrate.gauge import GAUGE, GaugeCalibration, require_gauge
+from stages.premises import PREMISES
 from stages.rings import RINGS
 
-STAGES = (RINGS, GAUGE)
+STAGES = (PREMISES, RINGS, GAUGE)
 
 
 def calibrate(

@@ -27,6 +27,7 @@ from pipeline.simulator.exact import room_mm, wall_radius
 from pipeline.simulator.scene import read_scene
 from pipeline.simulator.truth import SceneTruth
 from stages.diagnose.drill.cases import Case
+from stages.premises import PREMISES
 from stages.rings import RINGS
 
 _SCENE = "truth_scene.yaml"
@@ -34,6 +35,7 @@ _CACHE = "wall_errors.json"
 # Samples beside the wall's own edges are no matter of the instrument.
 _OUTLYING = 5.0
 _EVERY = 4
+_STAGES = (PREMISES, RINGS)
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ def measured_rings(field: Path, stated: Probe, folder: Path) -> RingSamples:
     """Return the rings of an inspection; the diagnosis in ``folder`` has measured them already."""
     sources = (recording_source(open_recording(field)), probe_source(stated))
     with TemporaryDirectory(dir=folder, prefix=".rings-") as own:
-        job = Job("prove", sources, (RINGS,), (), resolve((RINGS,)), Path(own), lent=(folder,))
+        job = Job("prove", sources, _STAGES, (), resolve(_STAGES), Path(own), lent=(folder,))
         run_job(job, Selection(), SilentDisplay())
         return result_of(job, RingSamples)
 

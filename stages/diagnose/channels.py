@@ -10,13 +10,12 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
+from pipeline.recording.checked_frames import CheckedFrames
 from stages.calibrate.gauge import GaugeParameters
 from stages.calibrate.gauge.calibrate import MeasuredRun, measure_gauge
 from stages.diagnose.field.run import FieldRun, field_run
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
-from stages.motion import MotionParameters
-from stages.motion.bundle_adjustment.equations import Equations, Measurements
-from stages.motion.bundle_adjustment.unknowns import EncoderReadings, State
+from stages.motion import EncoderReadings, Equations, Measurements, MotionParameters, State
 
 
 @dataclass(frozen=True)
@@ -63,27 +62,41 @@ class FreeMotion:
 
 
 def examine_line(
-    recording: Recording, rings: RingSamples, probe: Probe, *, parameters: Parameters, context: Context
+    recording: Recording,
+    frames: CheckedFrames,
+    rings: RingSamples,
+    probe: Probe,
+    *,
+    parameters: Parameters,
+    context: Context,
 ) -> LineProfile:
     """Test every effect that the line's light can show: see `profile_evidence`."""
     try:
-        return LineProfile(profile_evidence(recording, rings, probe, context))
+        return LineProfile(profile_evidence(frames.applied_to(recording), rings, probe, context))
     except UnusableError as error:
         return LineProfile(None, error.problem)
 
 
 def measure_fiducials(
-    recording: Recording, rings: RingSamples, probe: Probe, *, parameters: GaugeParameters, context: Context
+    recording: Recording,
+    frames: CheckedFrames,
+    rings: RingSamples,
+    probe: Probe,
+    *,
+    parameters: GaugeParameters,
+    context: Context,
 ) -> GaugeMeasured:
     """Measure rings and fiducials of a gauge run: see `measure_gauge`."""
     try:
-        return GaugeMeasured(measure_gauge(recording, rings, probe, parameters, context))
+        checked = frames.applied_to(recording)
+        return GaugeMeasured(measure_gauge(checked, rings, probe, parameters, context))
     except UnusableError as error:
         return GaugeMeasured(None, error.problem)
 
 
 def adjust_freely(
     recording: Recording,
+    frames: CheckedFrames,
     probe: Probe,
     rings: RingSamples,
     points: RingPoints,
@@ -93,7 +106,7 @@ def adjust_freely(
 ) -> FreeMotion:
     """Adjust a field recording without its encoder, so that what is seen can be held against it."""
     try:
-        run = field_run(recording, probe, rings, points, parameters, context)
+        run = field_run(frames.applied_to(recording), probe, rings, points, parameters, context)
     except UnusableError as error:
         return FreeMotion(None, error.problem)
     return FreeMotion(Adjusted(**{f.name: getattr(run, f.name) for f in fields(Adjusted)}))

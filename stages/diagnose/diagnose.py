@@ -14,6 +14,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Parameters, Stage
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Recording
+from pipeline.recording.checked_frames import CheckedFrames
 from stages.diagnose.channels import (
     FIDUCIALS,
     FREE_MOTION,
@@ -41,6 +42,7 @@ from stages.diagnose.second_line import held_against_rings, sheet_by_rings
 from stages.diagnose.seen import Seen
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.diagnose.travel.gauge import gauge_travel
+from stages.premises import PREMISES
 from stages.rings import RINGS
 from stages.triangulate import TRIANGULATE
 
@@ -106,10 +108,12 @@ class GaugeRecorded:
 
 def diagnose_both(
     field: Annotated[Recording, Of("field")],
+    frames: Annotated[CheckedFrames, Of("field")],
     rings: Annotated[RingSamples, Of("field")],
     profile: Annotated[LineProfile, Of("field")],
     motion: Annotated[FreeMotion, Of("field")],
     gauge: Annotated[Recording, Of("gauge")],
+    gauge_frames: Annotated[CheckedFrames, Of("gauge")],
     gauge_profile: Annotated[LineProfile, Of("gauge")],
     fiducials: Annotated[GaugeMeasured, Of("gauge")],
     probe: Probe,
@@ -119,13 +123,14 @@ def diagnose_both(
     context: Context,
 ) -> Diagnosed:
     """Diagnose an inspection and a gauge run of one probe: see `diagnosed`."""
-    of_field = FieldMeasured(field, rings, profile, motion)
-    of_gauge = GaugeRecorded(gauge, gauge_profile, fiducials)
+    of_field = FieldMeasured(frames.applied_to(field), rings, profile, motion)
+    of_gauge = GaugeRecorded(gauge_frames.applied_to(gauge), gauge_profile, fiducials)
     return diagnosed(of_field, of_gauge, probe, noticed, parameters, context)
 
 
 def diagnose_field(
     field: Annotated[Recording, Of("field")],
+    frames: Annotated[CheckedFrames, Of("field")],
     rings: Annotated[RingSamples, Of("field")],
     profile: Annotated[LineProfile, Of("field")],
     motion: Annotated[FreeMotion, Of("field")],
@@ -136,12 +141,13 @@ def diagnose_field(
     context: Context,
 ) -> Diagnosed:
     """Diagnose an inspection alone: see `diagnosed`."""
-    of_field = FieldMeasured(field, rings, profile, motion)
+    of_field = FieldMeasured(frames.applied_to(field), rings, profile, motion)
     return diagnosed(of_field, None, probe, noticed, parameters, context)
 
 
 def diagnose_gauge(
     gauge: Annotated[Recording, Of("gauge")],
+    gauge_frames: Annotated[CheckedFrames, Of("gauge")],
     profile: Annotated[LineProfile, Of("gauge")],
     fiducials: Annotated[GaugeMeasured, Of("gauge")],
     probe: Probe,
@@ -151,7 +157,7 @@ def diagnose_gauge(
     context: Context,
 ) -> Diagnosed:
     """Diagnose a gauge run alone: see `diagnosed`."""
-    of_gauge = GaugeRecorded(gauge, profile, fiducials)
+    of_gauge = GaugeRecorded(gauge_frames.applied_to(gauge), profile, fiducials)
     return diagnosed(None, of_gauge, probe, noticed, parameters, context)
 
 
@@ -291,8 +297,8 @@ def _of_geometry(
 
 _SUMMARY = "what physics was left out, where it shows, and what bears it out"
 _DIAGNOSIS = Stage("diagnosis", "1", DiagnosisParameters, diagnose_both, _SUMMARY)
-OF_FIELD = tuple(s.for_role("field") for s in (RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION))
-OF_GAUGE = tuple(s.for_role("gauge") for s in (RINGS, LINE_PROFILE, FIDUCIALS))
+OF_FIELD = tuple(s.for_role("field") for s in (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION))
+OF_GAUGE = tuple(s.for_role("gauge") for s in (PREMISES, RINGS, LINE_PROFILE, FIDUCIALS))
 
 
 def diagnosis_stages(with_field: bool, with_gauge: bool) -> tuple[Stage, ...]:

@@ -85,13 +85,13 @@ def test_a_second_call_computes_nothing(calibration: Path) -> None:
     before = {p.name: p.read_bytes() for p in calibration.iterdir() if p.is_file() and p.name != "run.json"}
     assert len(before) == 3
     calibrate(shared("recordings", "open-2-gauge"), calibration)
-    assert states(calibration) == {"rings": "reused", "gauge": "reused"}
+    assert states(calibration) == {"premises": "reused", "rings": "reused", "gauge": "reused"}
     assert {name: (calibration / name).read_bytes() for name in before} == before
 
 
 def test_another_prior_keeps_the_rings(calibration: Path) -> None:
     calibrate(shared("recordings", "open-2-gauge"), calibration, assignments=["gauge.iterations=11"])
-    assert states(calibration) == {"rings": "reused", "gauge": "completed"}
+    assert states(calibration) == {"premises": "reused", "rings": "reused", "gauge": "completed"}
 
 
 def test_inspection_is_refused(tmp_path: Path) -> None:
