@@ -19,6 +19,8 @@ __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 
 # Rows that the report's medians are taken of.
 _REPORTED_ROWS = 2000
+# A branch, step or collapse may take half of the radius somewhere, not from most of a pipe. Not measured.
+_IMPOSSIBLE, _MOST_IMPOSSIBLE = 0.5, 0.5
 
 
 class AccumulateParameters(Parameters):
@@ -50,7 +52,7 @@ def accumulate_wall(
     Raises
     ------
     UnusableError
-        When no ring sample lies on the wall.
+        When no ring sample lies on the wall, or most of the wall is nowhere near the pipe's radius.
     """
     found = probe.as_found_in(trajectory)
     on_wall = RingsOnWall(found, rings, points, trajectory)
@@ -67,8 +69,26 @@ def accumulate_wall(
         radius_map = map_of(stretch, on_wall, survey, grid, spread, smoothing_mm, gap_mm)
         fill(wall, stretch, radius_map, on_wall, survey)
         context.progress(done, len(stretches))
+    _refuse_impossible_radii(wall, trajectory)
     _report(context, wall, spread)
     return wall
+
+
+def _refuse_impossible_radii(wall: Wall, trajectory: Trajectory) -> None:
+    """End the run when half of the wall lies off the motion's radius by half of it: the poses are wrong."""
+    rows = slice(None, None, max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1))
+    radius = wall.radius_map.radius_mm[rows]
+    known = radius[np.isfinite(radius)]
+    impossible = np.abs(known - trajectory.radius_mm) > _IMPOSSIBLE * trajectory.radius_mm
+    if known.size and impossible.mean() > _MOST_IMPOSSIBLE:
+        raise UnusableError(
+            "accumulate",
+            f"{100 * impossible.mean():.0f} % of the wall lies more than {100 * _IMPOSSIBLE:.0f} % off the "
+            f"pipe's radius of {trajectory.radius_mm:.4g} mm, from {known.min():.4g} to {known.max():.4g} mm",
+            limit=f"{100 * _MOST_IMPOSSIBLE:.0f} % of the wall",
+            frames=trajectory.frame.tolist(),
+            hint="see the warnings of premises and motion; times in frames.csv may not belong to the pictures",
+        )
 
 
 def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:

@@ -198,3 +198,12 @@ def test_a_wall_made_in_stretches_is_the_wall_made_at_once(monkeypatch: pytest.M
         np.testing.assert_array_equal(getattr(cut.cloud, name), getattr(whole.cloud, name))
     assert np.median(np.sum(cut.cloud.normal_p * whole.cloud.normal_p, 1)) > 0.9999
     assert not np.array_equal(cut.radius_map.sigma_random_mm, whole.radius_map.sigma_random_mm), "the control"
+
+
+def test_radii_that_no_pipe_has_end_the_run() -> None:
+    """The motion's pipe is three times as wide as what the rings show."""
+    probe, rings = exact_probe(), drawn_rings()
+    points = triangulate_rings(rings, probe, TriangulateParameters(), quiet_context())
+    wide = replace(motion(), radius_mm=3 * motion().radius_mm)
+    with pytest.raises(UnusableError, match="100 % of the wall lies more than 50 % off"):
+        accumulate_wall(probe, rings, points, wide, PARAMETERS, quiet_context())
