@@ -87,7 +87,7 @@ def _refuse_impossible_radii(wall: Wall, trajectory: Trajectory) -> None:
             f"pipe's radius of {trajectory.radius_mm:.4g} mm, from {known.min():.4g} to {known.max():.4g} mm",
             limit=f"{100 * _MOST_IMPOSSIBLE:.0f} % of the wall",
             frames=trajectory.frame.tolist(),
-            hint="see the warnings of premises and motion; times in frames.csv may not belong to the pictures",
+            hint="see the warnings of premises and motion: times may not belong to the pictures",
         )
 
 
