@@ -7,6 +7,7 @@ from enum import IntEnum
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Int
 from stages.premises.pictures import CLOSED, Pictures
 
@@ -64,7 +65,7 @@ def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
 def _differ(one: Float, other: Float) -> bool:
     if min(len(one), len(other)) == 0:
         return False
-    spread = _spread(np.concatenate([one, other]))
+    spread = spread_about_median(np.concatenate([one, other]))
     return bool(abs(np.median(one) - np.median(other)) > 2 * spread)
 
 
@@ -74,7 +75,7 @@ def _two_lights(brightness: Float) -> tuple[float, float] | None:
     if bright.all() or not bright.any():
         return None
     low, high = float(np.median(brightness[~bright])), float(np.median(brightness[bright]))
-    spread = max(_spread(brightness[~bright]), _spread(brightness[bright]))
+    spread = max(spread_about_median(brightness[~bright]), spread_about_median(brightness[bright]))
     place = (brightness - low) / (high - low)
     between = float((np.abs(place - 0.5) < _MIDDLE / 2).mean())
     return (low, high) if high - low > _APART * spread and between < _MOST_BETWEEN else None
@@ -89,10 +90,6 @@ def _otsu(value: Float) -> float:
     variance = count * (len(ordered) - count) * (above - below) ** 2
     best = int(np.argmax(variance)) if variance.size else 0
     return float(ordered[best : best + 2].mean())
-
-
-def _spread(value: Float) -> float:
-    return 1.4826 * float(np.median(np.abs(value - np.median(value))))
 
 
 def _height(brightness: Float, low: float, high: float) -> Float:
