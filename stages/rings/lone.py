@@ -53,7 +53,7 @@ def lone_runs(
     lone = runs == 2
     glint = (lone & (odd > _ODD_RUN**2)) | (odd > _GLARING_RUN**2)
     chance = _chance_of_clutter((lone & glint).sum(1), (lone & ~glint).sum(1))
-    unsure = np.hypot(sigma_px, np.sqrt(chance) * np.where(lone, np.abs(away), 0.0))
+    unsure = np.hypot(sigma_px, np.sqrt(chance) * np.where(lone, np.nan_to_num(np.abs(away)), 0.0))
     return glint & np.isfinite(radius_px), np.asarray(unsure, np.float32)
 
 

@@ -131,3 +131,10 @@ def test_between_two_equal_lines_the_chain_does_not_decide_with_confidence():
     found = choose_line(both, np.full(SECTORS, 296.0), 1.2)
     unsure = found.probability < 0.9
     assert unsure.all() or np.allclose(found.radius_px, 296.0)
+
+
+def test_a_run_over_a_place_without_a_wall_to_compare_with_leaves_no_sigma_unknown(drawn):
+    radius = drawn[0]
+    radius[5, RUN] += 3.0
+    radius[:5, 208:210] = radius[6:, 208:210] = np.nan
+    assert np.isfinite(lone_runs(*drawn)[1]).all()
