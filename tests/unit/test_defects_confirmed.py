@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.machine.stage import quiet_context
 from stages.defects import DefectParameters, find_defects
 from stages.defects.corroborate import chance_meetings
+from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
 DISTANCE, RADIUS, SIGMA = np.arange(0, 60, 1.0), 38.0, 0.02
