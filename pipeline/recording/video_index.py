@@ -11,8 +11,7 @@ import av
 import numpy as np
 
 from pipeline.arrays import Bool, Int
-from pipeline.recording.ffv1 import checksums_hold
-from pipeline.recording.h264 import is_reference, length_bytes
+from pipeline.recording.codec_headers import checksums_hold, is_reference, length_bytes
 
 
 @dataclass(frozen=True)
