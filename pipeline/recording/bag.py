@@ -30,13 +30,18 @@ from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import read_yaml
 from pipeline.recording.bag_file import BAG_ERRORS, Bag, RosBag, bag_files, open_mcap
-from pipeline.recording.bag_images import ENCODINGS, message_image
-from pipeline.recording.bag_topics import Topics, choose_topics, encoder_of, frames_of
-from pipeline.recording.base import FrameTable, Planes, Recording
+from pipeline.recording.bag_topics import (
+    ENCODINGS,
+    Topics,
+    choose_topics,
+    encoder_of,
+    frames_of,
+    message_image,
+)
+from pipeline.recording.base import FrameTable, Planes, Recording, ascending, complete, decoded_ahead
 from pipeline.recording.checks import encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe
 from pipeline.recording.input_file import content_key, input_file
-from pipeline.recording.selection import ascending, complete, decoded_ahead
 
 _KEYS = (*COMMON_KEYS, "topics", "illumination")
 

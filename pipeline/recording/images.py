@@ -12,9 +12,8 @@ import numpy as np
 
 from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
-from pipeline.recording.base import Planes
-from pipeline.recording.selection import ascending, decoded_ahead
-from pipeline.recording.still import EXPECTED, decode_still
+from pipeline.recording.base import Planes, ascending, decoded_ahead
+from pipeline.recording.pixels import EXPECTED, decode_still
 
 _FIELD = re.compile(r"%(0\d)?d")
 

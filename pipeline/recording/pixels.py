@@ -1,6 +1,8 @@
-"""Grey and colour planes of decoded frames."""
+"""Grey and colour planes of decoded frames, and the decoding of single compressed images."""
 
 from __future__ import annotations
+
+from typing import cast
 
 import av
 import cv2
@@ -58,3 +60,22 @@ def _yuv_to_bgr(weights: tuple[float, float], full: bool) -> Float:
     u, v = 2 * (1 - blue) * chroma, 2 * (1 - red) * chroma
     matrix = np.array([[luma, u, 0], [luma, -u * blue / green, -v * red / green], [luma, 0, v]])
     return np.column_stack([matrix, -matrix @ [black, 128, 128]])
+
+
+_CODECS = {b"\x89PNG": "png", b"\xff\xd8\xff": "mjpeg", b"BM": "bmp", b"RIFF": "webp"}
+EXPECTED = "PNG, JPEG, BMP or WebP images"
+
+
+def decode_still(data: bytes, planes: Planes) -> Image | None:
+    """Return a compressed image's grey or colour planes; None when it is damaged or of another format."""
+    codec = next((name for lead, name in _CODECS.items() if data.startswith(lead)), None)
+    if codec is None:
+        return None
+    context = cast(av.VideoCodecContext, av.CodecContext.create(codec, "r"))
+    context.thread_count = 1
+    context.options = {"err_detect": "crccheck+explode"}
+    try:
+        frames = context.decode(av.Packet(data)) or context.decode(None)
+    except av.FFmpegError:
+        return None
+    return pixels(frames[0], planes) if frames and not frames[0].is_corrupt else None

@@ -7,10 +7,10 @@ import pytest
 
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
-from pipeline.review.assessment import b31g, strength
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.ledger import Ledger, StaleError
 from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, covered, replay
+from pipeline.review.documents import b31g, strength
 from pipeline.review.measuring import OutlineGauge, readings
 
 SQUARE = ((48.0, 0.1), (52.0, 0.1), (52.0, 0.2), (48.0, 0.2))

@@ -20,11 +20,17 @@ from jinja2 import Environment, StrictUndefined
 
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
-from pipeline.review.assessment import ASSUMPTIONS
 from pipeline.review.decisions.replay import ACCEPTED, OPEN, REJECTED, Finding
-from pipeline.review.documents import cleaned, run_document
-from pipeline.review.papers.pictures import finding_picture, section_plot
-from pipeline.review.papers.tables import POF_COLUMNS, clock_text, csv_text, findings_table, pof_rows
+from pipeline.review.documents import ASSUMPTIONS, cleaned, run_document
+from pipeline.review.papers.tables import (
+    POF_COLUMNS,
+    clock_text,
+    csv_text,
+    finding_picture,
+    findings_table,
+    pof_rows,
+    section_plot,
+)
 from pipeline.review.review import Review, State
 
 _HEADLINE_METRICS = 14
