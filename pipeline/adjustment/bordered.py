@@ -13,10 +13,9 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.adjustment.banded_cholesky import BandedCholesky
-from pipeline.adjustment.elimination import add_landmarks, add_rows
+from pipeline.adjustment.elimination import BLOCK, Sums, add_landmarks, add_rows
 from pipeline.adjustment.marginal import marginalised
 from pipeline.adjustment.robust import Loss, Squares
-from pipeline.adjustment.sums import BLOCK, Sums
 from pipeline.arrays import Float, Int
 from pipeline.system.threads import in_threads
 

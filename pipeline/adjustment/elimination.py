@@ -1,4 +1,4 @@
-"""Compiled sums of `bordered`: equations into a banded, bordered matrix, landmarks eliminated.
+"""Normal equations of `bordered` summed in compiled loops: a banded, bordered matrix, landmarks eliminated.
 
 The band holds the rows of frame f and the columns of frame f - l in ``band[f, l]`` (block, block); with l = 0
 only the lower triangle counts. Arguments are those of `Rows` or `LandmarkRows`, then band, border, corner and
@@ -7,10 +7,57 @@ both right sides, which are added to.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numba
 import numpy as np
 
+from pipeline.arrays import Float
+
 _HOLD = 1e-4  # 1/mm²: a landmark that nothing holds any more keeps its place
+BLOCK = 7
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Normal equations of N frames and B numbers that all share.
+
+    Attributes
+    ----------
+    band : (N, R, 7, 7)
+        Rows of frame f and columns of frame f - l in ``band[f, l]``; of l = 0 the lower triangle.
+    border : (7 N, B)
+    corner : (B, B)
+    right : (7 N,)
+    right_border : (B,)
+    """
+
+    band: Float
+    border: Float
+    corner: Float
+    right: Float
+    right_border: Float
+
+    @staticmethod
+    def empty(frames: int, border: int, lags: int, block: int = BLOCK) -> Sums:
+        """Return sums of nothing, of frames with ``block`` unknowns each."""
+        size = block * frames
+        shapes = (frames, lags, block, block), (size, border), (border, border), (size,), (border,)
+        return Sums(*(np.zeros(shape) for shape in shapes))
+
+    def like(self) -> Sums:
+        """Return sums of nothing, of the same sizes."""
+        return Sums(*(np.zeros_like(a) for a in self.arrays))
+
+    @property
+    def arrays(self) -> tuple[Float, ...]:
+        """All of them, in the order of the fields."""
+        return self.band, self.border, self.corner, self.right, self.right_border
+
+    def add(self, other: Sums) -> None:
+        """Add other sums to these."""
+        for mine, more in zip(self.arrays, other.arrays, strict=True):
+            mine += more
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -20,7 +20,7 @@ from pipeline.instrument.probe_file import read_with_source
 from pipeline.machine.configuration import Configuration
 from pipeline.recording.base import Recording
 from stages.catalogue import PIPELINE
-from stages.diagnose.encoder import encoder_effects, with_true_readings
+from stages.diagnose.correct import encoder_effects, with_true_readings
 from stages.diagnose.result import EffectFound
 
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from pipeline.arrays import Float
 from pipeline.commands.figure import rendered, tidy
-from stages.diagnose.on_image import OnImage
+from stages.diagnose.compared import OnImage
 from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import Candidate, Picture, WallPicture
 

@@ -19,7 +19,7 @@ from pipeline.commands.diagnose_figures import (
 )
 from pipeline.files.disk import replace_text
 from pipeline.pages import page_template
-from stages.diagnose.on_image import OnImage
+from stages.diagnose.compared import OnImage
 from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import Diagnosis, Verdict, to_json
 

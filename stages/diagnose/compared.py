@@ -1,4 +1,4 @@
-"""Residuals before and after the correction, on the recording that had no say in it where there is one."""
+"""Residuals before and after the correction, on the recording that had no say in it, and on its picture."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from pipeline.arrays import Float
+from pipeline.arrays import Byte, Float
+from pipeline.recording.base import Recording
+from stages.diagnose.channels import Seen
 from stages.diagnose.correct import Correction
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.field.against import floor_px, rings_against_texture
@@ -16,7 +18,6 @@ from stages.diagnose.gauge.against import GaugeResiduals, rings_against_fiducial
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.residual import RingResidual, azimuths_rad, wall_distances_mm
 from stages.diagnose.result import Diagnosis, FitQuality, Picture, WallPicture
-from stages.diagnose.seen import Seen
 
 Linear = tuple[tuple[EffectModel, Shape, Float], ...]
 
@@ -104,3 +105,42 @@ def _beyond_probe(examined: Examined | None, correction: Correction | None) -> L
     if best is None or correction is None:
         return ()
     return tuple((t.model, t.shape, t.amplitude) for t in best.fit.terms if t.model.name in correction.unsaid)
+
+
+@dataclass(frozen=True)
+class OnImage:
+    """One frame with its ring residuals.
+
+    Attributes
+    ----------
+    frame : int
+    grey : (H, W) uint8
+    uv_before, uv_after : (M, 2), (K, 2)
+    before_px, after_px : (M,), (K,)
+    """
+
+    frame: int
+    grey: Byte
+    uv_before: Float
+    uv_after: Float
+    before_px: Float
+    after_px: Float
+
+
+def image_of(seen: Compared | None, field: Recording | None, gauge: Recording | None) -> OnImage | None:
+    """Return the ring frame with the most usable bins, or None where there is none."""
+    if seen is None or not seen.before.usable.any():
+        return None
+    recording = field if seen.before.source == "field" else gauge
+    if recording is None:
+        return None
+    frames, count = np.unique(seen.before.frame[seen.before.usable], return_counts=True)
+    number = int(frames[np.argmax(count)])
+    picture = next(iter(recording.read([number], "grey")))[1]
+    if picture is None:
+        return None
+    before, after = (r.usable & (r.frame == number) for r in (seen.before, seen.after))
+    return OnImage(
+        number, picture.copy(), seen.before.uv[before], seen.after.uv[after],
+        seen.before.residual_px[before], seen.after.residual_px[after],
+    )  # fmt: skip

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
+from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of
-from stages.diagnose.classes import classes_of, record_next
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.result import Diagnosis, EffectFound, Location, Verdict
-from stages.diagnose.seen import Seen
+from stages.diagnose.result import Diagnosis, EffectFound, Location, Verdict, classes_of, record_next
 
 _SAME_FREQUENCY_HZ = 0.15
 _AGAIN = (

@@ -22,8 +22,10 @@ from stages.diagnose.channels import (
     FreeMotion,
     GaugeMeasured,
     LineProfile,
+    Seen,
+    gauge_travel,
 )
-from stages.diagnose.compared import compared, with_pictures
+from stages.diagnose.compared import OnImage, compared, image_of, with_pictures
 from stages.diagnose.compose import composed
 from stages.diagnose.correct import Correction, correction_by_gauge
 from stages.diagnose.effects.base import EffectModel
@@ -34,14 +36,11 @@ from stages.diagnose.field.run import FieldRun, with_probe
 from stages.diagnose.field.shortcomings import nothing_said
 from stages.diagnose.gauge.examine import examine
 from stages.diagnose.inference import stated_belief
-from stages.diagnose.on_image import OnImage, image_of
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.resimulate import Resimulated, resimulate
 from stages.diagnose.result import Diagnosis
 from stages.diagnose.second_line import held_against_rings, sheet_by_rings
-from stages.diagnose.seen import Seen
 from stages.diagnose.travel.evidence import TravelEvidence
-from stages.diagnose.travel.gauge import gauge_travel
 from stages.premises import PREMISES
 from stages.rings import RINGS
 from stages.triangulate import TRIANGULATE

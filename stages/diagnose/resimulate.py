@@ -31,9 +31,9 @@ from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.grid import Wall, WallGrid
 from stages.calibrate.gauge.geometry import gauge_of
+from stages.diagnose.channels import Seen
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.seen import Seen
 
 _HELD_OUT = 12
 _RELAXED, _UNHEARD = 1e-4, 1e-8

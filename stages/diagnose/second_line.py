@@ -9,11 +9,11 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.diagnose.agreement import Agreement, Part, agreement
+from stages.diagnose.channels import Seen
 from stages.diagnose.correct import Correction
 from stages.diagnose.gauge.answer import verdict_of
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import Verdict
-from stages.diagnose.seen import Seen
 
 _NAME = "ghost_ring"
 _SHEET = ("tilt_x", "tilt_y", "cone_rad")

@@ -27,6 +27,7 @@ from pipeline.physics.catalogue import effect
 from pipeline.simulator.effects.switch import Switch, switches_from_mapping
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.scene import Scene
+from stages.diagnose.channels import Seen, gauge_travel
 from stages.diagnose.compose import composed
 from stages.diagnose.diagnose import TRAVEL_EFFECTS
 from stages.diagnose.drill.answer import Answer, Concealed
@@ -38,9 +39,7 @@ from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.scan import scan
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.result import to_json
-from stages.diagnose.seen import Seen
 from stages.diagnose.travel.evidence import TravelEvidence
-from stages.diagnose.travel.gauge import gauge_travel
 from tests.benchmarks.ring_level import Noise, ring_level_run
 
 PRIOR = Path(__file__).with_name("ring_level.yaml")

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.commands.diagnose_apply import GeometryChange, clock_of, consequence, geometry_change
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
-from stages.diagnose.encoder import encoder_effects, with_true_readings
+from stages.diagnose.correct import encoder_effects, with_true_readings
 from stages.diagnose.residual import AZIMUTHS, RingResidual, azimuths_rad, wall_distances_mm
 from stages.diagnose.result import EffectFound, Value
 

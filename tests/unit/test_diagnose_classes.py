@@ -6,8 +6,8 @@ from typing import Any, cast
 import pytest
 
 from pipeline.physics.catalogue import CLASSES, EFFECTS
-from stages.diagnose.classes import alike, class_of, classes_of, record_next
 from stages.diagnose.gauge.examine import _untested
+from stages.diagnose.result import alike, class_of, classes_of, record_next
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -12,10 +12,10 @@ import pytest
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from stages.diagnose.agreement import Agreement
+from stages.diagnose.channels import Seen
 from stages.diagnose.claims import rocking_excluded
 from stages.diagnose.compose import composed, verdict_of_rings
 from stages.diagnose.result import Confirmation, Diagnosis, Verdict
-from stages.diagnose.seen import Seen
 from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line

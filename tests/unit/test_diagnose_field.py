@@ -5,12 +5,11 @@ import pytest
 
 from pipeline.physics.effect import Channel
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.evidence import ChannelEvidence, Column, Evidence
 from stages.diagnose.field.answer import field_answer
 from stages.diagnose.field.confirm import InField
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.join import _alone, _met
-from stages.diagnose.inference import Stated
+from stages.diagnose.inference import ChannelEvidence, Column, Evidence, Stated
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
 
 NOTHING_STATED = Stated((), np.zeros((0, 0)))

@@ -11,7 +11,6 @@ from scipy import stats
 from pipeline.adjustment.bordered import Rows
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.evidence import INSTRUMENT, Column, Evidence, total
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.elimination import (
     Equations,
@@ -22,7 +21,7 @@ from stages.diagnose.gauge.elimination import (
 )
 from stages.diagnose.gauge.feasible import APART, expected_gain
 from stages.diagnose.gauge.formula import joint_p
-from stages.diagnose.inference import Stated, estimate, places_of, score
+from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
 from stages.diagnose.result import Confirmation, Verdict
 
 FRAMES, GLOBALS = 9, 5

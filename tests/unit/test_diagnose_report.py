@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.commands.diagnose_apply import DefectChange, GeometryChange
 from pipeline.commands.diagnose_report import Shown, headline, write_page
-from stages.diagnose.on_image import OnImage
+from stages.diagnose.compared import OnImage
 from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import (
     Candidate,

@@ -8,9 +8,9 @@ from scipy.optimize import least_squares
 
 from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.bordered import BorderedSystem, LandmarkRows, Rows, Step, landmark_steps
+from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.levenberg_marquardt import Damping
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
-from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of

@@ -7,13 +7,11 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
-from stages.diagnose.travel.events import steps_found, with_events
-from stages.diagnose.travel.jump import jump_of_reading, reading_jump
-from stages.diagnose.travel.lines import find_lines
+from stages.diagnose.travel.events import jump_of_reading, reading_jump, steps_found, with_events
+from stages.diagnose.travel.lines import find_lines, swing_agreements
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, fitted
 from stages.diagnose.travel.parts import second_predictions
-from stages.diagnose.travel.swings import swing_agreements
-from stages.diagnose.travel.turns import turns_between
+from stages.diagnose.travel.sight import turns_between
 from tests.travel_cases import read, seen, way
 
 TIME_S = np.arange(240) / 30

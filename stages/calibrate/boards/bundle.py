@@ -14,9 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipeline.adjustment.clusters import cluster_covariance
 from pipeline.adjustment.levenberg_marquardt import Stop, minimise
 from pipeline.adjustment.marginal import ArrowEquations, covariance_of
+from pipeline.adjustment.robust import cluster_covariance
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, skew
 from pipeline.instrument.camera.base import Camera

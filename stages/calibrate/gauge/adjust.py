@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor
-from pipeline.adjustment.clusters import cluster_covariance
 from pipeline.adjustment.motion_priors import smooth_motion_rows
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import cluster_covariance, robust_spread
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.adjustment.clusters import cluster_sums
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import cluster_sums, robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.instrument.laser import LaserPlane
 

@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.classes import classes_of, record_next
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.evidence import INSTRUMENT, Evidence
 from stages.diagnose.field.evidence import FieldEvidence
-from stages.diagnose.inference import Score, Stated, places_of, score
-from stages.diagnose.result import Location
+from stages.diagnose.inference import INSTRUMENT, Evidence, Score, Stated, places_of, score
+from stages.diagnose.result import Location, classes_of, record_next
 
 # Something was left out when its probability by chance, corrected for all tried, is below this.
 # Debt: data/debts.md.

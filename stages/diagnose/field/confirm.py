@@ -10,12 +10,11 @@ from pipeline.arrays import Float
 from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.predict import columns
-from stages.diagnose.evidence import Evidence
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.points import ring_points
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.inference import Score, Stated, places_of, score
+from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
 # The field confirms or contradicts only when its 1 σ is below this share of the effect's size.

@@ -12,13 +12,13 @@ from pipeline.geometry.axis import to_pipe
 from pipeline.physics.effect import Channel
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.kinds import Periodic
-from stages.diagnose.evidence import ChannelEvidence, Evidence
 from stages.diagnose.field.parts import part_of
 from stages.diagnose.field.points import ring_points
 from stages.diagnose.field.reduce import evidence_of, reduced
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.shortcomings import nothing_said, shortcomings_of
 from stages.diagnose.field.system import OWN, Asked, field_system
+from stages.diagnose.inference import ChannelEvidence, Evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_trajectory
 

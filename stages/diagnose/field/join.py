@@ -7,15 +7,14 @@ from dataclasses import replace
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.classes import classes_of, record_next
+from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.answer import FieldAnswer, field_answer, location_in_field
 from stages.diagnose.field.confirm import InField, met_in_field
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.shortcomings import travels
 from stages.diagnose.inference import stated_belief
-from stages.diagnose.result import Diagnosis, EffectFound, Verdict
-from stages.diagnose.seen import Seen
+from stages.diagnose.result import Diagnosis, EffectFound, Verdict, classes_of, record_next
 
 _BY_FIELD = "The field, by itself, shows: "
 

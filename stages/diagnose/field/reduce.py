@@ -8,11 +8,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor, Rows
-from pipeline.adjustment.clusters import cluster_variance
 from pipeline.adjustment.marginal import marginalised
+from pipeline.adjustment.robust import cluster_variance
 from pipeline.arrays import Float, Int
-from stages.diagnose.evidence import Evidence
 from stages.diagnose.field.system import FieldSystem
+from stages.diagnose.inference import Evidence
 
 _LEAST_REACH = 4
 

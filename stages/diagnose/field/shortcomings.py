@@ -6,8 +6,8 @@ import numpy as np
 
 from pipeline.physics.effect import Channel
 from pipeline.recording.base import Illumination, Recording
-from stages.diagnose.evidence import ChannelEvidence, Evidence
 from stages.diagnose.field.run import FieldRun
+from stages.diagnose.inference import ChannelEvidence, Evidence
 
 # Relative error of a nominal diameter: pipes are made to about 1 %, of which this is 3 σ.
 _DIAMETER_SHARE = 0.03

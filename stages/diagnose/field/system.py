@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.bordered import LandmarkRows, Rows
+from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.adjustment.robust import Squares
-from pipeline.adjustment.sums import BLOCK
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, transform
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.predict import columns, reading_columns, texture_columns
-from stages.diagnose.evidence import INSTRUMENT, Column
 from stages.diagnose.field.points import distance_mm, ring_points, speed_mm_s, texture_points
 from stages.diagnose.field.run import FieldRun
+from stages.diagnose.inference import INSTRUMENT, Column
 from stages.motion import MATCH_BIASES, EncoderReadings, State, residuals
 
 Asked = Sequence[tuple[EffectModel, Shape]]

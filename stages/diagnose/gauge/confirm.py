@@ -10,12 +10,11 @@ import numpy as np
 
 from pipeline.arrays import Float
 from stages.diagnose.agreement import TELLING, same
-from stages.diagnose.evidence import Evidence
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.inference import Stated, estimate
+from stages.diagnose.inference import Evidence, Stated, estimate
 from stages.diagnose.result import Confirmation
 
 # Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is

@@ -1,7 +1,7 @@
 """Elimination of poses and other unknowns of one recording from its linearised measurements.
 
 What is left is the evidence over the shared columns. B. Triggs et al., "Bundle adjustment: a modern
-synthesis", 2000, § 6. Scores err alike in cells of wall and in frames: `pipeline.adjustment.clusters`.
+synthesis", 2000, § 6. Scores err alike in cells of wall and in frames: `pipeline.adjustment.robust`.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ import numpy as np
 
 from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.bordered import Rows
-from pipeline.adjustment.clusters import two_way_variance
-from pipeline.adjustment.elimination import add_rows
+from pipeline.adjustment.elimination import Sums, add_rows
 from pipeline.adjustment.marginal import Marginal, marginalised
-from pipeline.adjustment.sums import Sums
+from pipeline.adjustment.robust import two_way_variance
 from pipeline.arrays import Bool, Float, Int
 
 POSE = 6

@@ -11,7 +11,6 @@ from threadpoolctl import threadpool_limits
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.calibrate import MeasuredRun
-from stages.diagnose.classes import class_of
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.gauge.confirm import confirmations
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
@@ -24,7 +23,7 @@ from stages.diagnose.gauge.prepare import prepare
 from stages.diagnose.gauge.search import DETECTED, Search, search
 from stages.diagnose.gauge.sizes import Sized, sizes_of
 from stages.diagnose.inference import Stated, stated_belief
-from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
+from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location, class_of
 
 # A gauge is straight and round, so that effects of the pipe's own shape are not tested.
 OF_A_PIPE = frozenset({"ovality", "pipe_bend"})

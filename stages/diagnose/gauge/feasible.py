@@ -13,11 +13,10 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.physics.catalogue import effect
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.evidence import Evidence
 from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import span
-from stages.diagnose.inference import Stated, eliminated, instrument_places, places_of
+from stages.diagnose.inference import Evidence, Stated, eliminated, instrument_places, places_of
 from stages.diagnose.result import Feasible
 
 _SIGMAS = 5.0

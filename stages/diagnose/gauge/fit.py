@@ -12,7 +12,6 @@ from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.evidence import INSTRUMENT, Column, Evidence
 from stages.diagnose.gauge.baseline import BASELINE_SIZE, SIGMA_PX
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
@@ -25,7 +24,7 @@ from stages.diagnose.gauge.elimination import (
     score_inflation,
 )
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
-from stages.diagnose.inference import instrument_information
+from stages.diagnose.inference import INSTRUMENT, Column, Evidence, instrument_information
 
 _CONVERGED = 0.5
 # Step of a pose, mm and rad, below which it is still: its square over the distance of the wall is far below

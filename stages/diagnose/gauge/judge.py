@@ -12,7 +12,6 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.decoys import DECOYS
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import Nameless
-from stages.diagnose.evidence import INSTRUMENT, Evidence, total
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.formula import adequacy, empirical, says_the_same
@@ -20,7 +19,7 @@ from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import scan, span
 from stages.diagnose.gauge.search import Search, refits
 from stages.diagnose.gauge.shapes import refined
-from stages.diagnose.inference import PRIOR_PLAUSIBLE, Stated, estimate
+from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Evidence, Stated, estimate, total
 
 _STRETCHES = 2
 _LEAST_FRAMES = 8

@@ -13,7 +13,7 @@ from pipeline.physics.effect import Channel
 from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.evidence import Anomaly
+from stages.diagnose.inference import Anomaly
 from stages.diagnose.travel.events import StepFound, steps_found, with_events
 from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, EventKind, TravelFit

@@ -1,8 +1,4 @@
-"""Lines in time: sinusoids in the camera's place across the pipe, and which pictures show them.
-
-Harmonic F-test over orthogonal tapers: D. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE,
-1982, § XIII. It compares a sinusoid with the noise right around its frequency, whatever the noise elsewhere.
-"""
+"""Sinusoids in time of the camera's place across the pipe, and which pictures show them."""
 
 from __future__ import annotations
 
@@ -13,9 +9,7 @@ from scipy.signal.windows import dpss
 from scipy.stats import f as fisher
 
 from pipeline.arrays import Bool, Float
-from stages.diagnose.agreement import Agreement
-from stages.diagnose.travel.swings import swing_agreements
-from stages.diagnose.travel.wave import LEAST_SAMPLES, SLOWEST_HZ, amplitudes, shows_apart, wander
+from stages.diagnose.agreement import Agreement, Part, agreement
 
 _BANDWIDTH = 3.0
 _TAPERS = 5
@@ -26,6 +20,75 @@ _REPORTED = 1e-4
 _MOST = 4
 _SIGNIFICANT = 5.0
 _TRIALS = 40
+# Below this frequency the wander of a towed probe itself contains spectral lines. Debt: data/debts.md.
+SLOWEST_HZ = 1.5
+_WANDER_HZ = 1.2
+LEAST_SAMPLES = 48
+
+
+def shows_apart(time_s: Float, frequency: float) -> bool:
+    """Return whether pictures at these times show the frequency apart from the probe's wander."""
+    rate = 1 / float(np.median(np.diff(time_s)))
+    alias = abs(frequency - rate * round(frequency / rate))
+    return bool(alias > SLOWEST_HZ or frequency < rate / 2)
+
+
+def amplitudes(
+    time_s: Float, xy_mm: Float, frequency: float, start_s: float | None = None
+) -> tuple[Float, float]:
+    """Return amplitudes (2, 2) along x and y of sine and cosine, wander taken out, and their 1 σ.
+
+    Phases count from ``start_s``, else from the first picture.
+    """
+    t = time_s - (time_s[0] if start_s is None else start_s)
+    line = [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)]
+    design = np.concatenate([np.stack(line, 1), wander(time_s)], 1)
+    if len(t) < 1.3 * design.shape[1]:
+        return np.full((2, 2), np.nan), float("nan")
+    solution = np.linalg.lstsq(design, xy_mm, rcond=1e-6)[0]
+    left = xy_mm - design @ solution
+    noise = float(np.sqrt(np.mean(left**2) * len(t) / (len(t) - design.shape[1])))
+    return np.asarray(solution[:2].T), noise * float(np.sqrt(2 / len(t)))
+
+
+def wander(time_s: Float) -> Float:
+    """Return (N, K) columns of whatever changes more slowly than lines are looked for."""
+    span = float(time_s[-1] - time_s[0])
+    t = time_s - time_s[0]
+    phase = np.pi / span * np.arange(1, int(2 * span * _WANDER_HZ) + 1) * t[:, None]
+    return np.concatenate([np.stack([np.ones_like(t), t / span], 1), np.cos(phase), np.sin(phase)], 1)
+
+
+def swing_agreements(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float) -> tuple[Agreement, ...]:
+    """Return whether disjoint pictures show one oscillation: size, direction and phase at its frequency."""
+    early = time_s <= (time_s[0] + time_s[-1]) / 2
+    pairs = (
+        (("first half of the pictures", early), ("second half of the pictures", ~early)),
+        (("pictures of the lit wall", lit), ("pictures of the laser's ring alone", ~lit)),
+    )
+    found = [[_part(time_s, xy_mm, frequency_hz, *p) for p in pair] for pair in pairs]
+    each = [_compared(*a, *b) for a, b in found if a is not None and b is not None]
+    return tuple(a for a in each if a is not None)
+
+
+def _part(
+    time_s: Float, xy_mm: Float, frequency_hz: float, where: str, use: Bool
+) -> tuple[Part, Float] | None:
+    """Return what these pictures say, with its covariance (4, 4); None where they do not show the line."""
+    t = time_s[use]
+    if use.sum() < LEAST_SAMPLES / 2 or not shows_apart(t, frequency_hz):
+        return None
+    both, sigma = amplitudes(t, xy_mm[use], frequency_hz, float(time_s[0]))
+    if not np.isfinite(sigma):
+        return None
+    size = float(np.linalg.norm(both, 2))
+    phase = float(np.degrees(np.arctan2(*np.linalg.svd(both)[2][0][::-1]))) % 180
+    words = f"±{size:.4g} mm (± {sigma:.2g} mm) at phase {phase:.0f}° of {frequency_hz:.2f} Hz"
+    return Part(where, words, both.ravel()), sigma**2 * np.eye(4)
+
+
+def _compared(first: Part, own: Float, second: Part, other: Float) -> Agreement | None:
+    return agreement(first, second, (own, other), own + other)
 
 
 @dataclass(frozen=True)

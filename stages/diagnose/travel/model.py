@@ -17,8 +17,7 @@ from stages.diagnose.travel.noise import (
     robust_coefficients,
     whitened_fit,
 )
-from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
-from stages.diagnose.travel.turns import lag_mm, turns_between
+from stages.diagnose.travel.sight import Sight, lag_mm, quantum_mm, readings_at, turns_between
 
 OFFSET, SCALE, DELAY, PLAY = range(4)
 SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
