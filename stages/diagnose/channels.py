@@ -39,7 +39,7 @@ def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> Tra
     run
         The measured run.
     state
-        The adjusted state, as of `stages.diagnose.gauge.prepare.prepare`.
+        The adjusted state, as of `stages.diagnose.gauge.search.prepare`.
     """
     fiducials = recording.pipe.fiducials
     # Markers of one row were put there together and err alike: rows count, not markers.

@@ -30,10 +30,9 @@ from stages.diagnose.compose import composed
 from stages.diagnose.correct import Correction, correction_by_gauge
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import without as library_without
-from stages.diagnose.field.evidence import FieldEvidence, field_evidence, travel_of_run
-from stages.diagnose.field.join import with_field
+from stages.diagnose.field.answer import with_field
+from stages.diagnose.field.evidence import FieldEvidence, field_evidence, nothing_said, travel_of_run
 from stages.diagnose.field.run import FieldRun, with_probe
-from stages.diagnose.field.shortcomings import nothing_said
 from stages.diagnose.gauge.examine import examine
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.evidence import ProfileEvidence

@@ -12,9 +12,9 @@ from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.effect import Channel
 from stages.diagnose.effects.base import Travel
-from stages.diagnose.effects.decoys import DECOYS
 from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns, smooth_texture_columns
 from stages.diagnose.effects.library import LIBRARY, NOT_PREDICTED, shown_in, without
+from stages.diagnose.effects.nameless import DECOYS
 from stages.diagnose.effects.predict import (
     columns,
     reading_columns,

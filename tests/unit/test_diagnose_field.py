@@ -5,10 +5,9 @@ import pytest
 
 from pipeline.physics.effect import Channel
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.field.answer import field_answer
+from stages.diagnose.field.answer import _alone, _met, field_answer
 from stages.diagnose.field.confirm import InField
 from stages.diagnose.field.evidence import FieldEvidence
-from stages.diagnose.field.join import _alone, _met
 from stages.diagnose.inference import ChannelEvidence, Column, Evidence, Stated
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
 

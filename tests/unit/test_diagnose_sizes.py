@@ -8,11 +8,11 @@ import pytest
 from pipeline.adjustment.marginal import Marginal
 from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.swings import SWINGS
+from stages.diagnose.effects.nameless import SWINGS
+from stages.diagnose.gauge.confirm import Sized, quantities
 from stages.diagnose.gauge.elimination import Reduced, score_inflation
 from stages.diagnose.gauge.run import Term
-from stages.diagnose.gauge.shapes import FreeShape
-from stages.diagnose.gauge.sizes import Sized, quantities
+from stages.diagnose.gauge.scan import FreeShape
 from tests.unit.test_diagnose_inference import FRAMES, GLOBALS, equations
 from tests.unit.wall_points import Bore, plain_probe, ring_points
 

@@ -9,8 +9,7 @@ from pipeline.physics.catalogue import EFFECTS, effect
 from pipeline.physics.effect import Channel
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.camera import CAMERA_MODELS
-from stages.diagnose.effects.laser import LASER_MODELS
-from stages.diagnose.effects.photometric import PHOTOMETRIC_MODELS
+from stages.diagnose.effects.laser import LASER_MODELS, PHOTOMETRIC_MODELS
 from stages.diagnose.effects.pose import POSE_MODELS
 from stages.diagnose.effects.window import WINDOW_MODELS
 

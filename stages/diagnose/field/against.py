@@ -11,9 +11,8 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Illumination
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.predict import columns
-from stages.diagnose.field.points import ring_points
 from stages.diagnose.field.reduce import reduced, rings_after
-from stages.diagnose.field.run import FieldRun
+from stages.diagnose.field.run import FieldRun, ring_points
 from stages.diagnose.field.system import field_system
 from stages.diagnose.residual import RingResidual
 

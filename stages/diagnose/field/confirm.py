@@ -11,7 +11,7 @@ from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.predict import columns
 from stages.diagnose.field.evidence import FieldEvidence
-from stages.diagnose.field.points import ring_points
+from stages.diagnose.field.run import ring_points
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import Evidence, Score, Stated, places_of, score

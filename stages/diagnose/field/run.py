@@ -1,4 +1,4 @@
-"""A field recording measured and adjusted with the stated instrument, without the encoder."""
+"""A field recording or a stretch of it, adjusted with the stated instrument, and the points it measured."""
 
 from __future__ import annotations
 
@@ -6,12 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.arrays import Int
+from pipeline.adjustment.bordered import LandmarkRows, Rows
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
+from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
+from stages.diagnose.effects.base import ImagePoints
 from stages.motion import (
     MATCH_BIASES,
     EncoderReadings,
@@ -19,7 +23,9 @@ from stages.motion import (
     JointEstimate,
     Measurements,
     MotionParameters,
+    RingBins,
     State,
+    Tracks,
     adjust_at_once,
     encoder_at_frames,
     measure_run,
@@ -117,3 +123,154 @@ def _adjusted_with(run: FieldRun, probe: Probe, context: Context) -> JointEstima
 
 
 __all__ = ["FieldRun", "UnusableError", "field_run", "with_probe"]
+
+
+_SEEN_OFTEN = 3
+
+
+def part_of(run: FieldRun, first: int, end: int) -> FieldRun:
+    """Return the run's frames from ``first`` up to ``end``, with the weights they had in the whole."""
+    tracks, rings = run.measured.tracks, run.measured.rings
+    of_ring = (rings.frame >= first) & (rings.frame < end)
+    seen = (tracks.frame >= first) & (tracks.frame < end)
+    kept = np.bincount(tracks.landmark[seen], minlength=len(run.state.xyz_p)) >= _SEEN_OFTEN
+    seen &= kept[tracks.landmark]
+    state = replace(
+        run.state, T_pc=run.state.T_pc[first:end], slip=run.state.slip[first:end], xyz_p=run.state.xyz_p[kept]
+    )
+    measured = replace(
+        run.measured, tracks=_tracks(tracks, seen, kept, first), rings=_bins(rings, of_ring, first),
+        time_s=run.measured.time_s[first:end],
+    )  # fmt: skip
+    equations = Equations(
+        end - first, (), _ring_rows(run.equations.rings, of_ring, first),
+        _landmark_rows(run.equations.texture, seen, kept, tracks.landmark, first),
+    )  # fmt: skip
+    return replace(
+        run, state=state, measured=measured, equations=equations, encoder=_readings(run.encoder, first, end),
+        ring_frames=run.ring_frames - first,
+    )  # fmt: skip
+
+
+def _tracks(tracks: Tracks, seen: Bool, kept: Bool, first: int) -> Tracks:
+    number = np.cumsum(kept) - 1
+    return replace(
+        tracks, landmark=number[tracks.landmark[seen]], frame=tracks.frame[seen] - first, uv=tracks.uv[seen],
+        sigma_px=tracks.sigma_px[seen], xyz=tracks.xyz[kept],
+    )  # fmt: skip
+
+
+def _bins(rings: RingBins, of_ring: Bool, first: int) -> RingBins:
+    return RingBins(
+        rings.frame[of_ring] - first,
+        rings.xyz_c[of_ring],
+        rings.by_instrument[of_ring],
+        rings.sigma_mm[of_ring],
+    )
+
+
+def _ring_rows(rows: Rows, keep: Bool, first: int) -> Rows:
+    return replace(
+        rows, frame=rows.frame[keep] - first, by_frame=rows.by_frame[keep], by_border=rows.by_border[keep],
+        residual=rows.residual[keep], sigma=rows.sigma[keep],
+    )  # fmt: skip
+
+
+def _landmark_rows(rows: LandmarkRows, seen: Bool, kept: Bool, landmark: Int, first: int) -> LandmarkRows:
+    count = np.bincount(landmark[seen], minlength=len(kept))[kept]
+    return replace(
+        rows, start=np.concatenate([[0], np.cumsum(count)]), frame=rows.frame[seen] - first,
+        by_pose=rows.by_pose[seen], by_point=rows.by_point[seen], by_instrument=rows.by_instrument[seen],
+        residual=rows.residual[seen], sigma=rows.sigma[seen], surface_by_point=rows.surface_by_point[kept],
+        surface_by_border=rows.surface_by_border[kept], surface_residual=rows.surface_residual[kept],
+        surface_sigma=rows.surface_sigma[kept],
+    )  # fmt: skip
+
+
+def _readings(encoder: EncoderReadings | None, first: int, end: int) -> EncoderReadings | None:
+    if encoder is None:
+        return None
+    return replace(encoder, distance_mm=encoder.distance_mm[first:end], known=encoder.known[first:end])
+
+
+def ring_points(run: FieldRun) -> ImagePoints:
+    """Return the ring bins where the smooth pipe would have them.
+
+    Not where they were found: derivatives that follow a measurement's error correlate with its residual.
+    """
+    frame, found_c = run.measured.rings.frame, run.measured.rings.xyz_c
+    uv = run.probe.camera.project(found_c).uv
+    away = uv - run.probe.camera.centre_px
+    outward = away / np.linalg.norm(away, axis=1)[:, None]
+    along_ray = np.einsum("mij,mj->mi", run.probe.triangulate_jacobian(uv)[0], outward)
+    inclined = np.einsum("mi,mi->m", _wall_at(run, frame, found_c)[0], along_ray)
+    uv = uv - (run.equations.rings.residual / inclined)[:, None] * outward
+    xyz_c = run.probe.triangulate(uv)
+    normal_c, along_c, azimuth, distance = _wall_at(run, frame, xyz_c)
+    passing = _passing(run, frame, xyz_c)
+    rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
+    return ImagePoints(
+        run.probe, frame, run.measured.time_s[frame], uv, xyz_c, normal_c, along_c, rate[:, None] * outward,
+        speed_mm_s(run)[frame], True, _widths(run.rings, run.ring_frames, frame, uv), azimuth, distance,
+    )  # fmt: skip
+
+
+def texture_points(run: FieldRun) -> ImagePoints:
+    """Return the landmark observations where poses and landmarks of the state place them."""
+    tracks, state = run.measured.tracks, run.state
+    xyz_c = transform(inverse(state.T_pc[tracks.frame]), state.xyz_p[tracks.landmark])
+    normal_c, along_c, azimuth, distance = _wall_at(run, tracks.frame, xyz_c)
+    by_c = run.probe.camera.project_jacobian(xyz_c).by_point
+    velocity = np.einsum("mij,mj->mi", by_c, _passing(run, tracks.frame, xyz_c))
+    return ImagePoints(
+        run.probe, tracks.frame, run.measured.time_s[tracks.frame], run.probe.camera.project(xyz_c).uv,
+        xyz_c, normal_c, along_c, velocity,
+        speed_mm_s(run)[tracks.frame], False, np.full(len(tracks.uv), np.nan), azimuth, distance,
+    )  # fmt: skip
+
+
+def speed_mm_s(run: FieldRun) -> Float:
+    """Return the camera's speed (N,) along the pipe."""
+    return np.asarray(np.gradient(distance_mm(run), run.measured.time_s))
+
+
+def distance_mm(run: FieldRun) -> Float:
+    """Return the camera's distance (N,) along the pipe's axis."""
+    return to_pipe(run.state.axis, run.state.T_pc[:, :3, 3])[0]
+
+
+def _wall_at(run: FieldRun, frame: Int, xyz_c: Float) -> tuple[Float, Float, Float, Float]:
+    """Return outward normal and axis direction (M, 3) in C, azimuth and distance (M,) in P."""
+    T = run.state.T_pc[frame]
+    s, azimuth, _ = to_pipe(run.state.axis, transform(T, xyz_c))
+    sections = frames_at(run.state.axis, s)[1]
+    normal_p = np.cos(azimuth)[:, None] * sections[:, :, 0] + np.sin(azimuth)[:, None] * sections[:, :, 1]
+    to_c = T[:, :3, :3]
+    return (
+        np.einsum("mij,mi->mj", to_c, normal_p), np.einsum("mij,mi->mj", to_c, sections[:, :, 2]), azimuth, s,
+    )  # fmt: skip
+
+
+def _passing(run: FieldRun, frame: Int, xyz_c: Float) -> Float:
+    """Return how points (M, 3) of the wall pass in C, mm/s."""
+    T, time_s = run.state.T_pc, run.measured.time_s
+    before = np.maximum(np.arange(len(time_s)) - 1, 0)
+    after = np.minimum(np.arange(len(time_s)) + 1, len(time_s) - 1)
+    span = np.maximum(time_s[after] - time_s[before], 1e-9)[:, None]
+    velocity_p = (T[after, :3, 3] - T[before, :3, 3]) / span
+    turning_c = vector_from_rotation(np.swapaxes(T[before, :3, :3], -1, -2) @ T[after, :3, :3]) / span
+    velocity_c = np.einsum("nij,ni->nj", T[:, :3, :3], velocity_p)
+    return np.asarray(-velocity_c[frame] - np.cross(turning_c[frame], xyz_c))
+
+
+def _widths(rings: RingSamples, ring_frames: Int, frame: Int, uv: Float) -> Float:
+    """Return the line's width (M,) of the sample nearest in azimuth."""
+    away = uv - rings.centre_px
+    count = len(rings.azimuth_rad)
+    step = 2 * np.pi / count
+    column = (
+        np.round((np.arctan2(away[:, 1], away[:, 0]) - rings.azimuth_rad[0]) / step).astype(np.int64) % count
+    )
+    width = rings.width_px[np.searchsorted(ring_frames, frame), column].astype(float)
+    seen = np.isfinite(width)
+    return np.where(seen, width, np.median(width[seen]) if seen.any() else 1.0)

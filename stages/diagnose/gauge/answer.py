@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from stages.diagnose.gauge.confirm import quantities
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.examine import ADEQUATE, Examined
-from stages.diagnose.gauge.sizes import quantities
 from stages.diagnose.result import Candidate, EffectFound, Picture, Verdict
 
 # Likelihoods do not contain the small errors of laws and of image formation, so that odds of 1000 to 1 are

@@ -1,10 +1,10 @@
-"""Second predictions of the same physics in a gauge run: other bores and motion, fiducials against rings."""
+"""Second predictions of the same physics in a gauge run, and sizes with all that makes them uncertain."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
 from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.scan import freed
 from stages.diagnose.inference import Evidence, Stated, estimate
-from stages.diagnose.result import Confirmation
+from stages.diagnose.result import Confirmation, Value
 
 # Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is
 # compared about five times, and noise may contradict it once in a thousand times.
@@ -136,3 +137,44 @@ def _words(term: Term, part: Partial) -> str:
     spread = float(np.sqrt(np.trace(part.covariance) / len(part.amplitude)))
     named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
     return f"{named} (± {spread:.2g} {term.model.amplitudes[0].unit})"
+
+
+_DRAWS = 400
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A term, its continuous shape free, with the covariance (Q, Q) of its amplitudes."""
+
+    term: Term
+    covariance: Float
+
+
+def sizes_of(run: GaugeRun, judged: Judged, stated: Stated) -> tuple[Sized, ...]:
+    """Return the terms of a hypothesis with covariances: by the data, shapes, and laws."""
+    free = freed(run, judged.fit)
+    whole = judged.evidence if free.terms == judged.fit.terms else evidence(run, free, ())[0]
+    about = replace(judged, fit=free, evidence=whole)
+    return tuple(_sized(about, term, stated) for term in free.terms)
+
+
+def _sized(judged: Judged, term: Term, stated: Stated) -> Sized:
+    part = partial_of("all", judged.evidence, judged, term, stated)
+    covariance = part.covariance if part is not None else np.zeros((len(term.amplitude),) * 2)
+    by_law = term.model.law_sigma**2 * np.outer(term.amplitude, term.amplitude)
+    return Sized(term, covariance + by_law)
+
+
+def quantities(sized: Sized) -> dict[str, Value]:
+    """Return the catalogue's quantities with 1 σ, by draws of the amplitudes."""
+    term, random = sized.term, np.random.default_rng(0)
+    draws = random.multivariate_normal(term.amplitude, sized.covariance, _DRAWS, check_valid="ignore")
+    middle = term.model.quantities(term.shape, term.amplitude)
+    drawn = [term.model.quantities(term.shape, a) for a in draws]
+    out = {}
+    for name, value in middle.items():
+        apart = np.array([d[name] for d in drawn]) - value
+        if name.endswith("_deg") and name.startswith("direction"):
+            apart = (apart + 180) % 360 - 180
+        out[name] = Value(value, float(np.sqrt(np.mean(apart**2))))
+    return out

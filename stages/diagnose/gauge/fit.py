@@ -12,7 +12,6 @@ from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.gauge.baseline import BASELINE_SIZE, SIGMA_PX
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
     Equations,
@@ -23,6 +22,7 @@ from stages.diagnose.gauge.elimination import (
     eliminate_poses,
     score_inflation,
 )
+from stages.diagnose.gauge.points import BASELINE_SIGMA_PX, BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, instrument_information
 
@@ -162,7 +162,7 @@ def own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
     wide = [np.zeros(size) for _ in range(3)]
     for all_of_them, first in zip(wide, (prior.diagonal(), pull, value), strict=True):
         all_of_them[: len(first)] = first
-    wide[0][size - BASELINE_SIZE :] = SIGMA_PX**-2
+    wide[0][size - BASELINE_SIZE :] = BASELINE_SIGMA_PX**-2
     out = np.r_[1:ENCODER, at.bore, at.marker, size - BASELINE_SIZE : size]
     return OwnUnknowns(out, *(x[out] for x in wide))
 

@@ -14,11 +14,10 @@ from scipy import stats
 from pipeline.arrays import Int
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
-from stages.diagnose.effects.swings import SWINGS
+from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term, linearise
-from stages.diagnose.gauge.scan import Scored, scan
-from stages.diagnose.gauge.shapes import freed, refined
+from stages.diagnose.gauge.scan import Scored, freed, refined, scan
 from stages.diagnose.inference import (
     DEGREES,
     Evidence,

@@ -11,10 +11,10 @@ import numpy as np
 from pipeline.arrays import Float
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
-from stages.diagnose.gauge.baseline import BASELINE_SIZE
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
 from stages.diagnose.gauge.fit import Fit, kept_columns, own_unknowns
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
+from stages.diagnose.gauge.points import BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun, linearise, ring_mm_per_px
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, total
 from stages.diagnose.result import FitQuality

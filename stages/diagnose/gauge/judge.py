@@ -9,16 +9,14 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float
 from stages.diagnose.effects.base import EffectModel
-from stages.diagnose.effects.decoys import DECOYS
 from stages.diagnose.effects.generic import VOCABULARY
-from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.effects.nameless import DECOYS, Nameless
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.formula import adequacy, empirical, says_the_same
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.scan import scan, span
+from stages.diagnose.gauge.scan import refined, scan, span
 from stages.diagnose.gauge.search import Search, refits
-from stages.diagnose.gauge.shapes import refined
 from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Evidence, Stated, estimate, total
 
 _STRETCHES = 2

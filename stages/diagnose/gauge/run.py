@@ -25,10 +25,9 @@ from stages.diagnose.effects.predict import (
     texture_columns,
     texture_shift_px,
 )
-from stages.diagnose.gauge.baseline import edge_baseline, ring_baseline
 from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
-from stages.diagnose.gauge.points import edge_points, ring_points, speed_along
+from stages.diagnose.gauge.points import edge_baseline, edge_points, ring_baseline, ring_points, speed_along
 
 _ROUNDS = 2
 _FAR_PX = 1.0
