@@ -11,7 +11,8 @@ from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.codec import Json, canonical
 from pipeline.files.disk import FileStamp, stamp_of
 from pipeline.review.decisions import actions as do
-from pipeline.review.decisions.actions import Action, carried, same_findings
+from pipeline.review.decisions.actions import Action
+from pipeline.review.decisions.carry import carried, same_findings
 from pipeline.review.decisions.ledger import Entry, Ledger, Signature
 from pipeline.review.decisions.replay import Finding, ImpossibleError, counting, replay
 from pipeline.review.measuring import OutlineGauge
