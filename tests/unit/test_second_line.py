@@ -7,7 +7,8 @@ import pytest
 
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import FOUND_Z, Size, finding
-from stages.diagnose.profile.ghost import bounced, responses
+from stages.diagnose.profile.ghost import bounced
+from stages.diagnose.profile.matched_filter import responses
 from stages.diagnose.second_line import SheetByRings, against_rings
 
 BLOCKS, SECTORS, WIDTH_PX = 10, 72, 1.4

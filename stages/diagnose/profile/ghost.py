@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 
-from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Int
 from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.matched_filter import STEP_PX, Responses
 from stages.diagnose.profile.regression import Tested, tested
 
-REACH_PX, STEP_PX = 45.0, 0.5
-NOISE_FLOOR = 3e-4
 _LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.04), np.radians(0.08)
 _LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04
 _CLEAR_WIDTHS = 2.5
@@ -29,27 +27,6 @@ _SECTORS_A_GROUP = 6
 # A part of the ring tells how its sides differ if it has this share of the best part's information.
 _LEAST_SHARE = 0.1
 _SHRINK, _HALVINGS = 0.5, 9
-
-
-@dataclass(frozen=True)
-class Responses:
-    """How strongly each of N cells asks for a second line at D distances from the line.
-
-    Attributes
-    ----------
-    distance_px : (D,)
-        Uniform.
-    score, information : (N, D)
-        Their ratio is the height over that of the line, less what the opposite side of the line shows;
-        1 / √information its σ if bins erred independently.
-    skirt : (N, D)
-        Score of the mean of both sides of the line, at the same information.
-    """
-
-    distance_px: Float
-    score: Float
-    information: Float
-    skirt: Float
 
 
 @dataclass(frozen=True)
@@ -94,54 +71,6 @@ class SecondLine:
         score = np.array([_at(found.score, found, d).sum() for d in places])
         information = np.array([_at(found.information, found, d).sum() for d in places])
         return np.asarray(score / np.maximum(information, 1e-12))
-
-
-def responses(cells: Cells) -> Responses:
-    """Return matched-filter responses of the whole cells; what a Gaussian fit would absorb is taken out.
-
-    So is what the opposite side of the line shows as well: halos, glare and compression are alike on both.
-    """
-    distance = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
-    rest = cells.rest[cells.whole]
-    noise = np.hypot(robust_spreads(rest - np.median(rest, axis=0), axis=0), NOISE_FLOOR)
-    score, information = np.zeros((len(rest), len(distance))), np.zeros((len(rest), len(distance)))
-    _match(
-        rest, cells.offset_px, cells.centre_px[cells.whole], cells.width_px[cells.whole], 1 / noise**2,
-        distance, score, information,
-    )  # fmt: skip
-    with np.errstate(invalid="ignore", divide="ignore"):
-        height = np.where(information > 0, score / information, 0.0)
-    opposite = height[:, ::-1] * information
-    return Responses(distance, score - opposite, information, (score + opposite) / 2)
-
-
-@numba.njit(cache=True, nogil=True)
-def _match(rest, offset, centre, width, weight, distance, score, information):  # type: ignore[no-untyped-def]
-    bins = offset.size
-    basis, cross = np.zeros((3, bins)), np.zeros(3)
-    gram = np.zeros((3, 3))
-    for n in range(rest.shape[0]):
-        for b in range(bins):
-            x = (offset[b] - centre[n]) / width[n]
-            e = np.exp(-0.5 * x * x) if abs(x) < 3.5 else 0.0
-            basis[0, b], basis[1, b], basis[2, b] = e, x * e, x * x * e
-        for i in range(3):
-            for j in range(3):
-                gram[i, j] = np.sum(basis[i] * basis[j])
-        inverse = np.linalg.inv(gram)
-        for d in range(distance.size):
-            ghost = np.exp(-0.5 * ((offset - centre[n] - distance[d]) / width[n]) ** 2)
-            inside = np.abs(offset - centre[n]) < 3.5 * width[n]
-            for i in range(3):
-                cross[i] = np.sum(basis[i] * ghost * inside)
-            taken = inverse @ cross
-            for b in range(bins):
-                template = ghost[b]
-                for i in range(3):
-                    template -= taken[i] * basis[i, b]
-                if not np.isnan(rest[n, b]):
-                    score[n, d] += weight[b] * template * rest[n, b]
-                    information[n, d] += weight[b] * template * template
 
 
 def bounced(found: Responses, cells: Cells, floor: float) -> SecondLine:

@@ -9,7 +9,8 @@ from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry
-from stages.diagnose.profile.ghost import Responses, SecondLine, bounced, copied, responses
+from stages.diagnose.profile.ghost import SecondLine, bounced, copied
+from stages.diagnose.profile.matched_filter import Responses, responses
 
 # Light relative to the line's height that compression may leave on one side only: in places, and everywhere.
 # Debt: data/debts.md.

@@ -1,0 +1,85 @@
+"""How strongly the profile of the line asks for a second line at any distance: a matched filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from pipeline.adjustment.robust import robust_spreads
+from pipeline.arrays import Float
+from stages.diagnose.profile.cells import Cells
+
+REACH_PX, STEP_PX = 45.0, 0.5
+# Least noise of a bin, as a part of the line's height; chosen, not measured (data/debts.md).
+NOISE_FLOOR = 3e-4
+
+
+@dataclass(frozen=True)
+class Responses:
+    """How strongly each of N cells asks for a second line at D distances from the line.
+
+    Attributes
+    ----------
+    distance_px : (D,)
+        Uniform.
+    score, information : (N, D)
+        Their ratio is the height over that of the line, less what the opposite side of the line shows;
+        1 / √information its σ if bins erred independently.
+    skirt : (N, D)
+        Score of the mean of both sides of the line, at the same information.
+    """
+
+    distance_px: Float
+    score: Float
+    information: Float
+    skirt: Float
+
+
+def responses(cells: Cells) -> Responses:
+    """Return matched-filter responses of the whole cells; what a Gaussian fit would absorb is taken out.
+
+    So is what the opposite side of the line shows as well: halos, glare and compression are alike on both.
+    """
+    distance = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
+    rest = cells.rest[cells.whole]
+    noise = np.hypot(robust_spreads(rest - np.median(rest, axis=0), axis=0), NOISE_FLOOR)
+    score, information = np.zeros((len(rest), len(distance))), np.zeros((len(rest), len(distance)))
+    _match(
+        rest, cells.offset_px, cells.centre_px[cells.whole], cells.width_px[cells.whole], 1 / noise**2,
+        distance, score, information,
+    )  # fmt: skip
+    with np.errstate(invalid="ignore", divide="ignore"):
+        height = np.where(information > 0, score / information, 0.0)
+    opposite = height[:, ::-1] * information
+    return Responses(distance, score - opposite, information, (score + opposite) / 2)
+
+
+@numba.njit(cache=True, nogil=True)
+def _match(rest, offset, centre, width, weight, distance, score, information):  # type: ignore[no-untyped-def]
+    bins = offset.size
+    basis, cross = np.zeros((3, bins)), np.zeros(3)
+    gram = np.zeros((3, 3))
+    for n in range(rest.shape[0]):
+        for b in range(bins):
+            x = (offset[b] - centre[n]) / width[n]
+            e = np.exp(-0.5 * x * x) if abs(x) < 3.5 else 0.0
+            basis[0, b], basis[1, b], basis[2, b] = e, x * e, x * x * e
+        for i in range(3):
+            for j in range(3):
+                gram[i, j] = np.sum(basis[i] * basis[j])
+        inverse = np.linalg.inv(gram)
+        for d in range(distance.size):
+            ghost = np.exp(-0.5 * ((offset - centre[n] - distance[d]) / width[n]) ** 2)
+            inside = np.abs(offset - centre[n]) < 3.5 * width[n]
+            for i in range(3):
+                cross[i] = np.sum(basis[i] * ghost * inside)
+            taken = inverse @ cross
+            for b in range(bins):
+                template = ghost[b]
+                for i in range(3):
+                    template -= taken[i] * basis[i, b]
+                if not np.isnan(rest[n, b]):
+                    score[n, d] += weight[b] * template * rest[n, b]
+                    information[n, d] += weight[b] * template * template
