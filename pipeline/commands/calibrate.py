@@ -10,18 +10,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.api.job import open_job, result_of
-from pipeline.commands.working import Assignments, ConfigFile, worked
-from pipeline.files.disk import require_writable
-from pipeline.files.provenance import MadeBy
-from pipeline.instrument.probe_file import write_probe
-from pipeline.machine.configuration import resolve
-from pipeline.machine.exporter import Exporter
-from stages.calibrate.gauge import GAUGE, GaugeCalibration, require_gauge
-from stages.premises import PREMISES
-from stages.rings import RINGS
-
-STAGES = (PREMISES, RINGS, GAUGE)
+from pipeline.api.calibration import calibrate as calibration
+from pipeline.commands.working import Assignments, ConfigFile, print_warnings
+from pipeline.machine.display import ProgressDisplay
+from stages.calibrate.gauge import GaugeCalibration
 
 
 def calibrate(
@@ -37,25 +29,13 @@ def calibrate(
 
     Writes probe.yaml, which `boresight run --probe` takes, calibration.json and calibration.html.
     """
-    configuration = resolve(STAGES, config, assignments or ())
-    job = open_job(gauge, output, probe, STAGES, EXPORTERS, configuration, "calibrate")
-    require_gauge(job.recording)
-    require_writable(output)
     console = Console(stderr=True)
-    worked(job, console)
-    _show(result_of(job, GaugeCalibration), output, console)
-
-
-def write_calibration(result: GaugeCalibration, made_by: MadeBy, folder: Path) -> None:
-    """Write probe.yaml, calibration.json and calibration.html."""
-    # matplotlib takes a second to load, for which a refusal need not wait
-    from pipeline.commands.calibrate_report import write_report
-
-    write_probe(result.probe, folder / "probe.yaml", made_by)
-    write_report(result, made_by, folder)
-
-
-EXPORTERS = (Exporter("calibration", write_calibration),)
+    with ProgressDisplay(console) as display:
+        done = calibration.calibrate(
+            gauge, output, probe=probe, config=config, settings=assignments or (), display=display
+        )
+    print_warnings(done.warnings, console)
+    _show(done.result, output, console)
 
 
 def _show(result: GaugeCalibration, output: Path, console: Console) -> None:

@@ -12,11 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.arrays import Float
-from pipeline.commands.figure import rendered
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
 from pipeline.pages import page_template
+from pipeline.pages.figure import rendered
 
 
 def uncertainty_figure(report: CalibrationReport) -> Figure:

@@ -19,7 +19,6 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.arrays import Float
-from pipeline.commands.figure import rendered
 from pipeline.errors import InputError
 from pipeline.files.disk import written_together
 from pipeline.instrument.budget.combine import Budget
@@ -36,6 +35,7 @@ from pipeline.instrument.budget.scan import Pose, RingScan
 from pipeline.instrument.budget.sources import NOT_IN_RADIUS, Kind, typical_probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.pages import page_template
+from pipeline.pages.figure import rendered
 
 # Wished accuracies where none are given: the seed paper's 0.1 mm, and what a calibrated probe may reach.
 ACCURACIES_MM = (0.1, 0.02)

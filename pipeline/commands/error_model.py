@@ -18,7 +18,6 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from rich.console import Console
 
-from pipeline.commands.figure import rendered, tidy
 from pipeline.files.disk import written_together
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.formats import read_camera
@@ -32,6 +31,7 @@ from pipeline.instrument.misalignment import (
     paper_error,
 )
 from pipeline.instrument.probe_file import read_probe
+from pipeline.pages.figure import rendered, tidy
 
 # Baseline of the physics notes; see `implied_baselines_mm` for what the paper's figures imply.
 PAPER_BASELINE_MM = 22.0

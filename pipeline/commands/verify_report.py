@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import binned_statistic_2d
 
-from pipeline.commands.figure import rendered, tidy
 from pipeline.pages import page_template
+from pipeline.pages.figure import rendered, tidy
 from stages.compare.verification import Differences
 
 _STATIONS, _SECTORS = 300, 120

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -32,6 +33,11 @@ def worked(job: Job, console: Console) -> RunOutcome:
     """
     with ProgressDisplay(console) as display:
         outcome = run_job(job, Selection(), display)
-    for warning in warnings_of(outcome.stages):
-        console.print(f"warning: {warning}", highlight=False)
+    print_warnings(warnings_of(outcome.stages), console)
     return outcome
+
+
+def print_warnings(warnings: Iterable[str], console: Console) -> None:
+    """Print warnings, a line each."""
+    for warning in warnings:
+        console.print(f"warning: {warning}", highlight=False)

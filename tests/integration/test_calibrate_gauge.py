@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.commands.calibrate import STAGES, calibrate
+from pipeline.api.calibration.calibrate import STAGES, calibrate
 from pipeline.errors import InputError
 from pipeline.instrument.probe_file import read_probe, read_with_source
 from pipeline.machine.configuration import resolve
@@ -90,7 +90,7 @@ def test_a_second_call_computes_nothing(calibration: Path) -> None:
 
 
 def test_another_prior_keeps_the_rings(calibration: Path) -> None:
-    calibrate(shared("recordings", "open-2-gauge"), calibration, assignments=["gauge.iterations=11"])
+    calibrate(shared("recordings", "open-2-gauge"), calibration, settings=["gauge.iterations=11"])
     assert states(calibration) == {"premises": "reused", "rings": "reused", "gauge": "completed"}
 
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from pipeline.api.calibration import calibrate as calibrating
+from pipeline.api.diagnosis import diagnose as diagnosing
 from pipeline.cli import app
-from pipeline.commands import calibrate as calibrating
 from pipeline.commands import calibrate_camera as calibrating_camera
-from pipeline.commands import diagnose as diagnosing
 from pipeline.errors import InputError
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording

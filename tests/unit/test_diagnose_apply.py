@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.commands.diagnose_apply import GeometryChange, clock_of, consequence, geometry_change
+from pipeline.api.diagnosis.apply import GeometryChange, clock_of, consequence, geometry_change
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
 from stages.diagnose.correct import encoder_effects, with_true_readings
 from stages.diagnose.residual import AZIMUTHS, RingResidual, azimuths_rad, wall_distances_mm

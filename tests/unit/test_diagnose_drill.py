@@ -114,6 +114,8 @@ def test_what_is_removed_is_counted_above_the_noise_floor():
     assert heldout_removed(Answer(verdict="named", fit=fit)) == pytest.approx(1.0)
     nothing = Fit(rms_before=0.1, rms_after=0.1, heldout_before=0.1, heldout_after=0.1, noise_floor=0.1)
     assert heldout_removed(Answer(verdict="consistent", fit=nothing)) is None
+    unknown = Fit.model_validate(fit.model_dump() | {"noise_floor": None})
+    assert heldout_removed(Answer(verdict="named", fit=unknown)) is None
 
 
 def test_an_interval_of_no_failures_does_not_reach_certainty():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.commands.diagnose_apply import DefectChange, GeometryChange
-from pipeline.commands.diagnose_report import Shown, headline, write_page
+from pipeline.api.diagnosis.apply import DefectChange, GeometryChange
+from pipeline.api.diagnosis.report import Shown, headline, write_page
 from stages.diagnose.compared import OnImage
 from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import (

@@ -5,6 +5,9 @@
     run = boresight.run("recording", "run")             # or boresight.open_run("run")
     print(run.wall.radius_map.radius_mm.shape)          # typed arrays; lengths in mm
     print(run.table("sections"))                        # a pandas table
+    calibrated = boresight.calibrate("gauge", "probe")  # calibrated.probe_file is the calibrated probe
+    found = boresight.diagnose("recording", gauge="gauge", output="diagnosis", run="run")
+    print(found.answer.verdict, found.answer.effects)   # boresight.open_diagnosis("diagnosis") reads it again
 
 What is wrong with an input is told by an `InputError`, what a recording cannot show by an `UnusableError`.
 """
@@ -20,22 +23,31 @@ except ModuleNotFoundError as error:
         f"another package named pipeline hides boresight's own: {list(pipeline.__path__)}. "
         "Install boresight in an environment without it."
     ) from error
+from pipeline.api.calibration.calibrate import Calibration, calibrate
+from pipeline.api.diagnosis.diagnose import DiagnosisFolder, diagnose, open_diagnosis
 from pipeline.api.run import run
 from pipeline.api.simulate import Simulated, simulate, simulate_pairs
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 from pipeline.files.shipped import PARAMETERS, PRIORS, SCENES, shipped_names
+from stages.diagnose.drill.answer import Answer
 
 __all__ = [
     "PARAMETERS",
     "PRIORS",
     "SCENES",
+    "Answer",
     "BoresightError",
+    "Calibration",
     "Cancelled",
+    "DiagnosisFolder",
     "InputError",
     "MissingPackageError",
     "Run",
     "Simulated",
     "UnusableError",
+    "calibrate",
+    "diagnose",
+    "open_diagnosis",
     "open_run",
     "run",
     "shipped_names",

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from pipeline.errors import InputError
 from pipeline.files.json_file import read_json
 
 Verdict = Literal["consistent", "named", "class", "unexplained", "not_identifiable"]
+# JSON has no NaN: a number that is not known is written as null.
+Number = Annotated[float, BeforeValidator(lambda v: float("nan") if v is None else v)]
 
 
 class Value(BaseModel):
-    """A number and its 1 σ."""
+    """A number and its 1 σ; NaN where it is not known."""
 
     model_config = ConfigDict(frozen=True)
 
-    value: float
-    sd: float
+    value: Number
+    sd: Number
 
 
 class NamedEffect(BaseModel):
@@ -30,6 +32,7 @@ class NamedEffect(BaseModel):
     name: str
     probability: float = Field(ge=0, le=1)
     parameters: dict[str, Value] = {}
+    statement: str = ""
 
 
 class Location(BaseModel):
@@ -43,15 +46,15 @@ class Location(BaseModel):
 
 
 class Fit(BaseModel):
-    """Residuals before and after the diagnosis' model."""
+    """Residuals before and after the diagnosis' model; NaN where they are not known."""
 
     model_config = ConfigDict(frozen=True)
 
-    rms_before: float
-    rms_after: float
-    heldout_before: float
-    heldout_after: float
-    noise_floor: float
+    rms_before: Number
+    rms_after: Number
+    heldout_before: Number
+    heldout_after: Number
+    noise_floor: Number
 
 
 class Feasibility(BaseModel):
@@ -73,7 +76,23 @@ class Feasibility(BaseModel):
 
 
 class Answer(BaseModel):
-    """What is scored of a diagnosis.json; further keys are left alone."""
+    """What is read of a diagnosis.json; further keys are left alone.
+
+    Attributes
+    ----------
+    verdict : str
+    global_p : float or None
+        Chance of so much mismatch where nothing is left out; None where it is not known.
+    location : Location or None
+    effects : tuple of NamedEffect
+        The effects named, each with its probability, and its parameters with 1 σ.
+    members : tuple of str
+        The class, which diagnosis.json calls ``class``: effects that cannot be told apart here.
+    fit : Fit or None
+    feasibility : tuple of Feasibility
+    record_next : str
+        What to record to tell more; empty where nothing is asked for.
+    """
 
     model_config = ConfigDict(frozen=True, populate_by_name=True)
 
@@ -84,6 +103,7 @@ class Answer(BaseModel):
     members: tuple[str, ...] = Field((), alias="class")
     fit: Fit | None = None
     feasibility: tuple[Feasibility, ...] = ()
+    record_next: str = ""
 
 
 class Concealed(BaseModel):

@@ -202,7 +202,7 @@ def size_errors(trial: Trial) -> list[float]:
 def heldout_removed(answer: Answer) -> float | None:
     """Return the share of the held-out discrepancy above the noise floor that the model removes."""
     fit = answer.fit
-    if fit is None or fit.heldout_before <= 1.05 * fit.noise_floor:
+    if fit is None or not fit.heldout_before > 1.05 * fit.noise_floor:  # also where a number is not known
         return None
     above = fit.heldout_before**2 - fit.noise_floor**2
     return float((fit.heldout_before**2 - fit.heldout_after**2) / above)

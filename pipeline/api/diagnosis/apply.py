@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
-from pipeline.api.job import Job, recording_job
+from pipeline.api.job import Job, recording_job, run_job
 from pipeline.arrays import Float
-from pipeline.commands.working import worked
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.files.codec import digest
 from pipeline.instrument.probe_file import read_with_source
 from pipeline.machine.configuration import Configuration
+from pipeline.machine.display import Display
+from pipeline.machine.plan import Selection
 from pipeline.recording.base import Recording
 from stages.catalogue import PIPELINE
 from stages.diagnose.correct import encoder_effects, with_true_readings
@@ -82,7 +82,7 @@ class Uncorrected:
 
 
 def apply_correction(
-    effects: Sequence[EffectFound], field: Uncorrected, folder: Path, console: Console
+    effects: Sequence[EffectFound], field: Uncorrected, folder: Path, display: Display
 ) -> GeometryChange:
     """Reconstruct the field with the corrected instrument into run, and with the stated one into run-stated.
 
@@ -101,8 +101,8 @@ def apply_correction(
     true = _true_field(effects, field.recording)
     corrected = _job(true, folder / "probe.yaml", field.configuration, folder / "run")
     if field.run is None:
-        worked(stated, console)
-    worked(replace(corrected, lent=(folder,)), console)
+        run_job(stated, Selection(), display)
+    run_job(replace(corrected, lent=(folder,)), Selection(), display)
     return geometry_change(field.run or stated.folder, corrected.folder)
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from scipy.stats import binned_statistic_2d
 
 from pipeline.arrays import Float, Int
-from pipeline.commands.figure import rendered
+from pipeline.pages.figure import rendered
 from stages.calibrate.gauge.result import GaugeCalibration
 
 _CELL_PX = 40

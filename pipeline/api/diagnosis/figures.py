@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from pipeline.arrays import Float
-from pipeline.commands.figure import rendered, tidy
+from pipeline.pages.figure import rendered, tidy
 from stages.diagnose.compared import OnImage
 from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import Candidate, Picture, WallPicture

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.commands.diagnose_apply import GeometryChange, consequence
-from pipeline.commands.diagnose_figures import (
+from pipeline.api.diagnosis.apply import GeometryChange, consequence
+from pipeline.api.diagnosis.figures import (
     azimuth_figure,
     candidates_figure,
     frames_figure,

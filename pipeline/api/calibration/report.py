@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Float
-from pipeline.commands.calibrate_figures import (
+from pipeline.api.calibration.figures import (
     correlation_figure,
     image_figure,
     png,
     radius_figure,
     run_figure,
 )
+from pipeline.arrays import Float
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
 from pipeline.pages import page_template
