@@ -6,7 +6,7 @@ import numpy as np
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView
-from stages.calibrate.boards.targets import grid
+from stages.calibrate.boards.detect import grid
 
 
 def facing_pose(direction, distance_mm, tilt):

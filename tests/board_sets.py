@@ -11,9 +11,8 @@ from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, rms
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
 from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
-from stages.calibrate.boards.detect import detect
+from stages.calibrate.boards.detect import Chessboard, detect
 from stages.calibrate.boards.start import pose
-from stages.calibrate.boards.targets import Chessboard
 from tests.shared_data import shared
 
 

@@ -24,7 +24,7 @@ from pipeline.instrument.camera.formats import WRITTEN, read_camera, write_camer
 from pipeline.machine.configuration import resolve
 from pipeline.machine.exporter import Exporter
 from stages.calibrate.boards import BOARDS, CAMERA, CameraFile, Target, list_pictures
-from stages.calibrate.boards.targets import Board, Charuco, Chessboard
+from stages.calibrate.boards.detect import Board, Charuco, Chessboard
 
 
 class BoardKind(StrEnum):

@@ -7,9 +7,8 @@ import numpy as np
 from pipeline.artefacts.comparison import Comparison, FindingPair, RegisteredWalls, WallPair
 from pipeline.machine.stage import Context, Parameters, Stage
 from stages.compare.changes import changes, put_together
-from stages.compare.difference import registered_walls
 from stages.compare.growth import Resolution
-from stages.compare.paired import PairedWalls
+from stages.compare.paired import PairedWalls, registered_walls
 from stages.compare.registration.by_marks import RegisterParameters, register
 from stages.compare.registration.marks import Surface
 

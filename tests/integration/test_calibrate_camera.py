@@ -15,7 +15,7 @@ from pipeline.errors import InputError, UnusableError
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.camera.formats import read_camera, write_camera
 from pipeline.instrument.camera.mapping import camera_from_mapping
-from stages.calibrate.boards.targets import Charuco
+from stages.calibrate.boards.detect import Charuco
 from tests.board_scene import chessboard_picture, facing_pose, render
 
 CAMERA = KannalaBrandt((640, 480), (184.0, 183.6), (318.6, 240.9), (-0.0118, 0.0008, -0.0008, 0.0001))

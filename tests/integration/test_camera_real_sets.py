@@ -3,7 +3,7 @@
 import pytest
 
 from pipeline.instrument.camera.formats import read_camera
-from stages.calibrate.boards.targets import Chessboard
+from stages.calibrate.boards.detect import Chessboard
 from tests.board_sets import detected, matlab_camera, pose_rms_px
 from tests.shared_data import shared
 

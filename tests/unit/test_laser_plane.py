@@ -10,12 +10,16 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from stages.calibrate.boards.detect import detect
-from stages.calibrate.boards.targets import Chessboard
-from stages.calibrate.laser.calibrate import LaserPicture, calibrate_laser_plane, line_on_board
+from stages.calibrate.boards.detect import Chessboard, detect
+from stages.calibrate.laser.calibrate import (
+    LaserPicture,
+    calibrate_laser_plane,
+    fit_plane,
+    fit_plane_robustly,
+    line_on_board,
+)
 from stages.calibrate.laser.line import fit_peaks
 from stages.calibrate.laser.parameters import LaserPlaneParameters
-from stages.calibrate.laser.plane import fit_plane, fit_plane_robustly
 from tests.board_scene import chessboard_picture, facing_pose, render
 from tests.quiet import quiet_context
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
+from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence, with_halves
 from stages.diagnose.profile.finding import Finding, Size, finding
-from stages.diagnose.profile.halves import with_halves
 from stages.rings import RingParameters, extract_rings
 from tests.profile_lines import Hidden, probe, recording
 from tests.quiet import quiet_context

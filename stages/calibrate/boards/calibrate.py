@@ -13,6 +13,8 @@ from pipeline.instrument.camera.calibration import BoardView, CalibrationReport,
 from pipeline.machine.stage import Context
 from stages.calibrate.boards.bundle import Estimate
 from stages.calibrate.boards.compare import (
+    Part,
+    deal,
     displacement_map,
     ranked,
     score,
@@ -21,7 +23,6 @@ from stages.calibrate.boards.compare import (
 )
 from stages.calibrate.boards.fit import NAME, adjust, refuse_one_plane, refuse_too_few
 from stages.calibrate.boards.parameters import MODEL_NAMES, BoardCalibrationParameters, ModelName
-from stages.calibrate.boards.parts import Part, deal
 from stages.calibrate.boards.pictures import FoundBoards
 from stages.calibrate.boards.start import start
 

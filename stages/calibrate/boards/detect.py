@@ -1,4 +1,4 @@
-"""Finding board corners in strongly distorted images.
+"""Calibration boards, in mm in the board's frame B, and their corners found in strongly distorted images.
 
 Chessboards by OpenCV's sector-based detector (A. Duda, U. Frese, "Accurate detection and localization of
 checkerboard corners for calibration", BMVC 2018). A board that is not found whole is looked for with more
@@ -8,6 +8,7 @@ every view is free.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import cv2
@@ -16,7 +17,6 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float, Image
 from pipeline.instrument.camera.calibration import BoardView
-from stages.calibrate.boards.targets import Board, Charuco, Chessboard, grid
 
 LEAST_CORNERS = 12
 _SHORTEST_SIDE = 4
@@ -27,6 +27,57 @@ _THOROUGH = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_C
 _WINDOW_SHARE, _SMALLEST_WINDOW, _LARGEST_WINDOW = 0.33, 2, 20
 _STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
 _CONTRAST_LIMIT, _CONTRAST_TILES = 4.0, (8, 8)
+
+
+@dataclass(frozen=True)
+class Chessboard:
+    """A chessboard of ``columns`` × ``rows`` inner corners with squares of ``square_mm``."""
+
+    columns: int
+    rows: int
+    square_mm: float
+
+
+@dataclass(frozen=True)
+class Charuco:
+    """A ChArUco board of ``columns`` × ``rows`` squares.
+
+    Attributes
+    ----------
+    columns, rows : int
+        Squares, not inner corners, as OpenCV counts them for this kind of board.
+    square_mm, marker_mm : float
+        Edges of a square and of a marker inside it.
+    dictionary : str
+        OpenCV's name, e.g. ``DICT_5X5_100``.
+    """
+
+    columns: int
+    rows: int
+    square_mm: float
+    marker_mm: float
+    dictionary: str
+
+    def board(self, legacy: bool) -> cv2.aruco.CharucoBoard:
+        """Return OpenCV's board; ``legacy`` places the markers as OpenCV did before 4.6."""
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
+        board = cv2.aruco.CharucoBoard((self.columns, self.rows), self.square_mm, self.marker_mm, dictionary)
+        board.setLegacyPattern(legacy)
+        return board
+
+    def fits_dictionary(self) -> bool:
+        """Return whether the dictionary has a marker for every white square."""
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
+        return self.columns * self.rows // 2 <= len(dictionary.bytesList)
+
+
+Board = Chessboard | Charuco
+
+
+def grid(columns: int, rows: int, square_mm: float) -> Float:
+    """Return (columns · rows, 3) points of a plane grid, row by row."""
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows))
+    return np.asarray(square_mm * np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3), np.float64)
 
 
 def detect(image: Image, board: Board, name: str) -> BoardView | None:

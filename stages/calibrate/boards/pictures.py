@@ -18,8 +18,7 @@ from pipeline.instrument.camera.calibration import BoardView
 from pipeline.machine.plan import Source
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.input_file import InputFile, content_key, input_file
-from stages.calibrate.boards.detect import LEAST_CORNERS, detect
-from stages.calibrate.boards.targets import Board, Charuco
+from stages.calibrate.boards.detect import LEAST_CORNERS, Board, Charuco, detect
 
 Image = NDArray[np.uint8]
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")

@@ -17,14 +17,18 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Measurements
-from stages.calibrate.gauge.detect import Sighting, find_fiducials
-from stages.calibrate.gauge.edges import Edges, joined, measure_edges
+from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.poses import PosedFrames, frame_index, posed_frames, poses_of_all_frames
+from stages.calibrate.gauge.poses import (
+    PosedFrames,
+    first_pose,
+    frame_index,
+    posed_frames,
+    poses_of_all_frames,
+)
 from stages.calibrate.gauge.result import Finding, GaugeCalibration, calibration_of
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
-from stages.calibrate.gauge.start import first_pose
 from stages.calibrate.gauge.state import Unknowns
 
 

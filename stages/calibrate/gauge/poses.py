@@ -1,23 +1,110 @@
-"""First poses of all frames: from fiducials where they are read, interpolated or carried on elsewhere."""
+"""First poses of all frames: from fiducials where they are read, interpolated or carried on elsewhere.
+
+Perspective-n-Point places each lit frame, and fiducials that do not fit are outvoted.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
-from pipeline.geometry.rigid import from_parts
+from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, skew, transform
+from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Recording
-from stages.calibrate.gauge.detect import Sighting
-from stages.calibrate.gauge.start import FirstPose
+from stages.calibrate.gauge.edges import Sighting
+from stages.calibrate.gauge.geometry import Gauge
 
 _LEAST_SAMPLES = 90
+LEAST_MARKERS = 3
+_DRAWS = 12
+_FITS_PX = 6.0
+# Normalised coordinates tan θ overrate corners near 90°.
+_WIDEST = np.radians(80.0)
+
+
+@dataclass(frozen=True)
+class FirstPose:
+    """Pose ``T_pc`` (4, 4) of a frame, and which of its sighting's fiducials fit it (M,)."""
+
+    T_pc: Float
+    fits: Bool
+
+
+def first_pose(
+    sighting: Sighting, gauge: Gauge, camera: Camera, random: np.random.Generator
+) -> FirstPose | None:
+    """Return the pose that most fiducials agree on; None when fewer than three or half of them do."""
+    count = len(sighting.marker)
+    if count < LEAST_MARKERS:
+        return None
+    xyz_p = gauge.corners(sighting.marker)
+    draws = [np.arange(count)] + [random.permutation(count)[:LEAST_MARKERS] for _ in range(_DRAWS)]
+    best: FirstPose | None = None
+    for draw in draws:
+        found = _tried(camera, sighting.corner_px, xyz_p, draw)
+        if found is not None and (best is None or found.fits.sum() > best.fits.sum()):
+            best = found
+        if best is not None and best.fits.all():
+            break
+    if best is None or best.fits.sum() < max(LEAST_MARKERS, count / 2):
+        return None
+    T_pc = refined_pose(camera, sighting.corner_px[best.fits], xyz_p[best.fits], best.T_pc)
+    return FirstPose(T_pc, _fits(camera, sighting.corner_px, xyz_p, T_pc))
+
+
+def refined_pose(camera: Camera, uv: Float, xyz_p: Float, T_pc: Float) -> Float:
+    """Minimise the reprojection of corners (M, 4, 2) by Gauss-Newton with Cauchy weights."""
+    uv, xyz_p = uv.reshape(-1, 2), xyz_p.reshape(-1, 3)
+    for _ in range(8):
+        xyz_c = transform(inverse(T_pc), xyz_p)
+        residual = camera.project(xyz_c).uv - uv
+        by_c = camera.project_jacobian(xyz_c).by_point
+        jacobian = np.concatenate([-by_c @ T_pc[:3, :3].T, by_c @ skew(xyz_c)], -1)
+        ok = np.isfinite(jacobian).all((1, 2)) & np.isfinite(residual).all(1)
+        weight = 1 / (1 + np.sum(residual[ok] ** 2, 1))
+        j, r = jacobian[ok], residual[ok]
+        normal = np.einsum("mki,m,mkj->ij", j, weight, j)
+        step = np.linalg.lstsq(normal, -np.einsum("mki,m,mk->i", j, weight, r), rcond=None)[0]
+        T_pc = from_parts(T_pc[:3, :3] @ rotation_from_vector(step[3:]), T_pc[:3, 3] + step[:3])
+    return T_pc
+
+
+def disagreeing(poses: Sequence[tuple[Sighting, FirstPose]], markers: int) -> tuple[Int, Bool]:
+    """Return how often each fiducial was seen in posed frames, and which were outvoted in most of them."""
+    seen, outvoted = np.zeros(markers, np.int64), np.zeros(markers, np.int64)
+    for sighting, pose in poses:
+        np.add.at(seen, sighting.marker, 1)
+        np.add.at(outvoted, sighting.marker[~pose.fits], 1)
+    return seen, outvoted * 2 > seen
+
+
+def _tried(camera: Camera, uv: Float, xyz_p: Float, draw: Int) -> FirstPose | None:
+    ray = camera.unproject(uv[draw].reshape(-1, 2)).ray
+    ok = ray[:, 2] > np.cos(_WIDEST)
+    if ok.sum() < 6:
+        return None
+    flat = ray[ok, :2] / ray[ok, 2:]
+    solved, turn, shift = cv2.solvePnP(
+        xyz_p[draw].reshape(-1, 3)[ok], flat, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_SQPNP
+    )
+    if not solved or not (np.isfinite(turn).all() and np.isfinite(shift).all()):
+        return None
+    T_cp = from_parts(rotation_from_vector(np.asarray(turn[:, 0], float)), np.asarray(shift[:, 0], float))
+    T_pc = inverse(T_cp)
+    return FirstPose(T_pc, _fits(camera, uv, xyz_p, T_pc))
+
+
+def _fits(camera: Camera, uv: Float, xyz_p: Float, T_pc: Float) -> Bool:
+    error = np.linalg.norm(camera.project(transform(inverse(T_pc), xyz_p)).uv - uv, axis=-1)
+    return np.asarray(np.nan_to_num(error, nan=np.inf).mean(1) < _FITS_PX)
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,10 @@ from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from pipeline.recording.base import Illumination, Recording
-from stages.calibrate.gauge.detect import Sighting, detect, detector
+from stages.calibrate.gauge.edges import Sighting, detect, detector
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.poses import PosedFrames
-from stages.calibrate.gauge.start import disagreeing
+from stages.calibrate.gauge.poses import PosedFrames, disagreeing
 
 STAGE = "calibrate"
 _LOOKED_AT = 6

@@ -17,10 +17,9 @@ from stages.calibrate.gauge.adjust import (
     instrument_covariance,
     spread,
 )
-from stages.calibrate.gauge.geometry import Gauge
+from stages.calibrate.gauge.geometry import BoreRings, Gauge, bore_rings
 from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.result import Finding
-from stages.calibrate.gauge.rings import BoreRings, bore_rings
 from stages.calibrate.gauge.state import SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
 

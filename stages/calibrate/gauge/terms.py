@@ -14,8 +14,8 @@ from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, skew, transform
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
+from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.rings import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 
 _STEP_S = 1e-3

@@ -14,7 +14,7 @@ from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from stages.calibrate.gauge.edges import Edges
-from stages.calibrate.gauge.rings import BoreRings
+from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import ImagePoints
 

@@ -14,7 +14,7 @@ from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
-from stages.calibrate.gauge.rings import BoreRings
+from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.calibrate.gauge.terms import edge_equations, ring_equations
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel

@@ -11,8 +11,8 @@ from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.adjust import adjust
 from stages.calibrate.gauge.calibrate import MeasuredRun
+from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.rings import BoreRings
 from stages.calibrate.gauge.state import SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel

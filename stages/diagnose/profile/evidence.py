@@ -1,8 +1,9 @@
-"""The profile channel of the diagnosis: every test of the line's light on one recording."""
+"""The profile channel of the diagnosis: every test of the line's light on one recording and its halves."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,20 +14,63 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
-from stages.diagnose.profile.brightness import clip_finding, decentre_finding, dust_finding, stray_finding
-from stages.diagnose.profile.cells import make_cells
-from stages.diagnose.profile.finding import Finding
+from stages.diagnose.agreement import Agreement, Part, agreement
+from stages.diagnose.profile.brightness import (
+    clip_finding,
+    decentre_finding,
+    dust_finding,
+    stray_finding,
+    vignetting_finding,
+)
+from stages.diagnose.profile.cells import Cells, make_cells
+from stages.diagnose.profile.finding import Finding, Size
 from stages.diagnose.profile.geometry import LineGeometry, line_geometry
-from stages.diagnose.profile.halves import Test, with_halves
-from stages.diagnose.profile.lit import vignetting_finding
 from stages.diagnose.profile.measure import LineProfiles, measure_profiles
-from stages.diagnose.profile.rivals import settle
 from stages.diagnose.profile.secondary import ghost_findings
 from stages.diagnose.profile.sensor import locking_finding, pattern_finding
-from stages.diagnose.profile.shape import skew_findings
+from stages.diagnose.profile.shape import settle, skew_findings
 from stages.diagnose.profile.width import blur_finding, width_findings
 
 _LEAST_BLOCKS = 4
+Test = Callable[[Cells], tuple[Finding, ...]]
+_HALVES = ("first half of the frames", "second half of the frames")
+# A jackknife over fewer blocks gives no usable σ.
+_LEAST_BLOCKS_OF_HALF = 3
+
+
+def with_halves(findings: tuple[Finding, ...], tests: Sequence[Test], cells: Cells) -> tuple[Finding, ...]:
+    """Return the findings, those that were found with what each half of the frames says of the other.
+
+    ``tests`` are those that found something; they are repeated on each half.
+    """
+    count = len(cells.frames)
+    middle = count // 2
+    if middle < _LEAST_BLOCKS_OF_HALF:
+        return findings
+    halves = [_of_half(cells.of_blocks(*ends), tests) for ends in ((0, middle), (middle, count))]
+    return tuple(replace(f, agreements=_halves_agree(f, *halves)) if f.found else f for f in findings)
+
+
+def _of_half(half: Cells, tests: Sequence[Test]) -> dict[str, Finding]:
+    return {f.effect: f for test in tests for f in test(half)}
+
+
+def _halves_agree(
+    whole: Finding, first: Mapping[str, Finding], second: Mapping[str, Finding]
+) -> tuple[Agreement, ...]:
+    """Return whether the halves agree on the first quantity; nothing where either tells too little."""
+    each = [half[whole.effect].sizes[:1] for half in (first, second) if whole.effect in half]
+    sizes = [size for sizes in each for size in sizes]
+    if len(sizes) < 2:
+        return ()
+    parts = [Part(where, _words(s), np.array([s.value])) for where, s in zip(_HALVES, sizes, strict=True)]
+    variance = [np.array([[s.sigma**2]]) for s in sizes]
+    out = agreement(parts[0], parts[1], (variance[0], variance[1]), variance[0] + variance[1])
+    return () if out is None else (out,)
+
+
+def _words(size: Size) -> str:
+    return f"{size.name} {size.value:.4g} (± {size.sigma:.2g}{f' {size.unit}' if size.unit else ''})"
 
 
 @dataclass(frozen=True)

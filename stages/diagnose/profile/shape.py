@@ -1,17 +1,25 @@
-"""Whether the line is skewed: by the sheet itself, or by light that returns from within the wall."""
+"""Whether the line is skewed, by the sheet or by light from within the wall, and which rival explains it.
+
+The skewed line is a normal of 1 σ s and an exponential of mean τ added (the simplest one-sided line: light
+that travels on in the sheet's profile or in the wall). All that a Gaussian fit makes of it depends on τ/s
+alone.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cache
+
 import numpy as np
+from scipy.special import erfcx
 
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
-from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.cells import CORE_REACH, Cells, fit_gaussians
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
 from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.regression import Tested, regress, tested
-from stages.diagnose.profile.skewed import cell_skewness, skew_table
 from stages.diagnose.profile.width import scale_law
 
 # Half a grey level of compression on one flank of a line 100 levels high, over its whole width.
@@ -20,6 +28,70 @@ HERMITE_FLOOR = 1e-3
 WIDTH_FLOOR = 0.05
 _SMALLEST_BLUR_PX2 = 1 / 12
 _CLEARLY = 3.0
+_RATIOS = np.linspace(0.0, 3.0, 61)
+_SIGMA_PX, _REACH_PX, _STEP_PX = 1.2, 12.0, 0.05
+
+
+def third_hermite(rest: Float, offset_px: Float, centre_px: Float, width_px: Float) -> Float:
+    """Return (N,) the coefficient of He₃(x) exp(−x²/2) in what a Gaussian fit of unit height leaves (N, B).
+
+    A small third cumulant κ₃ gives κ₃ / 6w³. What the fit would absorb is taken out of the template.
+    """
+    x = (offset_px - centre_px[:, None]) / width_px[:, None]
+    e = np.exp(-0.5 * x * x) * (np.abs(x) < CORE_REACH)
+    tangent = np.stack([e, x * e, x * x * e], axis=-1)
+    template = (x**3 - 3 * x) * e
+    gram = np.einsum("nbi,nbj->nij", tangent, tangent)
+    taken = np.linalg.solve(gram, np.einsum("nbi,nb->ni", tangent, template)[..., None])
+    template = template - (tangent @ taken)[..., 0]
+    return np.asarray(np.sum(template * np.where(e > 0, rest, 0.0), axis=1) / np.sum(template**2, axis=1))
+
+
+def cell_skewness(cells: Cells) -> Float:
+    """Return (N,) `third_hermite` of the cells, outward positive; NaN where the middle is not seen."""
+    out = np.full(len(cells.whole), np.nan)
+    w = cells.whole
+    out[w] = third_hermite(cells.rest[w], cells.offset_px, cells.centre_px[w], cells.width_px[w])
+    return out
+
+
+@dataclass(frozen=True)
+class SkewTable:
+    """What a Gaussian fit makes of the skewed line with τ/s = ``ratio``, all (K,) and in units of s.
+
+    ``hermite``: third coefficient; ``width``: fitted 1 σ; ``centre``: fitted centre from the normal's.
+    """
+
+    ratio: Float
+    hermite: Float
+    width: Float
+    centre: Float
+
+
+@cache
+def skew_table() -> SkewTable:
+    """Return the table; it is computed once."""
+    t = np.arange(-_REACH_PX, _REACH_PX, _STEP_PX)
+    profile = np.array([exponential_gaussian(t, _SIGMA_PX, k * _SIGMA_PX) for k in _RATIOS])
+    profile /= profile.max(axis=1, keepdims=True)
+    moved = np.array([t[int(np.argmax(p))] for p in profile])
+    placed = np.array([np.interp(t + m, t, p) for p, m in zip(profile, moved, strict=True)])
+    centre, width, peak = fit_gaussians(placed, t)
+    rest = placed / peak[:, None] - np.exp(-0.5 * ((t - centre[:, None]) / width[:, None]) ** 2)
+    hermite = third_hermite(rest, t, centre, width)
+    return SkewTable(_RATIOS, hermite, width / _SIGMA_PX, (centre + moved) / _SIGMA_PX)
+
+
+def exponential_gaussian(t: Float, sigma: float, tau: float) -> Float:
+    """Return the density (...) of a normal of 1 σ ``sigma`` at 0 plus an exponential of mean ``tau``."""
+    normal = np.exp(-0.5 * (t / sigma) ** 2)
+    if tau < 1e-3 * sigma:
+        return np.asarray(normal / (sigma * np.sqrt(2 * np.pi)))
+    argument = (sigma / tau - t / sigma) / np.sqrt(2)
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = normal * erfcx(argument)
+        tail = 2 * np.exp(0.5 * (sigma / tau) ** 2 - t / tau)
+    return np.asarray(np.where(np.isfinite(scaled), scaled, tail) / (2 * tau))
 
 
 def skew_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[Finding, Finding]:
@@ -134,3 +206,79 @@ def _curve(cells: Cells, coefficient: Float) -> Curve:
         "What a Gaussian leaves of the line", "distance from the line, line widths", "share of the height",
         x, mean, sigma, predicted,
     )  # fmt: skip
+
+
+_REACH_WIDTHS, _STEP_WIDTHS = 7.0, 0.25
+_OVERLAP_WIDTHS = 5.0
+_SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
+
+
+def settle(findings: tuple[Finding, ...], cells: Cells) -> tuple[Finding, ...]:
+    """Return the findings, each effect kept only where no other found one explains it better.
+
+    A skewed line and a copy on its shoulder look alike: the one that leaves less of the mean profile stays.
+    A tail that light within the wall adds also widens the line, which is then no response's doing.
+    """
+    by_name = {f.effect: f for f in findings}
+    lost: dict[str, str] = {}
+    skewed = next((by_name[n] for n in ("line_skew", "subsurface") if by_name[n].found), None)
+    if skewed is not None:
+        copy = by_name["tube_ghost"]
+        better = copy.found and _copy_is_better(cells, copy)
+        for name in ("line_skew", "subsurface") if better else ("tube_ghost",):
+            lost[name] = "tube_ghost" if better else skewed.effect
+    if by_name["subsurface"].found and "subsurface" not in lost:
+        lost |= {name: "subsurface" for name in ("gamma", "albedo_bias")}
+    kept = (_yielded(f, lost[f.effect]) if f.effect in lost else f for f in findings)
+    return tuple(_unrivalled(f, by_name) for f in kept)
+
+
+def _unrivalled(finding: Finding, by_name: dict[str, Finding]) -> Finding:
+    """Return a spot without the pixels' own gains as rival where these were measured and found even, or back.
+
+    Gains of single pixels would show in their own test long before they made a dip in all frames.
+    """
+    rival = by_name.get(_SPOT_OR_PIXELS.get(finding.effect, ""))
+    if rival is None or rival.found or not rival.sizes:
+        return finding
+    return replace(finding, alike=tuple(n for n in finding.alike if n != rival.effect))
+
+
+def _yielded(finding: Finding, other: str) -> Finding:
+    return replace(finding, p_value=1.0, alike=(other,), confirms=())
+
+
+def _copy_is_better(cells: Cells, copy: Finding) -> bool:
+    """Return whether a copy of the line leaves less of the mean profile than an exponential tail does."""
+    relative, distance_mm = (s.value for s in copy.sizes)
+    whole = cells.whole
+    width = float(np.median(cells.width_px[whole]))
+    apart = -distance_mm * float(np.median(cells.px_per_mm[whole])) / width
+    if abs(apart) > _OVERLAP_WIDTHS:
+        return True
+    x = np.arange(-_REACH_WIDTHS, _REACH_WIDTHS + _STEP_WIDTHS / 2, _STEP_WIDTHS)
+    rest = _mean_rest(cells, x)
+    hermite = float(np.nanmedian(cell_skewness(cells)))
+    table = skew_table()
+    ratio = float(np.interp(abs(hermite), table.hermite, table.ratio))
+    tail = _left_by_fit(exponential_gaussian(np.sign(hermite) * x, 1.0, ratio), x)
+    second = _left_by_fit(np.exp(-0.5 * x**2) + relative * np.exp(-0.5 * (x - apart) ** 2), x)
+    return bool(np.sum((rest - second) ** 2) < np.sum((rest - tail) ** 2))
+
+
+def _mean_rest(cells: Cells, x: Float) -> Float:
+    """Return the median over all cells of what a Gaussian leaves, at distances x (K,) in line widths."""
+    whole = cells.whole
+    place = (cells.offset_px - cells.centre_px[whole, None]) / cells.width_px[whole, None]
+    rest = [np.interp(x, p, r) for p, r in zip(place, cells.rest[whole], strict=True)]
+    return np.asarray(np.median(rest, axis=0))
+
+
+def _left_by_fit(profile: Float, x: Float) -> Float:
+    """Return what a Gaussian fit of a profile (K,), peak near 0, leaves over distances in fitted widths."""
+    fine = np.arange(-12.0, 12.0, 0.05)
+    at_peak = float(x[int(np.argmax(profile))])
+    placed = np.interp(fine, x - at_peak, profile / profile.max(), left=0.0, right=0.0)
+    centre, width, peak = fit_gaussians(placed[None], fine, start_px=1.0)
+    rest = placed / peak[0] - np.exp(-0.5 * ((fine - centre[0]) / width[0]) ** 2)
+    return np.asarray(np.interp(x, (fine - centre[0]) / width[0], rest))

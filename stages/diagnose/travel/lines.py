@@ -1,4 +1,8 @@
-"""Sinusoids in time of the camera's place across the pipe, and which pictures show them."""
+"""Lines in time: sinusoids in the camera's place across the pipe, and which pictures show them.
+
+Harmonic F-test over orthogonal tapers: D. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE,
+1982, § XIII. It compares a sinusoid with the noise right around its frequency, whatever the noise elsewhere.
+"""
 
 from __future__ import annotations
 
