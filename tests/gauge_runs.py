@@ -28,10 +28,10 @@ from pipeline.recording.base import (
 from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.edges import Edges, Sighting, joined, predicted_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
-from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import FirstPose, PosedFrames, poses_of_all_frames
 from stages.calibrate.gauge.result import GaugeCalibration, calibration_of
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
+from stages.calibrate.gauge.state import GaugeParameters
 
 RING_PX, EDGE_PX = 0.1, 0.1
 _NEAREST, _FARTHEST = 10.0, 55.0

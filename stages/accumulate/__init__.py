@@ -11,9 +11,8 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from stages.accumulate.calibration import CalibrationSpread, calibration_spread
 from stages.accumulate.grid import map_grid
-from stages.accumulate.samples import RingsOnWall
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
-from stages.accumulate.survey import survey_of
+from stages.accumulate.survey import RingsOnWall, survey_of
 
 __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 

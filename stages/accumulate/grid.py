@@ -17,8 +17,7 @@ from scipy.ndimage import median_filter
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
 from pipeline.system.threads import in_threads
-from stages.accumulate.samples import WallSamples
-from stages.accumulate.survey import RingSurvey
+from stages.accumulate.survey import RingSurvey, WallSamples
 
 # Columns a thread takes at a time, and threads: see `pipeline.system.threads`.
 _BLOCK, _THREADS = 64, 2

@@ -13,8 +13,7 @@ from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
 from stages.accumulate.calibration import CalibrationSpread
 from stages.accumulate.grid import MapGrid, gridded, rings_on_columns
-from stages.accumulate.samples import RingsOnWall, WallSamples
-from stages.accumulate.survey import RingSurvey, centred, some_at_a_time
+from stages.accumulate.survey import RingsOnWall, RingSurvey, WallSamples, centred, some_at_a_time
 
 # Rows of a stretch, for memory's sake.
 _ROWS = 1000

@@ -1,4 +1,4 @@
-"""A first pass over every ring: where it lies, and its shift across the pipe's axis, which is taken out."""
+"""Ring samples in pipe coordinates, and a first pass over them that takes out each ring's shift."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Int
-from stages.accumulate.samples import RingsOnWall, WallSamples
+from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory
+from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.instrument.probe import Probe
 
 # Times the weights are computed anew. Debt: data/debts.md.
 _ITERATIONS = 12
@@ -21,6 +23,84 @@ _FEWEST = 0.5
 # Rings of the running median and of the mean after it. Debt: data/debts.md.
 _RINGS = 31
 _SMOOTH_RINGS = 7
+# Rings worked out at a time, for memory's sake.
+_AT_ONCE = 512
+
+
+@dataclass(frozen=True)
+class WallSamples:
+    """Every ring sample on the wall; rows are laser frames, columns image azimuths.
+
+    Attributes
+    ----------
+    frame : (F,) int
+    valid : (F, A) bool
+    xyz_p : (F, A, 3)
+    distance_mm, azimuth_rad, radius_mm : (F, A)
+        Pipe coordinates.
+    sigma_mm : (F, A)
+        1 σ of the radius from image noise.
+    misalignment_mm : (F, A)
+        Radius with the sheet taken as square to the camera, minus ``radius_mm``.
+    section : (F, A, 3, 3)
+        The pipe's section frame at each sample.
+    """
+
+    frame: Int
+    valid: Bool
+    xyz_p: Float
+    distance_mm: Float
+    azimuth_rad: Float
+    radius_mm: Float
+    sigma_mm: Float
+    misalignment_mm: Float
+    section: Float
+
+
+@dataclass
+class RingsOnWall:
+    """All rings of a run; samples are worked out for some of them at a time."""
+
+    probe: Probe
+    rings: RingSamples
+    points: RingPoints
+    trajectory: Trajectory
+    _last: tuple[Int, WallSamples] | None = None
+
+    def samples(self, rows: Int) -> WallSamples:
+        """Return the samples of some rings (n,); those asked for last are kept at hand."""
+        if self._last is None or not np.array_equal(self._last[0], rows):
+            self._last = None
+            self._last = rows, wall_samples(self.probe, self.rings, self.points, self.trajectory, rows)
+        return self._last[1]
+
+
+def wall_samples(
+    probe: Probe, rings: RingSamples, points: RingPoints, trajectory: Trajectory, rows: Int
+) -> WallSamples:
+    """Triangulate rings ``rows`` (n,) with the probe as found in the run and place the points on the wall."""
+    frame, last = rings.frame[rows], len(trajectory.frame) - 1
+    index = np.minimum(np.searchsorted(trajectory.frame, frame), last)
+    T_pc = trajectory.T_pc[index]
+    direction = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
+    pixels = rings.centre_px + rings.radius_px[rows][..., None].astype(np.float64) * direction
+    ray = probe.camera.unproject(pixels).ray
+    xyz_p = _placed(T_pc, probe.laser.intersect(ray))
+    s, psi, radius = to_pipe(trajectory.axis, xyz_p)
+    uncorrected = to_pipe(trajectory.axis, _placed(T_pc, probe.laser.untilted().intersect(ray)))[2]
+    section = frames_at(trajectory.axis, np.where(np.isfinite(s), s, 0.0))[1]
+    outward = section[..., :, 0] * np.cos(psi)[..., None] + section[..., :, 1] * np.sin(psi)[..., None]
+    noise_p = np.einsum("fij,faj->fai", T_pc[:, :3, :3], points.noise_direction[rows].astype(float))
+    sigma = np.abs(np.sum(outward * noise_p, -1))
+    known = trajectory.frame[index] == frame
+    seen = rings.validity[rows] == RingValidity.VALID
+    valid = seen & known[:, None] & np.isfinite(radius) & np.isfinite(sigma)
+    return WallSamples(frame, valid, xyz_p, s, psi, radius, sigma, uncorrected - radius, section)
+
+
+def _placed(T_pc: Float, xyz_c: Float) -> Float:
+    """Return ring points (F, A, 3) of C in P."""
+    return np.asarray(np.einsum("fij,faj->fai", T_pc[:, :3, :3], xyz_c) + T_pc[:, None, :3, 3])
 
 
 def centred(samples: WallSamples, shift: Float) -> WallSamples:
@@ -63,10 +143,6 @@ def first_harmonic(samples: WallSamples) -> Float:
         scale[usable] = _REDESCENT * np.maximum(spread, 1e-6)
         weight = samples.valid / (1 + (error / scale[:, None]) ** 2) ** 2
     return np.where(usable[:, None], shape[:, :2], 0.0)
-
-
-# Rings worked out at a time, for memory's sake.
-_AT_ONCE = 512
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,13 @@ _TUKEY = 4.685
 _LEAST_SEEN = 0.5
 # A bound on memory alone.
 _ROWS_AT_ONCE = 512
+# Rows in the middle of what both saw from which the difference's typical σ is taken: a bound on time alone.
+_SAMPLED_ROWS = 2000
+# Colours end at so many typical σ of the difference, so that noise shows as the palette's middle only.
+_ENDS = 8.0
+# Mean diameters of rings nearer than this were measured from one stretch of the motion and count as one:
+# chosen, a fifth of a 4 inch bore's radius; the correlation was not measured.
+_CORRELATED_MM = 10.0
 
 
 @dataclass(frozen=True)
@@ -159,15 +166,6 @@ def _sectors(rows: Float) -> Float:
     return np.asarray(
         np.where(2 * count > width, np.nan_to_num(blocks).sum(2) / np.maximum(count, 1), np.nan)
     )
-
-
-# Rows in the middle of what both saw from which the difference's typical σ is taken: a bound on time alone.
-_SAMPLED_ROWS = 2000
-# Colours end at so many typical σ of the difference, so that noise shows as the palette's middle only.
-_ENDS = 8.0
-# Mean diameters of rings nearer than this were measured from one stretch of the motion and count as one:
-# chosen, a fifth of a 4 inch bore's radius; the correlation was not measured.
-_CORRELATED_MM = 10.0
 
 
 def registered_walls(pair: PairedWalls, is_one_calibration: bool, progress: Progress) -> RegisteredWalls:

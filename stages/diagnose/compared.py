@@ -12,11 +12,17 @@ from pipeline.recording.base import Recording
 from stages.diagnose.channels import Seen
 from stages.diagnose.correct import Correction
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.field.against import floor_px, rings_against_texture
 from stages.diagnose.field.run import FieldRun
-from stages.diagnose.gauge.against import GaugeResiduals, rings_against_fiducials
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.residual import RingResidual, azimuths_rad, wall_distances_mm
+from stages.diagnose.residual import (
+    GaugeResiduals,
+    RingResidual,
+    azimuths_rad,
+    floor_px,
+    rings_against_fiducials,
+    rings_against_texture,
+    wall_distances_mm,
+)
 from stages.diagnose.result import Diagnosis, FitQuality, Picture, WallPicture
 
 Linear = tuple[tuple[EffectModel, Shape, Float], ...]

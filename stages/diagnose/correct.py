@@ -26,6 +26,7 @@ _OF_ENCODER = {
     "time_offset": "delay_s",
 }  # fmt: skip
 _ROUNDS = 3
+_OF_CAMERA = frozenset({"principal_point", "focal_scale", "pixel_aspect", "radial_distortion"})
 
 
 def encoder_effects(effects: Sequence[EffectFound]) -> tuple[EffectFound, ...]:
@@ -204,6 +205,3 @@ def _spread(known: Evidence, stated: Stated, terms: Sequence[Term]) -> Float:
     found = estimate(known, stated, prior_sigma(known, terms)).covariance
     excess = known.score_covariance - known.information
     return np.asarray(found + found @ excess @ found)
-
-
-_OF_CAMERA = frozenset({"principal_point", "focal_scale", "pixel_aspect", "radial_distortion"})

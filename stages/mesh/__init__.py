@@ -18,10 +18,9 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.system.isolated import CrashError, TimeLimitError, call_isolated
 from stages.mesh.bake import TilePacker, bake_tile
 from stages.mesh.charts import cut_charts, pack, tile_count, tile_length, unroll
-from stages.mesh.decimate import Decimated, decimate
 from stages.mesh.join import OpenMesh
 from stages.mesh.poisson import folded_cells, joined_pieces, piece_cuts, poisson_surface, seen_part
-from stages.mesh.surface import Surface, grid_surface, row_pieces, with_normals
+from stages.mesh.surface import Decimated, Surface, decimate, grid_surface, row_pieces, with_normals
 
 # Rows and points that medians are taken of.
 _SAMPLED_ROWS, _SAMPLED_POINTS = 2000, 1 << 20

@@ -15,8 +15,17 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
 from pipeline.recording.checked_frames import CheckedFrames
-from stages.premises.light import Light, alike, light_seen, pattern_breaks
-from stages.premises.lost import repeated, rhythm_of, row_times, rows_by_motion, steps_of_wall
+from stages.premises.light import (
+    Light,
+    alike,
+    light_seen,
+    pattern_breaks,
+    repeated,
+    rhythm_of,
+    row_times,
+    rows_by_motion,
+    steps_of_wall,
+)
 from stages.premises.pictures import Pictures, look_at_pictures
 from stages.premises.rows import Lights, Story, cheapest_story
 from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm

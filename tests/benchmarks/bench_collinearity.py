@@ -14,8 +14,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.effects.base import ImagePoints
-from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.predict import columns, texture_columns
+from stages.diagnose.effects.library import LIBRARY, columns, texture_columns
 from tests.unit.wall_points import Bore, ring_points, texture_points
 
 RADII_MM, SECTION_MM = (50.8, 42.0, 35.0), 42.0

@@ -32,8 +32,8 @@ from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.edges import Edges, joined, predicted_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
-from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.solve import RingSource, first_unknowns
+from stages.calibrate.gauge.state import GaugeParameters
 
 _AZIMUTHS = 360
 _NEWTON = 5

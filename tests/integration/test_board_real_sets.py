@@ -6,8 +6,7 @@ import pytest
 from pipeline.instrument.camera.calibration import rms
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import Chessboard
-from stages.calibrate.boards.fit import fit, held_out_residuals
-from stages.calibrate.boards.parameters import BoardCalibrationParameters
+from stages.calibrate.boards.fit import BoardCalibrationParameters, fit, held_out_residuals
 from stages.calibrate.boards.start import start
 from tests.board_sets import babelcalib, detected
 from tests.quiet import quiet_context

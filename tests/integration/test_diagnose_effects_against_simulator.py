@@ -16,8 +16,7 @@ from pipeline.simulator.laws.bench import bench_truth, trace_ring
 from pipeline.simulator.motion import Motion, Odometer, Signal, Slip, Wave, constant
 from pipeline.simulator.rays import viewing_rays
 from stages.diagnose.effects.base import Travel
-from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.predict import ring_shift_px, texture_shift_px
+from stages.diagnose.effects.library import LIBRARY, ring_shift_px, texture_shift_px
 from tests.unit.wall_points import Bore, ring_points, texture_points
 
 COUNT, TIME_S = 144, 3.0

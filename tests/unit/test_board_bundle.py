@@ -16,8 +16,7 @@ from stages.calibrate.boards.bundle import (
     linearise,
     solve,
 )
-from stages.calibrate.boards.fit import adjust
-from stages.calibrate.boards.parameters import BoardCalibrationParameters
+from stages.calibrate.boards.fit import BoardCalibrationParameters, adjust
 from stages.calibrate.boards.start import start
 from tests.board_scene import varied_poses, views_of
 from tests.unit.camera_samples import CAMERAS, KANNALA_BRANDT

@@ -11,8 +11,7 @@ from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.compare import displacement_map, uncertainty_map
-from stages.calibrate.boards.fit import adjust, held_out_residuals
-from stages.calibrate.boards.parameters import MODEL_NAMES, BoardCalibrationParameters
+from stages.calibrate.boards.fit import MODEL_NAMES, BoardCalibrationParameters, adjust, held_out_residuals
 from stages.calibrate.boards.start import pose, start
 from tests.board_scene import facing_pose, varied_poses, views_of
 from tests.quiet import quiet_context

@@ -9,7 +9,7 @@ from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from stages.calibrate.boards.calibrate import calibrate_boards
 from stages.calibrate.boards.detect import grid
-from stages.calibrate.boards.parameters import BoardCalibrationParameters
+from stages.calibrate.boards.fit import BoardCalibrationParameters
 from stages.calibrate.boards.start import start
 from stages.calibrate.boards.survey import applied, nominal_board, placed, survey_board
 from tests.board_scene import varied_poses

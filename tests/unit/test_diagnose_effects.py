@@ -13,15 +13,18 @@ from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.effect import Channel
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns, smooth_texture_columns
-from stages.diagnose.effects.library import LIBRARY, NOT_PREDICTED, shown_in, without
-from stages.diagnose.effects.nameless import DECOYS
-from stages.diagnose.effects.predict import (
+from stages.diagnose.effects.library import (
+    LIBRARY,
+    NOT_PREDICTED,
     columns,
     reading_columns,
     ring_shift_px,
+    shown_in,
     texture_columns,
     texture_shift_px,
+    without,
 )
+from stages.diagnose.effects.nameless import DECOYS
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
 # What a position or reading effect leaves alone.

@@ -12,8 +12,7 @@ import pytest
 
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
-from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.predict import ring_shift_px, texture_shift_px
+from stages.diagnose.effects.library import LIBRARY, ring_shift_px, texture_shift_px
 from tests.unit.refraction import through_cylinder, through_sphere
 from tests.unit.wall_points import (
     BASELINE_MM,

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.predict import ring_shift_px
+from stages.diagnose.effects.library import LIBRARY, ring_shift_px
 from tests.unit.wall_points import BASELINE_MM, FOCAL_PX, Bore, plain_probe, ring_points
 
 RADII_MM = (25.4, 38.1, 50.8)

@@ -18,10 +18,9 @@ from pipeline.recording.base import BoreSection, Illumination, Planes, Recording
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.edges import Sighting, find_fiducials, fit_steps
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
-from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import first_pose, posed_frames
 from stages.calibrate.gauge.solve import RingSource, first_unknowns
-from stages.calibrate.gauge.state import SheetModel, Unknowns
+from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns
 from stages.calibrate.gauge.terms import Equations, edge_equations, ring_equations
 from tests.gauge_runs import GaugeRun, calibrated, driven, facts, in_sigma, made_run, stated_probe
 

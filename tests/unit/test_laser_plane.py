@@ -18,8 +18,7 @@ from stages.calibrate.laser.calibrate import (
     fit_plane_robustly,
     line_on_board,
 )
-from stages.calibrate.laser.line import fit_peaks
-from stages.calibrate.laser.parameters import LaserPlaneParameters
+from stages.calibrate.laser.line import LaserPlaneParameters, fit_peaks
 from tests.board_scene import chessboard_picture, facing_pose, render
 from tests.quiet import quiet_context
 

@@ -13,8 +13,7 @@ from pipeline.files.codec import digest
 from pipeline.geometry.axis import PipeAxis, from_pipe, straight_axis, to_pipe
 from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
-from stages.mesh.decimate import decimate
-from stages.mesh.surface import grid_surface, row_pieces, vertex_normals, weld, with_normals
+from stages.mesh.surface import decimate, grid_surface, row_pieces, vertex_normals, weld, with_normals
 from stages.overlays import OverlayParameters, overlays_of
 from tests.quiet import quiet_context
 from tests.unit.small_wall import PIT, RADIUS, bent_axis, drawn_radius, small_wall, smooth_photo, tee

@@ -2,7 +2,7 @@
 
 from pipeline.machine.stage import Parameters, Stage
 from stages.calibrate.boards.calibrate import CameraFile, calibrate_camera
-from stages.calibrate.boards.parameters import BoardCalibrationParameters
+from stages.calibrate.boards.fit import BoardCalibrationParameters
 from stages.calibrate.boards.pictures import (
     FoundBoards,
     Pictures,

@@ -21,8 +21,15 @@ from stages.calibrate.boards.compare import (
     uncertainty_map,
     without_outlier_views,
 )
-from stages.calibrate.boards.fit import NAME, adjust, refuse_one_plane, refuse_too_few
-from stages.calibrate.boards.parameters import MODEL_NAMES, BoardCalibrationParameters, ModelName
+from stages.calibrate.boards.fit import (
+    MODEL_NAMES,
+    NAME,
+    BoardCalibrationParameters,
+    ModelName,
+    adjust,
+    refuse_one_plane,
+    refuse_too_few,
+)
 from stages.calibrate.boards.pictures import FoundBoards
 from stages.calibrate.boards.start import start
 

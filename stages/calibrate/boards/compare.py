@@ -21,8 +21,7 @@ from pipeline.instrument.camera.calibration import (
     rms,
 )
 from stages.calibrate.boards.bundle import Estimate
-from stages.calibrate.boards.fit import fit, held_out_residuals
-from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
+from stages.calibrate.boards.fit import BoardCalibrationParameters, ModelName, fit, held_out_residuals
 from stages.calibrate.boards.survey import applied, placed, survey_board
 
 _GRID_COLUMNS = 41

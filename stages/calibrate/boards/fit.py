@@ -1,17 +1,20 @@
-"""Fitting one camera model to board views, and refusing views that cannot determine a camera."""
+"""Fitting one camera model to board views, its parameters, and the views that cannot determine a camera."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardView, CameraCalibration
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
+from pipeline.machine.stage import Parameters
 from stages.calibrate.boards.bundle import (
     BENT,
     FLAT,
@@ -22,10 +25,52 @@ from stages.calibrate.boards.bundle import (
     covariance,
     solve,
 )
-from stages.calibrate.boards.parameters import BoardCalibrationParameters, ModelName
 from stages.calibrate.boards.start import model_start, pose
 
 NAME = "calibrate-camera"
+ModelName = Literal["kannala_brandt", "scaramuzza", "unified", "equidistant", "pinhole"]
+MODEL_NAMES: tuple[ModelName, ...] = ("kannala_brandt", "scaramuzza", "unified", "equidistant", "pinhole")
+
+
+class BoardCalibrationParameters(Parameters):
+    """How a camera is fitted to board views, and what makes views unfit for it."""
+
+    huber_px: float = Field(
+        default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
+    )
+    model: Literal["best", ModelName] = Field(
+        default="best", description="camera model; best: the one that predicts held-out pictures best"
+    )
+    board_shape: Literal["flat", "bent", "surveyed", "best"] = Field(
+        default="best",
+        description="board taken for flat, its sag estimated, every corner estimated, or whichever of the "
+        "latter two predicts held-out views best",
+    )
+    survey_sigma_mm: float = Field(
+        default=0.3, gt=0, le=10, description="1 σ of a corner's offset from its nominal place, mm"
+    )
+    polynomial_degree: int = Field(
+        default=7, ge=3, le=12, description="degree of Scaramuzza's polynomial; OCamCalib's own default is 4"
+    )
+    folds: int = Field(
+        default=5, ge=2, le=50, description="parts for held-out reprojection, each left out once"
+    )
+    least_views: int = Field(default=4, ge=3, le=1000, description="fewer views than this are refused")
+    least_tilt_deg: float = Field(
+        default=8.0,
+        ge=0,
+        le=90,
+        description="boards whose directions differ by less are refused, deg",
+    )
+    outlier_view_factor: float = Field(
+        default=4.0, gt=1, le=100, description="views whose rms is this many times the median are left out"
+    )
+    largest_scale_sigma: float = Field(
+        default=0.02,
+        gt=0,
+        le=1,
+        description="a larger relative 1 σ of the image scale is refused",
+    )
 
 
 def fit(

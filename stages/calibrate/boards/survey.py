@@ -27,7 +27,7 @@ from stages.calibrate.boards.bundle import (
     solve,
     weights,
 )
-from stages.calibrate.boards.parameters import BoardCalibrationParameters
+from stages.calibrate.boards.fit import BoardCalibrationParameters
 from stages.calibrate.boards.start import model_start, pose
 
 _SAME_MM = 1e-3

@@ -8,9 +8,9 @@ from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checked_frames import CheckedFrames
 from stages.calibrate.gauge.calibrate import calibrate_gauge
-from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.premises import require_gauge
 from stages.calibrate.gauge.result import GaugeCalibration
+from stages.calibrate.gauge.state import GaugeParameters
 
 __all__ = ["GAUGE", "GaugeCalibration", "GaugeParameters", "calibrate_gauge", "require_gauge"]
 

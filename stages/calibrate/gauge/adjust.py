@@ -13,8 +13,7 @@ from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
-from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.state import Unknowns
+from stages.calibrate.gauge.state import GaugeParameters, Unknowns
 from stages.calibrate.gauge.terms import (
     Equations,
     edge_equations,

@@ -19,7 +19,6 @@ from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges
 from stages.calibrate.gauge.geometry import Gauge
-from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import (
     PosedFrames,
     first_pose,
@@ -29,7 +28,7 @@ from stages.calibrate.gauge.poses import (
 )
 from stages.calibrate.gauge.result import Finding, GaugeCalibration, calibration_of
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
-from stages.calibrate.gauge.state import Unknowns
+from stages.calibrate.gauge.state import GaugeParameters, Unknowns
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera.base import Camera
 from stages.calibrate.gauge.geometry import Gauge
-from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.calibrate.gauge.state import GaugeParameters
 
 _PROFILE = 21
 _SIDES = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])

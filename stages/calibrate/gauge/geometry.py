@@ -11,10 +11,11 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Fiducials, PipeFacts
-from stages.calibrate.gauge.parameters import GaugeParameters
+from stages.calibrate.gauge.state import GaugeParameters
 
 # Corners as ArUco numbers them, clockwise from the pattern's top left: (column, row) from -1 to 1.
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+_LEAST_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,6 @@ def gauge_of(facts: PipeFacts, fiducials: Fiducials) -> Gauge:
     start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
     radius = np.array([b.diameter_mm for b in facts.bore]) / 2
     return Gauge(start, radius, facts.bore_tolerance_mm / 2 / np.sqrt(3), fiducials)
-
-
-_LEAST_SHARE = 0.5
 
 
 @dataclass(frozen=True)

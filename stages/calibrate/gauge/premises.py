@@ -14,8 +14,8 @@ from pipeline.instrument.camera.base import Camera
 from pipeline.recording.base import Illumination, Recording
 from stages.calibrate.gauge.edges import Sighting, detect, detector
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
-from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.poses import PosedFrames, disagreeing
+from stages.calibrate.gauge.state import GaugeParameters
 
 STAGE = "calibrate"
 _LOOKED_AT = 6

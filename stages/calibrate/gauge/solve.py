@@ -18,9 +18,8 @@ from stages.calibrate.gauge.adjust import (
     spread,
 )
 from stages.calibrate.gauge.geometry import BoreRings, Gauge, bore_rings
-from stages.calibrate.gauge.parameters import GaugeParameters
 from stages.calibrate.gauge.result import Finding
-from stages.calibrate.gauge.state import SheetModel, Unknowns, prior_directions
+from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
 
 _WRONG_RING = 4.0

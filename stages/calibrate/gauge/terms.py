@@ -15,8 +15,7 @@ from pipeline.geometry.rigid import inverse, skew, transform
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
-from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.state import ENCODER, Unknowns
+from stages.calibrate.gauge.state import ENCODER, GaugeParameters, Unknowns
 
 _STEP_S = 1e-3
 _ORIGIN_SIGMA_MM = 1e-3

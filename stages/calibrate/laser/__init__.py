@@ -2,7 +2,7 @@
 
 from pipeline.machine.stage import Stage
 from stages.calibrate.laser.calibrate import LaserCalibration, calibrate_laser
-from stages.calibrate.laser.parameters import LaserPlaneParameters
+from stages.calibrate.laser.line import LaserPlaneParameters
 
 __all__ = ["LASER_PLANE", "LaserCalibration"]
 

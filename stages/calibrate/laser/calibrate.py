@@ -24,8 +24,7 @@ from stages.calibrate.boards import CameraFile, FoundBoards, Pictures
 from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
 from stages.calibrate.boards.pictures import read_picture
 from stages.calibrate.boards.start import pose
-from stages.calibrate.laser.line import measure_line, patch_around
-from stages.calibrate.laser.parameters import LaserPlaneParameters
+from stages.calibrate.laser.line import LaserPlaneParameters, measure_line, patch_around
 from stages.rings.colour import excess_weights, mix
 
 _TUKEY = 4.685

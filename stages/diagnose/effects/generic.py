@@ -11,8 +11,8 @@ from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
+from stages.diagnose.effects.library import columns, texture_columns
 from stages.diagnose.effects.nameless import Nameless, growth, two_parts
-from stages.diagnose.effects.predict import columns, texture_columns
 
 _HARMONICS = (0, 1, 2, 3, 4)
 _EXPONENTS = (0, 1, 2, 3)

@@ -1,13 +1,17 @@
-"""All effects whose influence on positions or readings can be predicted, by name."""
+"""All effects by name, and their predictions: where ring and texture are found, what the encoder reads."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
+import numpy as np
+
+from pipeline.arrays import Float
 from pipeline.physics.catalogue import EFFECTS, effect
 from pipeline.physics.effect import Channel
-from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.camera import CAMERA_MODELS
 from stages.diagnose.effects.laser import LASER_MODELS, PHOTOMETRIC_MODELS
 from stages.diagnose.effects.pose import POSE_MODELS
@@ -28,6 +32,81 @@ NOT_PREDICTED: Mapping[str, str] = MappingProxyType({
     "fixed_pattern": "random from pixel to pixel: told by stacking residuals in the sensor's frame",
     "dust": "takes light away from a stretch of the ring: told by the line's brightness",
 })  # fmt: skip
+_ROUNDS = 3
+
+
+def ring_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+    """Return (M,) by which the ring is found farther out along the image radius, at the same image azimuth.
+
+    The sheet's new line on the wall is followed in the half-plane of each point's azimuth; the image's shift
+    is taken there, and read along the radius with the ring's own inclination.
+    """
+    ring = points.ring
+    moved = points
+    for _ in range(_ROUNDS):
+        sheet = model.sheet_shift_mm(moved, shape, amplitude)
+        wall = model.wall_shift_mm(moved, shape, amplitude)
+        if not (np.any(sheet) or np.any(wall)):
+            break
+        xyz = points.xyz_c + sheet[:, None] * ring.per_sheet_c + wall[:, None] * ring.per_wall_c
+        moved = _moved(points, xyz)
+    shift = moved.uv - points.uv + model.image_shift_px(moved, shape, amplitude)
+    return ring.read(shift) + model.line_shift_px(moved, shape, amplitude)
+
+
+def texture_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+    """Return (M, 2) by which the image of wall points is found farther along u and v."""
+    wall = model.wall_shift_mm(points, shape, amplitude)
+    moved = _moved(points, points.xyz_c + wall[:, None] * points.normal_c) if np.any(wall) else points
+    return np.asarray(moved.uv - points.uv + model.image_shift_px(moved, shape, amplitude))
+
+
+def columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
+    """Return (M, Q) derivatives of `ring_shift_px` by the amplitudes at zero, for points on the line."""
+    ring = points.ring
+    sheet_px, wall_px = ring.read_move(ring.per_sheet_c), ring.read_move(ring.per_wall_c)
+
+    def small(amplitude: Float) -> Float:
+        return (
+            ring.read_small(model.image_shift_px(points, shape, amplitude))
+            + sheet_px * model.sheet_shift_mm(points, shape, amplitude)
+            + wall_px * model.wall_shift_mm(points, shape, amplitude)
+            + model.line_shift_px(points, shape, amplitude)
+        )
+
+    return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
+
+
+def texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
+    """Return (M, 2, Q) derivatives of `texture_shift_px` by the amplitudes at zero."""
+    per_wall = np.einsum("mij,mj->mi", points.ring.by_point, points.normal_c)
+
+    def small(amplitude: Float) -> Float:
+        wall = model.wall_shift_mm(points, shape, amplitude)
+        return np.asarray(model.image_shift_px(points, shape, amplitude) + wall[:, None] * per_wall)
+
+    return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
+
+
+def reading_columns(model: EffectModel, travel: Travel, shape: Shape) -> Float:
+    """Return (N, Q) derivatives of the encoder's reading by the amplitudes at zero."""
+
+    def small(amplitude: Float) -> Float:
+        return model.reading_shift_mm(travel, shape, amplitude)
+
+    return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
+
+
+def _slope(prediction: Callable[[Float], Float], model: EffectModel, k: int) -> Float:
+    """Return the central difference over ± the plausible size of one amplitude."""
+    step = np.zeros(len(model.amplitudes))
+    step[k] = model.amplitudes[k].plausible
+    return np.asarray((prediction(step) - prediction(-step)) / (2 * step[k]))
+
+
+def _moved(points: ImagePoints, xyz_c: Float) -> ImagePoints:
+    uv = points.uv + points.probe.camera.project(xyz_c).uv - points.projected_uv
+    return replace(points, xyz_c=xyz_c, uv=np.asarray(uv))
 
 
 def without(names: Collection[str]) -> Mapping[str, EffectModel]:

@@ -16,6 +16,12 @@ from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Sh
 from stages.diagnose.effects.kinds import cosine
 
 _REFERENCE_MM = 50.0
+_SEED = 20261121
+_WRONG_EXPONENTS = {1: (-1.0, 3.5), 2: (-1.5, 4.0), 3: (-0.5, 3.0), 4: (0.5, 4.5)}
+_WAVES = 3
+_RATES_HZ = (0.02, 0.4)
+_ROW_PERIODS_PX = (97.0, 260.0, 700.0)
+_PIPE_PERIODS_MM = (15.0, 90.0)
 
 
 class Nameless(EffectModel):
@@ -116,14 +122,6 @@ def _swing(harmonic: int, exponent: int) -> SwingTerm:
 
 # A sheet lifts and falls, or rocks.
 SWINGS: tuple[SwingTerm, ...] = (_swing(0, 1), _swing(1, 2))
-
-
-_SEED = 20261121
-_WRONG_EXPONENTS = {1: (-1.0, 3.5), 2: (-1.5, 4.0), 3: (-0.5, 3.0), 4: (0.5, 4.5)}
-_WAVES = 3
-_RATES_HZ = (0.02, 0.4)
-_ROW_PERIODS_PX = (97.0, 260.0, 700.0)
-_PIPE_PERIODS_MM = (15.0, 90.0)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ DETECTED = 1e-4
 # recording's own unknowns absorb nearly the same of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0
 _SHOWN = 4
+_BY_FIELD = "The field, by itself, shows: "
 
 
 @dataclass(frozen=True)
@@ -122,9 +123,6 @@ def location_in_field(found: FieldEvidence, shown: Sequence[Shown]) -> Location 
 def _about_as_good(scores: Sequence[Shown]) -> tuple[Shown, ...]:
     top = scores[0].score.statistic
     return tuple(s for s in scores if s.score.statistic > top - max(_APART, _ALMOST * top))
-
-
-_BY_FIELD = "The field, by itself, shows: "
 
 
 def with_field(

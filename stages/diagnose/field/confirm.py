@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.arrays import Float
 from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.predict import columns
+from stages.diagnose.effects.library import columns
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.run import ring_points
 from stages.diagnose.gauge.confirm import partial_of

@@ -32,6 +32,8 @@ from stages.motion import (
     ring_bins,
 )
 
+_SEEN_OFTEN = 3
+
 
 @dataclass(frozen=True)
 class FieldRun:
@@ -123,9 +125,6 @@ def _adjusted_with(run: FieldRun, probe: Probe, context: Context) -> JointEstima
 
 
 __all__ = ["FieldRun", "UnusableError", "field_run", "with_probe"]
-
-
-_SEEN_OFTEN = 3
 
 
 def part_of(run: FieldRun, first: int, end: int) -> FieldRun:

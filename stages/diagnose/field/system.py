@@ -14,7 +14,7 @@ from pipeline.adjustment.robust import Squares
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, transform
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
-from stages.diagnose.effects.predict import columns, reading_columns, texture_columns
+from stages.diagnose.effects.library import columns, reading_columns, texture_columns
 from stages.diagnose.field.run import FieldRun, distance_mm, ring_points, speed_mm_s, texture_points
 from stages.diagnose.inference import INSTRUMENT, Column
 from stages.motion import MATCH_BIASES, EncoderReadings, State, residuals

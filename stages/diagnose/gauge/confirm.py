@@ -22,6 +22,7 @@ from stages.diagnose.result import Confirmation, Value
 # compared about five times, and noise may contradict it once in a thousand times.
 _AGREE = 2e-4
 _LEAST_FRAMES = 8
+_DRAWS = 400
 
 
 @dataclass(frozen=True)
@@ -137,9 +138,6 @@ def _words(term: Term, part: Partial) -> str:
     spread = float(np.sqrt(np.trace(part.covariance) / len(part.amplitude)))
     named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
     return f"{named} (± {spread:.2g} {term.model.amplitudes[0].unit})"
-
-
-_DRAWS = 400
 
 
 @dataclass(frozen=True)

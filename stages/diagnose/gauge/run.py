@@ -18,7 +18,7 @@ from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.calibrate.gauge.terms import edge_equations, ring_equations
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
-from stages.diagnose.effects.predict import (
+from stages.diagnose.effects.library import (
     columns,
     reading_columns,
     ring_shift_px,

@@ -12,11 +12,10 @@ from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.adjust import adjust
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.geometry import BoreRings
-from stages.calibrate.gauge.parameters import GaugeParameters
-from stages.calibrate.gauge.state import SheetModel, Unknowns, prior_directions
+from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
-from stages.diagnose.effects.predict import ring_shift_px, texture_shift_px
+from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
 from stages.diagnose.gauge.fit import Fit, fit, own_parameters
 from stages.diagnose.gauge.points import bin_widths
 from stages.diagnose.gauge.run import GaugeRun, Term, linearise

@@ -11,11 +11,18 @@ from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
-from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
-from stages.diagnose.profile.geometry import LineGeometry
+from stages.diagnose.profile.cells import Cells, LineGeometry
+from stages.diagnose.profile.finding import (
+    Curve,
+    Finding,
+    Regression,
+    Size,
+    finding,
+    regress,
+    tested,
+    untestable,
+)
 from stages.diagnose.profile.measure import LineProfiles
-from stages.diagnose.profile.regression import Regression, regress, tested
 from stages.texture.light import irradiance
 
 # Light beside the line, relative to its height, that black level and compression may leave. Debt:

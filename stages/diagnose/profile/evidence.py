@@ -22,9 +22,8 @@ from stages.diagnose.profile.brightness import (
     stray_finding,
     vignetting_finding,
 )
-from stages.diagnose.profile.cells import Cells, make_cells
+from stages.diagnose.profile.cells import Cells, LineGeometry, line_geometry, make_cells
 from stages.diagnose.profile.finding import Finding, Size
-from stages.diagnose.profile.geometry import LineGeometry, line_geometry
 from stages.diagnose.profile.measure import LineProfiles, measure_profiles
 from stages.diagnose.profile.secondary import ghost_findings
 from stages.diagnose.profile.sensor import locking_finding, pattern_finding

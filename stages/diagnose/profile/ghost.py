@@ -14,8 +14,8 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
 from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.finding import Tested, tested
 from stages.diagnose.profile.matched_filter import STEP_PX, Responses
-from stages.diagnose.profile.regression import Tested, tested
 
 _LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.04), np.radians(0.08)
 _LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04

@@ -6,9 +6,8 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
-from stages.diagnose.profile.cells import Cells
+from stages.diagnose.profile.cells import Cells, LineGeometry
 from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
-from stages.diagnose.profile.geometry import LineGeometry
 from stages.diagnose.profile.ghost import SecondLine, bounced, copied
 from stages.diagnose.profile.matched_filter import Responses, responses
 

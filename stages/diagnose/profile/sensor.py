@@ -9,9 +9,8 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
+from stages.diagnose.profile.finding import Curve, Finding, Size, finding, regress, tested, untestable
 from stages.diagnose.profile.measure import LineProfiles
-from stages.diagnose.profile.regression import regress, tested
 
 # Locking of a line to pixels by pixel integration, rounding and compression, px. Debt: data/debts.md.
 LOCKING_FLOOR_PX = 1.5e-3

@@ -16,10 +16,8 @@ from scipy.special import erfcx
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
-from stages.diagnose.profile.cells import CORE_REACH, Cells, fit_gaussians
-from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
-from stages.diagnose.profile.geometry import LineGeometry
-from stages.diagnose.profile.regression import Tested, regress, tested
+from stages.diagnose.profile.cells import CORE_REACH, Cells, LineGeometry, fit_gaussians
+from stages.diagnose.profile.finding import Curve, Finding, Size, Tested, finding, regress, tested, untestable
 from stages.diagnose.profile.width import scale_law
 
 # Half a grey level of compression on one flank of a line 100 levels high, over its whole width.
@@ -30,6 +28,9 @@ _SMALLEST_BLUR_PX2 = 1 / 12
 _CLEARLY = 3.0
 _RATIOS = np.linspace(0.0, 3.0, 61)
 _SIGMA_PX, _REACH_PX, _STEP_PX = 1.2, 12.0, 0.05
+_REACH_WIDTHS, _STEP_WIDTHS = 7.0, 0.25
+_OVERLAP_WIDTHS = 5.0
+_SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
 
 
 def third_hermite(rest: Float, offset_px: Float, centre_px: Float, width_px: Float) -> Float:
@@ -206,11 +207,6 @@ def _curve(cells: Cells, coefficient: Float) -> Curve:
         "What a Gaussian leaves of the line", "distance from the line, line widths", "share of the height",
         x, mean, sigma, predicted,
     )  # fmt: skip
-
-
-_REACH_WIDTHS, _STEP_WIDTHS = 7.0, 0.25
-_OVERLAP_WIDTHS = 5.0
-_SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
 
 
 def settle(findings: tuple[Finding, ...], cells: Cells) -> tuple[Finding, ...]:

@@ -7,10 +7,17 @@ import numpy as np
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.instrument.probe import Probe
-from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
-from stages.diagnose.profile.geometry import LineGeometry
-from stages.diagnose.profile.regression import Regression, regress, tested
+from stages.diagnose.profile.cells import Cells, LineGeometry
+from stages.diagnose.profile.finding import (
+    Curve,
+    Finding,
+    Regression,
+    Size,
+    finding,
+    regress,
+    tested,
+    untestable,
+)
 
 # Changes of (line σ / stated)² and of exposure², s², that compression and clipped neighbours may cause.
 # Debt: data/debts.md.
