@@ -185,3 +185,22 @@ FIDUCIALS = Stage(
 FREE_MOTION = Stage(
     "free_motion", "1", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
+
+
+@dataclass(frozen=True)
+class FieldMeasured:
+    """An inspection with all that was measured of it."""
+
+    recording: Recording
+    rings: RingSamples
+    profile: LineProfile
+    motion: FreeMotion
+
+
+@dataclass(frozen=True)
+class GaugeRecorded:
+    """A gauge run with all that was measured of it."""
+
+    recording: Recording
+    profile: LineProfile
+    measured: GaugeMeasured

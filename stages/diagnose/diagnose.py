@@ -19,8 +19,10 @@ from stages.diagnose.channels import (
     FIDUCIALS,
     FREE_MOTION,
     LINE_PROFILE,
+    FieldMeasured,
     FreeMotion,
     GaugeMeasured,
+    GaugeRecorded,
     LineProfile,
     Seen,
     gauge_travel,
@@ -83,25 +85,6 @@ class Diagnosed:
     probe: Probe
     simulated: Resimulated | None
     image: OnImage | None
-
-
-@dataclass(frozen=True)
-class FieldMeasured:
-    """An inspection with all that was measured of it."""
-
-    recording: Recording
-    rings: RingSamples
-    profile: LineProfile
-    motion: FreeMotion
-
-
-@dataclass(frozen=True)
-class GaugeRecorded:
-    """A gauge run with all that was measured of it."""
-
-    recording: Recording
-    profile: LineProfile
-    measured: GaugeMeasured
 
 
 def diagnose_both(

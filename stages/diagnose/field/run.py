@@ -9,7 +9,6 @@ import numpy as np
 from pipeline.adjustment.bordered import LandmarkRows, Rows
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
-from pipeline.errors import UnusableError
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from pipeline.instrument.probe import Probe
@@ -122,9 +121,6 @@ def _adjusted_with(run: FieldRun, probe: Probe, context: Context) -> JointEstima
     radius_mm = float(run.state.globals[0])
     start = replace(run.state, instrument=np.zeros(measured.unsure.shape[1] + MATCH_BIASES))
     return adjust_at_once(start, measured, frames, radius_mm, parameters, context)
-
-
-__all__ = ["FieldRun", "UnusableError", "field_run", "with_probe"]
 
 
 def part_of(run: FieldRun, first: int, end: int) -> FieldRun:
