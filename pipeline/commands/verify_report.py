@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +19,7 @@ _STATIONS, _SECTORS = 300, 120
 
 
 def write_certificate(document: dict[str, Any], differences: Differences, folder: Path) -> None:
-    """Write certificate.json, certificate.png and certificate.html."""
-    (folder / "certificate.json").write_text(
-        json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8"
-    )
+    """Write certificate.png and certificate.html."""
     drawn = rendered(differences_figure(differences))
     (folder / "certificate.png").write_bytes(drawn)
     (folder / "certificate.html").write_text(certificate_page(document, drawn), "utf-8")

@@ -40,7 +40,7 @@ class WallPoints:
 
 @dataclass(frozen=True)
 class ReferenceSurface:
-    """Vertices (V, 3), mm, and triangles (T, 3); no triangles for a cloud of points."""
+    """Vertices (V, 3), in the unit of the file, and triangles (T, 3); no triangles for a cloud of points."""
 
     vertices: Float
     triangles: Int
@@ -95,8 +95,8 @@ def read_wall_points(run: Path, at_most: int = 200_000) -> WallPoints:
     return WallPoints(xyz, outward, np.asarray(vertex["distance_mm"], float), azimuth, sigma)
 
 
-def read_surface(file: Path, unit_mm: float) -> ReferenceSurface:
-    """Read a mesh or a cloud of points; ``unit_mm`` is the length of the file's unit in mm.
+def read_surface(file: Path) -> ReferenceSurface:
+    """Read a mesh or a cloud of points, in the file's own unit.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def read_surface(file: Path, unit_mm: float) -> ReferenceSurface:
         raise InputError(
             file, f"holds {len(vertices)} usable points", expected="a mesh or a cloud of the pipe's wall"
         )
-    return ReferenceSurface(vertices * unit_mm, triangles)
+    return ReferenceSurface(vertices, triangles)
 
 
 def map_file(path: Path) -> Path:

@@ -148,7 +148,7 @@ def surface_differences(
 ) -> Differences:
     """Return the distances of the run's points from the reference along its outward normals.
 
-    Points farther than ``reach_mm`` from the reference do not lie on it and are left out.
+    The reference is in mm. Points farther than ``reach_mm`` from it do not lie on it and are left out.
     """
     xyz, outward = transform(pose.T_rp, points.xyz_p), points.outward_p @ pose.T_rp[:3, :3].T
     closest = NearestPoints(reference)(xyz)

@@ -185,7 +185,7 @@ def test_a_reference_surface_in_its_own_frame(tmp_path, triangles):
     run = run_folder(tmp_path / "run", offset=0.05)
     pose = from_parts(rotation_from_vector(np.array([0.7, -0.4, 1.1])), np.array([120.0, -40.0, 300.0]))
     file = reference_mesh(tmp_path / "wall.ply", triangles=triangles, pose=pose)
-    points, surface = read_wall_points(run, 20_000), read_surface(file, 1.0)
+    points, surface = read_wall_points(run, 20_000), read_surface(file)
     found = register_points(points, surface)
     np.testing.assert_allclose(found.T_rp, pose, atol=0.03)
     figures = accuracy(surface_differences(points, surface, found, 5.0))
@@ -218,9 +218,33 @@ def test_certificate_is_one_page_and_data_that_agree(tmp_path):
     assert result.exit_code == 0, result.output
     page = (tmp_path / "out" / "certificate.html").read_text("utf-8")
     document = json.loads((tmp_path / "out" / "certificate.json").read_text("utf-8"))
-    assert document["made_by"]["input_sha256"] == {"wall": files_sha256([run / "radius_map.npz"])}
+    assert document["made_by"]["command"] == "verify"
+    assert document["made_by"]["input_sha256"]["wall"] == files_sha256([run / "radius_map.npz"])
+    log = (tmp_path / "out" / ".boresight" / "run.log").read_text("utf-8")
+    assert "stage verify completed" in log
     assert 'src="http' not in page
     assert f"{document['accuracy']['rms_mm']:.3f} mm RMS against bore of 101.6 mm" in page
+
+
+def test_another_bore_gives_another_certificate_and_the_same_one_is_kept(tmp_path):
+    run, out = run_folder(tmp_path / "run"), tmp_path / "out"
+    for diameter, tolerance in ((101.6, 0.0), (101.6, 0.0), (102.6, 0.0)):
+        result = command(run, "--bore-diameter-mm", diameter, "--bore-tolerance-mm", tolerance, "-o", out)
+        assert result.exit_code == 0, result.output
+        document = json.loads((out / "certificate.json").read_text("utf-8"))
+        known = accuracy(bore_differences(read_wall_map(run), diameter, tolerance))
+        assert document["accuracy"]["bias_mm"] == known.bias_mm
+    log = (out / ".boresight" / "run.log").read_text("utf-8")
+    assert log.count("stage verify starts") == 2, "the second call computes nothing"
+
+
+def test_a_surface_in_metres_gives_the_figures_of_one_in_millimetres(tmp_path):
+    run, file = run_folder(tmp_path / "run", offset=0.05), reference_mesh(tmp_path / "wall.ply")
+    in_mm = json.loads(command(run, "--reference", file, "--json").stdout)
+    assert in_mm["accuracy"]["bias_mm"] == pytest.approx(0.05, abs=3e-3)
+    small = reference_mesh(tmp_path / "metres.ply", pose=np.diag([1e-3, 1e-3, 1e-3, 1.0]))
+    in_m = json.loads(command(run, "--reference", small, "--set", "verify.reference_unit=m", "--json").stdout)
+    assert in_m["accuracy"]["rms_mm"] == pytest.approx(in_mm["accuracy"]["rms_mm"], rel=1e-3)
 
 
 @pytest.mark.parametrize(
