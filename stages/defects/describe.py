@@ -25,6 +25,9 @@ from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of
 
+# In words only: beside longer and shorter in one sentence, a quarter more is still nearly round.
+_NEARLY_ROUND = 1.25
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -120,17 +123,22 @@ def _contour(mask: Byte) -> Int:
     return np.asarray(max(contours, key=len))
 
 
+def _form(elongation: float) -> str:
+    """Return how long a defect is for its width, in words."""
+    return "nearly round" if elongation < _NEARLY_ROUND else f"{elongation:.1f} times as long as wide"
+
+
 def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth, darkness: float) -> str:
-    """Say what it is and why it was called so."""
+    """Say what it is and why it is classed so."""
     kinds = list(likely)
     way = "into the wall" if depth.depth_mm > 0 else "inward"
     words = f"{kinds[0].capitalize()}, {abs(depth.depth_mm):.2f} ± {depth.sigma_mm:.2f} mm {way}"
     if kinds[0] is DefectKind.WELD:
-        return f"{words}, {features.length_mm:.0f} mm along the pipe. Called so because it goes all round."
+        return f"{words}, {features.length_mm:.0f} mm along the pipe. Classed as weld: it goes all round."
     words += (
-        f", {features.length_mm:.1f} mm along × {features.width_mm:.1f} mm around. Called so for its "
-        f"slimmest extent of {features.slim_mm:.1f} mm, {features.elongation:.1f} times as long as slim, "
-        f"uneven by {100 * features.roughness:.0f} % of its depth"
+        f", {features.length_mm:.1f} mm along × {features.width_mm:.1f} mm around. Classed as {kinds[0]}: "
+        f"{features.slim_mm:.1f} mm across, {_form(features.elongation)}; its surface varies by "
+        f"{100 * features.roughness:.0f} % of its depth"
     )
     words += f"; {kinds[1]} is {100 * likely[kinds[1]]:.0f} % likely." if len(kinds) > 1 else "."
     if abs(darkness) > 0.1:
