@@ -70,7 +70,8 @@ def light_seen(pictures: Pictures) -> Int:
 def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
     """Return whether two sets (F,) of pictures that the table tells apart look the same.
 
-    They do when neither brightness nor the closed line differs between them by more than it varies in all.
+    They do when neither brightness nor the closed line differs between them by more than it varies within
+    one of them.
     """
     measures = (pictures.brightness, pictures.closed)
     return not any(_differ(m[one & pictures.seen], m[other & pictures.seen]) for m in measures)
@@ -79,7 +80,7 @@ def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
 def _differ(one: Float, other: Float) -> bool:
     if min(len(one), len(other)) == 0:
         return False
-    spread = spread_about_median(np.concatenate([one, other]))
+    spread = max(spread_about_median(one), spread_about_median(other))
     return bool(abs(np.median(one) - np.median(other)) > 2 * spread)
 
 

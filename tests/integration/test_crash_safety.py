@@ -31,10 +31,12 @@ def content(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, bytes], float]:
-    folder = tmp_path_factory.mktemp("undisturbed") / "run"
+    folder = tmp_path_factory.mktemp("undisturbed")
+    # The first start also reads all libraries from the disk: a later one tells how long a run takes.
+    assert start(folder / "first").wait() == 0
     begin = time.monotonic()
-    assert start(folder).wait() == 0
-    return content(folder), time.monotonic() - begin
+    assert start(folder / "run").wait() == 0
+    return content(folder / "run"), time.monotonic() - begin
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -47,7 +49,7 @@ def test_killed_at_random_moments(
     for _ in range(3):
         process = start(tmp_path / "run")
         try:
-            process.wait(timeout=moments.uniform(0.3, 1.0) * seconds)
+            process.wait(timeout=moments.uniform(0.1, 0.8) * seconds)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

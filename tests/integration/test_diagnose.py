@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
 from pipeline.cli import app
-from pipeline.errors import InputError
+from pipeline.errors import InputError, UnusableError
 from pipeline.instrument.probe_file import read_probe, read_with_source
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
@@ -233,20 +233,28 @@ def of_another_size(recording):
         (without_texture, Verdict.NOT_IDENTIFIABLE, "No frame of the field shows the wall's texture"),
         (without_encoder, Verdict.CLASS, "no encoder: its scale, slips, play and delay cannot be told"),
         (without_motion, Verdict.NOT_IDENTIFIABLE, "travels only 0 mm"),
-        (of_another_size, Verdict.CLASS, "not of 76.2 mm as stated"),
     ],
 )
 def test_what_a_recording_lacks_is_told_and_nothing_is_guessed(pair, spoilt, verdict, said, tmp_path):
-    recording = spoilt(open_recording(pair[0]))
-    probe = read_probe(pair[0] / "probe.yaml")
+    found = field_alone(spoilt(open_recording(pair[0])), pair[0], tmp_path)
+    assert found.verdict is verdict
+    assert not found.effects
+    assert any(said in s for s in found.shortcomings), found.shortcomings
+
+
+def test_a_field_whose_size_the_ring_contradicts_is_refused(pair, tmp_path):
+    with pytest.raises(UnusableError, match=r"diameter is 50\.\d+ mm, stated are 76\.2 mm"):
+        field_alone(of_another_size(open_recording(pair[0])), pair[0], tmp_path)
+
+
+def field_alone(recording, folder, tmp_path):
+    """What a diagnosis of an inspection alone finds."""
+    probe = read_probe(folder / "probe.yaml")
     stages = diagnosis_stages(with_field=True, with_gauge=False)
     sources = (recording_source(recording, "field"), probe_source(probe), Source(Noticed, Noticed(), ""))
     job = Job("diagnose", sources, stages, (), resolve(stages), tmp_path / "out", at_once=1)
     run_job(job, Selection(), SilentDisplay())
-    found = result_of(job, Diagnosed).found
-    assert found.verdict is verdict
-    assert not found.effects
-    assert any(said in s for s in found.shortcomings), found.shortcomings
+    return result_of(job, Diagnosed).found
 
 
 def test_a_gauge_of_another_probe_is_left_out_and_said_to_be(pair, tmp_path):

@@ -111,7 +111,7 @@ def test_a_clock_set_back_between_decisions_loses_none(
     review = open_review(files)
     for k, at in enumerate(("2026-11-21T10:00:00+00:00", "1999-01-01T00:00:00+00:00")):
         monkeypatch.setattr(ledger, "_now", lambda at=at: at)
-        action = (actions.Accept if k else actions.Reject)(finding="1")
+        action = actions.Accept(finding="1") if k else actions.Reject(finding="1", reason="shadow")
         review.act(action, "Ada", k)
     state = review.state()
     assert state.revision == 2

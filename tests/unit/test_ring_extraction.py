@@ -123,7 +123,7 @@ def test_the_same_recording_gives_the_same_bytes():
 
 
 def test_the_stage_is_wired_by_type():
-    assert list(RINGS.inputs()) == ["recording", "probe"]
+    assert list(RINGS.inputs()) == ["recording", "frames", "probe"]
 
 
 def test_outliers_are_marked_in_batches_as_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -159,7 +159,7 @@ def test_same_input_same_bytes(plain):
 
 def test_stage_is_wired_by_type():
     assert TEXTURE.output() is WallTexture
-    assert set(TEXTURE.inputs()) == {"recording", "probe", "trajectory", "wall"}
+    assert set(TEXTURE.inputs()) == {"recording", "frames", "probe", "trajectory", "wall"}
 
 
 def test_unrolled_picture_is_encoded_for_display_and_placed(tmp_path):

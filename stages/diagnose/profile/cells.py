@@ -84,11 +84,13 @@ def line_geometry(
 
 
 def _medians(values: Float32, valid: Bool, sectors: int) -> Float:
-    """Return medians (F, S) of the valid ones of values (F, A), A a multiple of S."""
-    parts = np.where(valid, values, np.nan).astype(float).reshape(len(values), sectors, -1)
+    """Return medians (F, S) of the valid ones of values (F, A) in each of S sectors, A not below S."""
+    seen = np.where(valid, values, np.nan).astype(float)
+    sector = np.arange(seen.shape[1]) * sectors // seen.shape[1]
+    first = np.searchsorted(sector, np.arange(1, sectors))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
-        return np.asarray(np.nanmedian(parts, axis=2))
+        return np.stack([np.nanmedian(part, axis=1) for part in np.split(seen, first, axis=1)], axis=1)
 
 
 def _steady(middle: Float) -> Bool:
