@@ -2,9 +2,9 @@
 
 ``bordered``: normal equations of frames (a block band), of landmarks and of a border of global unknowns,
 with marginal covariances; its compiled sums are in ``elimination``, its factor in ``banded_cholesky``.
-``marginal``: dense normal equations and marginalisation by the Schur complement. ``robust``: losses and
-robust spread. ``motion_priors``: smooth motion and slow drift. ``levenberg_marquardt``: the search.
-``clusters``: scores of equations that err alike (sandwich covariance).
+``marginal``: dense normal equations and marginalisation by the Schur complement. ``robust``: losses, robust
+spread, and scores of equations that err alike (sandwich covariance). ``motion_priors``: smooth motion and
+slow drift. ``levenberg_marquardt``: the search.
 
 Why not a library: gtsam 4.3.0 and pyceres 2.6 have wheels, scikit-sparse has none for this Python. On 400
 frames, 2,000 landmarks and 20,000 observations of two coordinates (one core, Jacobians known beforehand),

@@ -105,7 +105,7 @@ def add_landmarks(  # type: ignore[no-untyped-def]
     s_point, s_border, s_residual, s_weight, damping,
     band, border, corner, right, right_border, inverse, right_point,
 ):  # fmt: skip
-    """Add texture and surface equations, and subtract what the landmarks take along when they leave.
+    """Add texture and surface equations with the landmarks eliminated by their Schur complement.
 
     ``damping`` raises the diagonal of each landmark's information. Products of the instrument's derivatives
     with themselves are left to matrix algebra, which is quicker.

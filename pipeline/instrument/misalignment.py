@@ -165,7 +165,8 @@ def misread_ring(
 ) -> MisreadRing:
     """Return the ring on the wall and as triangulated with the plane z = baseline.
 
-    A camera limits the ring to what it sees; it is believed as it is, so what it sees it leaves.
+    With a camera, only the part of the ring that it sees is returned. The camera is taken to
+    be without error.
     """
     azimuth = scan.azimuths() if azimuth_rad is None else azimuth_rad
     xyz = scan.wall_points(azimuth)

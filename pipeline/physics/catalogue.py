@@ -15,7 +15,8 @@ EFFECTS: Mapping[str, Effect] = MappingProxyType({
     for effect in (*LASER_EFFECTS, *CAMERA_EFFECTS, *WINDOW_EFFECTS, *POSE_EFFECTS, *PHOTOMETRIC_EFFECTS)
 })  # fmt: skip
 
-# Classes of effects that one kind of recording may not tell apart (shared physics notes).
+# Classes of effects that one kind of recording may not tell apart; data/effects/laws.md compares their laws
+# with traced rings.
 CLASSES: tuple[tuple[str, ...], ...] = (
     ("laser_cone", "focal_scale", "pupil_shift", "dome_axial"),
     ("baseline", "outside_index", "vignetting", "encoder_scale"),

@@ -6,7 +6,7 @@
 3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
 4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
 5. What neither a second ring nor the photo confirms is set apart (`corroborate`).
-6. Kind from named features as a probability; codes; words (`classify`, `codes`, `describe`).
+6. Kind from named features as a probability, with codes and words (`classify`, `describe`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
 """
@@ -91,7 +91,7 @@ def _described(
     """Yield the regions that were measured and are as deep as is worth reporting, and which are confirmed."""
     clean = clean_wall(wall, regions)
     for done, region in enumerate(regions, 1):
-        # Of what the sure points do not show, it is told what all points show.
+        # A region that the sure points do not show is measured once more with all points.
         for every_point in (False, True):
             surface, here = wall.surface_about(region, every_point)
             if not _is_measured(surface, here):

@@ -33,7 +33,8 @@ from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
 _SHOWN = 8
-# A light that pictures do not bear out is a slip of the pen in fewer than a third of the rows, no more.
+# Where all pictures look alike, the light that at least this share of the rows states is believed: the other
+# rows are slips of the pen. With a smaller share the table itself is refused.
 _MOST_ROWS = 2 / 3
 # Lights that change more often than this from picture to picture are switched on purpose.
 _SWITCHED = 0.1

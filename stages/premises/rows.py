@@ -17,8 +17,8 @@ from pipeline.arrays import Bool, Float, Int
 # One accident each: a wrong label, a loss, a swap, a loss that leaves the rhythm whole, a break of the rhythm
 # without a loss. Only their comparison matters, so all cost the same.
 _ACCIDENT = 1.0
-# Of two losses that explain the same lights, the smaller is believed; those before the first picture break no
-# rhythm and are the easier excuse for wrong labels.
+# Of two losses that explain the same lights, the smaller is believed. A loss before the first picture leaves
+# the rhythm whole, so that it could explain away wrong labels at no cost: each such picture costs more.
 _EACH_LOST, _EACH_LOST_FIRST = 0.2, 0.5
 # Rows left over when the pictures end are half an accident, a video cut short. So are rows that are missing
 # where the table has one for each picture: it was cut. In any other table each missing row is an accident.

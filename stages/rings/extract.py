@@ -17,7 +17,7 @@ from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
 from stages.rings.colour import discriminant_weights, excess_weights, mix
-from stages.rings.lone import SAYING_RINGS
+from stages.rings.glints import SAYING_RINGS
 from stages.rings.noise import clip_level_of, noise_response
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring

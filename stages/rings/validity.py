@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spread, robust_spreads
 from pipeline.arrays import Bool, Byte, Float32
 from pipeline.artefacts.measured import RingSamples, RingValidity
-from stages.rings.lone import lone_runs
+from stages.rings.glints import lone_runs
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0

@@ -1,7 +1,7 @@
 """The closed-form laws of the physics notes: radius error, apparent less true, over azimuth.
 
 Each takes radius and azimuth, then the catalogue's quantities by name; constants are those of the bench.
-Where the traced result shows the notes wrong, ``MENDED`` has the law that holds.
+Where the traced result shows the notes wrong, ``radius`` has the law that holds.
 """
 
 from __future__ import annotations

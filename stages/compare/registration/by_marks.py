@@ -85,7 +85,8 @@ def _refuse_other_bore(earlier: Surface, now: Surface, alike: float) -> None:
 def _chance(matches: Matches) -> float:
     """Return how probable so many agreeing blocks are when every block lands anywhere in its room.
 
-    That the median they agree with is their own makes agreement easier than the share of the room says.
+    A block agrees by chance with the share of its search area that lies within the limit. The factor 3
+    allows for the median being taken from the same blocks, which makes agreement easier; it is not derived.
     """
     count, good = (int(n / matches.overlapping) for n in (len(matches.agree), matches.agree.sum()))
     return float(binom.sf(good - 1, count, min(3 * AGREE**2, 1.0))) if good else 1.0

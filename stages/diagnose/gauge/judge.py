@@ -21,9 +21,9 @@ from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Evidence, Sta
 
 _STRETCHES = 2
 _LEAST_FRAMES = 8
-# Prior: all effects of the library are equally likely. A pattern without a cause that fits as well as a law
-# may be that law, so that it is given a fiftieth; whether a law suffices is tested separately. Debt:
-# data/debts.md.
+# Prior: all effects of the library are equally likely, and a pattern without a cause is 50 times less likely
+# than one of them, because such a pattern can imitate any law. Whether a law suffices is tested separately.
+# Debt: data/debts.md.
 _NAMELESS = 1 / 50
 _PEAK = 2
 

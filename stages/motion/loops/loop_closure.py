@@ -40,7 +40,7 @@ _LEAST_REACH_PX = 4.0
 """Shifts are looked for up to so many σ of their prediction, and some strip samples more for its rounding."""
 _DISTANCE, _ROLL = 2, 5
 _ACROSS = (0, 1, 3, 4)
-"""Components of a closure: along z and about z of the section; the others come from the windows' axes."""
+"""Components of a closure that texture gives (along z and about z of the section) and that the axes give."""
 
 
 class View(Protocol):

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.rings.chain import choose_line
-from stages.rings.lone import lone_runs
+from stages.rings.glints import lone_runs
 from stages.rings.search import Candidates
 from stages.rings.validity import contradicted
 

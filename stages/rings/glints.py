@@ -24,15 +24,16 @@ SAYING_RINGS = WALL_RINGS + 1 + _CLUTTER_RINGS
 # A run is as wide as its samples leave the wall by 2.5 σ, and counts when one leaves it by 5 σ: of a hundred
 # thousand samples of noise less than one does.
 _RUN_SIGMAS, _SEED_SIGMAS = 2.5, 5.0
-# A ring 0.7 of a defect's half width away still sees a quarter of its depth (a bell of 1.7 half widths).
+# Least share of a lone run's depth that a neighbouring ring must show to confirm it. Chosen so that a ring
+# beside the middle of a small pit still counts; not measured (data/debts.md).
 _SHARE = 0.25
 _NEAR_SECTORS, _GAP_SECTORS = 2, 4
 # Root mean square, over a run, of how many robust σ of the ring it is brighter and wider than the ring. The
 # ring's own runs have 1. Glaring runs are glints even where a second ring shows one in the same place; what
 # three of five rings show is the wall and no run.
 _ODD_RUN, _GLARING_RUN = 3.0, 6.0
-# One in five of a glint's samples has the profile of a line, and in a recording without any, one in ten
-# lone samples is taken to be no wall all the same. Both are judgements: nothing has measured them yet.
+# For four samples of glints that look odd, one has the profile of a line; and in a recording without any
+# odd one, one in ten lone samples is still taken to be no wall. Both are judgements; nothing has measured them.
 _CLUTTER_ORDINARY, _CLUTTER_PRIOR = 0.25, 0.1
 _LEAST_WIDTH_SPREAD, _LEAST_BRIGHTNESS_SPREAD = 0.03, 0.1
 
