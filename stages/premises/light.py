@@ -20,6 +20,8 @@ _MIDDLE = 1 / 3
 _APART, _MOST_BETWEEN = 3.0, 0.05
 # Dark pictures are those of the laser only where more than this part of them shows its line.
 _MOST_DARK = 0.5
+# Of fewer pictures in one light the spread is not known.
+_FEWEST_ALIKE = 3
 # The brightness of either light is followed over so many frames on both sides, as lamps warm up.
 _AROUND = 8
 # Least distance within these frames, as a part of that in the whole run, at which both lights are among them.
@@ -71,9 +73,11 @@ def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
     """Return whether two sets (F,) of pictures that the table tells apart look the same.
 
     They do when neither brightness nor the closed line differs between them by more than it varies within
-    one of them.
+    one of them; too few pictures do not show that.
     """
     measures = (pictures.brightness, pictures.closed)
+    if min((one & pictures.seen).sum(), (other & pictures.seen).sum()) < _FEWEST_ALIKE:
+        return False
     return not any(_differ(m[one & pictures.seen], m[other & pictures.seen]) for m in measures)
 
 
