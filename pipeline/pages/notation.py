@@ -1,10 +1,10 @@
 """How numbers and places are written, the same in every paper, table, page and message.
 
 A clock position is ``7:01`` (12 o'clock up, clockwise looking forward), an extent ``7:01–7:11``. A depth
-is given without sign and with its direction: ``1.58 ± 0.03 mm deep`` goes into the wall, ``1.48 ± 0.05 mm
-inward`` stands into the bore. Where a table needs a bare number, into the wall is positive. A finding is at its peak,
-where its depth was read, with its extent behind: ``412.3 mm (408.1–416.0 mm)``. A value bears as many digits as
-its 1 σ.
+is given without sign and with its direction: ``1.58 ± 0.03 mm deep`` goes into the wall, ``1.48 ± 0.05
+mm inward`` stands into the bore. Where a table needs a bare number, into the wall is positive. A finding
+is at its peak, where its depth was read, with its extent behind: ``412.3 mm (408.1–416.0 mm)``. A value
+bears as many digits as its 1 σ.
 """
 
 from __future__ import annotations
