@@ -99,6 +99,8 @@ class Defect:
     distance_from_mm, distance_to_mm : float
     clock_from, clock_to : float
         Hours, clockwise from one to the other; 0 to 12 all round.
+    peak_distance_mm, peak_clock : float
+        Where the depth was read: the place of the extreme deviation.
     length_mm, width_mm : float
         Extent along the pipe and around it.
     depth_mm, depth_sigma_mm : float
@@ -125,6 +127,8 @@ class Defect:
     distance_to_mm: float
     clock_from: float
     clock_to: float
+    peak_distance_mm: float
+    peak_clock: float
     length_mm: float
     width_mm: float
     depth_mm: float

@@ -16,7 +16,8 @@ from pipeline.geometry.rigid import quaternion_from_rotation
 
 _DEGREES = {"major_axis_rad": "major_axis_deg"}
 _TABLE = (
-    "id", "kind", "distance_from_mm", "distance_to_mm", "clock_from", "clock_to", "length_mm", "width_mm",
+    "id", "kind", "distance_from_mm", "distance_to_mm", "clock_from", "clock_to", "peak_distance_mm",
+    "peak_clock", "length_mm", "width_mm",
     "depth_mm", "depth_sigma_mm", "wall_loss_percent", "confidence", "frames", "pof_class", "pacp_suggestion",
     "en13508_suggestion", "statement",
 )  # fmt: skip

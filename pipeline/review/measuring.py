@@ -32,14 +32,20 @@ class OutlineGauge:
         point = np.asarray(outline, float)
         rows, columns, inside, around = self._cells(point)
         radius = np.where(inside | around, self.wall.radius_mm[np.ix_(rows, columns)], np.nan)
-        depth, sigma = self._depth(radius, self.wall.sigma_random_mm[np.ix_(rows, columns)], inside, around)
+        random = self.wall.sigma_random_mm[np.ix_(rows, columns)]
+        depth, sigma, peak = self._depth(radius, random, inside, around)
         (first, last), (a0, a1) = np.sort(point[:, 0])[[0, -1]], np.sort(point[:, 1])[[0, -1]]
         middle = float(np.nanmedian(self.wall.radius_mm[rows]))
         clock = clock_of_azimuth(np.array([a0, a1]))
+        there = (float("nan"), float("nan")) if peak is None else self._place(rows[peak[0]], columns[peak[1]])
         return Measured(
             float(first), float(last), float(clock[0]), float(clock[1]),
-            float(last - first), float(min(a1 - a0, 2 * np.pi) * middle), depth, sigma,
+            float(last - first), float(min(a1 - a0, 2 * np.pi) * middle), depth, sigma, *there,
         )  # fmt: skip
+
+    def _place(self, row: int, column: int) -> tuple[float, float]:
+        """Return distance (mm) and clock position (h) of a cell."""
+        return float(self.wall.distance_mm[row]), float(clock_of_azimuth(self.wall.azimuth_rad[column]))
 
     def _cells(self, point: Float) -> tuple[Int, Int, Bool, Bool]:
         """Return rows and columns about the outline, and which of their cells are in it or around it."""
@@ -59,21 +65,25 @@ class OutlineGauge:
         columns = (first + np.arange(count)) % len(wall.azimuth_rad)
         return rows, columns, inside, grown.astype(bool) & ~inside
 
-    def _depth(self, radius: Float, sigma: Float32, inside: Bool, around: Bool) -> tuple[float, float]:
-        """Return the extreme of the smoothed radius within, less the median around, and its 1 σ."""
+    def _depth(
+        self, radius: Float, sigma: Float32, inside: Bool, around: Bool
+    ) -> tuple[float, float, tuple[int, int] | None]:
+        """Return the extreme of the smoothed radius within, less the median around, its 1 σ and its cell."""
         known = around & np.isfinite(radius)
         seen = inside & np.isfinite(radius)
         if known.sum() < _LEAST_AROUND or not seen.any():
-            return float("nan"), float("nan")
+            return float("nan"), float("nan"), None
         away = np.where(np.isfinite(radius), radius - float(np.median(radius[known])), 0.0)
         weight = np.isfinite(radius).astype(float)
         step = np.array([self.wall.step_mm, self.wall.step_rad * float(np.median(radius[known]))])
         cells = tuple(int(max(round(_MEAN_MM / s), 1)) for s in step[::-1])
         mean = cv2.blur(away, cells) / np.maximum(cv2.blur(weight, cells), 1e-9)
-        extreme = float(mean[seen][np.argmax(np.abs(mean[seen]))])
+        peak = np.unravel_index(int(np.argmax(np.where(seen, np.abs(mean), -1.0))), mean.shape)
+        extreme = float(mean[peak])
         noise = float(np.median(sigma[seen & np.isfinite(sigma)])) / np.sqrt(cells[0] * cells[1])
         spread = robust_spread(away[known])
-        return extreme, float(np.hypot(noise, spread / np.sqrt(cells[0] * cells[1])))
+        sigma_mm = float(np.hypot(noise, spread / np.sqrt(cells[0] * cells[1])))
+        return extreme, sigma_mm, (int(peak[0]), int(peak[1]))
 
 
 Tool = Literal["point", "distance", "area", "depth", "diameter"]

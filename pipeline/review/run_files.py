@@ -32,6 +32,8 @@ _MAKERS: dict[type, str] = {
     CheckedFrames: "premises", Sections: "sections", WallTexture: "texture", RingPoints: "triangulate",
     Defects: "defects",
 }  # fmt: skip
+_PEAK = ("peak_distance_mm", "peak_clock")  # runs of version 0.1 have none
+_SIZES = tuple(name for name in Measured.__dataclass_fields__ if name not in _PEAK)
 # What a signature binds: the results and the record of how they came about.
 _BOUND = ("run.json", "defects.json", "radius_map.npz", "unrolled.png", "model.glb", "sections.csv")
 
@@ -189,7 +191,10 @@ def _finding(entry: dict[str, Any]) -> Finding:
     outline = tuple((float(s), float(a)) for s, a in entry["outline"])
     if len(outline) < 3 or not np.isfinite(outline).all():
         raise ValueError(f"the outline of {entry['id']} is no polygon")
-    size = Measured(**{name: _number(entry[name]) for name in Measured.__dataclass_fields__})
+    size = Measured(
+        **{name: _number(entry[name]) for name in _SIZES},
+        **{name: _number(entry.get(name)) for name in _PEAK},
+    )
     number = int(entry["id"])
     return Finding(str(number), DefectKind(entry["kind"]).value, outline, size, original=number)
 

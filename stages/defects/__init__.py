@@ -133,5 +133,5 @@ def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float
 
 
 DEFECTS = Stage(
-    "defects", "4", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
+    "defects", "5", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
 )

@@ -25,11 +25,15 @@ _SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 
 @dataclass(frozen=True)
 class Depth:
-    """Depth (positive into the wall), its 1 σ, and the bias that was taken out, mm."""
+    """Depth (positive into the wall), its 1 σ, and the bias that was taken out, mm.
+
+    ``peak`` is the cell of the region's window (row, column) whose deviation is extreme.
+    """
 
     depth_mm: float
     sigma_mm: float
     bias_mm: float
+    peak: tuple[int, int]
 
 
 def measure_depth(
@@ -57,7 +61,8 @@ def measure_depth(
     scatter = float(np.linalg.norm([drawn.std(), _SHARPENING * np.nan_to_num(sharpened)]))
     if _is_small(relief, region, surface.points):
         depth, scatter = _between_rings(relief, region, surface.points, depth, scatter)
-    return Depth(region.sign * depth, float(np.hypot(scatter, _shape_sigma(relief, depth))), bias)
+    sigma = float(np.hypot(scatter, _shape_sigma(relief, depth)))
+    return Depth(region.sign * depth, sigma, bias, (int(peak[0]), int(peak[1])))
 
 
 def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:

@@ -46,6 +46,7 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
     kind, share = next(iter(likely.items()))
     real = float(ndtr((abs(depth.depth_mm) - scene.min_depth_mm / 2) / depth.sigma_mm))
     clock_from, clock_to = _clock(relief, region)
+    peak_distance, peak_clock = _peak(relief, region, depth)
     first = float(relief.distance_mm[region.row] - relief.cell_mm[0] / 2)
     loss = kind.is_metal_loss and scene.wall_thickness_mm
     return Defect(
@@ -55,6 +56,8 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
         distance_to_mm=first + features.length_mm,
         clock_from=clock_from,
         clock_to=clock_to,
+        peak_distance_mm=peak_distance,
+        peak_clock=peak_clock,
         length_mm=features.length_mm,
         width_mm=features.width_mm,
         depth_mm=depth.depth_mm,
@@ -86,6 +89,13 @@ def _clock(relief: Relief, region: Region) -> tuple[float, float]:
         return 0.0, 12.0
     hours = clock_of_azimuth(np.array(_azimuths(relief, region)))
     return float(hours[0]), float(hours[1])
+
+
+def _peak(relief: Relief, region: Region, depth: Depth) -> tuple[float, float]:
+    """Return distance (mm) and clock position (h) of the cell whose deviation is extreme."""
+    row, column = depth.peak
+    azimuth = relief.azimuth_rad[(region.column + column) % len(relief.azimuth_rad)]
+    return float(relief.distance_mm[region.row + row]), float(clock_of_azimuth(azimuth))
 
 
 def _frames(points: PointCloud, relief: Relief, region: Region) -> Int:

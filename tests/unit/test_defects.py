@@ -113,6 +113,8 @@ def test_clock_over_the_seam_and_over_twelve(azimuth_deg, hours):
     assert span * 30 * np.pi / 180 * RADIUS == pytest.approx(item.width_mm, rel=0.01)
     assert item.width_mm == pytest.approx(drawn.width_mm, rel=0.3)
     assert 0 <= item.clock_from < 12
+    assert abs((item.peak_clock - hours + 6) % 12 - 6) < 0.15, "the depth was read at the deepest place"
+    assert item.peak_distance_mm == pytest.approx(80.0, abs=2.0)
     assert np.ptp(item.outline[:, 1]) * RADIUS == pytest.approx(item.width_mm, rel=0.1)
 
 

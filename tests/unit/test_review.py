@@ -96,6 +96,12 @@ def test_a_pit_of_known_depth_is_measured_against_the_wall_around_it():
     wall = WallMap(s, psi, radius, np.full_like(radius, 0.03), np.full_like(radius, 0.02))
     inside = ((44.0, 0.03), (56.0, 0.03), (56.0, 0.27), (44.0, 0.27))
     assert OutlineGauge(wall).measure(inside).depth_mm == pytest.approx(1.0, abs=0.01)
+    radius[(s == 47.0)[:, None] & (np.abs(psi - 0.1) < 0.02)[None]] += (
+        4.0  # the deepest place, off the middle
+    )
+    deepest = OutlineGauge(wall).measure(inside)
+    assert deepest.peak_distance_mm == pytest.approx(47.0, abs=0.6)
+    assert deepest.peak_clock == pytest.approx(3 + 0.1 * 6 / np.pi, abs=0.05)
     diameter = readings(wall, "diameter", ((20.0, 1.0),))[0]
     assert (diameter.value, diameter.sigma) == pytest.approx((100.0, 0.06))
 

@@ -38,8 +38,8 @@ def pit_defect() -> Defect:
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     outline = np.stack([at + width * np.cos(turn), around + width / RADIUS * np.sin(turn)], -1)
     return Defect(
-        7, "corrosion", at - width, at + width, 4.5, 5.5, 2 * width, 2 * width, depth, 0.02, float("nan"),
-        0.9, np.arange(3), outline, "", "", "", "drawn",
+        7, "corrosion", at - width, at + width, 4.5, 5.5, at, 5.0, 2 * width, 2 * width, depth, 0.02,
+        float("nan"), 0.9, np.arange(3), outline, "", "", "", "drawn",
     )  # fmt: skip
 
 

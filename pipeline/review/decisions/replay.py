@@ -23,7 +23,10 @@ class ImpossibleError(BoresightError):
 
 @dataclass(frozen=True)
 class Measured:
-    """Size of an outline on the wall; ``depth_mm`` positive into the wall, NaN where nothing was seen."""
+    """Size of an outline on the wall; ``depth_mm`` positive into the wall, NaN where nothing was seen.
+
+    The peak is the place where the depth was read; NaN of a run that was made before its findings told it.
+    """
 
     distance_from_mm: float
     distance_to_mm: float
@@ -33,6 +36,8 @@ class Measured:
     width_mm: float
     depth_mm: float
     depth_sigma_mm: float
+    peak_distance_mm: float = float("nan")
+    peak_clock: float = float("nan")
 
 
 class Gauge(Protocol):
