@@ -13,6 +13,7 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.json_file import parse_json, read_json
+from pipeline.review.cautions import cautions, labels
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.replay import GONE, Finding, covered
 from pipeline.review.flat_tiles import FlatPicture
@@ -90,6 +91,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "radius_mm": float(np.median(overlays.reference_radius_mm)),
         "overlays": [overlay_document(o) for o in overlays.pictures],
         "defects": parse_json(files.defects_text()),
+        "unconfirmed": files.unconfirmed(),
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),
         "diagnosis": _diagnosis(files),
@@ -104,11 +106,13 @@ def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:
 
 def state_document(state: State, files: RunFiles) -> dict[str, Any]:
     """Return the findings as they stand."""
-    bore = 2 * files.artefact(Overlays).nominal_radius_mm
-    standing = [f for f in state.findings if f.status != GONE]
+    standing, called = [f for f in state.findings if f.status != GONE], labels(state.findings)
     return {
         "revision": state.revision,
-        "findings": [_finding(f, state, bore) | {"covers": _covers(f, standing)} for f in state.findings],
+        "findings": [
+            _finding(f, state, files) | {"label": called[f.id], "covers": _covers(f, standing)}
+            for f in state.findings
+        ],
         "may_undo": state.may_undo,
         "may_redo": state.may_redo,
         "lost": [_entry(e) for e in state.lost],
@@ -183,8 +187,9 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _finding(finding: Finding, state: State, bore_mm: float) -> dict[str, Any]:
+def _finding(finding: Finding, state: State, files: RunFiles) -> dict[str, Any]:
     size, wall = finding.size, state.assumed.wall_thickness_mm
+    bore_mm = 2 * files.artefact(Overlays).nominal_radius_mm
     is_loss = DefectKind(finding.kind).is_metal_loss
     loss = 100 * size.depth_mm / wall if wall and is_loss and size.depth_mm > 0 else None
     remaining = None
@@ -195,6 +200,7 @@ def _finding(finding: Finding, state: State, bore_mm: float) -> dict[str, Any]:
         "wall_loss_percent": loss,
         "wall_loss_sigma_percent": 100 * size.depth_sigma_mm / wall if loss is not None and wall else None,
         "strength": vars(remaining) if remaining else None,
+        "cautions": cautions(files, finding),
     }
     # A long pipe has thousands of outlines: they are known to be finite and are not copied.
     return vars(finding) | cleaned(judged) | {"remarks": [vars(r) for r in finding.remarks]}

@@ -138,6 +138,14 @@ class RunFiles:
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(file, f"cannot be read: {error}") from error
 
+    def unconfirmed(self) -> list[dict[str, Any]]:
+        """Return what one ring alone shows, as the run wrote it; empty for a run that wrote none."""
+        if not self.file("unconfirmed.json").is_file():
+            return []
+        measured_findings(self.file("unconfirmed.json").read_text("utf-8"), self.path / "unconfirmed.json")
+        found: list[dict[str, Any]] = self._json("unconfirmed.json")  # type: ignore[assignment]
+        return found
+
     def fingerprint(self) -> dict[str, str]:
         """Return the SHA-256 of every file that a signature binds."""
         present = (name for name in _BOUND if self.file(name).is_file())

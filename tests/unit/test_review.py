@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
+from pipeline.review.cautions import contradiction, labels
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.ledger import Ledger, StaleError
 from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, covered, replay
@@ -80,6 +81,24 @@ def test_what_a_merged_outline_covers_besides_its_own_is_told():
     within, around = square("1", 45, 3.1 - 2 * np.pi, 2, 0.1), square("2", 50, 3.1, 30, 0.5)
     beyond, behind = square("3", 90, 3.1, 5, 0.1), square("4", 50, 0.0, 5, 0.1)
     assert covered(wide, [wide, within, around, beyond, behind]) == ("1", "2")
+
+
+def test_findings_made_by_hand_are_numbered_on_from_the_measured_ones():
+    ids = ("1", "2", "3", "m8", "a9", "2.1", "m8.2")
+    assert labels([replace(found(1), id=name) for name in ids]) == {
+        "1": "1", "2": "2", "3": "3", "m8": "4 (merged)", "a9": "5 (added)", "2.1": "2.1 (split)",
+        "m8.2": "4.2 (split)",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "depth", "contradicts"),
+    [("deposit", 1.0, True), ("deposit", -1.0, False), ("pit", -1.0, True), ("pit", 1.0, False),
+     ("dent", 1.0, True), ("deposit", 0.15, False), ("pit", float("nan"), False)],
+)  # fmt: skip
+def test_a_kind_that_the_measured_depth_contradicts_is_told(kind, depth, contradicts):
+    told = contradiction(replace(found(1), kind=kind, size=replace(SIZE, depth_mm=depth)))
+    assert ("Check its kind" in told) == contradicts
 
 
 def test_a_file_that_is_no_ledger_is_refused(tmp_path):
