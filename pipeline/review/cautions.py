@@ -65,8 +65,8 @@ def _read_again(files: RunFiles, finding: Finding) -> str:
     same = OutlineGauge(files.artefact(Wall).radius_map).measure(run.outline)
     return (
         f"The depth was read again because the outline was drawn again. The run found {_depth(run.size)}, "
-        "from the single ring points against the fitted pipe; the review reads the wall map, as the largest mean "
-        "over 1 mm against the wall within 6 mm around the outline. "
+        "from the single ring points against the fitted pipe; the review reads the wall map, as the largest "
+        "mean over 1 mm against the wall within 6 mm around the outline. "
         f"Read in this way, the run's own outline gives {_depth(same)}, the new one {_depth(finding.size)}."
     )
 
