@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
@@ -111,6 +111,7 @@ def recording_record(recording: Recording) -> dict[str, Json]:
         "kind": recording.kind,
         "path": str(recording.path.resolve()),
         "files_sha256": content_key(recording.files),
+        "inspection": {name: text for name, text in asdict(recording.inspection).items() if text},
     }
 
 

@@ -162,6 +162,7 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
         content_key=content_key(files),
         warnings=(*described.warnings, *encoder_warnings(encoder, frames)),
         files=files,
+        inspection=described.inspection,
     )
 
 

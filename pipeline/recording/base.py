@@ -122,6 +122,33 @@ class PipeFacts:
     fiducials: Fiducials | None = None
 
 
+@dataclass(frozen=True)
+class InspectionFacts:
+    """What a report must say of an inspection and nothing measures; empty where nobody has stated it.
+
+    Attributes
+    ----------
+    client, site, asset, line : str
+        For whom, where, and which pipe.
+    operator, date : str
+        Who drove the probe, and when (ISO 8601).
+    procedure : str
+        The written procedure that was followed.
+    equipment, calibration : str
+        The probe by its serial number, and its calibration certificate.
+    """
+
+    client: str = ""
+    site: str = ""
+    asset: str = ""
+    line: str = ""
+    operator: str = ""
+    date: str = ""
+    procedure: str = ""
+    equipment: str = ""
+    calibration: str = ""
+
+
 class FrameSource(Protocol):
     """Delivers images by need and in order."""
 
@@ -162,6 +189,8 @@ class Recording:
     listed
         All rows of the table of frames, also those for which there are no pictures; None where there is no
         such table.
+    inspection
+        For whom, where and how it was recorded, for the report.
     """
 
     name: str
@@ -177,6 +206,7 @@ class Recording:
     warnings: tuple[str, ...] = ()
     files: tuple[InputFile, ...] = ()
     listed: FrameTable | None = None
+    inspection: InspectionFacts = InspectionFacts()
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import datetime
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import Section
-from pipeline.recording.base import BoreSection, Fiducials, Marker, PipeFacts
+from pipeline.recording.base import BoreSection, Fiducials, InspectionFacts, Marker, PipeFacts
 
-COMMON_KEYS = ("name", "kind", "frame_rate", "probe", "pipe")
+COMMON_KEYS = ("name", "kind", "frame_rate", "probe", "pipe", "inspection")
 _PIPE_KEYS = ("nominal_diameter_mm", "wall_thickness_mm", "bore", "bore_tolerance_mm", "fiducials")
+_INSPECTION_KEYS = tuple(f.name for f in fields(InspectionFacts))
 _FIDUCIAL_KEYS = ("dictionary", "size_mm", "columns_along", "rows_along", "markers")
 
 
@@ -50,6 +52,24 @@ def _marker(section: Section) -> Marker:
     )
 
 
+def inspection_facts(section: Section) -> InspectionFacts:
+    """Return what the ``inspection`` section says; raises `InputError` at the key at fault."""
+    section.refuse_unknown(_INSPECTION_KEYS)
+    stated = {key: section.text(key) for key in _INSPECTION_KEYS if section.has(key) and key != "date"}
+    return InspectionFacts(**stated, date=_date(section) if section.has("date") else "")
+
+
+def _date(section: Section) -> str:
+    """Return a date as ISO 8601 has it; YAML reads an unquoted one as a date already."""
+    value = section.require("date", "a date such as 2026-05-31")
+    if isinstance(value, datetime.date):
+        return value.isoformat()
+    try:
+        return datetime.date.fromisoformat(str(value)).isoformat()
+    except ValueError as error:
+        raise section.fail("date", f"is {value!r}", "a date such as 2026-05-31") from error
+
+
 @dataclass(frozen=True)
 class Description:
     """What recording.yaml says whatever holds the frames; ``frame_rate`` is None where it says none."""
@@ -60,6 +80,7 @@ class Description:
     pipe: PipeFacts
     probe_file: Path | None
     warnings: tuple[str, ...]
+    inspection: InspectionFacts
 
 
 def describe(section: Section) -> Description:
@@ -72,6 +93,9 @@ def describe(section: Section) -> Description:
         pipe=pipe_facts(section.section("pipe")),
         probe_file=probe_file,
         warnings=warnings,
+        inspection=inspection_facts(section.section("inspection"))
+        if section.has("inspection")
+        else InspectionFacts(),
     )
 
 

@@ -90,6 +90,7 @@ def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Record
         ),
         files=parts.files,
         listed=parts.table,
+        inspection=described.inspection,
     )  # fmt: skip
 
 

@@ -117,6 +117,7 @@ def state_document(state: State, files: RunFiles) -> dict[str, Any]:
         "may_redo": state.may_redo,
         "lost": [_entry(e) for e in state.lost],
         "assumed": state.assumed.model_dump(exclude={"do"}),
+        "described": state.described.model_dump(exclude={"do"}),
         "history": [_entry(e) for e in state.entries],
     }
 

@@ -34,7 +34,9 @@ class State:
     lost : tuple of Entry
         Decisions whose finding a later computation of the run no longer has.
     assumed : Assume
-        Wall thickness and yield strength taken for known.
+        Wall thickness and yield strength, for wall loss and failure pressure.
+    described : Describe
+        For whom, where and how it was inspected, as the recording says and the inspector completed it.
     entries : tuple of Entry
         Those that count, in order.
     """
@@ -46,6 +48,7 @@ class State:
     lost: tuple[Entry, ...]
     assumed: do.Assume
     entries: tuple[Entry, ...]
+    described: do.Describe = do.Describe()
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,14 @@ class Review:
             lost=lost,
             assumed=assumed[-1] if assumed else do.Assume(),
             entries=done,
+            described=self._described(done),
         )
+
+    def _described(self, done: tuple[Entry, ...]) -> do.Describe:
+        """Return what the recording says of the inspection, with what the inspector said last over it."""
+        said = [e.action for e in done if isinstance(e.action, do.Describe)]
+        own = {name: text for name, text in said[-1].model_dump().items() if text} if said else {}
+        return do.Describe(**(self.files.record()["recording"].get("inspection", {}) | own))
 
     def seal(self, state: State) -> Seal:
         """Return what a signature of a state binds; reads every file of the run once."""

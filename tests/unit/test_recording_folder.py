@@ -7,6 +7,7 @@ import pytest
 from pipeline.errors import InputError
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
+from pipeline.recording.base import InspectionFacts
 from pipeline.recording.checks import check_probe_fits
 from tests.made_recording import COUNT, LIGHTS, READINGS, TIMES_S, picture, write_folder
 from tests.shared_data import shared
@@ -202,4 +203,23 @@ def test_spoiled_recordings_are_refused_with_the_place(copy: Path, case: str) ->
 def test_yaml_too_large_is_refused_unread(copy: Path) -> None:
     (copy / "recording.yaml").write_text("#" * 1_000_001)
     with pytest.raises(InputError, match="bytes long"):
+        open_recording(copy)
+
+
+def test_for_whom_and_how_it_was_inspected_is_read_where_it_is_stated(folder: Path, copy: Path) -> None:
+    assert open_recording(folder).inspection == InspectionFacts()
+    with (copy / "recording.yaml").open("a") as file:
+        file.write("\ninspection: {client: Water Works, line: A 12, date: 2026-05-31}\n")
+    stated = open_recording(copy).inspection
+    assert stated == InspectionFacts(client="Water Works", line="A 12", date="2026-05-31")
+
+
+@pytest.mark.parametrize(
+    ("stated", "complaint"),
+    [("{cleint: W}", "did you mean client"), ("{date: yesterday}", "a date such as 2026-05-31")],
+)
+def test_wrong_facts_of_an_inspection_are_refused(copy: Path, stated: str, complaint: str) -> None:
+    with (copy / "recording.yaml").open("a") as file:
+        file.write(f"\ninspection: {stated}\n")
+    with pytest.raises(InputError, match=complaint):
         open_recording(copy)

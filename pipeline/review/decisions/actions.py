@@ -107,6 +107,24 @@ class Assume(_Action):
     yield_mpa: Annotated[float, Field(gt=0, le=5000)] | None = None
 
 
+ShortText = Annotated[str, Field(max_length=200)]
+
+
+class Describe(_Action):
+    """For whom, where and how the pipe was inspected; what is left empty is as the recording says."""
+
+    do: Literal["describe"] = "describe"
+    client: ShortText = ""
+    site: ShortText = ""
+    asset: ShortText = ""
+    line: ShortText = ""
+    operator: ShortText = ""
+    date: Annotated[str, Field(pattern=r"^([0-9]{4}-[0-9]{2}-[0-9]{2})?$")] = ""
+    procedure: ShortText = ""
+    equipment: ShortText = ""
+    calibration: ShortText = ""
+
+
 class Undo(_Action):
     """Take back the last action that still counts."""
 
@@ -119,7 +137,7 @@ class Redo(_Action):
     do: Literal["redo"] = "redo"
 
 
-Deed = Accept | Reject | Reopen | Reclassify | Redraw | Merge | Split | Add | Comment | Assume
+Deed = Accept | Reject | Reopen | Reclassify | Redraw | Merge | Split | Add | Comment | Assume | Describe
 Action = Deed | Undo | Redo
 _ACTION: TypeAdapter[Action] = TypeAdapter(Annotated[Action, Field(discriminator="do")])
 

@@ -51,7 +51,7 @@ def _renamed(entry: Entry, names: dict[str, str]) -> Entry | None:
         if not all(moved):
             return None
         return replace(entry, action=action.model_copy(update={"findings": tuple(moved)}))
-    if isinstance(action, do.Add | do.Assume | do.Undo | do.Redo):
+    if isinstance(action, do.Add | do.Assume | do.Describe | do.Undo | do.Redo):
         return entry
     one = _translated(action.finding, names)
     return replace(entry, action=action.model_copy(update={"finding": one})) if one else None

@@ -137,7 +137,7 @@ def _after(findings: Mapping[str, Finding], entry: Entry, gauge: Gauge) -> dict[
         return _merged([_there(findings, name) for name in action.findings], entry, gauge)
     if isinstance(action, do.Split):
         return _split(_there(findings, action.finding), action.outlines, entry, gauge)
-    if isinstance(action, do.Undo | do.Redo | do.Assume):
+    if isinstance(action, do.Undo | do.Redo | do.Assume | do.Describe):
         return {}
     old = _there(findings, action.finding)
     return {old.id: _changed(old, entry, gauge)}
