@@ -48,7 +48,7 @@ class State:
     lost: tuple[Entry, ...]
     assumed: do.Assume
     entries: tuple[Entry, ...]
-    described: do.Describe = do.Describe()
+    described: do.Describe
 
 
 @dataclass(frozen=True)
