@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.artefacts.findings import Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.outcome import Number
 
@@ -52,13 +53,25 @@ def _of_wall(wall: Wall) -> Iterator[Number]:
         return
     core = slice(rows[0], rows[-1] + 1)
     length = float(radius.distance_mm[rows[-1]] - radius.distance_mm[rows[0]])
-    diameter = 2 * float(np.mean(radius.radius_mm[seen], dtype=np.float64))
+    diameter, diameter_sigma = mean_diameter(radius)
     yield Number("inspected length", round(length, 2), "mm")
     yield Number("wall seen", round(100 * float(np.mean(seen[core])), 2), "%")
     yield Number("mean diameter", round(diameter, 3), "mm")
+    yield Number("1 sigma of the mean diameter", round(diameter_sigma, 4), "mm")
     yield Number("median 1 sigma of the radius", round(float(np.median(radius.sigma_mm[seen])), 4), "mm")
     random = float(np.median(radius.sigma_random_mm[seen]))
     yield Number("median 1 sigma of the radius, random part", round(random, 4), "mm")
+
+
+def mean_diameter(radius: WallMap) -> tuple[float, float]:
+    """Return the mean diameter of what was seen, mm, and its 1 σ.
+
+    What the calibration leaves open is common to all cells and stays; noise is nothing beside it.
+    """
+    seen = np.isfinite(radius.radius_mm)
+    common = radius.sigma_mm[seen].astype(float) ** 2 - radius.sigma_random_mm[seen].astype(float) ** 2
+    sigma = 2 * float(np.sqrt(max(0.0, float(common.mean()))))
+    return 2 * float(np.mean(radius.radius_mm[seen], dtype=np.float64)), sigma
 
 
 def _of_defects(defects: Defects) -> Iterator[Number]:

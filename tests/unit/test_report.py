@@ -121,7 +121,9 @@ def test_no_text_becomes_markup(summary, tmp_path):
 def test_shows_the_pit_with_pictures_clock_and_wall_loss(summary):
     (finding,) = page_of(summary).findings
     assert finding.kind == "pit"
-    assert re.match(r"11:\d\d – 12:\d\d", finding.clock)
+    assert re.match(r"11:\d\d–12:\d\d$", finding.clock)
+    assert re.match(r"[56]\d\.\d mm \(\d\d\.\d–\d\d\.\d mm\)$", finding.distance), "peak and extent"
+    assert re.match(r"\d\.\d+ ± \d\.\d+ mm deep$", finding.depth)
     assert finding.wall_loss in {f"{k} %" for k in range(22, 29)}
     assert finding.photo.startswith("data:image/jpeg;base64,")
     assert finding.deviation.startswith("data:image/jpeg;base64,")

@@ -177,7 +177,6 @@ class Finding:
     length: str
     width: str
     depth: str
-    way: str
     wall_loss: str
     confidence: str
     codes: tuple[str, ...]

@@ -7,12 +7,18 @@ from collections import Counter
 import numpy as np
 
 from pipeline.artefacts.findings import Defect
+from pipeline.artefacts.headline import mean_diameter
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, Wall
 from pipeline.export.report.page import Card, Table
 from pipeline.export.report.summary import RunSummary
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.outcome import WARNING, Number, State
+from pipeline.pages import notation
 
+NOT_CALIBRATED = (
+    "The instrument's numbers are only stated, not calibrated on a gauge: diameters rest on them, "
+    "and a misaligned laser would go unnoticed."
+)
 _ONE = {"corrosion": "area of corrosion"}
 _MANY = {"corrosion": "areas of corrosion"}
 
@@ -32,8 +38,8 @@ def verdict(summary: RunSummary) -> str:
     deepest = summary.defects.deepest
     if deepest is None:
         return told
-    where = f"{_depth(deepest)} at {deepest.distance_from_mm:.0f} mm"
-    return f"{told} The largest deviation is a {deepest.kind} of {where}."
+    depth = notation.depth(deepest.depth_mm, deepest.depth_sigma_mm)
+    return f"{told} The largest deviation is a {deepest.kind}, {depth}, at {deepest.peak_distance_mm:.1f} mm."
 
 
 def cards(summary: RunSummary) -> tuple[Card, ...]:
@@ -51,7 +57,7 @@ def _inspected(summary: RunSummary) -> Card:
     value = "no wall"
     if summary.wall is not None:
         value = f"{np.ptp(_seen_distances(summary.wall)):.0f} mm of pipe"
-        lines.insert(1, f"mean diameter {_mean_diameter(summary.wall)}")
+        lines.insert(1, f"mean diameter {notation.measured(*mean_diameter(summary.wall.radius_map))}")
     return Card("What was inspected", value, tuple(lines))
 
 
@@ -64,11 +70,7 @@ def _instrument(summary: RunSummary) -> Card:
     )
     if probe.calibrated_from:
         return Card("With which instrument", f"calibrated on {probe.calibrated_from}", lines)
-    warning = (
-        "The instrument's numbers are only stated, not calibrated on a gauge: diameters rest on them, "
-        "and a misaligned laser would go unnoticed."
-    )
-    return Card("With which instrument", "stated, not calibrated", lines, warning)
+    return Card("With which instrument", "stated, not calibrated", lines, NOT_CALIBRATED)
 
 
 def _measured(summary: RunSummary) -> Card:
@@ -119,24 +121,10 @@ def _seen_distances(wall: Wall) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.asarray(wall.radius_map.distance_mm[rows] if rows.any() else [0.0], float)
 
 
-def _mean_diameter(wall: Wall) -> str:
-    """Return the mean diameter ± 1 σ; calibration is common to all cells, noise is nothing beside it."""
-    m = wall.radius_map
-    seen = np.isfinite(m.radius_mm)
-    excess = m.sigma_mm[seen].astype(float) ** 2 - m.sigma_random_mm[seen].astype(float) ** 2
-    sigma = 2 * np.sqrt(max(0.0, float(excess.mean())))
-    return f"{2 * float(m.radius_mm[seen].mean(dtype=np.float64)):.3f} ± {sigma:.3f} mm"
-
-
 def _counted(found: tuple[Defect, ...]) -> str:
     counts = Counter(d.kind for d in found)
     words = [f"{n} {_ONE.get(k, k) if n == 1 else _MANY.get(k, k + 's')}" for k, n in counts.most_common()]
     return ", ".join(words)
-
-
-def _depth(defect: Defect) -> str:
-    way = "depth" if defect.depth_mm > 0 else "height"
-    return f"{abs(defect.depth_mm):.2f} ± {defect.depth_sigma_mm:.2f} mm {way}"
 
 
 REASONS = {

@@ -21,6 +21,7 @@ from pipeline.files.codec import digest
 from pipeline.files.provenance import program_version
 from pipeline.instrument.probe import Probe
 from pipeline.machine.outcome import Results, warnings_of
+from pipeline.pages import notation
 from pipeline.recording.base import Recording
 from pipeline.recording.checked_frames import CheckedFrames
 
@@ -105,16 +106,14 @@ def _finding(defect: Defect, photo: str, deviation: str) -> Finding:
         f"PACP, suggested: {defect.pacp_suggestion}",
         f"EN 13508-2, suggested: {defect.en13508_suggestion}",
     )
-    all_round = defect.clock_to - defect.clock_from == 12
     return Finding(
         number=defect.id,
         kind=defect.kind,
-        distance=f"{defect.distance_from_mm:.1f} – {defect.distance_to_mm:.1f} mm",
-        clock="all round" if all_round else f"{_dial(defect.clock_from)} – {_dial(defect.clock_to)}",
+        distance=notation.distance(defect.peak_distance_mm, defect.distance_from_mm, defect.distance_to_mm),
+        clock=notation.clock_extent(defect.clock_from, defect.clock_to),
         length=f"{defect.length_mm:.1f} mm",
         width=f"{defect.width_mm:.1f} mm",
-        depth=f"{abs(defect.depth_mm):.2f} ± {defect.depth_sigma_mm:.2f} mm",
-        way="into the wall" if defect.depth_mm > 0 else "inward",
+        depth=notation.depth(defect.depth_mm, defect.depth_sigma_mm),
         wall_loss=_wall_loss(defect),
         confidence=f"{100 * defect.confidence:.0f} %",
         codes=tuple(c for c in codes if c),
@@ -122,7 +121,7 @@ def _finding(defect: Defect, photo: str, deviation: str) -> Finding:
         statement=defect.statement,
         photo=photo,
         deviation=deviation,
-        description=f"{defect.kind} {defect.id} at {defect.distance_from_mm:.0f} mm",
+        description=f"{defect.kind} {defect.id} at {defect.peak_distance_mm:.0f} mm",
     )
 
 
@@ -130,12 +129,6 @@ def _wall_loss(defect: Defect) -> str:
     if np.isfinite(defect.wall_loss_percent):
         return f"{defect.wall_loss_percent:.0f} %"
     return "thickness unknown" if defect.pof_class else "–"
-
-
-def _dial(hours: float) -> str:
-    """Return a clock position as on a dial, to 6 minutes, which is 3°."""
-    tenths = round(hours * 10) % 120
-    return f"{tenths // 10 or 12}:{6 * (tenths % 10):02d}"
 
 
 def _ranges(frames: list[int]) -> tuple[str, ...]:

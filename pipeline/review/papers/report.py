@@ -1,4 +1,4 @@
-"""What an inspector takes away: the report as PDF and HTML, tables and pictures, all from one set of data."""
+"""What an inspector takes away: the report as PDF and HTML, tables and pictures, all from one content."""
 
 from __future__ import annotations
 
@@ -6,94 +6,54 @@ import base64
 import json
 import tempfile
 import zipfile
-from collections import Counter
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import typst
 from jinja2 import Environment, StrictUndefined
 
-from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
-from pipeline.review.decisions.replay import ACCEPTED, OPEN, REJECTED, Finding
-from pipeline.review.documents import ASSUMPTIONS, cleaned, run_document
-from pipeline.review.papers.tables import (
-    POF_COLUMNS,
-    clock_text,
-    csv_text,
-    finding_picture,
-    findings_table,
-    pof_rows,
-    section_plot,
-)
+from pipeline.review.decisions.replay import GONE, REJECTED, Finding
+from pipeline.review.papers.content import report_content
+from pipeline.review.papers.exchange import en13508_text, pacp_text, pof_text
+from pipeline.review.papers.pictures import canvas_of
+from pipeline.review.papers.tables import csv_text, findings_table
 from pipeline.review.review import Review, State
 
-_HEADLINE_METRICS = 14
-# Headline numbers of the run as measured: the papers tell those of the findings as decided.
-_OF_FINDINGS = ("defects", "deepest defect")
-
-
-def report_data(review: Review, state: State) -> dict[str, Any]:
-    """Return all that the report tells."""
-    run, seal = run_document(review.files), review.seal(state)
-    rows = findings_table(review, state)
-    edited = {row["id"] for row in rows if row["edited"]}
-    said = {str(d["id"]): d["statement"] for d in run["defects"] if str(d["id"]) not in edited}
-    return cleaned({
-        "name": run["name"],
-        "nominal_diameter_mm": run["nominal_diameter_mm"],
-        "distance_mm": run["distance_mm"],
-        "metrics": [*_of_the_run(run["metrics"]), *_decided(rows)],
-        "program": run["program"],
-        "diagnosis": run["diagnosis"],
-        "strength_assumptions": ASSUMPTIONS,
-        "assumed": state.assumed.model_dump(exclude={"do"}),
-        "findings": [row | {"statement": said.get(row["id"], "")} for row in rows],
-        "signed": seal.signed,
-        "signature": asdict(seal.signature) if seal.signature else None,
-        "sha256": seal.sha256,
-    })  # fmt: skip
-
-
-def _of_the_run(metrics: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the run's headline numbers without those of its findings, which decisions may have changed."""
-    return [m for m in metrics[:_HEADLINE_METRICS] if m["name"] not in _OF_FINDINGS]
-
-
-def _decided(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return how many findings were decided how, and the deepest of those not rejected."""
-    count = Counter(row["status"] for row in rows)
-    told = [("accepted", ACCEPTED), ("rejected", REJECTED), ("undecided", OPEN)]
-    out = [{"name": f"findings {word}", "value": count[status], "unit": ""} for word, status in told]
-    depths = [abs(r["depth_mm"]) for r in rows if r["status"] != REJECTED and r["depth_mm"] is not None]
-    if depths:
-        out.append({"name": "largest depth or height not rejected", "value": max(depths), "unit": "mm"})
-    return out
+OVERVIEW = "overview.svg"
+# Findings with pictures, the deepest first: about 100 kB each, of a report that is to open anywhere.
+_MOST_PICTURED = 60
+# PDF/A-2u: for keeping, every font inside, every character with its meaning (ISO 19005-2).
+_STANDARD: Literal["a-2u"] = "a-2u"
 
 
 def pictures(review: Review, state: State) -> dict[str, bytes]:
-    """Return the pictures of every finding that was not rejected, by file name."""
-    overlays, wall = review.files.artefact(Overlays), review.wall()
-    made: dict[str, bytes] = {}
-    for finding in pictured(state):
-        distance, azimuth = (float(v) for v in np.mean(np.asarray(finding.outline), axis=0))
-        made[f"{finding.id}.jpg"] = finding_picture(review.files, finding, overlays.nominal_radius_mm)
-        made[f"{finding.id}.svg"] = section_plot(wall, overlays, distance, azimuth)
-    return made
+    """Return the picture of the whole wall and one of every finding shown, by file name."""
+    canvas, shown = canvas_of(review.files), pictured(state)
+    labels = {row["id"]: row["label"] for row in findings_table(review, state)}
+    named = [(labels[f.id].split(" ")[0], f) for f in state.findings if f.status not in (REJECTED, GONE)]
+    return {OVERVIEW: canvas.overview(named)} | {picture_name(f.id): canvas.finding(f) for f in shown}
 
 
 def pictured(state: State) -> tuple[Finding, ...]:
-    """Return the findings that the papers show."""
-    return tuple(f for f in state.findings if f.status not in (REJECTED, "gone"))
+    """Return the findings that the papers show with a picture: the deepest of those not rejected."""
+    standing = [f for f in state.findings if f.status not in (REJECTED, GONE)]
+    deepest = sorted(standing, key=lambda f: -abs(np.nan_to_num(f.size.depth_mm)))[:_MOST_PICTURED]
+    return tuple(f for f in standing if f in deepest)
+
+
+def picture_name(finding: str) -> str:
+    """Return the file name of a finding's picture."""
+    return f"finding-{finding}.svg"
 
 
 def pdf_report(review: Review, state: State) -> bytes:
-    """Return the report as PDF; names and remarks reach the page as data, never as markup.
+    """Return the report as PDF/A; names and remarks reach the page as data, never as markup.
 
     Raises
     ------
@@ -107,7 +67,9 @@ def pdf_report(review: Review, state: State) -> bytes:
             (folder / file).write_bytes(content)
         template = files("pipeline.review.papers").joinpath("report.typ").read_bytes()
         (folder / "report.typ").write_bytes(template)
-        made = typst.compile(str(folder / "report.typ"), root=str(folder), ignore_system_fonts=True)
+        made = typst.compile(
+            str(folder / "report.typ"), root=str(folder), ignore_system_fonts=True, pdf_standards=[_STANDARD]
+        )
     return bytes(made)
 
 
@@ -115,10 +77,10 @@ def html_report(review: Review, state: State) -> str:
     """Return the report as one HTML file without scripts."""
     page = files("pipeline.review.papers").joinpath("report.html").read_text("utf-8")
     shown = {k: base64.b64encode(v).decode("ascii") for k, v in pictures(review, state).items()}
-    environment = Environment(undefined=StrictUndefined, autoescape=True)
-    return environment.from_string(page).render(
-        d=_with_pictures(review, state), pictures=shown, hour=clock_text
+    environment = Environment(
+        undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
+    return environment.from_string(page).render(d=_with_pictures(review, state), pictures=shown)
 
 
 def pictures_archive(review: Review, state: State) -> bytes:
@@ -132,8 +94,9 @@ def pictures_archive(review: Review, state: State) -> bytes:
 
 def _with_pictures(review: Review, state: State) -> dict[str, Any]:
     shown = {f.id for f in pictured(state)}
-    data = report_data(review, state)
-    return data | {"findings": [row | {"pictured": row["id"] in shown} for row in data["findings"]]}
+    data = report_content(review, state)
+    rows = [r | {"picture": picture_name(r["id"]) if r["id"] in shown else ""} for r in data["findings"]]
+    return data | {"findings": rows, "overview": OVERVIEW}
 
 
 @dataclass(frozen=True)
@@ -165,11 +128,7 @@ def _csv(review: Review, state: State) -> bytes:
 
 
 def _json(review: Review, state: State) -> bytes:
-    return json.dumps(report_data(review, state), indent=1, ensure_ascii=False, allow_nan=False).encode()
-
-
-def _pof(review: Review, state: State) -> bytes:
-    return csv_text(pof_rows(findings_table(review, state), state), POF_COLUMNS).encode("utf-8-sig")
+    return json.dumps(report_content(review, state), indent=1, ensure_ascii=False, allow_nan=False).encode()
 
 
 def _html(review: Review, state: State) -> bytes:
@@ -181,6 +140,8 @@ PAPERS: dict[str, tuple[str, bool, Callable[[Review, State], bytes]]] = {
     "report.html": ("text/html", False, _html),
     "findings.csv": ("text/csv", False, _csv),
     "findings.json": ("application/json", False, _json),
-    "pof.csv": ("text/csv", False, _pof),
+    "pof.csv": ("text/csv", False, pof_text),
+    "pacp.csv": ("text/csv", False, pacp_text),
+    "en13508-2.txt": ("text/plain", False, en13508_text),
     "pictures.zip": ("application/zip", False, pictures_archive),
 }
