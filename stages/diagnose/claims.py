@@ -107,7 +107,12 @@ def claims_of(field: Seen | None, gauge: Seen | None) -> list[Claim]:
             out.append(_borne_out(*sorted(each, key=lambda c: c.p_value)))
         else:
             out.append(_against(each[0], field if name in of_gauge else gauge))
-    return sorted(out, key=lambda c: c.p_value)
+    return sorted((c for c in out if not _excluded(c, out)), key=lambda c: c.p_value)
+
+
+def _excluded(claim: Claim, claims: Sequence[Claim]) -> bool:
+    """Return whether a recording that tells a claim's rivals apart has decided for one of them."""
+    return any(c.name in claim.alike and claim.name not in c.alike for c in claims)
 
 
 def _of_recording(seen: Seen | None) -> dict[str, Claim]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import Channel
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of
 from stages.diagnose.gauge import answer as of_gauge
@@ -14,6 +15,7 @@ from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import Diagnosis, EffectFound, Location, Verdict, classes_of, record_next
 
 _SAME_FREQUENCY_HZ = 0.15
+_IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _AGAIN = (
     "To see what the pattern goes with, record the gauge again: rolled by 90° (probe or gauge), at another "
     "speed (time), after warming up (drift)."
@@ -29,17 +31,18 @@ def composed(
     """
     examined = gauge.geometry if gauge is not None else None
     every = claims_of(field, gauge)
-    said = _said(examined, every, without)
+    unexplained = _unexplained_profile(field, gauge)
+    said = _said(examined, every, without, bool(unexplained))
     asked = said.members if said.verdict is Verdict.CLASS else [e.name for e in said.effects]
     return Diagnosis(
         recording=field.recording.name if field is not None else "",
         gauge=gauge.recording.name if gauge is not None else "",
         verdict=said.verdict,
         global_p=_global_p(field, gauge),
-        location=_location(examined, every, asked),
+        location=_location(examined, every, asked) or (_IN_PROFILE if unexplained else None),
         effects=said.effects,
         members=said.members,
-        identifiable=_identifiable(said, examined),
+        identifiable=" ".join(s for s in (_identifiable(said, examined), *unexplained) if s),
         fit=examined.quality if examined is not None else None,
         record_next=_next(said.verdict, asked),
         feasibility=examined.feasibility if examined is not None else (),
@@ -59,10 +62,15 @@ class _Said:
     members: tuple[str, ...]
 
 
-def _said(examined: Examined | None, every: Sequence[Claim], without: Collection[str]) -> _Said:
-    """Return what rings and fiducials, and then the claims beyond them, come to."""
+def _said(
+    examined: Examined | None, every: Sequence[Claim], without: Collection[str], unexplained: bool
+) -> _Said:
+    """Return what rings and fiducials, and then the claims beyond them, come to.
+
+    Where the line's profile shows what nothing explains, ``unexplained``, no name stands alone.
+    """
     known = [c for c in every if c.name not in without]
-    nameless = len(known) < len(every)
+    nameless = unexplained or len(known) < len(every)
     verdict = verdict_of_rings(examined, bool(known))
     of_rings = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(known, of_rings)
@@ -136,7 +144,8 @@ def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Cla
 
 def _location(examined: Examined | None, claims: Sequence[Claim], asked: Sequence[str]) -> Location | None:
     """Return the place as far as it was measured, and for the rest what all causes in question share."""
-    if examined is not None and examined.location is not None:
+    of_claims = bool(asked) and set(asked) <= {c.name for c in claims}
+    if examined is not None and examined.location is not None and not of_claims:
         return examined.location
     if not claims:
         return None
@@ -147,6 +156,12 @@ def _location(examined: Examined | None, claims: Sequence[Claim], asked: Sequenc
         fixed_to=measured.fixed_to or (fixed_to.pop() if len(fixed_to) == 1 else None),
         time=measured.time or (time.pop() if len(time) == 1 else None),
     )
+
+
+def _unexplained_profile(*recordings: Seen | None) -> tuple[str, ...]:
+    """Return sentences on what the lines' profiles show and no shape with a name fits."""
+    profiles = [(s.recording.name, s.profile) for s in recordings if s is not None and s.profile is not None]
+    return tuple(f"{name}: {p.unexplained.statement}" for name, p in profiles if p.unexplained is not None)
 
 
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:

@@ -13,7 +13,6 @@ from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.profile.cells import Cells, LineGeometry
 from stages.diagnose.profile.finding import (
-    Curve,
     Finding,
     Regression,
     Size,
@@ -61,17 +60,10 @@ def vignetting_finding(recording: Recording, probe: Probe) -> Finding:
     test = tested(float(fit.coefficient[1]), float(fit.sigma[1]), FALLOFF_FLOOR, fit.groups)
     sigma = float(np.hypot(fit.sigma[0], EXPONENT_FLOOR))
     exponent, falloff = (float(c) for c in fit.coefficient[:2])
-    middle = np.nanmean(np.log(grey), axis=0)
-    predicted = exponent * light + falloff * np.log(np.cos(theta))
     return finding(
         "vignetting", test.z, test.p_value, (Size("falloff", "", falloff, test.sigma),),
         f"The lit wall's grey follows the light to the power {exponent:.2f} and falls off as cos^k θ with "
         f"k = {falloff:+.2f}.",
-        Curve(
-            "Grey of the lit wall by polar angle", "polar angle, deg", "ln of grey",
-            np.degrees(theta), middle,
-            np.full(len(theta), EXPONENT_FLOOR), predicted + np.nanmean(middle - predicted),
-        ),
         confirms=(Size("gamma.exponent", "", exponent, sigma),), alike=("gamma",),
     )  # fmt: skip
 
@@ -144,14 +136,9 @@ def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Fi
         Size("azimuth_deg", "deg", azimuth, width / max(z, 1.0)),
         Size("width_deg", "deg", width, 0.3 * width),
     )  # fmt: skip
-    dip = np.exp(-0.5 * ((np.degrees(rings.azimuth_rad) - azimuth + 180) % 360 - 180) ** 2 / width**2)
-    curve = Curve(
-        "Brightness of the line by camera azimuth", "azimuth, deg", "ln of brightness less its slow part",
-        np.degrees(rings.azimuth_rad), middle, sigma, -depth * dip,
-    )  # fmt: skip
     return finding(
         "dust", z, p, sizes,
-        f"At {azimuth:.0f}° the line is {100 * -np.expm1(-depth):.0f} % darker in all frames alike.", curve,
+        f"At {azimuth:.0f}° the line is {100 * -np.expm1(-depth):.0f} % darker in all frames alike.",
         alike=("fixed_pattern",),
     )  # fmt: skip
 
@@ -165,13 +152,9 @@ def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
     share = profiles.background[used] / height[used]
     worst = float(np.percentile(share, 90))
     z = worst / STRAY_FLOOR
-    curve = Curve(
-        "Light beside the line", "frame", "share of the line's height",
-        profiles.frame[used].astype(float), share, np.full(used.sum(), STRAY_FLOOR), np.zeros(used.sum()),
-    )  # fmt: skip
     return finding(
         "ambient_light", z, float(2 * norm.sf(abs(z))), (Size("relative", "", worst, STRAY_FLOOR),),
-        f"Beside the line lies light of {100 * worst:.2f} % of its height where there is most.", curve,
+        f"Beside the line lies light of {100 * worst:.2f} % of its height where there is most.",
     )  # fmt: skip
 
 

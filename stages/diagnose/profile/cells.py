@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -167,6 +167,13 @@ class Cells:
             self.width_px[k], self.rest[k], self.whole[k], self.azimuth_rad[k], self.px_per_mm[k],
             self.radius_mm[k], self.height[k], self.frames[first:end],
         )  # fmt: skip
+
+    def less(self, light: Float) -> Cells:
+        """Return the cells without a light (M, B), over the line's height, in those that are whole."""
+        profile, rest = self.profile.copy(), self.rest.copy()
+        profile[self.whole] -= light
+        rest[self.whole] -= light
+        return replace(self, profile=profile, rest=rest)
 
 
 def make_cells(profiles: LineProfiles, geometry: LineGeometry) -> Cells:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
@@ -25,12 +25,12 @@ from stages.diagnose.profile.brightness import (
 from stages.diagnose.profile.cells import Cells, LineGeometry, line_geometry, make_cells
 from stages.diagnose.profile.finding import Finding, Size
 from stages.diagnose.profile.measure import LineProfiles, measure_profiles
-from stages.diagnose.profile.secondary import ghost_findings
+from stages.diagnose.profile.naming import UNEXPLAINED, shape_findings
 from stages.diagnose.profile.sensor import locking_finding, pattern_finding
-from stages.diagnose.profile.shape import settle, skew_findings
-from stages.diagnose.profile.width import blur_finding, width_findings
+from stages.diagnose.profile.width import blur_finding
 
 _LEAST_BLOCKS = 4
+_SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
 Test = Callable[[Cells], tuple[Finding, ...]]
 _HALVES = ("first half of the frames", "second half of the frames")
 # A jackknife over fewer blocks gives no usable σ.
@@ -82,27 +82,24 @@ class ProfileEvidence:
         Name of the recording.
     frame : (F,) int
         Frames lit by the laser alone.
-    azimuth_rad : (S,)
-        Middles of the sectors.
     findings : tuple of Finding
         One an effect, found or not.
-    offset_px : (B,)
-        Distance from the line, outward positive.
-    profile : (S, B)
-        The line by sector, all blocks averaged, over its height; NaN where it was not seen.
     """
 
     source: str
     frame: Int
-    azimuth_rad: Float
     findings: tuple[Finding, ...]
-    offset_px: Float
-    profile: Float
 
     @property
     def found(self) -> tuple[Finding, ...]:
-        """Findings beyond what image formation and chance do, the clearest first."""
-        return tuple(sorted((f for f in self.findings if f.found), key=lambda f: -abs(f.z)))
+        """Findings with a name beyond what image formation and chance do, the clearest first."""
+        named = (f for f in self.findings if f.found and f.effect != UNEXPLAINED)
+        return tuple(sorted(named, key=lambda f: -abs(f.z)))
+
+    @property
+    def unexplained(self) -> Finding | None:
+        """What the line shows that no shape with a name fits; None where there is nothing of the kind."""
+        return next((f for f in self.findings if f.effect == UNEXPLAINED), None)
 
     def with_finding(self, finding: Finding) -> ProfileEvidence:
         """Return the evidence with the finding of one effect replaced."""
@@ -160,14 +157,25 @@ def _examined(recording: Recording, rings: RingSamples, probe: Probe, context: C
         pattern_finding(profiles, recording.source.image_size),
     )
     telling = [test for test, each in zip(tests, shown, strict=True) if any(f.found for f in each)]
-    findings = with_halves(settle(findings, cells), telling, cells)
+    findings = with_halves(_spot_or_pixels(findings), telling, cells)
     context.report("effects found in the line's profile", sum(f.found for f in findings), "effects")
-    whole = np.where(cells.whole[:, None], cells.profile, np.nan).reshape(
-        len(cells.frames), -1, len(cells.offset_px)
-    )
-    return ProfileEvidence(
-        recording.name, profiles.frame, profiles.azimuth_rad, findings, cells.offset_px, _mean(whole)
-    )
+    return ProfileEvidence(recording.name, profiles.frame, findings)
+
+
+def _spot_or_pixels(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Return the findings, spot and pixels' own gains without each other as rival where that was found even.
+
+    Gains of single pixels would show in their own test long before they made a dip in all frames.
+    """
+    by_name = {f.effect: f for f in findings}
+
+    def settled(found: Finding) -> Finding:
+        rival = by_name.get(_SPOT_OR_PIXELS.get(found.effect, ""))
+        if rival is None or rival.found or not rival.sizes:
+            return found
+        return replace(found, alike=tuple(n for n in found.alike if n != rival.effect))
+
+    return tuple(settled(f) for f in findings)
 
 
 def _tests(
@@ -175,19 +183,10 @@ def _tests(
 ) -> tuple[Test, ...]:
     """Return the tests that any cells of the recording can be put to."""
     return (
-        lambda cells: ghost_findings(cells, geometry, probe),
-        lambda cells: skew_findings(cells, geometry, probe),
-        lambda cells: width_findings(cells, geometry, probe),
+        lambda cells: shape_findings(cells, geometry, probe),
         lambda cells: (blur_finding(cells, geometry, probe),),
         lambda cells: (dust_finding(rings, profiles, cells),),
         lambda cells: (decentre_finding(geometry, cells),),
         lambda cells: (clip_finding(profiles, cells, geometry),),
         lambda cells: (locking_finding(rings, profiles, cells),),
     )
-
-
-def _mean(values: Float) -> Float:
-    """Return the mean over the first axis of what is finite."""
-    known = np.isfinite(values)
-    count = known.sum(0)
-    return np.asarray(np.where(known, values, 0.0).sum(0) / np.where(count > 0, count, np.nan))

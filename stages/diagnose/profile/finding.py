@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
@@ -104,19 +104,6 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Curve:
-    """What was measured and what the effect predicts, to be drawn: (K,) each."""
-
-    title: str
-    x_label: str
-    y_label: str
-    x: Float
-    measured: Float
-    sigma: Float
-    predicted: Float
-
-
-@dataclass(frozen=True)
 class Finding:
     """The test of one effect.
 
@@ -136,9 +123,6 @@ class Finding:
         Likewise.
     statement : str
         What was seen, with numbers.
-    curve : Curve or None
-    shift_px : (F, S) or None
-        By how much the line is found too far out for it, per frame and sector of the evidence.
     confirms : tuple of Size
         Sizes of other effects that this measurement gives independently, named ``effect.quantity``.
     alike : tuple of str
@@ -154,8 +138,6 @@ class Finding:
     fixed_to: FixedTo | None
     time: str | None
     statement: str
-    curve: Curve | None = None
-    shift_px: Float | None = None
     confirms: tuple[Size, ...] = ()
     alike: tuple[str, ...] = ()
     agreements: tuple[Agreement, ...] = ()
@@ -167,15 +149,20 @@ class Finding:
 
 
 def finding(
-    name: str, z: float, p_value: float, sizes: tuple[Size, ...], statement: str, curve: Curve | None = None,
-    shift_px: Float | None = None, confirms: tuple[Size, ...] = (), alike: tuple[str, ...] = (),
+    name: str, z: float, p_value: float, sizes: tuple[Size, ...], statement: str,
+    confirms: tuple[Size, ...] = (), alike: tuple[str, ...] = (),
 ) -> Finding:  # fmt: skip
     """Return the finding of an effect; what it is fixed to is stated only where the test shows that."""
     fixed_to = FixedTo.CAMERA if name in _OF_THE_SENSOR else None
     time = "speed" if name == "motion_blur" else None
-    return Finding(name, z, p_value, sizes, fixed_to, time, statement, curve, shift_px, confirms, alike)
+    return Finding(name, z, p_value, sizes, fixed_to, time, statement, confirms, alike)
 
 
 def untestable(name: str, why: str) -> Finding:
     """Return the finding of an effect that these frames cannot show."""
     return finding(name, 0.0, 1.0, (), why)
+
+
+def withdrawn(found: Finding) -> Finding:
+    """Return a finding that something else explains better: measured, and not found."""
+    return replace(found, p_value=1.0, confirms=(), alike=())

@@ -65,13 +65,6 @@ class SecondLine:
         """By how much the weighted sum of squares falls."""
         return self.relative**2 * self.information
 
-    def stack(self, found: Responses, offset_px: Float) -> Float:
-        """Return (K,) the height found at offsets (K,) from the line's place, over all cells."""
-        places = [self.distance_px + o for o in offset_px]
-        score = np.array([_at(found.score, found, d).sum() for d in places])
-        information = np.array([_at(found.information, found, d).sum() for d in places])
-        return np.asarray(score / np.maximum(information, 1e-12))
-
 
 def bounced(found: Responses, cells: Cells, floor: float) -> SecondLine:
     """Return the best line bounced across the bore: parameters tan φ (along x, y) and ε₀, rad.

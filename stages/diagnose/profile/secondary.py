@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells, LineGeometry
-from stages.diagnose.profile.finding import Curve, Finding, Size, finding, untestable
+from stages.diagnose.profile.finding import Finding, Size, finding, untestable
 from stages.diagnose.profile.ghost import SecondLine, bounced, copied
-from stages.diagnose.profile.matched_filter import Responses, responses
+from stages.diagnose.profile.matched_filter import responses
 
 # Light relative to the line's height that compression may leave on one side only: in places, and everywhere.
 # Debt: data/debts.md.
@@ -37,14 +36,19 @@ def ghost_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     bounced_wins = ring.misfit_drop > _BETTER * copy.misfit_drop
     copied_wins = copy.misfit_drop > _SIMPLER * ring.misfit_drop
     return (
-        _ring_finding(ring, cells, geometry, probe, found, kept=not copied_wins),
-        _copy_finding(copy, cells, geometry, found, kept=not bounced_wins),
+        _ring_finding(ring, geometry, probe, kept=not copied_wins),
+        _copy_finding(copy, geometry, kept=not bounced_wins),
     )
 
 
-def _ring_finding(
-    line: SecondLine, cells: Cells, geometry: LineGeometry, probe: Probe, found: Responses, *, kept: bool
-) -> Finding:
+def without_bounced_line(cells: Cells) -> Cells:
+    """Return the cells without the best line bounced across the bore."""
+    line, w = bounced(responses(cells), cells, BOUNCED_FLOOR), cells.whole
+    away = (cells.offset_px - cells.centre_px[w, None] - line.distance_px[:, None]) / cells.width_px[w, None]
+    return cells.less(line.relative * np.exp(-0.5 * away**2))
+
+
+def _ring_finding(line: SecondLine, geometry: LineGeometry, probe: Probe, *, kept: bool) -> Finding:
     test = line.test
     tilt_x, tilt_y, cone = line.parameters
     lever_px = np.array([4.0, 4.0, 2.0]) * float(np.nanmedian(geometry.px_per_mm * geometry.radius_mm))
@@ -56,24 +60,18 @@ def _ring_finding(
         _degrees("laser_tilt.tilt_deg along y", tilt_y - stated.tilt_y, sigma[1]),
         _degrees("laser_cone.cone_deg", cone - np.tan(stated.cone_rad), sigma[2]),
     )
-    scale = geometry.px_per_mm * geometry.radius_mm
-    psi = geometry.azimuth_rad
-    apart = 4 * scale * (tilt_x * np.cos(psi) + tilt_y * np.sin(psi)) - 2 * scale * cone
     tilt_deg, cone_deg = np.degrees(np.arctan(np.hypot(tilt_x, tilt_y))), np.degrees(np.arctan(cone))
     return finding(
         "ghost_ring", test.z, test.p_value if kept else 1.0,
         (Size("relative", "", line.relative, test.sigma),),
         f"A second line of {100 * line.relative:.2f} % lies where light bounced across the bore would: "
         f"the sheet tilts by {tilt_deg:.3f}° and is a cone of {cone_deg:+.3f}°.",
-        _curve(cells, found, line, "A line bounced across the bore"),
-        pulled(apart, geometry.width_px, line.relative), confirms if kept else (),
+        confirms if kept else (),
         alike=() if kept else ("tube_ghost",),
     )  # fmt: skip
 
 
-def _copy_finding(
-    line: SecondLine, cells: Cells, geometry: LineGeometry, found: Responses, *, kept: bool
-) -> Finding:
+def _copy_finding(line: SecondLine, geometry: LineGeometry, *, kept: bool) -> Finding:
     distance, test = float(line.parameters[0]), line.test
     systematic = PLACE_FLOOR_PX / float(np.nanmedian(geometry.px_per_mm))
     sigma = float(np.hypot(np.sqrt(line.parameter_covariance[0, 0]), systematic))
@@ -82,32 +80,9 @@ def _copy_finding(
         (Size("relative", "", line.relative, test.sigma), Size("separation_mm", "mm", distance, sigma)),
         f"A copy of the line of {100 * line.relative:.2f} % lies {distance:+.2f} mm along the axis from it, "
         "the same all round.",
-        _curve(cells, found, line, "A copy of the line at a constant distance"),
-        pulled(-geometry.px_per_mm * distance, geometry.width_px, line.relative),
         alike=() if kept else ("ghost_ring",),
     )  # fmt: skip
 
 
-def pulled(apart_px: Float, width_px: Float, relative: float) -> Float:
-    """Return (F, S) by how much a Gaussian fit is drawn toward a fainter line ``apart_px`` away, px.
-
-    First order in the height: the overlap of the second line with the fit's influence function.
-    """
-    typical = float(np.nanmedian(width_px)) if np.isfinite(width_px).any() else 1.0
-    x = apart_px / np.where(np.isfinite(width_px), width_px, typical)
-    return np.asarray(relative * apart_px * np.exp(-0.25 * x * x))
-
-
 def _degrees(name: str, slope: float, sigma: float) -> Size:
     return Size(name, "deg", float(np.degrees(slope)), float(np.degrees(sigma)))
-
-
-def _curve(cells: Cells, found: Responses, line: SecondLine, title: str) -> Curve:
-    """Return the second line's response around its place, stacked over all cells."""
-    offset = np.arange(-12.0, 12.01, 0.5)
-    height = line.stack(found, offset)
-    width = float(np.median(cells.width_px[cells.whole]))
-    return Curve(
-        title, "distance from where it should be, px", "share of the line's height", offset, height,
-        np.full(len(offset), line.test.sigma), line.relative * np.exp(-0.25 * (offset / width) ** 2),
-    )  # fmt: skip

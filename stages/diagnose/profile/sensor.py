@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.finding import Curve, Finding, Size, finding, regress, tested, untestable
+from stages.diagnose.profile.finding import Finding, Size, finding, regress, tested, untestable
 from stages.diagnose.profile.measure import LineProfiles
 
 # Locking of a line to pixels by pixel integration, rounding and compression, px. Debt: data/debts.md.
@@ -47,7 +46,6 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
         "pixel_locking", test.z, test.p_value,
         (Size("amplitude_px", "px", float(fit.coefficient[0]), sigma),),
         f"The line's radius follows the pixels by {size:.4f} ± {sigma:.4f} px.",
-        _phase_curve(rough, smooth, fit.coefficient),
     )  # fmt: skip
 
 
@@ -82,21 +80,6 @@ def _smoothed(values: Float, valid: Bool) -> Float:
     total = uniform_filter1d(some, _SMOOTH_AZIMUTHS, axis=1, mode="wrap")
     weight = uniform_filter1d(valid.astype(float), _SMOOTH_AZIMUTHS, axis=1, mode="wrap")
     return np.asarray(total / np.maximum(weight, 1e-3))
-
-
-def _phase_curve(rough: Float, smooth: Float, coefficient: Float) -> Curve:
-    edges = np.linspace(0, 1, 17)
-    phase, known = (smooth % 1).ravel(), np.isfinite(rough).ravel()
-    index = np.digitize(phase, edges) - 1
-    parts = [rough.ravel()[known & (index == k)] for k in range(16)]
-    x = (edges[1:] + edges[:-1]) / 2
-    turn = 2 * np.pi * x
-    return Curve(
-        "Radius against the pixels' phase", "fraction of a pixel", "px", x,
-        np.array([np.median(p) if len(p) else np.nan for p in parts]),
-        np.array([robust_spread(p) / np.sqrt(len(p)) if len(p) else np.nan for p in parts]),
-        coefficient[0] * np.sin(turn) + coefficient[1] * np.cos(turn),
-    )  # fmt: skip
 
 
 def _gains(profiles: LineProfiles, image_size: tuple[int, int]) -> tuple[list[Float], list[Bool]]:

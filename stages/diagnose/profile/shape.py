@@ -1,4 +1,4 @@
-"""Whether the line is skewed, by the sheet or by light from within the wall, and which rival explains it.
+"""Whether the line is skewed, by the sheet or by light from within the wall, and by how much.
 
 The skewed line is a normal of 1 σ s and an exponential of mean τ added (the simplest one-sided line: light
 that travels on in the sheet's profile or in the wall). All that a Gaussian fit makes of it depends on τ/s
@@ -7,17 +7,16 @@ alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import erfcx
 
-from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import CORE_REACH, Cells, LineGeometry, fit_gaussians
-from stages.diagnose.profile.finding import Curve, Finding, Size, Tested, finding, regress, tested, untestable
+from stages.diagnose.profile.finding import Finding, Size, Tested, finding, regress, tested, untestable
+from stages.diagnose.profile.line_spread import exponential_gaussian
 from stages.diagnose.profile.width import scale_law
 
 # Half a grey level of compression on one flank of a line 100 levels high, over its whole width.
@@ -28,9 +27,6 @@ _SMALLEST_BLUR_PX2 = 1 / 12
 _CLEARLY = 3.0
 _RATIOS = np.linspace(0.0, 3.0, 61)
 _SIGMA_PX, _REACH_PX, _STEP_PX = 1.2, 12.0, 0.05
-_REACH_WIDTHS, _STEP_WIDTHS = 7.0, 0.25
-_OVERLAP_WIDTHS = 5.0
-_SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
 
 
 def third_hermite(rest: Float, offset_px: Float, centre_px: Float, width_px: Float) -> Float:
@@ -60,39 +56,26 @@ def cell_skewness(cells: Cells) -> Float:
 class SkewTable:
     """What a Gaussian fit makes of the skewed line with τ/s = ``ratio``, all (K,) and in units of s.
 
-    ``hermite``: third coefficient; ``width``: fitted 1 σ; ``centre``: fitted centre from the normal's.
+    ``hermite``: third coefficient; ``width``: fitted 1 σ.
     """
 
     ratio: Float
     hermite: Float
     width: Float
-    centre: Float
 
 
 @cache
 def skew_table() -> SkewTable:
     """Return the table; it is computed once."""
-    t = np.arange(-_REACH_PX, _REACH_PX, _STEP_PX)
-    profile = np.array([exponential_gaussian(t, _SIGMA_PX, k * _SIGMA_PX) for k in _RATIOS])
+    t, sigma = np.arange(-_REACH_PX, _REACH_PX, _STEP_PX), np.array(_SIGMA_PX)
+    profile = np.array([exponential_gaussian(t, sigma, k * sigma) for k in _RATIOS])
     profile /= profile.max(axis=1, keepdims=True)
     moved = np.array([t[int(np.argmax(p))] for p in profile])
     placed = np.array([np.interp(t + m, t, p) for p, m in zip(profile, moved, strict=True)])
     centre, width, peak = fit_gaussians(placed, t)
     rest = placed / peak[:, None] - np.exp(-0.5 * ((t - centre[:, None]) / width[:, None]) ** 2)
     hermite = third_hermite(rest, t, centre, width)
-    return SkewTable(_RATIOS, hermite, width / _SIGMA_PX, (centre + moved) / _SIGMA_PX)
-
-
-def exponential_gaussian(t: Float, sigma: float, tau: float) -> Float:
-    """Return the density (...) of a normal of 1 σ ``sigma`` at 0 plus an exponential of mean ``tau``."""
-    normal = np.exp(-0.5 * (t / sigma) ** 2)
-    if tau < 1e-3 * sigma:
-        return np.asarray(normal / (sigma * np.sqrt(2 * np.pi)))
-    argument = (sigma / tau - t / sigma) / np.sqrt(2)
-    with np.errstate(over="ignore", invalid="ignore"):
-        scaled = normal * erfcx(argument)
-        tail = 2 * np.exp(0.5 * (sigma / tau) ** 2 - t / tau)
-    return np.asarray(np.where(np.isfinite(scaled), scaled, tail) / (2 * tau))
+    return SkewTable(_RATIOS, hermite, width / _SIGMA_PX)
 
 
 def skew_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[Finding, Finding]:
@@ -109,7 +92,7 @@ def skew_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[F
     hermite = float(mean.coefficient[0])
     test = tested(hermite, float(mean.sigma[0]), HERMITE_FLOOR, mean.groups)
     tail = _Tail(cells, geometry, probe, hermite, test.sigma)
-    return _judged(tail, test, _curve(cells, coefficient), geometry)
+    return _judged(tail, test)
 
 
 class _Tail:
@@ -167,7 +150,7 @@ class _Tail:
         return bool(off < _CLEARLY and left > _SMALLEST_BLUR_PX2 - _CLEARLY * max(spread, 0.05))
 
 
-def _judged(tail: _Tail, test: Tested, curve: Curve, geometry: LineGeometry) -> tuple[Finding, Finding]:
+def _judged(tail: _Tail, test: Tested) -> tuple[Finding, Finding]:
     """Return both findings; one that the widths rule out keeps p = 1."""
     z, p = test.z, test.p_value
     side = "outside" if tail.sign > 0 else "inside"
@@ -177,104 +160,11 @@ def _judged(tail: _Tail, test: Tested, curve: Curve, geometry: LineGeometry) -> 
     sheet = finding(
         "line_skew", z, 1.0 if wall_only else p, (tail.skewness,),
         f"{seen} Skewness {tail.skewness.value:+.2f} of the sheet; variance {width:.2f} of the stated.",
-        curve, _shift(tail, geometry, mean_kept=True), alike=() if sheet_only else ("subsurface",),
+        alike=() if sheet_only else ("subsurface",),
     )  # fmt: skip
     wall = finding(
         "subsurface", z, 1.0 if sheet_only else p, (tail.transport,),
         f"{seen} A tail {tail.tau_mm:.3f} mm long adds to it; variance {width:.2f} of the stated.",
-        curve, _shift(tail, geometry, mean_kept=False), alike=() if wall_only else ("line_skew",),
+        alike=() if wall_only else ("line_skew",),
     )  # fmt: skip
     return sheet, wall
-
-
-def _shift(tail: _Tail, geometry: LineGeometry, *, mean_kept: bool) -> Float:
-    """Return (F, S) by how much a Gaussian fit finds the line farther out than the sheet's own middle."""
-    table = skew_table()
-    centre = float(np.interp(tail.ratio, table.ratio, table.centre)) - (tail.ratio if mean_kept else 0.0)
-    return np.asarray(tail.sign * centre / max(tail.ratio, 1e-9) * tail.tau_mm * geometry.px_per_mm)
-
-
-def _curve(cells: Cells, coefficient: Float) -> Curve:
-    """Return what Gaussian fits leave, mean over all cells, against the third Hermite function."""
-    x = np.linspace(-4, 4, 33)
-    w = cells.whole
-    place = (cells.offset_px - cells.centre_px[w, None]) / cells.width_px[w, None]
-    rest = np.array([np.interp(x, p, r) for p, r in zip(place, cells.rest[w], strict=True)])
-    mean = np.median(rest, axis=0)
-    sigma = robust_spreads(rest - mean, axis=0) / np.sqrt(max(len(rest), 1))
-    predicted = np.nanmedian(coefficient) * (x**3 - 3 * x) * np.exp(-0.5 * x * x)
-    return Curve(
-        "What a Gaussian leaves of the line", "distance from the line, line widths", "share of the height",
-        x, mean, sigma, predicted,
-    )  # fmt: skip
-
-
-def settle(findings: tuple[Finding, ...], cells: Cells) -> tuple[Finding, ...]:
-    """Return the findings, each effect kept only where no other found one explains it better.
-
-    A skewed line and a copy on its shoulder look alike: the one that leaves less of the mean profile stays.
-    A tail that light within the wall adds also widens the line, which is then no response's doing.
-    """
-    by_name = {f.effect: f for f in findings}
-    lost: dict[str, str] = {}
-    skewed = next((by_name[n] for n in ("line_skew", "subsurface") if by_name[n].found), None)
-    if skewed is not None:
-        copy = by_name["tube_ghost"]
-        better = copy.found and _copy_is_better(cells, copy)
-        for name in ("line_skew", "subsurface") if better else ("tube_ghost",):
-            lost[name] = "tube_ghost" if better else skewed.effect
-    if by_name["subsurface"].found and "subsurface" not in lost:
-        lost |= {name: "subsurface" for name in ("gamma", "albedo_bias")}
-    kept = (_yielded(f, lost[f.effect]) if f.effect in lost else f for f in findings)
-    return tuple(_unrivalled(f, by_name) for f in kept)
-
-
-def _unrivalled(finding: Finding, by_name: dict[str, Finding]) -> Finding:
-    """Return a spot without the pixels' own gains as rival where these were measured and found even, or back.
-
-    Gains of single pixels would show in their own test long before they made a dip in all frames.
-    """
-    rival = by_name.get(_SPOT_OR_PIXELS.get(finding.effect, ""))
-    if rival is None or rival.found or not rival.sizes:
-        return finding
-    return replace(finding, alike=tuple(n for n in finding.alike if n != rival.effect))
-
-
-def _yielded(finding: Finding, other: str) -> Finding:
-    return replace(finding, p_value=1.0, alike=(other,), confirms=())
-
-
-def _copy_is_better(cells: Cells, copy: Finding) -> bool:
-    """Return whether a copy of the line leaves less of the mean profile than an exponential tail does."""
-    relative, distance_mm = (s.value for s in copy.sizes)
-    whole = cells.whole
-    width = float(np.median(cells.width_px[whole]))
-    apart = -distance_mm * float(np.median(cells.px_per_mm[whole])) / width
-    if abs(apart) > _OVERLAP_WIDTHS:
-        return True
-    x = np.arange(-_REACH_WIDTHS, _REACH_WIDTHS + _STEP_WIDTHS / 2, _STEP_WIDTHS)
-    rest = _mean_rest(cells, x)
-    hermite = float(np.nanmedian(cell_skewness(cells)))
-    table = skew_table()
-    ratio = float(np.interp(abs(hermite), table.hermite, table.ratio))
-    tail = _left_by_fit(exponential_gaussian(np.sign(hermite) * x, 1.0, ratio), x)
-    second = _left_by_fit(np.exp(-0.5 * x**2) + relative * np.exp(-0.5 * (x - apart) ** 2), x)
-    return bool(np.sum((rest - second) ** 2) < np.sum((rest - tail) ** 2))
-
-
-def _mean_rest(cells: Cells, x: Float) -> Float:
-    """Return the median over all cells of what a Gaussian leaves, at distances x (K,) in line widths."""
-    whole = cells.whole
-    place = (cells.offset_px - cells.centre_px[whole, None]) / cells.width_px[whole, None]
-    rest = [np.interp(x, p, r) for p, r in zip(place, cells.rest[whole], strict=True)]
-    return np.asarray(np.median(rest, axis=0))
-
-
-def _left_by_fit(profile: Float, x: Float) -> Float:
-    """Return what a Gaussian fit of a profile (K,), peak near 0, leaves over distances in fitted widths."""
-    fine = np.arange(-12.0, 12.0, 0.05)
-    at_peak = float(x[int(np.argmax(profile))])
-    placed = np.interp(fine, x - at_peak, profile / profile.max(), left=0.0, right=0.0)
-    centre, width, peak = fit_gaussians(placed[None], fine, start_px=1.0)
-    rest = placed / peak[0] - np.exp(-0.5 * ((fine - centre[0]) / width[0]) ** 2)
-    return np.asarray(np.interp(x, (fine - centre[0]) / width[0], rest))

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells, LineGeometry
 from stages.diagnose.profile.finding import (
-    Curve,
     Finding,
     Regression,
     Size,
@@ -45,10 +43,9 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     stated_mm = probe.laser.line_sigma_mm
     line = Size("line_sigma_mm", "mm", stated_mm * np.sqrt(safe), stated_mm * sigma / (2 * np.sqrt(safe)))
     seen = f"The line's width² follows the image's scale with {scale:.3f} ± {sigma:.3f} of what is stated."
-    curve = _scale_curve(cells, geometry, stated, fit)
     return (
-        finding("gamma", test.z, test.p_value, (exponent,), seen, curve, alike=("albedo_bias",)),
-        finding("albedo_bias", test.z, test.p_value, (line,), seen, curve, alike=("gamma",)),
+        finding("gamma", test.z, test.p_value, (exponent,), seen, alike=("albedo_bias",)),
+        finding("albedo_bias", test.z, test.p_value, (line,), seen, alike=("gamma",)),
     )
 
 
@@ -88,11 +85,9 @@ def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     sigma = test.sigma
     total = np.sqrt(max(exposure2, 0.0))
     size = Size("exposure_s", "s", float(total - own), sigma / (2 * max(total, np.sqrt(sigma))))
-    shift = -0.5 * total * geometry.speed_px_s
     return finding(
         "motion_blur", test.z, test.p_value, (size,),
         f"The line widens with its own speed as an exposure of {1e3 * total:.1f} ms makes it.",
-        shift_px=np.nan_to_num(shift) + 0.5 * own * np.nan_to_num(geometry.speed_px_s),
     )  # fmt: skip
 
 
@@ -115,20 +110,3 @@ def _without_frame_means(values: Float, known: Bool) -> Float:
     some = np.where(known[..., None], values, 0.0)
     mean = some.sum(1, keepdims=True) / np.maximum(known.sum(1), 1)[:, None, None]
     return np.where(known[..., None], values - mean, np.nan)
-
-
-def _scale_curve(cells: Cells, geometry: LineGeometry, stated: Float, fit: Regression) -> Curve:
-    """Return width² against the stated line's, medians of every block."""
-    width2 = geometry.width_px**2
-    x = np.array([np.nanmedian(stated[rows]) for rows in cells.frames])
-    y = np.array(
-        [np.nanmedian(width2[rows]) if np.isfinite(width2[rows]).any() else np.nan for rows in cells.frames]
-    )
-    sigma = np.array([
-        robust_spread(width2[rows] - m) / np.sqrt(max(np.isfinite(width2[rows]).sum(), 1))
-        if np.isfinite(m) else np.nan for rows, m in zip(cells.frames, y, strict=True)
-    ])  # fmt: skip
-    return Curve(
-        "Width of the line against the image's scale", "stated line's width², px²", "fitted width², px²",
-        x, y, sigma, fit.coefficient[0] * x + fit.coefficient[1],
-    )  # fmt: skip
