@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from pipeline.errors import BoresightError, Cancelled, UnusableError
 
@@ -25,6 +27,7 @@ _EXIT_FAILED, _EXIT_REFUSED, _EXIT_UNUSABLE, _EXIT_CANCELLED = 1, 2, 3, 130
 class _Attached:
     """A command that lives in ``pipeline.commands`` and is imported only when it is called."""
 
+    group: str
     name: str
     summary: str
 
@@ -33,31 +36,51 @@ class _Attached:
         """Module of the command; the function in it bears the module's name."""
         return self.name.replace("-", "_")
 
+    def loaded(self) -> Any:
+        """Return the command itself, with its own options, ready to be called."""
+        module = import_module(f"pipeline.commands.{self.module}")
+        own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+        own.command(name=self.name)(getattr(module, self.module))
+        return typer.main.get_command(own)
 
+
+_INSPECT, _INSTRUMENT, _SIMULATE, _MANY = (
+    "Inspect a pipe",
+    "The instrument",
+    "Simulate and prove",
+    "Many runs",
+)
 _ATTACHED = (
-    _Attached("error-model", "What a misaligned laser sheet does to the radius; tables, figures, page."),
-    _Attached("error-budget", "Every source of error, its share in the radius, and what dominates."),
-    _Attached("batch", "Run many recordings, on local workers or a Dask scheduler; resumable."),
-    _Attached("calibrate", "Find camera and laser sheet, with covariance, from a gauge run."),
-    _Attached("calibrate-camera", "Calibrate a camera from pictures of boards."),
-    _Attached("calibrate-laser", "Find the laser plane from pictures of a board with the line across it."),
-    _Attached("diagnose", "Find what physics was left out, where it shows, and what bears it out."),
-    _Attached("prove", "Conceal effects in recordings, diagnose them, open the truth, and score."),
-    _Attached("simulate", "Render recordings from a scene, with their truth apart."),
-    _Attached("gallery", "What each known effect does: picture, residual, law, size, likeness; a page."),
-    _Attached("open-seal", "Verify that a truth is the one a recording was sealed with."),
-    _Attached("review", "Go through a run in the browser: decide on each finding, measure, sign."),
-    _Attached("reproduce", "Compute a run again from what its record names, and compare every file."),
-    _Attached("verify", "Compare a run with a known bore, a reference model or truth: a certificate."),
+    _Attached(_INSPECT, "review", "Go through a run in the browser: decide on each finding, measure, sign."),
+    _Attached(_INSPECT, "verify", "Compare a run with a known bore, a reference or truth: a certificate."),
+    _Attached(_INSPECT, "reproduce", "Compute a run again from its record, and compare every file."),
+    _Attached(_INSTRUMENT, "calibrate", "Find camera and laser sheet, with covariance, from a gauge run."),
+    _Attached(_INSTRUMENT, "calibrate-camera", "Calibrate a camera from pictures of boards."),
+    _Attached(_INSTRUMENT, "calibrate-laser", "Find the laser plane from pictures of a board and the line."),
+    _Attached(
+        _INSTRUMENT, "diagnose", "Find what physics was left out, where it shows, and what supports it."
+    ),
+    _Attached(_INSTRUMENT, "error-model", "What a misaligned laser sheet does to the radius: tables, page."),
+    _Attached(_INSTRUMENT, "error-budget", "Every source of error, its share in the radius, what dominates."),
+    _Attached(_SIMULATE, "simulate", "Render recordings from a scene, with their truth apart."),
+    _Attached(_SIMULATE, "gallery", "What each known effect does: picture, law, size, likeness; a page."),
+    _Attached(_SIMULATE, "prove", "Conceal effects in recordings, diagnose them, open the truth, score."),
+    _Attached(_SIMULATE, "open-seal", "Verify that a truth is the one a recording was sealed with."),
+    _Attached(_MANY, "batch", "Run many recordings, on local workers or a Dask scheduler; resumable."),
 )
 
-app = typer.Typer(
-    name="boresight",
-    help="Turns a recorded laser-ring run through a pipe into a measured, textured pipe model.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-)
+
+class _Commands(TyperGroup):
+    """Lists all commands at once, and imports the module of one when it is called or completed."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return a command's name, the command, and the words that are left for it."""
+        name, command, rest = super().resolve_command(ctx, args)
+        attached = next((a for a in _ATTACHED if a.name == name), None)
+        return name, command if attached is None else attached.loaded(), rest
+
+
+app = typer.Typer(name="boresight", cls=_Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 
 _ConfigFile = Annotated[
     Path | None, typer.Option("--config", metavar="FILE", help="Parameters (YAML); see: boresight config.")
@@ -68,7 +91,24 @@ _Assignments = Annotated[
 ]
 
 
-@app.command()
+def _tell_version(wanted: bool) -> None:
+    if wanted:
+        from pipeline.files.provenance import program_version
+
+        typer.echo(f"boresight {program_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def boresight(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Turn a recorded laser-ring run through a pipe into a measured, textured pipe model."""
+
+
+@app.command(rich_help_panel=_INSPECT)
 def run(
     recording: Annotated[Path, typer.Argument(help="Recording: a folder or a bag.")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="RUN", help="Run folder.")],
@@ -92,6 +132,7 @@ def run(
     ] = 10.0,
 ) -> None:
     """Turn a recording into a run folder: model, measurements, defects and report."""
+    typer.echo(f"Opening {recording}", err=True)  # at once: what is imported next takes seconds
     from rich.console import Console
 
     from pipeline.api.job import run_job
@@ -106,18 +147,18 @@ def run(
 
         follow_recording(recording, output, probe, quiet_s, console)
     job = prepare(recording, output, probe=probe, configuration=parameters)
-    _print_inputs(console, job.recording.name, job.recording.warnings)
+    _warn(console, "Look at this first", job.recording.warnings)
+    display = ProgressDisplay(console)
     try:
-        with ProgressDisplay(console) as display:
+        with display:
             outcome = run_job(job, Selection(from_stage, only, resume), display)
-    except UnusableError:
-        # What was wrong with the recording from the start is the likeliest reason: it is said again.
-        _print_inputs(console, job.recording.name, job.recording.warnings)
-        raise
-    _print_outcome(outcome, output)
+        _print_outcome(outcome, output)
+    finally:
+        # What was wrong with the recording from the start is the likeliest reason of what went wrong later.
+        _warn(console, "Before you rely on this run", (*job.recording.warnings, *display.warnings))
 
 
-@app.command()
+@app.command(rich_help_panel=_INSPECT)
 def stages() -> None:
     """List the stages in order, with what each needs and makes."""
     from stages.catalogue import PIPELINE
@@ -128,7 +169,7 @@ def stages() -> None:
         typer.echo(f"{'':<12} version {stage.version}: {needs} -> {stage.output().__name__}")
 
 
-@app.command()
+@app.command(rich_help_panel=_INSPECT)
 def config(
     file: _ConfigFile = None,
     assignments: _Assignments = None,
@@ -148,7 +189,7 @@ def config(
 def main() -> None:
     """Run the command line; a refusal is told as text, with its own exit code."""
     try:
-        app()
+        app(prog_name="boresight")
     except BoresightError as error:
         typer.echo(f"boresight: {error}", err=True)
         sys.exit(_exit_code(error))
@@ -166,39 +207,31 @@ def _exit_code(error: BoresightError) -> int:
 
 
 def _attach(command: _Attached) -> None:
-    """Put a command into the list; its module is imported when it is called, and parses its own words."""
+    """Put a command into the list; `_Commands` imports what is behind it when it is called."""
 
-    def forward(context: typer.Context) -> None:
-        module = import_module(f"pipeline.commands.{command.module}")
-        own = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-        own.command(name=command.name)(getattr(module, command.module))
-        own(args=context.args, prog_name=f"boresight {command.name}")
+    def listed() -> None: ...
 
-    passing_on = {"allow_extra_args": True, "ignore_unknown_options": True}
-    app.command(command.name, help=command.summary, add_help_option=False, context_settings=passing_on)(
-        forward
-    )
+    app.command(command.name, help=command.summary, rich_help_panel=command.group)(listed)
 
 
-def _print_inputs(console: Console, name: str, warnings: tuple[str, ...]) -> None:
-    from rich.text import Text
+def _warn(console: Console, title: str, warnings: Sequence[str]) -> None:
+    """Print warnings so that nobody overlooks them; nothing where there are none."""
+    from rich.markup import escape
 
-    console.print(f"Recording {name}", highlight=False)
+    if not warnings:
+        return
+    console.print(f"\n[bold black on yellow] {title} [/]", highlight=False)
     for warning in warnings:
-        console.print(Text.assemble(("  noticed", "bold yellow"), f": {warning}"))
+        console.print(f"  [bold yellow]warning[/]: {escape(warning)}", highlight=False)
 
 
 def _print_outcome(outcome: RunOutcome, folder: Path) -> None:
-    from pipeline.machine.outcome import warnings_of
-
     for number in outcome.metrics:
         typer.echo(f"{number.name:<48} {number.value} {number.unit}".rstrip())
     for stage in outcome.stages:
         for number in stage.numbers:
             if "rejected" in number.name and number.value:
                 typer.echo(f"{stage.name + ': ' + number.name:<48} {number.value} {number.unit}".rstrip())
-    for warning in warnings_of(outcome.stages):
-        typer.echo(f"warning: {warning}", err=True)
     report = folder / "report.html"
     typer.echo(f"Report: {report.resolve()}" if report.is_file() else f"Run folder: {folder.resolve()}")
     if report.is_file():

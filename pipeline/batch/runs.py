@@ -17,6 +17,7 @@ from pipeline.errors import InputError
 from pipeline.files.codec import Json
 from pipeline.files.disk import disk_errors_named, replace_json, replace_text
 from pipeline.files.json_file import read_json
+from pipeline.machine.outcome import state_word
 from pipeline.pages import page_template
 from pipeline.system.stopping import end_with_parent
 
@@ -147,7 +148,7 @@ def write_summary(outcomes: Iterable[BatchOutcome], folder: Path) -> None:
     rows = [(e, {name: (value, unit) for name, value, unit in e.metrics}) for e in ordered]
     warned = sum(bool(e.warnings) for e in ordered)
     text = page_template("batch").render(
-        rows=rows, states=_states(ordered), metrics=SHOWN_METRICS, warned=warned
+        rows=rows, states=_states(ordered), metrics=SHOWN_METRICS, warned=warned, word=state_word
     )
     with disk_errors_named(folder):
         replace_json(folder / "batch.json", {"format": 1, "runs": runs, "states": dict(_states(ordered))})

@@ -14,6 +14,7 @@ from pipeline.batch.runs import BatchOutcome, Work, find_recordings, write_summa
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named
 from pipeline.machine.configuration import resolve
+from pipeline.machine.outcome import state_word
 from stages.catalogue import PIPELINE
 
 # Exit status where some recordings failed and the batch itself did not.
@@ -55,7 +56,9 @@ def batch(
     with workers(cluster) as client:
         for outcome in outcomes(client, works):
             done.append(outcome)
-            console.print(f"{len(done)}/{len(works)}  {outcome.name}: {outcome.state}", highlight=False)
+            console.print(
+                f"{len(done)}/{len(works)}  {outcome.name}: {state_word(outcome.state)}", highlight=False
+            )
             with suppress(InputError):  # a full disk does not stop the runs; it is reported at the end
                 write_summary(done, output)
     write_summary(done, output)

@@ -7,21 +7,16 @@ from typing import Protocol, Self
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskID,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from pipeline.machine.outcome import StageOutcome, State, warnings_of
+from pipeline.machine.outcome import StageOutcome, State, state_word, warnings_of
 
 
 class Display(Protocol):
     """Is told how the stages stand."""
+
+    def planned(self, stages: int) -> None:
+        """Hear how many stages there are."""
 
     def started(self, stage: str) -> None:
         """Hear that a stage started."""
@@ -36,6 +31,9 @@ class Display(Protocol):
 class SilentDisplay:
     """Shows nothing: for library use and tests."""
 
+    def planned(self, stages: int) -> None:
+        """Ignore."""
+
     def started(self, stage: str) -> None:
         """Ignore."""
 
@@ -47,22 +45,28 @@ class SilentDisplay:
 
 
 class ProgressDisplay:
-    """A bar with the time left for each running stage, and a line for each stage that ended."""
+    """One bar for the whole, one beneath it for each running stage, and a line for each that ended.
+
+    Attributes
+    ----------
+    warnings : list of str
+        What the stages that ended warn of.
+    """
 
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
             TextColumn("{task.description:<20}"),
             BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("for"),
+            TextColumn("{task.fields[told]}"),
             TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
             console=console,
             transient=True,
         )
         self._console = console
+        self._whole = self._progress.add_task("whole run", total=None, told="starting")
         self._tasks: dict[str, TaskID] = {}
+        self._stages, self._ended = 0, 0
+        self.warnings: list[str] = []
 
     def __enter__(self) -> Self:
         self._progress.start()
@@ -73,20 +77,41 @@ class ProgressDisplay:
     ) -> None:
         self._progress.stop()
 
+    def planned(self, stages: int) -> None:
+        """Give the bar of the whole its length."""
+        self._stages = stages
+        self._move_whole()
+
     def started(self, stage: str) -> None:
         """Open a bar."""
-        self._tasks[stage] = self._progress.add_task(stage, total=None)
+        self._tasks[stage] = self._progress.add_task(f"  {stage}", total=None, told="working")
 
     def progressed(self, stage: str, done: int, total: int) -> None:
-        """Move the bar."""
-        if stage in self._tasks:
-            self._progress.update(self._tasks[stage], completed=done, total=total)
+        """Move the bars."""
+        if stage in self._tasks and total > 0:
+            self._progress.update(self._tasks[stage], completed=done, total=total, told=f"{done} of {total}")
+            self._move_whole()
 
     def ended(self, outcome: StageOutcome) -> None:
         """Replace the bar by a line."""
         if outcome.name in self._tasks:
             self._progress.remove_task(self._tasks.pop(outcome.name))
-        time = f"{outcome.seconds:8.1f} s" if outcome.state == State.COMPLETED else " " * 10
-        self._console.print(f"  {outcome.name:<20} {outcome.state.value:<10}{time}", highlight=False)
+        self._ended += 1
+        self._move_whole()
+        time = f"{outcome.seconds:8.1f} s" if outcome.state == State.COMPLETED else ""
+        self._console.print(
+            f"  {outcome.name:<20} {state_word(outcome.state):<10}{time}".rstrip(), highlight=False
+        )
         for warning in warnings_of([outcome]):
+            self.warnings.append(warning)
             self._console.print(f"  [bold yellow]warning[/]: {escape(warning)}", highlight=False)
+
+    def _move_whole(self) -> None:
+        """Set the bar of the whole to the stages that ended, and the shares of those that run."""
+        if not self._stages:
+            return
+        running = [t for t in self._progress.tasks if t.id in self._tasks.values()]
+        done = self._ended + sum(t.percentage / 100 for t in running)
+        files = self._ended >= self._stages
+        words = "writing files" if files else f"{self._ended} of {self._stages} stages"
+        self._progress.update(self._whole, completed=done, total=self._stages, told=words)

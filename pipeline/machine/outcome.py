@@ -24,6 +24,11 @@ class State(StrEnum):
     CANCELLED = "cancelled"
 
 
+def state_word(state: str) -> str:
+    """Return the word for a state that people are shown: what ends early is stopped, for whatever reason."""
+    return "stopped" if state in (State.UNUSABLE, State.CANCELLED) else str(state)
+
+
 @dataclass(frozen=True)
 class Number:
     """A named number for people, with its unit (empty for plain counts and for words)."""

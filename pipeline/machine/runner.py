@@ -100,6 +100,7 @@ class Runner:
             For anything else that a stage or exporter raised; the traceback is in the log.
         """
         selection.check(self._plan)
+        self._display.planned(1 if selection.only else len(self._plan.steps))
         try:
             with self._writer:
                 self._withdraw_stale()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import pytest
 
 from pipeline.cli import _ATTACHED, _exit_code, main
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
+from pipeline.files.provenance import program_version
 from pipeline.machine.runner import FailedError
 from stages.catalogue import PIPELINE
 from tests.shared_data import PROJECT_ROOT
@@ -61,6 +63,38 @@ def test_attached_commands_are_there(boresight: Callable[..., Told], name: str) 
     told = boresight(name, "--help")
     assert told.code == 0, told.err
     assert f"boresight {name}" in told.out
+
+
+def test_help_groups_the_commands_by_what_they_are_for(boresight: Callable[..., Told]) -> None:
+    told = boresight("--help").out
+    places = [
+        told.index(f"─ {group} ─")
+        for group in dict.fromkeys(("Inspect a pipe", *(a.group for a in _ATTACHED)))
+    ]
+    assert places == sorted(places)
+    assert len(places) == 4
+    for attached in _ATTACHED:
+        group = told.rindex("╭", 0, told.index(f"│ {attached.name} "))
+        assert f"─ {attached.group} ─" in told[group : group + 60], attached.name
+
+
+def test_the_version_is_told(boresight: Callable[..., Told]) -> None:
+    assert boresight("--version").out == f"boresight {program_version()}\n"
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("rev", "review"), ("calibrate-", "calibrate-laser"), ("review --", "--compare")]
+)
+def test_the_shell_completes_commands_and_their_options(typed: str, offered: str) -> None:
+    asked = {
+        "_BORESIGHT_COMPLETE": "complete_bash", "COMP_WORDS": f"boresight {typed}",
+        "COMP_CWORD": str(len(typed.split())),
+    }  # fmt: skip
+    told = subprocess.run(
+        [sys.executable, "-m", "pipeline.cli"], cwd=PROJECT_ROOT, capture_output=True, text=True,
+        env=os.environ | asked,
+    )  # fmt: skip
+    assert offered in told.stdout.split(), told
 
 
 def test_stages_are_listed_in_order(boresight: Callable[..., Told]) -> None:

@@ -12,7 +12,7 @@ from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, W
 from pipeline.export.report.page import Card, Table
 from pipeline.export.report.summary import RunSummary
 from pipeline.geometry.axis import distance_along
-from pipeline.machine.outcome import WARNING, Number, State
+from pipeline.machine.outcome import WARNING, Number, State, state_word
 from pipeline.pages import notation
 
 NOT_CALIBRATED = (
@@ -212,7 +212,7 @@ def _value(number: Number) -> str:
 
 def _stages(summary: RunSummary) -> Table | None:
     rows = tuple(
-        (s.name, s.version, s.state.value, f"{s.seconds:.1f} s", s.key[:16], s.problem)
+        (s.name, s.version, state_word(s.state), f"{s.seconds:.1f} s", s.key[:16], s.problem)
         for s in summary.stages
     )
     header = ("stage", "version", "state", "time", "key", "note")
