@@ -7,8 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Encoder, FrameTable, Recording
+
+# Stands in the table of frames in place of a light: the frame has a pose, but no stage looks at its picture.
+WITHHELD = "withheld"
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,9 @@ class CheckedFrames:
         By which the encoder's readings are to be multiplied: 1 unless its unit or sign was wrong.
     relabelled, retimed : int
         In how many frames light and time differ from the recording's table.
+    withheld : (N,) bool or None
+        Frames whose pictures no stage of the run may measure, so that `boresight twin` can compare with them
+        what the run predicts; None where there are none.
     """
 
     frame: Int
@@ -35,10 +41,15 @@ class CheckedFrames:
     encoder_factor: float = 1.0
     relabelled: int = 0
     retimed: int = 0
+    withheld: Bool | None = None
 
     def applied_to(self, recording: Recording) -> Recording:
-        """Return the recording with these frames, and its encoder in mm and with the motion's sign."""
-        table = FrameTable(self.frame, self.time_s, self.illumination)
+        """Return the recording with these frames, and its encoder in mm and with the motion's sign.
+
+        The light of a withheld frame is `WITHHELD`, so that whoever asks for frames of a light passes it over.
+        """
+        hidden = np.zeros(len(self.frame), bool) if self.withheld is None else self.withheld
+        table = FrameTable(self.frame, self.time_s, np.where(hidden, WITHHELD, self.illumination))
         encoder = recording.encoder
         if encoder is not None and self.encoder_factor != 1.0:
             encoder = Encoder(encoder.time_s, encoder.distance_mm * self.encoder_factor)

@@ -47,6 +47,13 @@ class PremisesParameters(Parameters):
         True,
         description="mend lights and times of frames that the pictures contradict; false: stop instead",
     )
+    withhold: int = Field(
+        0,
+        ge=0,
+        le=1000,
+        description="of each light every so manieth frame is withheld from all measurement, so that boresight "
+        "twin can compare it with what the run predicts; 0: none",
+    )
 
 
 def check_premises(
@@ -76,10 +83,25 @@ def check_premises(
     _warn_of_clock(time_s, recording, context)
     _report(pictures, radius_mm, changes, context)
     keep = np.concatenate([[True], np.diff(row) > 0])
+    withheld = withheld_frames(label[keep], parameters.withhold)
+    context.report("frames withheld from measurement", int(withheld.sum()), "frames")
     return CheckedFrames(
         recording.frames.frame[keep], time_s[keep], label[keep], factor,
-        int(changes.relabelled.sum()), int(changes.retimed.sum()),
+        int(changes.relabelled.sum()), int(changes.retimed.sum()), withheld if withheld.any() else None,
     )  # fmt: skip
+
+
+def withheld_frames(label: Labels, every: int) -> Bool:
+    """Return which frames (N,) are withheld: one in ``every`` of each light, none for 0.
+
+    The lights take turns, so that the frames beside a withheld one are measured where lights alternate.
+    """
+    withheld = np.zeros(len(label), bool)
+    kinds = np.unique(label)
+    for turn, kind in enumerate(kinds):
+        first = every * (2 * turn + 1) // (2 * len(kinds))
+        withheld[np.flatnonzero(label == kind)[first :: max(every, 1)]] = every > 0
+    return withheld
 
 
 def _table(recording: Recording) -> FrameTable:

@@ -19,13 +19,17 @@ def _texture_of_run(
     parameters: TextureParameters,
     context: Context,
 ) -> WallTexture:
-    """Photograph the wall from the frames that the pictures show to be lit."""
-    return photograph_wall(frames.applied_to(recording), probe, trajectory, wall, parameters, context)
+    """Photograph the wall from the frames that the pictures show to be lit.
+
+    Poses and wall are those of the instrument as the motion found it, and so the pixels must be.
+    """
+    found = probe.as_found_in(trajectory)
+    return photograph_wall(frames.applied_to(recording), found, trajectory, wall, parameters, context)
 
 
 TEXTURE = Stage(
     "texture",
-    "3",
+    "4",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's reflectance as a flat picture, light divided out",

@@ -1,0 +1,39 @@
+"""Frames withheld from measurement: which they are, and that no stage is given their pictures."""
+
+import numpy as np
+import pytest
+
+from pipeline.recording.base import FrameTable, Illumination, PipeFacts, Recording
+from pipeline.recording.checked_frames import WITHHELD, CheckedFrames
+from stages.premises import withheld_frames
+
+
+def _recording(table):
+    return Recording("r", "inspection", None, table, None, PipeFacts(100.0), 30.0, None, None, "")
+
+
+def test_every_tenth_of_each_light_is_withheld_and_its_neighbours_are_not():
+    label = np.array(["laser", "led"] * 100)
+    withheld = withheld_frames(label, 10)
+    assert [withheld[label == kind].sum() for kind in ("laser", "led")] == [10, 10]
+    assert not np.any(withheld[1:] & withheld[:-1])
+
+
+@pytest.mark.parametrize("label", [["both"] * 30, ["laser"] * 30])
+def test_one_light_alone(label):
+    assert withheld_frames(np.array(label), 10).sum() == 3
+
+
+def test_nothing_is_withheld_unless_asked():
+    assert not withheld_frames(np.array(["laser", "led"] * 20), 0).any()
+
+
+def test_stages_are_not_given_withheld_pictures_but_poses_have_their_times():
+    label = np.array(["laser", "led"] * 20)
+    table = FrameTable(np.arange(40), np.arange(40) / 30, label)
+    checked = CheckedFrames(table.frame, table.time_s, label, withheld=withheld_frames(label, 10))
+    seen = checked.applied_to(_recording(table)).frames
+    given = seen.of(Illumination.LASER, Illumination.LED, Illumination.BOTH)
+    assert not set(given) & set(table.frame[checked.withheld])
+    assert len(seen.frame) == 40
+    assert (seen.illumination == WITHHELD).sum() == checked.withheld.sum() == 4
