@@ -46,7 +46,7 @@ class CheckedFrames:
     def applied_to(self, recording: Recording) -> Recording:
         """Return the recording with these frames, and its encoder in mm and with the motion's sign.
 
-        The light of a withheld frame is `WITHHELD`, so that whoever asks for frames of a light passes it over.
+        The light of a withheld frame is `WITHHELD`, so that asking for frames of a light passes over it.
         """
         hidden = np.zeros(len(self.frame), bool) if self.withheld is None else self.withheld
         table = FrameTable(self.frame, self.time_s, np.where(hidden, WITHHELD, self.illumination))

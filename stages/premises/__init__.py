@@ -51,7 +51,7 @@ class PremisesParameters(Parameters):
         0,
         ge=0,
         le=1000,
-        description="of each light every so manieth frame is withheld from all measurement, so that boresight "
+        description="of each light every nth frame is withheld from all measurement, so that boresight "
         "twin can compare it with what the run predicts; 0: none",
     )
 
