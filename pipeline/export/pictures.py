@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.arrays import Byte
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
+from pipeline.pages import notation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -127,9 +128,9 @@ def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:
         interpolation="nearest",
     )
     hours = np.arange(-6, 7, 3)
-    axes.set_yticks(hours, [f"{(h + 11) % 12 + 1:d}" for h in hours])
+    axes.set_yticks(hours, [notation.clock(float(h) % 12) for h in hours])
     axes.set_xlabel("distance (mm)")
-    axes.set_ylabel("clock position (h), clockwise looking forward")
+    axes.set_ylabel("clock position, looking forward")
     axes.set_title(overlay.title)
     _add_colour_bar(figure, overlay)
     return figure

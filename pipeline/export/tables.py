@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.artefacts.findings import Defect, Defects, Sections
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.rigid import quaternion_from_rotation
+from pipeline.pages import notation
 
 _DEGREES = {"major_axis_rad": "major_axis_deg"}
 _TABLE = (
@@ -43,7 +44,7 @@ def write_defects(defects: Defects, folder: Path) -> None:
         with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(_TABLE)
-            writer.writerows([_cell(record[column]) for column in _TABLE] for record in records)
+            writer.writerows([_cell(column, record[column]) for column in _TABLE] for record in records)
 
 
 def _number(value: float) -> str:
@@ -63,8 +64,10 @@ def _record(defect: Defect) -> dict[str, object]:
     return record
 
 
-def _cell(value: object) -> str:
-    """Return a cell's text; numbers of frames stand apart by blanks."""
+def _cell(column: str, value: object) -> str:
+    """Return a cell's text; numbers of frames stand apart by blanks, clock positions are ``h:mm``."""
+    if "clock" in column and isinstance(value, float):
+        return notation.clock(value)
     if isinstance(value, list):
         return " ".join(str(v) for v in value)
     return "" if value is None else str(value)

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.artefacts.comparison import Change, OutlinedFinding
 from pipeline.artefacts.findings import clock_of_azimuth
+from pipeline.pages import notation
 
 COLUMNS = (
     "id", "earlier_id", "kind", "fate", "distance_mm", "clock", "seen_percent", "earlier_seen_percent",
@@ -20,7 +21,7 @@ COLUMNS = (
     "wall_loss_rate_percent_per_year", "wall_loss_rate_sigma_percent_per_year",
 )  # fmt: skip
 # Decimals by the column's name, else by its last part.
-_DECIMALS = {"mm": 3, "mm2": 1, "percent": 1, "z": 2, "clock": 2, "distance_mm": 1, "year": 3}
+_DECIMALS = {"mm": 3, "mm2": 1, "percent": 1, "z": 2, "distance_mm": 1, "year": 3}
 
 
 def growth_rows(
@@ -32,9 +33,10 @@ def growth_rows(
 
 def _row(change: Change, years: float | None, wall_thickness_mm: float | None) -> dict[str, Any]:
     distance, azimuth = change.place.middle
+    clock = notation.clock(float(clock_of_azimuth(azimuth)))
     row: dict[str, Any] = dict.fromkeys(COLUMNS) | {
         "id": _id(change.place.now), "earlier_id": _id(change.place.earlier), "kind": change.place.kind.value,
-        "fate": change.fate.value, "distance_mm": distance, "clock": float(clock_of_azimuth(azimuth)),
+        "fate": change.fate.value, "distance_mm": distance, "clock": clock,
         "seen_percent": 100 * change.seen_now, "earlier_seen_percent": 100 * change.seen_earlier,
         "significant": change.is_significant,
         **_reported("", change.place.now), **_reported("earlier_", change.place.earlier),

@@ -18,6 +18,7 @@ from pipeline.artefacts.findings import (
     pof_class,
 )
 from pipeline.artefacts.measured import PointCloud, WallTexture
+from pipeline.pages import notation
 from stages.defects.classify import Features, features_of, probabilities
 from stages.defects.corroborate import darkness
 from stages.defects.depth import Depth
@@ -141,8 +142,7 @@ def _form(elongation: float) -> str:
 def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth, darkness: float) -> str:
     """Say what it is and why it is classed so."""
     kinds = list(likely)
-    way = "into the wall" if depth.depth_mm > 0 else "inward"
-    words = f"{kinds[0].capitalize()}, {abs(depth.depth_mm):.2f} ± {depth.sigma_mm:.2f} mm {way}"
+    words = f"{kinds[0].capitalize()}, {notation.depth(depth.depth_mm, depth.sigma_mm)}"
     if kinds[0] is DefectKind.WELD:
         return f"{words}, {features.length_mm:.0f} mm along the pipe. Classed as weld: it goes all round."
     words += (

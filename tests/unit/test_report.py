@@ -124,7 +124,9 @@ def test_shows_the_pit_with_pictures_clock_and_wall_loss(summary):
     assert re.match(r"11:\d\d–12:\d\d$", finding.clock)
     assert re.match(r"[56]\d\.\d mm \(\d\d\.\d–\d\d\.\d mm\)$", finding.distance), "peak and extent"
     assert re.match(r"\d\.\d+ ± \d\.\d+ mm deep$", finding.depth)
-    assert finding.wall_loss in {f"{k} %" for k in range(22, 29)}
+    loss = re.fullmatch(r"(\d+\.\d+) ± (\d\.\d+) %", finding.wall_loss)
+    assert loss is not None
+    assert 22 <= float(loss[1]) <= 29
     assert finding.photo.startswith("data:image/jpeg;base64,")
     assert finding.deviation.startswith("data:image/jpeg;base64,")
 
@@ -151,7 +153,7 @@ def test_what_stages_warn_of_is_told_first_and_as_text(summary, tmp_path):
     text = written(warned, tmp_path)
     assert text.index("motion: 36 σ &lt;script&gt;") < text.index("Ring samples")
     assert text.count("36 σ") == 1
-    assert "Noticed" not in written(
+    assert "Look at this first" not in written(
         replace(summary, recording=replace(summary.recording, warnings=())), tmp_path
     )
 

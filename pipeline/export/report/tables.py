@@ -102,14 +102,14 @@ def _found(summary: RunSummary) -> Card:
     if defects is None:
         return Card("What was found", "not searched", ())
     lines = [
-        f"nine of ten defects of 3 mm × 3 mm are found from {defects.smallest_depth_mm:.2f} mm depth on",
-        f"of the findings of such a recording, {defects.false_alarm_rate:.2g} are expected to be false: by "
-        "the wall's noise and roughness, and where two single rings err in one place",
+        f"nine of ten defects of 3 mm × 3 mm are found if they are {defects.smallest_depth_mm:.2f} mm deep",
+        f"{defects.false_alarm_rate:.2g} false findings are expected in such a recording, from the wall's "
+        "roughness and from two rings that err in the same place",
     ]
     if defects.unconfirmed:
         lines.append(
-            f"{len(defects.unconfirmed)} more are shown by one ring alone and by no photo: they are listed "
-            "apart as unconfirmed and not counted"
+            f"{len(defects.unconfirmed)} more places are seen in one ring alone and not in the photo: they "
+            "are listed as unconfirmed and not counted"
         )
     if not defects.items:
         return Card("What was found", "no defect", tuple(lines))
@@ -177,9 +177,7 @@ def _samples(rings: RingSamples | None) -> Table | None:
     total = rings.validity.size
     rows = [(REASONS[v], f"{counts[v]:,}", f"{100 * counts[v] / total:.2f} %") for v in RingValidity]
     rows = [r for r in rows if r[1] != "0"]
-    return Table(
-        "Ring samples", ("what became of it", "samples", "share"), (*rows, ("all", f"{total:,}", ""))
-    )
+    return Table("Ring samples", ("outcome", "samples", "share"), (*rows, ("all", f"{total:,}", "")))
 
 
 def _rejections(summary: RunSummary) -> Table | None:

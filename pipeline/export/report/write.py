@@ -127,7 +127,8 @@ def _finding(defect: Defect, photo: str, deviation: str) -> Finding:
 
 def _wall_loss(defect: Defect) -> str:
     if np.isfinite(defect.wall_loss_percent):
-        return f"{defect.wall_loss_percent:.0f} %"
+        sigma = abs(defect.wall_loss_percent / defect.depth_mm) * defect.depth_sigma_mm
+        return notation.measured(defect.wall_loss_percent, sigma, "%")
     return "thickness unknown" if defect.pof_class else "–"
 
 
