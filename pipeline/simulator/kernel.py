@@ -9,6 +9,10 @@ from typing import Any
 from numba import njit
 
 Function = Callable[..., Any]
+_OPTIONS: dict[str, Any] = {
+    "cache": True, "nogil": True, "error_model": "numpy", "forceinline": True, "_nrt": False,
+    "fastmath": {"contract"},
+}  # fmt: skip
 
 
 def kernel(function: Function) -> Function:
@@ -18,9 +22,13 @@ def kernel(function: Function) -> Function:
     references to these is left out too: with it a frame takes three times as long. Numba has no public name
     for that, so the lock pins the version this was tried with.
     """
-    compiled: Function = njit(
-        cache=True, nogil=True, error_model="numpy", forceinline=True, _nrt=False
-    )(function)  # fmt: skip
+    compiled: Function = njit(**_OPTIONS)(function)
+    return compiled
+
+
+def summing_kernel(function: Function) -> Function:
+    """Compile a kernel whose sums may be added up in any order, so that several terms go at once."""
+    compiled: Function = njit(**(_OPTIONS | {"fastmath": {"reassoc", "nsz", "contract"}}))(function)
     return compiled
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.raycast import first_hit, normal_at
+from pipeline.simulator.raycast import azimuth_of, first_hit, normal_at
 from pipeline.simulator.rays import part_ray_at, ray_at
 from pipeline.simulator.sheet import density_at, sheet_at
 from pipeline.simulator.surface import Texture, albedo_at, sheen_at
@@ -65,7 +65,7 @@ def _near_line(view: View, line: Line, u: int, v: int, times: int, work: Work) -
         if not first_hit(view.surface, w_ray, view.distance_mm, _CLOSE_MM, o, R, hit):
             continue
         x, y, z = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4], c_ray[2] + hit[0] * c_ray[5]
-        height, slope, _ = sheet_at(line.sheet, 0.5, np.arctan2(y, x))
+        height, slope, _ = sheet_at(line.sheet, 0.5, azimuth_of(y, x))
         above = z - height - np.sqrt(x * x + y * y) * slope
         normal_at(view.surface, hit, R, normal)
         facing = abs(w_ray[3] * normal[0] + w_ray[4] * normal[1] + w_ray[5] * normal[2])
@@ -90,7 +90,7 @@ def _line_light(
     x, y, z = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4], c_ray[2] + hit[0] * c_ray[5]
     q = np.sqrt(x * x + y * y)
     moment = view.moment[min(row, view.moment.shape[0] - 1), k]
-    height, slope, weight = sheet_at(line.sheet, moment, np.arctan2(y, x))
+    height, slope, weight = sheet_at(line.sheet, moment, azimuth_of(y, x))
     steep = np.sqrt(1.0 + slope * slope)
     density = density_at(line.profile, (z - height - q * slope) / steep)
     if density <= 0.0:
@@ -115,8 +115,8 @@ def _line_light(
 def _sheen(texture: Texture, normal: Float, way: Float, ray: Float) -> float:
     """Return the ratio of light that a partly glossy and a dull wall send to the camera."""
     a, b, c = -way[0] - ray[3], -way[1] - ray[4], -way[2] - ray[5]
-    size = np.sqrt(a * a + b * b + c * c) + 1e-12
-    return float(sheen_at(texture, (a * normal[0] + b * normal[1] + c * normal[2]) / size))
+    across = max(a * normal[0] + b * normal[1] + c * normal[2], 0.0)
+    return float(sheen_at(texture, across * across / (a * a + b * b + c * c + 1e-24)))
 
 
 @kernel

@@ -14,12 +14,15 @@ _SPARE = 0.1
 _FINE_MM = 0.3
 # Shortest step: the precision of a hit that the line needs.
 _LEAST_STEP_MM = 2e-5
+# How far from a section's plane a point of a bent pipe may lie: off by this times radius over bend, below
+# the precision of a hit.
+_SECTION_MM = 1e-5
 # Way after which a ray counts as lost: farther than any light in a pipe of this kind reaches.
 _FAR_MM = 2000.0
 
 
 @kernel
-def _frame(surface: Surface, s: float, o: Float, R: Float) -> None:
+def frame_at(surface: Surface, s: float, o: Float, R: Float) -> None:
     """Write a bent axis' point and the section's frame at distance s; straight beyond the ends."""
     axis_s, axis_o, turn = surface.axis_s, surface.axis_o, surface.axis_turn
     count = axis_s.shape[0]
@@ -31,26 +34,9 @@ def _frame(surface: Surface, s: float, o: Float, R: Float) -> None:
     for a in range(3):
         for b in range(3):
             R[a, b] = (1.0 - inside) * turn[k, a, b] + inside * turn[k + 1, a, b]
-    _orthonormalise(R)
     beyond = (w - inside) * span
     for a in range(3):
         o[a] = (1.0 - inside) * axis_o[k, a] + inside * axis_o[k + 1, a] + beyond * R[a, 2]
-
-
-@kernel
-def _orthonormalise(R: Float) -> None:
-    size = np.sqrt(R[0, 2] ** 2 + R[1, 2] ** 2 + R[2, 2] ** 2)
-    for a in range(3):
-        R[a, 2] /= size
-    along = R[0, 0] * R[0, 2] + R[1, 0] * R[1, 2] + R[2, 0] * R[2, 2]
-    for a in range(3):
-        R[a, 0] -= along * R[a, 2]
-    size = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2 + R[2, 0] ** 2)
-    for a in range(3):
-        R[a, 0] /= size
-    R[0, 1] = R[1, 2] * R[2, 0] - R[2, 2] * R[1, 0]
-    R[1, 1] = R[2, 2] * R[0, 0] - R[0, 2] * R[2, 0]
-    R[2, 1] = R[0, 2] * R[1, 0] - R[1, 2] * R[0, 0]
 
 
 @kernel
@@ -66,28 +52,55 @@ def _locate(
         return z, x, y
     a, b = 0.0, 0.0
     for _ in range(30):
-        _frame(surface, s, o, R)
+        frame_at(surface, s, o, R)
         dx, dy, dz = x - o[0], y - o[1], z - o[2]
         a = R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz
         b = R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz
         c = R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz
         s += c
-        if abs(c) < 1e-9:
+        if abs(c) < _SECTION_MM:
             break
     return s, a, b
 
 
 @kernel
+def cell_at(surface: Surface, s: float, psi: float) -> tuple[int, int, float, float]:
+    """Return row and column of the sample before a place, and the way to the next as shares."""
+    rows, columns = surface.radius.shape[0], surface.radius.shape[1] - 2
+    y = min(max((s - surface.from_mm) * surface.rows_per_mm, 0.0), rows - 1.0)
+    x = (psi + np.pi) * (columns * (0.5 / np.pi)) + 0.5
+    i, j = min(int(y), rows - 2), min(max(int(x), 0), columns)
+    return i, j, y - i, x - j
+
+
+@kernel
+def azimuth_of(y: float, x: float) -> float:
+    """Return the azimuth of a point to 2·10⁻⁸ rad, in a third of the time of the library's function.
+
+    Abramowitz and Stegun, Handbook of Mathematical Functions, 4.4.49.
+    """
+    low, high = min(abs(x), abs(y)), max(abs(x), abs(y))
+    t = low / max(high, 1e-300)
+    q = t * t
+    value = 0.0028662257
+    value = value * q - 0.0161657367
+    value = value * q + 0.0429096138
+    value = value * q - 0.0752896400
+    value = value * q + 0.1065626393
+    value = value * q - 0.1420889944
+    value = value * q + 0.1999355085
+    value = value * q - 0.3333314528
+    value = (value * q + 1.0) * t
+    value = 0.5 * np.pi - value if abs(y) > abs(x) else value
+    value = np.pi - value if x < 0.0 else value
+    return float(-value if y < 0.0 else value)
+
+
+@kernel
 def radius_at(surface: Surface, s: float, psi: float) -> float:
-    """Return the wall's radius at a distance and an azimuth, linear between samples."""
+    """Return the wall's radius at a distance and an azimuth from −π to π, linear between samples."""
     radius = surface.radius
-    rows, columns = radius.shape[0], radius.shape[1] - 2
-    y = min(max((s - surface.from_mm) / surface.step_mm, 0.0), rows - 1.0)
-    i = min(int(y), rows - 2)
-    x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
-    x -= np.floor((x - 0.5) / columns) * columns
-    j = min(max(int(x), 0), columns)
-    wy, wx = y - i, x - j
+    i, j, wy, wx = cell_at(surface, s, psi)
     upper = (1.0 - wx) * radius[i, j] + wx * radius[i, j + 1]
     lower = (1.0 - wx) * radius[i + 1, j] + wx * radius[i + 1, j + 1]
     return float((1.0 - wy) * upper + wy * lower)
@@ -107,8 +120,9 @@ def first_hit(surface: Surface, ray: Float, s: float, close: float, o: Float, R:
         How near to the wall's radius a hit must lie, mm.
     o, R : (3,), (3, 3)
         Work space; on return the axis point and the section's frame at the hit.
-    hit : (4,)
-        On return the way along the ray, mm, the wall's distance, azimuth and radius there.
+    hit : (6,)
+        On return the way along the ray, mm, the wall's distance, azimuth and radius there, and the azimuth's
+        cosine and sine.
 
     Returns
     -------
@@ -133,10 +147,10 @@ def first_hit(surface: Surface, ray: Float, s: float, close: float, o: Float, R:
             near = min(_reach(a, b, da, db, surface.floor_mm[0, k] + _LEAST_STEP_MM), NEAR_BLOCKS - _SPARE)
             way += max(far, near, _LEAST_STEP_MM)
             continue
-        psi = np.arctan2(b, a)
+        psi = azimuth_of(b, a)
         wall = radius_at(surface, s, psi)
         gap = wall - rho
-        hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
+        write_hit(hit, way, s, psi, wall, a / rho, b / rho)
         if gap <= close:
             break
         low, gap_low = way, gap
@@ -146,12 +160,13 @@ def first_hit(surface: Surface, ray: Float, s: float, close: float, o: Float, R:
     if gap < -close:
         _refine(surface, ray, close, low, gap_low, way, gap, s, o, R, hit)
     if straight:
-        _straight_frame(hit[1], o, R)
+        straight_frame(hit[1], o, R)
     return True
 
 
 @kernel
-def _straight_frame(s: float, o: Float, R: Float) -> None:
+def straight_frame(s: float, o: Float, R: Float) -> None:
+    """Write a straight axis' point and the section's frame at distance s."""
     o[0], o[1], o[2] = 0.0, 0.0, s
     for a in range(3):
         for b in range(3):
@@ -172,10 +187,16 @@ def _reach(a: float, b: float, da: float, db: float, radius: float) -> float:
 @kernel
 def _gap(surface: Surface, ray: Float, way: float, s: float, o: Float, R: Float, hit: Float) -> float:
     s, a, b = _locate(surface, ray, way, s, o, R)
-    psi = np.arctan2(b, a)
+    psi, rho = azimuth_of(b, a), np.sqrt(a * a + b * b)
     wall = radius_at(surface, s, psi)
-    hit[0], hit[1], hit[2], hit[3] = way, s, psi, wall
-    return float(wall - np.sqrt(a * a + b * b))
+    write_hit(hit, way, s, psi, wall, a / rho, b / rho)
+    return float(wall - rho)
+
+
+@kernel
+def write_hit(hit: Float, way: float, s: float, psi: float, wall: float, c: float, sn: float) -> None:
+    """Write a hit: way, distance, azimuth, radius, and cosine and sine of the azimuth."""
+    hit[0], hit[1], hit[2], hit[3], hit[4], hit[5] = way, s, psi, wall, c, sn
 
 
 @kernel
@@ -221,21 +242,15 @@ def normal_at(surface: Surface, hit: Float, R: Float, normal: Float) -> None:
 
     The foreshortening of distance in a bend, 1 − κ r cos, is left out of the slope along the pipe.
     """
-    slope, psi = surface.slope, hit[2]
-    rows, columns = slope.shape[0], slope.shape[1] - 2
-    y = min(max((hit[1] - surface.from_mm) / surface.step_mm, 0.0), rows - 1.0)
-    i = min(int(y), rows - 2)
-    x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
-    x -= np.floor((x - 0.5) / columns) * columns
-    j = min(max(int(x), 0), columns)
-    wy, wx = y - i, x - j
+    slope = surface.slope
+    i, j, wy, wx = cell_at(surface, hit[1], hit[2])
     w00, w01, w10, w11 = (1.0 - wy) * (1.0 - wx), (1.0 - wy) * wx, wy * (1.0 - wx), wy * wx
     along = w00 * slope[i, j, 0] + w01 * slope[i, j + 1, 0]
     along += w10 * slope[i + 1, j, 0] + w11 * slope[i + 1, j + 1, 0]
     around = w00 * slope[i, j, 1] + w01 * slope[i, j + 1, 1]
     around += w10 * slope[i + 1, j, 1] + w11 * slope[i + 1, j + 1, 1]
     around /= hit[3]
-    c, sn = np.cos(psi), np.sin(psi)
+    c, sn = hit[4], hit[5]
     size = 1.0 / np.sqrt(1.0 + along * along + around * around)
     x, y, z = -(c + around * sn) * size, -(sn - around * c) * size, along * size
     for k in range(3):

@@ -83,7 +83,7 @@ def ghost_table(surface: Surface, laser: TrueLaser, T_wc: Float, distance_mm: fl
     R, t = T_wc[:, :3], T_wc[:, 3]
     hits = np.full((_NODES, 9), np.nan)
     rays = np.concatenate([origin @ R.T + t, ray @ R.T], 1)
-    _write_mirrored(surface, rays, distance_mm, np.empty((5, 3)), np.empty(4), np.empty(6), hits)
+    _write_mirrored(surface, rays, distance_mm, np.empty((5, 3)), np.empty(6), np.empty(6), hits)
     second, onward = (hits[:, 3:6] - t) @ R, (hits[:, 6:9]) @ R
     final = np.unwrap(np.arctan2(second[:, 1], second[:, 0]))
     crowding = np.clip(np.abs(2 * np.pi / _NODES / np.gradient(final)), 0.0, 4.0)

@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.arrays import Float, Float32
 from pipeline.geometry.axis import PipeAxis, distance_along
 from pipeline.recording.base import Illumination
+from pipeline.simulator.calm import clear_mm
 from pipeline.simulator.instrument import TrueCamera, TrueInstrument, TrueLaser, TrueSensor
 from pipeline.simulator.kernel import in_bands
 from pipeline.simulator.line_light import add_line
@@ -27,7 +28,8 @@ from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
 from pipeline.simulator.surface import Surface, Texture, surface_of, texture_of
 from pipeline.simulator.view import Line, View, line_of, line_tiles
 from pipeline.simulator.wall.grid import Wall
-from pipeline.simulator.wall_light import Lamps, add_wall_light, lamps_of, stray_light
+from pipeline.simulator.wall_light import lamps_of, stray_light
+from pipeline.simulator.wall_tiles import add_wall
 
 
 @dataclass(frozen=True)
@@ -118,28 +120,31 @@ def light(scenery: Scenery, shot: Shot) -> Float32:
     """Return the light (H, W, 3) that would reach each pixel through a perfect lens, in full scales."""
     width, height = shot.instrument.camera.model.image_size
     image = np.zeros((height, width, 3), np.float32)
-    view = _view(scenery, shot)
+    view = view_of(scenery, shot)
     if shot.illumination != Illumination.LED.value:
         _add_laser(view, shot, image)
     if shot.illumination != Illumination.LASER.value:
         ring = shot.instrument.light
-        _add_wall(view, lamps_of(ring), np.array(ring.colour_bgr), shot.rendering.wall_samples, image)
+        add_wall(view, lamps_of(ring), np.array(ring.colour_bgr), shot.rendering.wall_samples, image)
     return image
 
 
-def _view(scenery: Scenery, shot: Shot) -> View:
+def view_of(scenery: Scenery, shot: Shot) -> View:
     """Return camera and wall of a shot as the kernels take them."""
     T_wc = scenery.surface.T_wp @ shot.T_pc
-    middle = shot.T_pc[len(shot.T_pc) // 2, shot.T_pc.shape[1] // 2]
-    camera = shot.instrument.camera
+    row, moment = len(shot.T_pc) // 2, shot.T_pc.shape[1] // 2
+    camera, ring = shot.instrument.camera, shot.instrument.light
+    distance = float(distance_along(scenery.axis, shot.T_pc[row, moment]))
+    clear = clear_mm(scenery.surface, T_wc[row, moment, :3], distance, ring.radius_mm)
     return View(
         _rays(camera),
         scenery.surface,
         scenery.texture,
         np.ascontiguousarray(T_wc[..., :3, :]),
         shot.moment,
-        float(distance_along(scenery.axis, middle)),
+        distance,
         focal_px(camera),
+        clear,
     )
 
 
@@ -157,7 +162,7 @@ def _add_laser(view: View, shot: Shot, image: Float32) -> None:
         in_bands(band, len(image))
     ambient = shot.instrument.sensor.ambient
     if ambient > 0:
-        _add_wall(view, stray_light(ambient), np.ones(3), 1, image)
+        add_wall(view, stray_light(ambient), np.ones(3), 1, image)
 
 
 def _lines(view: View, shot: Shot) -> tuple[Line, ...]:
@@ -185,10 +190,3 @@ def _shade(camera: TrueCamera, sensor: TrueSensor) -> Float32 | None:
     at_u, at_v = (np.ascontiguousarray(at) for at in np.meshgrid(u, v))
     cosine = cv2.remap(table.node[..., 5].astype(np.float32), at_u, at_v, cv2.INTER_LINEAR)
     return shade_of(sensor, np.asarray(np.nan_to_num(cosine, nan=-1.0), np.float32))
-
-
-def _add_wall(view: View, lamps: Lamps, colour: Float, samples: int, image: Float32) -> None:
-    def band(first: int, last: int) -> None:
-        add_wall_light(view, lamps, colour, samples, first, last, image)
-
-    in_bands(band, len(image))

@@ -5,16 +5,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
+from scipy.ndimage import maximum_filter, minimum_filter1d
 
 from pipeline.arrays import Float, Float32, Int
-from pipeline.geometry.axis import PipeAxis
+from pipeline.geometry.axis import PipeAxis, frames_at
 from pipeline.geometry.rigid import from_parts, inverse
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.wall.grid import Wall
 
 # Blocks of a millimetre that the two floors look ahead.
 NEAR_BLOCKS, WIDE_BLOCKS = 2, 32
+# Sectors of azimuth in which the wall's steepness is told: a pit or a weld spoils only its own.
+SECTORS = 32
+# Spacing of a bent axis' points: at a bend of 50 mm the frames between them, mixed linearly and not made
+# square again, are wrong by (0.25/50)²/8 = 3e-6.
+_AXIS_STEP_MM = 0.25
 
 
 class Surface(NamedTuple):
@@ -28,10 +33,15 @@ class Surface(NamedTuple):
         One column more on each side, so that interpolation needs no wrapping.
     slope : (rows, columns + 2, 2) float32
         Change of the radius along the pipe, mm/mm, and around it, mm/rad: differences over one cell each way.
-    from_mm, step_mm : float
+    from_mm, rows_per_mm : float
         Of the rows.
     floor_mm : (2, blocks)
         Least radius about every millimetre of distance: within 2 mm, and within 32 mm.
+    sector_floor_mm : (blocks, SECTORS)
+        Least radius in every millimetre and every sector of azimuth, and those around.
+    steepest : (blocks, SECTORS)
+        Largest slope between samples, mm/mm, in any direction, about every millimetre of distance and every
+        sector of azimuth: within 2 mm, and in the sectors beside it.
     least_mm, most_mm : float
         Of all radii.
     axis_s : (K,), axis_o : (K, 3), axis_turn : (K, 3, 3)
@@ -42,8 +52,10 @@ class Surface(NamedTuple):
     radius: Float32
     slope: Float32
     from_mm: float
-    step_mm: float
+    rows_per_mm: float
     floor_mm: Float
+    sector_floor_mm: Float
+    steepest: Float
     least_mm: float
     most_mm: float
     axis_s: Float
@@ -55,19 +67,31 @@ class Surface(NamedTuple):
 def surface_of(wall: Wall) -> Surface:
     """Lay a wall out for the kernels."""
     radius = np.concatenate([wall.radius_mm[:, -1:], wall.radius_mm, wall.radius_mm[:, :1]], 1)
+    axis = _fine(wall.axis)
     return Surface(
         np.ascontiguousarray(radius, np.float32),
         _slopes(wall),
         wall.shape.distance_from_mm,
-        wall.shape.step_mm,
+        1.0 / wall.shape.step_mm,
         _floor(wall),
+        -_most_by_sector(wall, -wall.radius_mm, 1),
+        _steepest(wall),
         float(wall.radius_mm.min()),
         float(wall.radius_mm.max()),
-        np.asarray(wall.axis.distance_mm, float),
-        np.ascontiguousarray(wall.axis.origin_p, float),
-        np.ascontiguousarray(wall.axis.R_pa, float),
+        np.asarray(axis.distance_mm, float),
+        np.ascontiguousarray(axis.origin_p, float),
+        np.ascontiguousarray(axis.R_pa, float),
         _own_frame(wall.axis),
     )
+
+
+def _fine(axis: PipeAxis) -> PipeAxis:
+    """Return a bent axis with evenly spaced points that lie close enough; a straight one as it is."""
+    if len(axis.distance_mm) == 2:
+        return axis
+    first, last = float(axis.distance_mm[0]), float(axis.distance_mm[-1])
+    distance = np.linspace(first, last, int(np.ceil((last - first) / _AXIS_STEP_MM)) + 1)
+    return PipeAxis(distance, *frames_at(axis, distance))
 
 
 def _slopes(wall: Wall) -> Float32:
@@ -102,10 +126,32 @@ def _floor(wall: Wall) -> Float:
     return np.stack([minimum_filter1d(least, blocks, mode="nearest") for blocks in reach])
 
 
+def _steepest(wall: Wall) -> Float:
+    """Return the largest slope (blocks, SECTORS) around every block and sector."""
+    grid, radius = wall.shape, wall.radius_mm
+    arc_mm = 2 * np.pi * float(radius.min()) / grid.columns
+    slope = np.abs(np.roll(radius, -1, 1) - radius) / arc_mm
+    slope[:-1] = np.hypot(slope[:-1], np.diff(radius, axis=0) / grid.step_mm)
+    return _most_by_sector(wall, slope, NEAR_BLOCKS)
+
+
+def _most_by_sector(wall: Wall, value: Float32, beside: int) -> Float:
+    """Return the most (blocks, SECTORS) of values (rows, columns) in a block, a sector, and those beside."""
+    grid = wall.shape
+    block = np.floor(grid.step_mm * np.arange(grid.rows)).astype(int)
+    sector = (SECTORS * np.arange(grid.columns)) // grid.columns
+    most = np.full((block[-1] + 1, SECTORS), -np.inf)
+    begins = np.minimum(np.searchsorted(sector, np.arange(SECTORS)), grid.columns - 1)
+    np.maximum.at(most, block, np.maximum.reduceat(value, begins, axis=1).astype(float))
+    # rows farther apart than a millimetre leave blocks between them empty
+    reach = beside + int(np.ceil(grid.step_mm))
+    return np.asarray(maximum_filter(most, (2 * reach + 1, 3), mode=("nearest", "wrap")))
+
+
 # Halvings of the texture along the pipe: up to 32 texels a pixel, as at a grazing view.
 _LEVELS = 6
-# Nodes over the cosine: linear between them, a lobe cos^40 errs by 40·39/(8·4096²) = 1.2e-5 of its peak.
-_SHEEN_NODES = 4097
+# Bits of half a lobe's exponent: up to cos^254.
+_LOBE_BITS = 7
 
 
 class Texture(NamedTuple):
@@ -119,16 +165,18 @@ class Texture(NamedTuple):
         Row at which each level begins.
     from_mm, step_mm : float
         Of the finest level's rows.
-    sheen : (N,)
-        What the wall sends to the camera over what a dull one would, by the cosine, 0 to 1, between its
-        normal and the direction halfway between light and camera (Blinn-Phong, normalised).
+    gloss : float
+        Share of the reflectance that is a glossy lobe.
+    half_lobe : int
+        Half of the lobe's exponent.
     """
 
     albedo: Float32
     first: Int
     from_mm: float
     step_mm: float
-    sheen: Float
+    gloss: float
+    half_lobe: int
 
 
 def texture_of(wall: Wall) -> Texture:
@@ -140,15 +188,15 @@ def texture_of(wall: Wall) -> Texture:
         levels.append(0.5 * (even[0::2] + even[1::2]))
     first = np.cumsum([0, *(len(level) for level in levels)])
     grid = wall.texture
-    cosine = np.linspace(0.0, 1.0, _SHEEN_NODES)
-    lobe = (wall.gloss_lobe + 8) / 8 * cosine**wall.gloss_lobe
-    sheen = 1 - wall.gloss + wall.gloss * lobe
-    return Texture(np.concatenate(levels), first, grid.distance_from_mm, grid.step_mm, sheen)
+    half_lobe = min(max(round(wall.gloss_lobe / 2), 1), 2**_LOBE_BITS - 1)
+    return Texture(
+        np.concatenate(levels), first, grid.distance_from_mm, grid.step_mm, float(wall.gloss), half_lobe
+    )
 
 
 @kernel
 def albedo_at(texture: Texture, s: float, psi: float, footprint_mm: float, out: Float) -> None:
-    """Write the reflectance (3,) at a place, averaged over a footprint along the pipe."""
+    """Write the reflectance (3,) at a distance and an azimuth from −π to π, averaged over a footprint."""
     level = 0.0
     if footprint_mm > texture.step_mm:
         level = np.log2(footprint_mm / texture.step_mm)
@@ -169,8 +217,7 @@ def _level_at(texture: Texture, k: int, s: float, psi: float, weight: float, fre
     y = min(max(y, 0.0), rows - 1.0)
     i = min(int(y), rows - 2)
     columns = texture.albedo.shape[1] - 2
-    x = (psi + np.pi) * columns / (2.0 * np.pi) + 0.5
-    x -= np.floor((x - 0.5) / columns) * columns
+    x = (psi + np.pi) * (columns * (0.5 / np.pi)) + 0.5
     j = min(max(int(x), 0), columns)
     wy, wx = y - i, x - j
     i += top
@@ -183,8 +230,15 @@ def _level_at(texture: Texture, k: int, s: float, psi: float, weight: float, fre
 
 
 @kernel
-def sheen_at(texture: Texture, cosine: float) -> float:
-    """Return the table's sheen at a cosine, linear between its nodes."""
-    x = min(max(cosine, 0.0), 1.0) * (texture.sheen.shape[0] - 1)
-    j = min(int(x), texture.sheen.shape[0] - 2)
-    return float(texture.sheen[j] + (x - j) * (texture.sheen[j + 1] - texture.sheen[j]))
+def sheen_at(texture: Texture, squared: float) -> float:
+    """Return what the wall sends to the camera over what a dull one would.
+
+    ``squared`` is the square of the cosine between the wall's normal and the direction halfway between light
+    and camera (Blinn-Phong, normalised: (m + 8)/8 cos^m for an exponent m).
+    """
+    power, factor, left = 1.0, min(squared, 1.0), texture.half_lobe
+    for _ in range(_LOBE_BITS):
+        power *= factor if left & 1 else 1.0
+        factor *= factor
+        left >>= 1
+    return 1.0 - texture.gloss + texture.gloss * (0.25 * texture.half_lobe + 1.0) * power

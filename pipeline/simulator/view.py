@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation
 
 from pipeline.arrays import Bool, Float
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.raycast import first_hit
+from pipeline.simulator.raycast import azimuth_of, first_hit
 from pipeline.simulator.rays import RayTable, ray_at
 from pipeline.simulator.sheet import ProfileTable, SheetTable, sheet_at
 from pipeline.simulator.surface import Surface, Texture
@@ -37,6 +37,8 @@ class View(NamedTuple):
         Of the camera, to start the search for hits.
     px_per_rad : float
         Near the axis, for the footprint of a pixel on the wall.
+    clear_mm : (blocks, SECTORS)
+        Largest radius that is surely in plain view of camera and LEDs: see `clear_mm` in `calm`.
     """
 
     rays: RayTable
@@ -46,6 +48,7 @@ class View(NamedTuple):
     moment: Float
     distance_mm: float
     px_per_rad: float
+    clear_mm: Float
 
 
 class Work(NamedTuple):
@@ -65,7 +68,7 @@ class Work(NamedTuple):
 def new_work() -> Work:
     """Return room for one ray."""
     ray, vector = (np.empty(6), np.empty(6)), (np.empty(3), np.empty(3), np.empty(3), np.empty(3))
-    return Work(*ray, np.empty(4), np.empty(3), np.empty((3, 3)), *vector)
+    return Work(*ray, np.empty(6), np.empty(3), np.empty((3, 3)), *vector)
 
 
 class Line(NamedTuple):
@@ -121,7 +124,7 @@ def _write_heights(view: View, sheet: SheetTable, k: int, work: Work, out: Float
                 continue
             x, y = c_ray[0] + hit[0] * c_ray[3], c_ray[1] + hit[0] * c_ray[4]
             z = c_ray[2] + hit[0] * c_ray[5]
-            height, slope, _ = sheet_at(sheet, 0.5, np.arctan2(y, x))
+            height, slope, _ = sheet_at(sheet, 0.5, azimuth_of(y, x))
             out[i, j] = z - height - np.sqrt(x * x + y * y) * slope
 
 

@@ -6,19 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.arrays import Float, Float32
+from pipeline.arrays import Float
 from pipeline.simulator.instrument import LedRing
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.line_light import REFERENCE_MM
-from pipeline.simulator.raycast import first_hit, normal_at, radius_at
+from pipeline.simulator.raycast import azimuth_of, first_hit, normal_at, radius_at
 from pipeline.simulator.rays import part_ray_at
 from pipeline.simulator.surface import Surface, albedo_at, sheen_at
-from pipeline.simulator.view import View, Work, new_work, to_wall
+from pipeline.simulator.view import View, Work, to_wall
 
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
 _CLOSE_MM = 5e-4
-# Side of a patch, px: the pixels of a patch share the wall's samples in the processor's cache.
-_PATCH_PX = 16
 
 
 class Lamps(NamedTuple):
@@ -28,7 +26,7 @@ class Lamps(NamedTuple):
     ----------
     place : (3, L)
         LEDs in C.
-    share : float
+    share : (L,)
         Light of each, full scales, on a white wall that faces it squarely from the reference distance.
     lobe, even : float
         See `LedRing`.
@@ -37,7 +35,7 @@ class Lamps(NamedTuple):
     """
 
     place: Float
-    share: float
+    share: Float
     lobe: float
     even: float
     ambient: float
@@ -48,50 +46,34 @@ def lamps_of(ring: LedRing) -> Lamps:
     around = 2 * np.pi * (np.arange(ring.leds) + 0.5) / ring.leds
     across = ring.radius_mm * np.stack([np.cos(around), np.sin(around)])
     place = np.concatenate([across, np.full((1, ring.leds), ring.z_mm)])
-    return Lamps(place, ring.level / ring.leds, ring.lobe, ring.even, 0.0)
+    return Lamps(place, np.full(ring.leds, ring.level / ring.leds), ring.lobe, ring.even, 0.0)
 
 
 def stray_light(level: float) -> Lamps:
     """Return no lamps but even stray light."""
-    return Lamps(np.zeros((3, 0)), 0.0, 1.0, 0.0, level)
-
-
-def add_wall_light(
-    view: View, lamps: Lamps, colour: Float, samples: int, v_from: int, v_to: int, image: Float32
-) -> None:
-    """Add what lamps make of the wall to rows v_from … v_to of an image (H, W, 3)."""
-    lit = np.empty((3, lamps.place.shape[1]))
-    _add_rows(view, lamps, colour, samples, v_from, v_to, new_work(), lit, np.empty(3), image)
+    return Lamps(np.zeros((3, 0)), np.zeros(0), 1.0, 0.0, level)
 
 
 @kernel
-def _add_rows(
-    view: View, lamps: Lamps, colour: Float, samples: int, v_from: int, v_to: int, work: Work, lit: Float,
-    total: Float, image: Float32,
+def least_ahead(lamps: Lamps) -> float:
+    """Return the cosine to the optical axis below which nothing is lit.
+
+    LEDs face forward and sit about at the viewpoint; stray light comes from everywhere.
+    """
+    return -0.05 if lamps.ambient == 0.0 else -1.0
+
+
+@kernel
+def light_of_ray(
+    view: View, lamps: Lamps, v: int, u: int, n: int, k: int, samples: int, work: Work, lit: Float,
+    total: Float,
 ) -> None:  # fmt: skip
-    across = -(-image.shape[1] // _PATCH_PX)
-    # in patches, so that neighbours find the wall's samples still at hand
-    for patch in range(across * -(-(v_to - v_from) // _PATCH_PX)):
-        v_first, u_first = v_from + patch // across * _PATCH_PX, patch % across * _PATCH_PX
-        for v in range(v_first, min(v_first + _PATCH_PX, v_to)):
-            for u in range(u_first, min(u_first + _PATCH_PX, image.shape[1])):
-                _pixel_light(view, lamps, samples, u, v, work, lit, total)
-                for c in range(3):
-                    image[v, u, c] += colour[c] * total[c]
+    """Add the light, by colour (3,), that part ``n`` of a pixel sees of the lamps at moment ``k``.
 
-
-@kernel
-def _pixel_light(
-    view: View, lamps: Lamps, samples: int, u: int, v: int, work: Work, lit: Float, total: Float
-) -> None:
-    times = view.pose.shape[1]
-    total[:] = 0.0
-    for n in range(samples * samples):
-        part_ray_at(view.rays, u, v, n, samples, work.c_ray)
-        for k in range(times):
-            _ray_light(view, lamps, v, k, samples, work, lit, total)
-    for c in range(3):
-        total[c] /= samples * samples * times
+    ``lit`` (3, L) is room for what each lamp contributes.
+    """
+    part_ray_at(view.rays, u, v, n, samples, work.c_ray)
+    _ray_light(view, lamps, v, k, samples, work, lit, total)
 
 
 @kernel
@@ -99,8 +81,7 @@ def _ray_light(
     view: View, lamps: Lamps, row: int, k: int, samples: int, work: Work, lit: Float, total: Float
 ) -> None:
     c_ray, w_ray, hit, normal, albedo = work.c_ray, work.w_ray, work.hit, work.normal, work.albedo
-    # LEDs face forward and sit about at the viewpoint
-    if not (c_ray[5] > (-0.05 if lamps.ambient == 0.0 else -1.0)):
+    if not (c_ray[5] > least_ahead(lamps)):
         return
     to_wall(view, row, k, c_ray, w_ray)
     if not first_hit(view.surface, w_ray, view.distance_mm, _CLOSE_MM, work.o, work.R, hit):
@@ -138,15 +119,20 @@ def _lamp_light(view: View, lamps: Lamps, T: Float, facing: float, work: Work, l
             if _shaded(view.surface, work.hit, T, way, distance, work.R):
                 continue
         lobe = lit[1, n] if lamps.lobe == 1.0 else lit[1, n] ** lamps.lobe
-        light += (lamps.even + (1.0 - lamps.even) * lobe) * lit[0, n] * sheen_at(view.texture, lit[2, n])
-    return lamps.share * light
+        light += (
+            lamps.share[n]
+            * (lamps.even + (1.0 - lamps.even) * lobe)
+            * lit[0, n]
+            * sheen_at(view.texture, lit[2, n])
+        )
+    return light
 
 
 @kernel
 def _face_lamps(
     place: Float, at: Float, ray: Float, normal: Float, T: Float, facing: float, lit: Float
 ) -> None:
-    """Write for each lamp: light over its lobe, cosine at the lamp, cosine of the direction halfway.
+    """Write for each lamp: light over its lobe, cosine at the lamp, squared cosine of the direction halfway.
 
     Without branches and sums, so that several lamps are computed at once.
     """
@@ -161,7 +147,7 @@ def _face_lamps(
         along = (x * rx + y * ry + z * rz) * near
         lit[0, n] = square * (REFERENCE_MM * near) ** 2
         lit[1, n] = z * near
-        lit[2, n] = (square + facing) / np.sqrt(2.0 + 2.0 * along)
+        lit[2, n] = (square + facing) ** 2 / (2.0 + 2.0 * along)
 
 
 @kernel
@@ -185,7 +171,7 @@ def _shaded(surface: Surface, hit: Float, T: Float, way: Float, distance: float,
 
     ``way`` (3,) leads from the LED to the hit in C and is ``distance`` long, ``T`` takes C to W.
     """
-    c, s, dx, dy, dz = np.cos(hit[2]), np.sin(hit[2]), 0.0, 0.0, 0.0
+    c, s, dx, dy, dz = hit[4], hit[5], 0.0, 0.0, 0.0
     for a in range(3):
         turned = -(T[a, 0] * way[0] + T[a, 1] * way[1] + T[a, 2] * way[2]) / distance
         dx += R[a, 0] * turned
@@ -198,7 +184,7 @@ def _shaded(surface: Surface, hit: Float, T: Float, way: Float, distance: float,
         rho = np.sqrt(x * x + y * y)
         if rho < surface.least_mm:
             return False
-        if radius_at(surface, hit[1] + back * dz, np.arctan2(y, x)) < rho - 0.01:
+        if radius_at(surface, hit[1] + back * dz, azimuth_of(y, x)) < rho - 0.01:
             return True
         step *= 1.25
         back += step

@@ -1,12 +1,14 @@
 """The simulator against its own exact line, and how quick it is.
 
-``python -m tests.benchmarks.bench_simulator [converge | speed | gauge ...]`` prints
+``python -m tests.benchmarks.bench_simulator [converge | speed | plain | gauge ...]`` prints
 
 converge   mean and rms, px, of the rendered line's centroid less the exact line's, by samples a side of a
            pixel: a plain 4 inch pipe at 2 MP, without noise and codec. The line's own width moves the
            mean a little where image radius is no straight function of height: that part is taken off
 speed      frames a second of laser and LED frames of two shipped scenes at 2 MP, codec left out: CPU time of
            one frame, and by the clock with the machine as busy as it is
+plain      LED frames against the plain path, which marches along every ray: CPU time of both for the light
+           alone, and their difference in units of the sensor's noise, rms and largest
 gauge      CPU time and time by the clock of the whole gauge run of 240 frames, premises, codec, truth and all
 """
 
@@ -29,7 +31,11 @@ from pipeline.simulator.produce import Order, Places, produce
 from pipeline.simulator.render import Renderer, renderer_of
 from pipeline.simulator.scene import read_scene
 from pipeline.simulator.sensor import through_lens
+from pipeline.simulator.shot import Shot, view_of
 from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.view import View
+from pipeline.simulator.wall_light import lamps_of
+from pipeline.simulator.wall_tiles import add_wall
 from tests.simulated import SCENES
 
 _AZIMUTHS, _REACH_PX, _STEP_PX = 360, 12.0, 0.05
@@ -106,6 +112,32 @@ def speed() -> None:
             print(f"{name:19} {kind:6} {cpu:11.3f} {clock:13.3f} {rates}", flush=True)
 
 
+def plain() -> None:
+    print("scene               CPU s/frame   plain CPU s   difference over noise: rms   largest")
+    for name in ("straight-4-inch", "gauge-4-inch", "bent-2-inch"):
+        truth = scene_truth(name)
+        renderer = renderer_of(truth)
+        shot = renderer.shot(int(np.flatnonzero(truth.frames.illumination == "led")[9]))
+        view, sensor = view_of(renderer.scenery, shot), truth.instrument.sensor
+        slow = view._replace(clear_mm=np.zeros_like(view.clear_mm))
+        (image, taken), (exact, longer) = (lit_wall(v, shot) for v in (view, slow))
+        noise = (
+            np.sqrt(np.clip(exact, 0, 1) * sensor.full_well_e + sensor.read_noise_e**2) / sensor.full_well_e
+        )
+        z = (image - exact) / noise
+        rms, most = float(np.sqrt(np.mean(z**2))), float(np.abs(z).max())
+        print(f"{name:19} {taken:11.3f} {longer:13.3f} {rms:27.4f} {most:9.3f}", flush=True)
+
+
+def lit_wall(view: View, shot: Shot) -> tuple[np.ndarray, float]:
+    """Return the light of the LEDs (H, W, 3) and the CPU time that it takes once compiled."""
+    width, height = shot.instrument.camera.model.image_size
+    for _ in range(2):
+        image = np.zeros((height, width, 3), np.float32)
+        taken, _ = timed(partial(add_wall, view, lamps_of(shot.instrument.light), np.ones(3), 1, image))
+    return image, taken
+
+
 def all_of(renderer: Renderer, frames: np.ndarray) -> None:
     for _ in renderer.frames(frames.tolist()):
         pass
@@ -128,5 +160,6 @@ def timed(call: Callable[[], object]) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    for study in sys.argv[1:] or ("converge", "speed", "gauge"):
-        {"converge": converge, "speed": speed, "gauge": gauge}[study]()
+    studies = {"converge": converge, "speed": speed, "plain": plain, "gauge": gauge}
+    for study in sys.argv[1:] or studies:
+        studies[study]()

@@ -54,7 +54,7 @@ class Wall:
     gloss : float
         Share of the reflectance that is a glossy lobe.
     gloss_lobe : float
-        Exponent of that lobe (Blinn-Phong, normalised).
+        Exponent of that lobe (Blinn-Phong, normalised), an even number up to 254: it is rounded to one.
     """
 
     axis: PipeAxis
