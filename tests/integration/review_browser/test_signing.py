@@ -68,6 +68,16 @@ def test_a_file_of_the_run_changed_behind_its_back_shows_as_unsigned(page: Tab, 
     page.until("boresight.session.seal?.signed")
 
 
+def test_for_whom_it_was_inspected_is_given_on_the_page_and_printed(page: Tab) -> None:
+    page.keys("3")
+    page.page.fill("#fact-client", "Water Works")
+    page.page.fill("#fact-date", "2026-05-31")
+    with page.one_change():
+        page.page.click('button:text-is("Use in the reports")')
+    facts = page.page.request.get(f"{page.origin}/api/papers/findings.json").json()["facts"]
+    assert facts == [["Client", "Water Works"], ["Date", "2026-05-31"]]
+
+
 def test_every_paper_can_be_taken_away(page: Tab) -> None:
     page.keys("3")
     links = page.page.locator(".papers a")
@@ -76,7 +86,9 @@ def test_every_paper_can_be_taken_away(page: Tab) -> None:
         "report.html": b"<!doctype html>",
         "findings.csv": b"\xef\xbb\xbfid,",
         "findings.json": b"{",
-        "pof.csv": b"\xef\xbb\xbffeature_id,",
+        "pof.csv": b"\xef\xbb\xbfLog distance [m],",
+        "pacp.csv": b"\xef\xbb\xbfConditionID,",
+        "en13508-2.txt": b"#A1=",
         "pictures.zip": b"PK",
     }
     assert links.count() == len(starts)

@@ -4,13 +4,14 @@ import { element, moment } from "./words";
 
 const PAPERS: [string, string][] = [
   ["report.pdf", "Report, PDF"], ["report.html", "Report, HTML"], ["findings.csv", "Findings, CSV"],
-  ["findings.json", "Findings, JSON"], ["pof.csv", "POF table, CSV"], ["pictures.zip", "Pictures of findings, JPEG"],
+  ["findings.json", "Findings, JSON"], ["pof.csv", "POF pipe tally, CSV"], ["pacp.csv", "PACP conditions, CSV"],
+  ["en13508-2.txt", "EN 13508-2 file"], ["pictures.zip", "Pictures of findings, SVG"],
 ];
 
 export function signPage(session: Session): HTMLElement {
   const root = element("div", { class: "page" });
   const form = session.source.readOnly ? null : signature(session);
-  const assumed = session.source.readOnly ? null : assumptions(session);
+  const assumed = session.source.readOnly ? null : element("div", {}, inspection(session), assumptions(session));
   const paint = () => root.replaceChildren(...parts(session, form, assumed));
   session.on(["state", "seal"], paint);
   session.on(["named"], () => {
@@ -90,4 +91,21 @@ function assumptions(session: Session): HTMLElement {
       element("label", { for: "wall" }, "Wall thickness, mm"), wall,
       element("label", { for: "yield" }, "Yield strength, MPa"), strength,
       element("button", {}, "Use for wall loss and B31G")));
+}
+
+const FACTS: [string, string][] = [
+  ["client", "Client"], ["site", "Site"], ["asset", "Asset"], ["line", "Line"], ["operator", "Operator"], ["date", "Date of inspection"],
+  ["procedure", "Procedure"], ["equipment", "Equipment"], ["calibration", "Calibration certificate"],
+];
+
+/** For whom, where and how it was inspected: as recording.yaml says, completed here, printed in every report. */
+function inspection(session: Session): HTMLElement {
+  const { described } = session.state;
+  const inputs = FACTS.map(([name]) => element("input", { type: name === "date" ? "date" : "text", maxlength: "200", id: `fact-${name}`, value: described[name] ?? "" }));
+  const facts = () => Object.fromEntries(FACTS.map(([name], k) => [name, (inputs[k] as HTMLInputElement).value.trim()]));
+  return element("section", {}, element("h2", {}, "The inspection"),
+    element("p", { class: "quiet" }, "Before signing. This is printed at the head of every report; what is left empty is named there as not stated."),
+    element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "describe", ...facts() }); } },
+      ...FACTS.flatMap(([name, label], k) => [element("label", { for: `fact-${name}` }, label), inputs[k] as HTMLInputElement]),
+      element("button", {}, "Use in the reports")));
 }

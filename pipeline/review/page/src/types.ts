@@ -47,7 +47,7 @@ export interface Signature { id: number; name: string; standard: string; remarks
 
 export interface ReviewState {
   revision: number; findings: Finding[]; may_undo: boolean; may_redo: boolean; lost: Entry[];
-  assumed: { wall_thickness_mm: number | null; yield_mpa: number | null }; history: Entry[];
+  assumed: { wall_thickness_mm: number | null; yield_mpa: number | null }; described: Record<string, string>; history: Entry[];
 }
 
 /** Of what state a signature would be, and the last one; changes whenever anything does. */
