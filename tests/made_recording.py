@@ -16,6 +16,7 @@ COUNT, WIDTH, HEIGHT, RATE = 16, 64, 48, 30
 LIGHTS = ["laser", "led"] * (COUNT // 2)
 TIMES_S = [i / RATE for i in range(COUNT)]
 READINGS = [(0.01 * i, 0.2 * i) for i in range(56)]
+IMU = [(0.01 * i, 0.1, -0.2, 0.01 * i, 0.0, 0.5, -9.8) for i in range(56)]
 START_NS = 1_700_000_000_000_000_000
 
 PROBE = """\
@@ -169,14 +170,33 @@ def _write_messages(
     for time_s, distance_mm in READINGS:
         reading = store.types["std_msgs/msg/Float64"](data=distance_mm)
         events.append((START_NS + round(time_s * 1e9), 2, encoder, reading, "std_msgs/msg/Float64"))
+    imu = connect("/imu/data", "sensor_msgs/msg/Imu")
+    for time_s, *values in IMU:
+        taken = START_NS + round(time_s * 1e9)
+        events.append((taken + 1_000_000, 3, imu, _imu(store, taken, values), "sensor_msgs/msg/Imu"))
     for time, _, link, message, name in sorted(events, key=lambda e: e[:2]):
         write(link, time, message, name)
 
 
-def _image(store, number: int, taken_ns: int, kind: str, encoding: str):
+def _header(store, taken_ns: int, frame: str):
     stamp = store.types["builtin_interfaces/msg/Time"](sec=taken_ns // 10**9, nanosec=taken_ns % 10**9)
-    extra = {"seq": number} if "seq" in store.types["std_msgs/msg/Header"].__dataclass_fields__ else {}
-    header = store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="camera", **extra)
+    extra = {"seq": 0} if "seq" in store.types["std_msgs/msg/Header"].__dataclass_fields__ else {}
+    return store.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame, **extra)
+
+
+def _imu(store, taken_ns: int, values: list[float]):
+    vector, none = store.types["geometry_msgs/msg/Vector3"], np.zeros(9)
+    return store.types["sensor_msgs/msg/Imu"](
+        header=_header(store, taken_ns, "imu"),
+        orientation=store.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0),
+        orientation_covariance=none, angular_velocity=vector(*values[:3]),
+        angular_velocity_covariance=none, linear_acceleration=vector(*values[3:]),
+        linear_acceleration_covariance=none,
+    )  # fmt: skip
+
+
+def _image(store, number: int, taken_ns: int, kind: str, encoding: str):
+    header = _header(store, taken_ns, "camera")
     pixels = picture(number)
     if kind.endswith("CompressedImage"):
         data = cv2.imencode(".png", pixels)[1].reshape(-1)

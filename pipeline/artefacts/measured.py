@@ -113,6 +113,40 @@ class MotionEvent:
 
 
 @dataclass(frozen=True)
+class PipePiece:
+    """A straight length or a bend of the pipe, as the axis was found.
+
+    Attributes
+    ----------
+    kind : str
+        ``straight`` or ``bend``.
+    from_mm, to_mm : float
+        Distances along the axis.
+    sigma_mm : float
+        1 σ of each of these limits; for the ends of the run, of the way between them.
+    angle_rad, angle_sigma_rad : float
+        By how much the piece turns the pipe; 0 for a straight length.
+    toward_rad : float
+        Azimuth in P toward which a bend turns; NaN for a straight length.
+    radius_mm, radius_sigma_mm : float
+        Of the bend's axis; NaN for a straight length.
+    standard : str
+        Name of the one standard radius that fits, such as ``1.5 D``; empty where none or several do.
+    """
+
+    kind: str
+    from_mm: float
+    to_mm: float
+    sigma_mm: float
+    angle_rad: float = 0.0
+    angle_sigma_rad: float = 0.0
+    toward_rad: float = float("nan")
+    radius_mm: float = float("nan")
+    radius_sigma_mm: float = float("nan")
+    standard: str = ""
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Pose of the camera in P at every frame, the pipe's axis, and what the motion showed.
 
@@ -142,6 +176,8 @@ class Trajectory:
     distance_sigma_mm : float
         1 σ of the distance along the axis from the first frame to the last, calibration included; NaN where
         it was not worked out.
+    pieces : tuple of PipePiece
+        Straight lengths and bends in the order of distance; empty where they were not looked for.
     """
 
     frame: Int
@@ -157,6 +193,7 @@ class Trajectory:
     instrument: Float | None = None
     instrument_covariance: Float | None = None
     distance_sigma_mm: float = float("nan")
+    pieces: tuple[PipePiece, ...] = ()
 
 
 @dataclass(frozen=True)

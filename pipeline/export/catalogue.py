@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pipeline.export.arrays import write_cloud, write_radius_map, write_rings
+from pipeline.export.centreline import write_centreline
 from pipeline.export.glb import write_model
 from pipeline.export.pictures import write_overlays, write_unrolled
 from pipeline.export.report.write import write_report_page
@@ -13,6 +14,7 @@ from pipeline.machine.exporter import Exporter
 EXPORTERS = (
     Exporter("rings.zarr", write_rings),
     Exporter("trajectory.csv", write_trajectory),
+    Exporter("centreline", write_centreline),
     Exporter("radius_map.npz", write_radius_map),
     Exporter("cloud.ply", write_cloud),
     Exporter("model.glb", write_model),

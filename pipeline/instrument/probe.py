@@ -32,6 +32,34 @@ class Lighting:
 
 
 @dataclass(frozen=True)
+class ImuMount:
+    """How the inertial measurement unit sits on the camera, and how it errs.
+
+    The defaults are those of consumer chips of 2015 to 2025 (MPU-6050, BMI160, ICM-20948; their data sheets
+    state 0.005 to 0.015 °/s/√Hz and 100 to 400 µg/√Hz). Names and units are Kalibr's.
+
+    Attributes
+    ----------
+    R_ci : (3, 3)
+        Turns directions in I (IMU) to C (camera).
+    gyroscope_noise_density : float
+        rad/s/√Hz.
+    gyroscope_random_walk : float
+        Of its bias, rad/s²/√Hz.
+    accelerometer_noise_density : float
+        m/s²/√Hz.
+    accelerometer_bias : float
+        1 σ, m/s², of what remains constant.
+    """
+
+    R_ci: Float
+    gyroscope_noise_density: float = 2e-4
+    gyroscope_random_walk: float = 2e-5
+    accelerometer_noise_density: float = 3e-3
+    accelerometer_bias: float = 0.2
+
+
+@dataclass(frozen=True)
 class Probe:
     """What is believed of the instrument.
 
@@ -44,6 +72,7 @@ class Probe:
         Relative 1 σ of the encoder's scale.
     calibrated_from : str
         Name of the gauge run, empty when the numbers are merely stated.
+    imu : ImuMount or None
     """
 
     camera: Camera
@@ -53,6 +82,7 @@ class Probe:
     lighting: Lighting = Lighting()
     encoder_scale_sigma: float = 0.002
     calibrated_from: str = ""
+    imu: ImuMount | None = None
 
     @property
     def parameter_names(self) -> tuple[str, ...]:

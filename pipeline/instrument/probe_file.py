@@ -23,7 +23,7 @@ from pipeline.files.provenance import MadeBy
 from pipeline.files.yaml_file import Section, read_yaml
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
-from pipeline.instrument.probe import Lighting, Probe, Shutter
+from pipeline.instrument.probe import ImuMount, Lighting, Probe, Shutter
 
 UNCERTAINTY_KEYS = (
     "focal_px", "centre_px", "distortion", "baseline_mm", "tilt_deg", "opening_angle_deg", "decentre_mm",
@@ -89,7 +89,7 @@ def _rms(variance: dict[str, float], members: Sequence[str]) -> float:
 
 
 _KEYS = (
-    "camera", "laser", "shutter", "lighting", "standard_uncertainty", "covariance", "calibrated_from",
+    "camera", "laser", "shutter", "lighting", "imu", "standard_uncertainty", "covariance", "calibrated_from",
     "made_by",
 )  # fmt: skip
 _LASER_KEYS = (
@@ -97,6 +97,8 @@ _LASER_KEYS = (
     "decentre_mm", "decentre_direction_deg", "waviness_rad",
 )  # fmt: skip
 _WAVES = len(LaserSheet(1.0).waviness)
+# Rows that are written with four digits are orthonormal to this.
+_ROTATION = 1e-3
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,7 @@ def probe_from(document: Section) -> Probe:
         lighting=_lighting(_optional(document, "lighting")),
         encoder_scale_sigma=stated.number("encoder_scale", least=0) if stated.has("encoder_scale") else 0.002,
         calibrated_from=document.text("calibrated_from") if document.has("calibrated_from") else "",
+        imu=_imu(document.section("imu")) if document.has("imu") else None,
     )  # fmt: skip
 
 
@@ -159,6 +162,8 @@ def write_probe(probe: Probe, path: Path, made_by: MadeBy | None = None) -> None
         "standard_uncertainty": stated_from_covariance(probe),
         "covariance": {"names": list(probe.parameter_names), "matrix": probe.covariance.tolist()},
     }
+    if probe.imu is not None:
+        document["imu"] = asdict(probe.imu) | {"R_ci": probe.imu.R_ci.tolist()}
     if probe.calibrated_from:
         document["calibrated_from"] = probe.calibrated_from
     if made_by is not None:
@@ -236,6 +241,31 @@ def _lighting(section: Section) -> Lighting:
         section.integer("leds", least=1) if section.has("leds") else usual.leds,
         section.number("radius_mm", least=0) if section.has("radius_mm") else usual.radius_mm,
         section.number("z_mm") if section.has("z_mm") else usual.z_mm,
+    )
+
+
+def _imu(section: Section) -> ImuMount:
+    """Return the mount that a section states: rows of ``R_ci``, and noise densities as Kalibr has them."""
+    section.refuse_unknown(tuple(ImuMount.__dataclass_fields__))
+    rows = section.require("R_ci", "three rows of three numbers")
+    try:
+        R_ci = np.array(rows, float)
+    except (TypeError, ValueError) as error:
+        raise section.fail("R_ci", f"is not a table of numbers ({error})", "three rows of three") from error
+    proper = R_ci.shape == (3, 3) and np.allclose(R_ci @ R_ci.T, np.eye(3), atol=_ROTATION)
+    if not proper or np.linalg.det(R_ci) < 0:
+        raise section.fail("R_ci", "is not a rotation", "orthonormal rows of determinant +1")
+    usual = ImuMount(R_ci)
+
+    def stated(name: str) -> float:
+        return section.number(name, above=0) if section.has(name) else float(getattr(usual, name))
+
+    return ImuMount(
+        R_ci,
+        stated("gyroscope_noise_density"),
+        stated("gyroscope_random_walk"),
+        stated("accelerometer_noise_density"),
+        stated("accelerometer_bias"),
     )
 
 

@@ -9,12 +9,14 @@ Topics, by default:
     ``std_msgs/String``: ``laser``, ``led`` or ``both``; one for each image, else each holds until the next.
 ``/encoder/distance_mm``
     ``std_msgs/Float64``, timed by when it was recorded.
+``/imu/data``
+    ``sensor_msgs/Imu``; the covariances in it are not used, probe.yaml says how an IMU errs.
 
 What a bag cannot say stands in a YAML file beside it: ``run.recording.yaml`` for ``run.bag``, ``run.mcap``
 or the folder ``run``, else ``recording.yaml`` in the same folder (for a ROS 2 bag: inside it). Its keys are
 those of a recording folder without ``video``, ``frames`` and ``encoder``; ``frame_rate`` may be left out;
-``topics`` may name ``image``, ``illumination`` and ``encoder``; without an illumination topic, the key
-``illumination`` lists the pattern that repeats, such as ``[laser, led]``. ``probe`` is relative to that file.
+``topics`` may name ``image``, ``illumination``, ``encoder`` and ``imu``; without an illumination topic, the
+key ``illumination`` lists the pattern that repeats, such as ``[laser, led]``. ``probe`` is relative to that file.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ from pipeline.recording.bag_topics import (
     choose_topics,
     encoder_of,
     frames_of,
+    imu_of,
     message_image,
 )
 from pipeline.recording.base import FrameTable, Planes, Recording, ascending, complete, decoded_ahead
@@ -142,6 +145,7 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
         topics = choose_topics(bag.topics(), section, path)
         recorded_ns, frames, start_ns = frames_of(bag, topics, section)
         encoder = encoder_of(bag, topics, start_ns)
+        imu = imu_of(bag, topics, start_ns)
         source = _source(bag, topics, recorded_ns)
     except BAG_ERRORS as error:
         raise InputError(
@@ -163,6 +167,7 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
         warnings=(*described.warnings, *encoder_warnings(encoder, frames)),
         files=files,
         inspection=described.inspection,
+        imu=imu,
     )
 
 

@@ -1,4 +1,4 @@
-"""Which topics of a bag hold the frames, their light and the encoder, what these say, and their images."""
+"""Which topics of a bag hold frames, light, encoder and IMU, what these say, and their images."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Image, Int
+from pipeline.arrays import Float, Image, Int
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import Section
 from pipeline.recording.bag_file import Bag
-from pipeline.recording.base import Encoder, FrameTable, Illumination, Planes
+from pipeline.recording.base import Encoder, FrameTable, Illumination, Imu, Planes
 from pipeline.recording.checks import refuse_backward
 from pipeline.recording.pixels import decode_still
+from pipeline.recording.tables import refuse_other_units
 
 IMAGE_TOPICS = ("/camera/image_raw", "/camera/image_raw/compressed", "/camera/image/compressed")
 ILLUMINATION_TOPIC, ILLUMINATION_TYPE = "/illumination", "std_msgs/msg/String"
 ENCODER_TOPIC, ENCODER_TYPE = "/encoder/distance_mm", "std_msgs/msg/Float64"
+IMU_TOPIC, IMU_TYPE = "/imu/data", "sensor_msgs/msg/Imu"
 # Stamps of the camera's driver count when they run with the recorder's clock to within this time.
 _SAME_CLOCK_NS = 5_000_000_000
 _KINDS = tuple(k.value for k in Illumination)
@@ -81,12 +83,13 @@ def _rows(message: Any) -> Image | None:
 
 @dataclass(frozen=True)
 class Topics:
-    """Topic and type of the images; topics of illumination and encoder, empty where there is none."""
+    """Topic and type of the images; topics of illumination, encoder and IMU, empty where there is none."""
 
     image: str
     image_type: str
     illumination: str
     encoder: str
+    imu: str
 
 
 def choose_topics(types: Mapping[str, str], section: Section, path: Path) -> Topics:
@@ -98,15 +101,18 @@ def choose_topics(types: Mapping[str, str], section: Section, path: Path) -> Top
         When a named topic is not there or of another type, or several could be the images.
     """
     named = section.section("topics") if section.has("topics") else Section(section.file, {}, "topics")
-    named.refuse_unknown(("image", "illumination", "encoder"))
+    named.refuse_unknown(("image", "illumination", "encoder", "imu"))
     image = _named(named, "image", types, IMAGE_TYPES) or _usual_image(types, path)
     illumination = _named(named, "illumination", types, (ILLUMINATION_TYPE,))
     encoder = _named(named, "encoder", types, (ENCODER_TYPE,))
     if not illumination and types.get(ILLUMINATION_TOPIC) == ILLUMINATION_TYPE:
         illumination = ILLUMINATION_TOPIC
+    imu = _named(named, "imu", types, (IMU_TYPE,))
     if not encoder and types.get(ENCODER_TOPIC) == ENCODER_TYPE:
         encoder = ENCODER_TOPIC
-    return Topics(image, types[image], illumination, encoder)
+    if not imu and types.get(IMU_TOPIC) == IMU_TYPE:
+        imu = IMU_TOPIC
+    return Topics(image, types[image], illumination, encoder, imu)
 
 
 def frames_of(bag: Bag, topics: Topics, section: Section) -> tuple[Int, FrameTable, int]:
@@ -148,6 +154,46 @@ def encoder_of(bag: Bag, topics: Topics, start_ns: int) -> Encoder | None:
         place = f"topic {topics.encoder}, message {wrong[0] + 1}"
         raise InputError(bag.files[0], f"is {distance_mm[wrong[0]]}", place=place, expected="a finite number")
     return Encoder(time_s, distance_mm)
+
+
+def imu_of(bag: Bag, topics: Topics, start_ns: int) -> Imu | None:
+    """Return the IMU's readings, time counted from ``start_ns``; None where there is no such topic.
+
+    Times are the stamps of its driver where these run with the recorder's clock, as those of the images.
+
+    Raises
+    ------
+    InputError
+        When readings are too few, not finite, not in order of time or in other units than rad/s and m/s².
+    """
+    if not topics.imu:
+        return None
+    file, place = bag.files[0], f"topic {topics.imu}"
+    recorded_ns, stamped_ns, values = _imu_messages(bag, topics.imu)
+    if len(values) < 2:
+        raise InputError(file, f"has {len(values)} readings", place=place, expected="at least 2")
+    wrong = np.flatnonzero(~np.isfinite(values).all(1))
+    if wrong.size:
+        number = int(wrong[0]) + 1
+        raise InputError(file, "is not finite", place=f"{place}, message {number}", expected="finite numbers")
+    same_clock = bool(np.all(np.abs(stamped_ns - recorded_ns) < _SAME_CLOCK_NS))
+    time_s = ((stamped_ns if same_clock else recorded_ns) - start_ns) * 1e-9
+    refuse_backward(file, time_s, f"the time of {topics.imu}", strictly=True)
+    imu = Imu(time_s, values[:, :3], values[:, 3:])
+    refuse_other_units(file, imu)
+    return imu
+
+
+def _imu_messages(bag: Bag, topic: str) -> tuple[Int, Int, Float]:
+    """Return when messages were recorded and stamped (M,), ns, and their rates and forces (M, 6)."""
+    recorded, stamped, values = [], [], []
+    for time_ns, coded in bag.messages(topic):
+        message = bag.decode(coded, IMU_TYPE)
+        stamp, rate, force = message.header.stamp, message.angular_velocity, message.linear_acceleration
+        recorded.append(time_ns)
+        stamped.append(stamp.sec * 1_000_000_000 + stamp.nanosec)
+        values.append((rate.x, rate.y, rate.z, force.x, force.y, force.z))
+    return np.array(recorded, np.int64), np.array(stamped, np.int64), np.array(values, float).reshape(-1, 6)
 
 
 def _lights(bag: Bag, topics: Topics, section: Section, recorded_ns: Int) -> NDArray[np.str_]:

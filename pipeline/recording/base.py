@@ -84,6 +84,24 @@ class Encoder:
 
 
 @dataclass(frozen=True)
+class Imu:
+    """Readings of an inertial measurement unit on its own clock, in its own frame I.
+
+    Attributes
+    ----------
+    time_s : (M,)
+    rate_rad_s : (M, 3)
+        Angular rate of I, by the gyroscope.
+    force_m_s2 : (M, 3)
+        Specific force, by the accelerometer: at rest it points up and is 9.81 m/s² long.
+    """
+
+    time_s: Float
+    rate_rad_s: Float
+    force_m_s2: Float
+
+
+@dataclass(frozen=True)
 class BoreSection:
     """A stretch of known bore in a gauge."""
 
@@ -112,6 +130,15 @@ class Fiducials:
 
 
 @dataclass(frozen=True)
+class PlannedPiece:
+    """A straight length, ``bend_deg`` 0, or a bend of a pipe as planned; NaN marks what is not stated."""
+
+    length_mm: float
+    bend_deg: float = 0.0
+    radius_mm: float = float("nan")
+
+
+@dataclass(frozen=True)
 class PipeFacts:
     """What is known of the pipe beforehand; gauge runs also know bores and fiducials."""
 
@@ -120,6 +147,7 @@ class PipeFacts:
     bore: tuple[BoreSection, ...] = ()
     bore_tolerance_mm: float = 0.0
     fiducials: Fiducials | None = None
+    plan: tuple[PlannedPiece, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -191,6 +219,8 @@ class Recording:
         such table.
     inspection
         For whom, where and how it was recorded, for the report.
+    imu
+        None where there is none.
     """
 
     name: str
@@ -207,6 +237,7 @@ class Recording:
     files: tuple[InputFile, ...] = ()
     listed: FrameTable | None = None
     inspection: InspectionFacts = InspectionFacts()
+    imu: Imu | None = None
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`."""

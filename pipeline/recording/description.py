@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import datetime
+import math
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import Section
-from pipeline.recording.base import BoreSection, Fiducials, InspectionFacts, Marker, PipeFacts
+from pipeline.recording.base import BoreSection, Fiducials, InspectionFacts, Marker, PipeFacts, PlannedPiece
 
 COMMON_KEYS = ("name", "kind", "frame_rate", "probe", "pipe", "inspection")
-_PIPE_KEYS = ("nominal_diameter_mm", "wall_thickness_mm", "bore", "bore_tolerance_mm", "fiducials")
+_PIPE_KEYS = ("nominal_diameter_mm", "wall_thickness_mm", "bore", "bore_tolerance_mm", "fiducials", "plan")
 _INSPECTION_KEYS = tuple(f.name for f in fields(InspectionFacts))
 _FIDUCIAL_KEYS = ("dictionary", "size_mm", "columns_along", "rows_along", "markers")
 
@@ -26,7 +27,18 @@ def pipe_facts(section: Section) -> PipeFacts:
         bore=tuple(map(_bore, section.sections("bore"))) if has("bore") else (),
         bore_tolerance_mm=section.number("bore_tolerance_mm", least=0) if has("bore_tolerance_mm") else 0.0,
         fiducials=_fiducials(section.section("fiducials")) if has("fiducials") else None,
+        plan=tuple(map(_planned, section.sections("plan"))) if has("plan") else (),
     )
+
+
+def _planned(section: Section) -> PlannedPiece:
+    """Return a piece of the plan: ``length_mm`` of a straight length, or ``bend_deg`` and ``radius_mm``."""
+    section.refuse_unknown(("length_mm", "bend_deg", "radius_mm"))
+    if not section.has("bend_deg"):
+        return PlannedPiece(section.number("length_mm", above=0))
+    angle = section.number("bend_deg", above=0)
+    radius = section.number("radius_mm", above=0) if section.has("radius_mm") else math.nan
+    return PlannedPiece(radius * math.radians(angle), angle, radius)
 
 
 def _bore(section: Section) -> BoreSection:

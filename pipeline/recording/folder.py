@@ -1,4 +1,4 @@
-"""A recording kept as a folder: recording.yaml, frames.csv, encoder.csv and a video or images."""
+"""A recording kept as a folder: recording.yaml, tables (frames, encoder, IMU) and a video or images."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import Section, read_yaml
-from pipeline.recording.base import Encoder, FrameTable, Recording
+from pipeline.recording.base import Encoder, FrameTable, Imu, Recording
 from pipeline.recording.checks import common_frames, encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe, inside, optional_file, required_file
 from pipeline.recording.images import ImageSequence, is_pattern, open_images
 from pipeline.recording.input_file import InputFile, content_key, input_file
-from pipeline.recording.tables import read_encoder, read_frame_table
+from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 from pipeline.recording.video import VideoSource, open_video
 
 DESCRIPTION = "recording.yaml"
-_KEYS = (*COMMON_KEYS, "video", "frames", "encoder")
+_KEYS = (*COMMON_KEYS, "video", "frames", "encoder", "imu")
 
 
 def recognise(path: Path) -> str | None:
@@ -38,13 +38,15 @@ def open_folder(path: Path) -> Recording:
     """
     description = input_file(path / DESCRIPTION)
     section = described_in(description.path)
-    frames_file, encoder_file, no_encoder = table_files(section)
-    tables = [input_file(f) for f in (frames_file, encoder_file) if f is not None]
-    table = read_frame_table(frames_file)
-    encoder = read_encoder(encoder_file) if encoder_file else None
+    named = table_files(section)
+    tables = [input_file(f) for f in (named.frames, named.encoder, named.imu) if f is not None]
+    table = read_frame_table(named.frames)
+    encoder = read_encoder(named.encoder) if named.encoder else None
+    imu = read_imu(named.imu) if named.imu else None
     source, image_files = _open_source(section, table)
-    parts = FolderParts(table, encoder, source, no_encoder, (description, *tables, *image_files))
-    return assembled(section, frames_file, parts)
+    files = (description, *tables, *image_files)
+    parts = FolderParts(table, encoder, imu, source, named.warnings, files)
+    return assembled(section, named.frames, parts)
 
 
 def described_in(file: Path) -> Section:
@@ -54,9 +56,20 @@ def described_in(file: Path) -> Section:
     return section
 
 
-def table_files(section: Section) -> tuple[Path, Path | None, tuple[str, ...]]:
-    """Return the files of frames and encoder, and a warning where the encoder's is not there."""
-    return required_file(section, "frames"), *optional_file(section, "encoder")
+@dataclass(frozen=True)
+class TableFiles:
+    """The files of a recording's tables, and warnings where one that is named is not there."""
+
+    frames: Path
+    encoder: Path | None
+    imu: Path | None
+    warnings: tuple[str, ...]
+
+
+def table_files(section: Section) -> TableFiles:
+    """Return the files of the tables that recording.yaml names; raises `InputError` without frames."""
+    (encoder, no_encoder), (imu, no_imu) = (optional_file(section, key) for key in ("encoder", "imu"))
+    return TableFiles(required_file(section, "frames"), encoder, imu, (*no_encoder, *no_imu))
 
 
 @dataclass(frozen=True)
@@ -65,6 +78,7 @@ class FolderParts:
 
     table: FrameTable
     encoder: Encoder | None
+    imu: Imu | None
     source: VideoSource | ImageSequence
     warnings: tuple[str, ...]
     files: tuple[InputFile, ...]
@@ -91,6 +105,7 @@ def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Record
         files=parts.files,
         listed=parts.table,
         inspection=described.inspection,
+        imu=parts.imu,
     )  # fmt: skip
 
 

@@ -66,11 +66,12 @@ class GrowingRecording:
 
     def _folder(self) -> Recording:
         section = described_in(self.path / DESCRIPTION)
-        frames_file, encoder_file, warnings = table_files(section)
-        table = self._frames.table(frames_file)
-        encoder = self._encoder.readings(encoder_file) if encoder_file is not None else None
-        parts = FolderParts(table, encoder, self._source(section, table), warnings, ())
-        return assembled(section, frames_file, parts)
+        named = table_files(section)
+        table = self._frames.table(named.frames)
+        encoder = self._encoder.readings(named.encoder) if named.encoder is not None else None
+        # A growing recording is shown, not measured: its poses do without the IMU.
+        parts = FolderParts(table, encoder, None, self._source(section, table), named.warnings, ())
+        return assembled(section, named.frames, parts)
 
     def _source(self, section: Section, table: FrameTable) -> VideoSource | ImageSequence:
         if is_pattern(section.text("video")):

@@ -1,4 +1,4 @@
-"""frames.csv and encoder.csv."""
+"""frames.csv, encoder.csv and imu.csv."""
 
 from __future__ import annotations
 
@@ -12,11 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import InputError
-from pipeline.recording.base import Encoder, FrameTable, Illumination
+from pipeline.recording.base import Encoder, FrameTable, Illumination, Imu
 from pipeline.recording.checks import refuse_backward
 
 FRAME_COLUMNS = ("frame", "time_s", "illumination")
 ENCODER_COLUMNS = ("time_s", "distance_mm")
+IMU_COLUMNS = ("time_s", "gx", "gy", "gz", "ax", "ay", "az")
+# A gyroscope of 4000 °/s and an accelerometer of 20 g are beyond what probes carry: such figures are in
+# another unit, as °/s (some hundred) and mg (1000 at rest) are.
+_LARGEST_RATE_RAD_S, _LARGEST_FORCE_M_S2 = 70.0, 200.0
+# At rest an accelerometer shows 9.8 m/s²; one that shows less than 2 in the median was written in g.
+_LEAST_FORCE_M_S2 = 2.0
 # About ten million lines: four days at 30 frames/s.
 LARGEST_BYTES = 256 << 20
 _KINDS = tuple(k.value for k in Illumination)
@@ -72,6 +78,51 @@ def encoder_readings(file: Path, text: str) -> Encoder:
     table = np.array(rows)
     refuse_backward(file, table[:, 0].tolist(), "time_s", strictly=False)
     return Encoder(table[:, 0], table[:, 1])
+
+
+def read_imu(file: Path) -> Imu:
+    """Read ``time_s,gx,gy,gz,ax,ay,az`` in s, rad/s and m/s²; times must rise.
+
+    Raises
+    ------
+    InputError
+        As `read_encoder`; also where rates or forces can only be in another unit.
+    """
+    return imu_readings(file, _text(file, IMU_COLUMNS))
+
+
+def imu_readings(file: Path, text: str) -> Imu:
+    """Return the readings that ``text`` of a file holds; raises as `read_imu`."""
+    rows = [
+        [_finite(file, line, name, cell) for name, cell in zip(IMU_COLUMNS, cells, strict=True)]
+        for line, cells in _rows(file, text, IMU_COLUMNS)
+    ]
+    if len(rows) < 2:
+        raise InputError(
+            file, f"has {len(rows)} readings", expected="at least 2",
+            hint="take the key imu out of recording.yaml to run without one",
+        )  # fmt: skip
+    table = np.array(rows)
+    refuse_backward(file, table[:, 0].tolist(), "time_s", strictly=True)
+    imu = Imu(table[:, 0], table[:, 1:4], table[:, 4:])
+    refuse_other_units(file, imu)
+    return imu
+
+
+def refuse_other_units(file: Path, imu: Imu) -> None:
+    """Raise `InputError` where rates can only be in °/s, or forces only in g or mg."""
+    rate = float(np.abs(imu.rate_rad_s).max())
+    force = float(np.median(np.linalg.norm(imu.force_m_s2, axis=1)))
+    if rate > _LARGEST_RATE_RAD_S:
+        raise InputError(
+            file, f"a rate is {rate:.4g} rad/s", expected=f"rates up to {_LARGEST_RATE_RAD_S:g} rad/s",
+            hint="give rates in rad/s: 1 °/s is 0.01745 rad/s",
+        )  # fmt: skip
+    if not _LEAST_FORCE_M_S2 <= force <= _LARGEST_FORCE_M_S2:
+        raise InputError(
+            file, f"the accelerometer usually shows {force:.4g} m/s²", expected="about 9.8 m/s²",
+            hint="give the specific force in m/s², gravity included: 1 g is 9.80665 m/s²",
+        )  # fmt: skip
 
 
 def _text(file: Path, columns: Sequence[str]) -> str:

@@ -30,6 +30,7 @@ from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import RingCircles, circles_in_rings
+from stages.motion.route.laying import lay_route
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.tracking.prediction import PosePredictor
 from stages.motion.tracking.strips import StripGrid, WallView
@@ -79,6 +80,7 @@ def estimate_motion(
     joined, loops = close_loops(estimate.joined, passage, features, view, parameters, context.scratch)
     has_encoder = run.encoder is not None
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
+    trajectory = lay_route(trajectory, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     _report(context, estimate, run.texture, trajectory)
     loops.report(context)
@@ -257,7 +259,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "4",
+    "5",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -17,6 +17,8 @@ FILES = (
     "run.json",
     "rings.zarr",
     "trajectory.csv",
+    "centreline.csv",
+    "route.csv",
     "cloud.ply",
     "radius_map.npz",
     "model.glb",

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import csv
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import zarr
 
-from pipeline.artefacts.measured import PointCloud, RadiusMap, RingSamples, Trajectory, Wall
+from pipeline.artefacts.measured import PipePiece, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
 from pipeline.export.arrays import write_radius_map, write_rings
+from pipeline.export.centreline import write_centreline
 from pipeline.export.tables import write_trajectory
 from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, rotation_from_quaternion, rotation_from_vector
+from tests.pose_chain import chain, curved
 
 
 @pytest.fixture
@@ -113,3 +117,38 @@ def test_radius_map(tmp_path: Path, random: np.random.Generator) -> None:
         for name in ("distance_mm", "azimuth_rad", "radius_mm", "sigma_mm", "count", "misalignment_mm"):
             np.testing.assert_array_equal(read[name], getattr(radius_map, name), err_msg=name)
         np.testing.assert_array_equal(read["sigma_random_mm"], part)
+
+
+def test_centreline(tmp_path: Path) -> None:
+    axis = curved((1000.0, 0.0, 0.0), (300.0, 1.0, 0.5), (700.0, 0.0, 0.0))
+    bend = PipePiece("bend", 1000.0, 1300.0, 1.0, 1.0, 0.01, 0.5, 300.0, 5.0, "3 D")
+    pieces = (
+        PipePiece("straight", 0.0, 1000.0, 1.0), bend, PipePiece("straight", 1300.0, 2000.0, 2.0)
+    )  # fmt: skip
+    run = replace(chain(axis).seen, pieces=pieces)
+    write_centreline(run, tmp_path)
+    table = np.genfromtxt(
+        tmp_path / "centreline.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
+    )
+    np.testing.assert_allclose(
+        np.stack([table[k] for k in ("x_mm", "y_mm", "z_mm")], -1)[-1], axis.origin_p[-1], atol=2
+    )
+    assert np.all(np.diff(table["distance_mm"]) > 0)
+    assert set(table["piece"][table["distance_mm"] < 990]) == {"straight"}
+    assert set(table["piece"][(table["distance_mm"] > 1010) & (table["distance_mm"] < 1290)]) == {"bend"}
+    assert table["sigma_z_mm"][-1] == pytest.approx(np.sqrt(run.covariance[-1, 2, 2]), rel=1e-3)
+    features = json.loads((tmp_path / "centreline.geojson").read_text())["features"]
+    lines = [f["geometry"]["coordinates"] for f in features]
+    assert [f["properties"]["kind"] for f in features] == ["straight", "bend", "straight"]
+    assert lines[0][-1] == lines[1][0]
+    np.testing.assert_allclose(lines[0][-1], [0, 0, 1.0], atol=1e-3)
+    drawing = (tmp_path / "centreline.dxf").read_text().split("\n")
+    assert len(drawing) % 2 == 1, "a code and a value by turns, and the last line's end"
+    codes, values = drawing[:-1:2], drawing[1::2]
+    assert values.count("POLYLINE") == values.count("SEQEND") == 3
+    drawn = [float(v) for c, v in zip(codes, values, strict=True) if c == "30"]
+    assert max(drawn) == pytest.approx(axis.origin_p[:, 2].max(), abs=2)
+    route = list(csv.DictReader((tmp_path / "route.csv").read_text().splitlines()))
+    assert [r["standard"] for r in route] == ["", "3 D", ""]
+    assert float(route[1]["angle_deg"]) == pytest.approx(57.3, abs=0.01)
+    assert float(route[1]["toward_clock"]) == pytest.approx((np.degrees(0.5) + 90) / 30, abs=1e-4)

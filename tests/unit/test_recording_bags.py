@@ -7,6 +7,7 @@ from pipeline.errors import InputError
 from pipeline.recording import open_recording
 from tests.made_recording import (
     COUNT,
+    IMU,
     LIGHTS,
     READINGS,
     TIMES_S,
@@ -37,6 +38,8 @@ def test_every_bag_gives_back_what_was_written(tmp_path: Path, kind: str, compre
     np.testing.assert_allclose(recording.frames.time_s, TIMES_S, atol=1e-9)
     np.testing.assert_allclose(recording.encoder.time_s, [r[0] for r in READINGS], atol=1e-9)
     np.testing.assert_allclose(recording.encoder.distance_mm, [r[1] for r in READINGS])
+    found = np.column_stack([recording.imu.time_s, recording.imu.rate_rad_s, recording.imu.force_m_s2])
+    np.testing.assert_allclose(found, IMU, atol=1e-9)
     images = dict(recording.read(range(COUNT), "bgr"))
     assert list(images) == list(range(COUNT))
     assert all(np.array_equal(images[n], picture(n)) for n in images)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.instrument.probe_file import read_probe
+from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.recording import open_recording
 from pipeline.recording.base import InspectionFacts
 from pipeline.recording.checks import check_probe_fits
@@ -38,6 +38,30 @@ def test_folder_says_what_it_holds(folder: Path) -> None:
     assert recording.pipe.wall_thickness_mm == 4.0
     assert recording.probe_file == folder / "probe.yaml"
     assert recording.warnings == ()
+
+
+def test_imu_plan_and_mount_are_read(copy: Path) -> None:
+    (copy / "imu.csv").write_text("time_s,gx,gy,gz,ax,ay,az\n0.0,0.1,0,0,0,0,-9.8\n0.01,0.2,0,0,0,0,-9.8\n")
+    text = (
+        (copy / "recording.yaml")
+        .read_text()
+        .replace("wall_thickness_mm: 4.0", "plan: [{length_mm: 800}, {bend_deg: 90, radius_mm: 150}]")
+    )
+    (copy / "recording.yaml").write_text(text + "imu: imu.csv\n")
+    recording = open_recording(copy)
+    assert recording.imu is not None
+    np.testing.assert_array_equal(recording.imu.rate_rad_s[:, 0], [0.1, 0.2])
+    assert [(round(p.length_mm), p.bend_deg) for p in recording.pipe.plan] == [(800, 0.0), (236, 90.0)]
+    mount = "imu: {R_ci: [[0, 0, 1], [1, 0, 0], [0, 1, 0]], gyroscope_noise_density: 1.0e-3}\n"
+    (copy / "probe.yaml").write_text((copy / "probe.yaml").read_text() + mount)
+    probe = read_probe(copy / "probe.yaml")
+    write_probe(probe, copy / "again.yaml")
+    for found in (probe.imu, read_probe(copy / "again.yaml").imu):
+        assert found.gyroscope_noise_density == 1e-3
+        np.testing.assert_array_equal(found.R_ci @ [1, 0, 0], [0, 1, 0])
+    (copy / "probe.yaml").write_text((copy / "probe.yaml").read_text().replace("[0, 0, 1]", "[0, 0, -1]"))
+    with pytest.raises(InputError, match="not a rotation"):
+        read_probe(copy / "probe.yaml")
 
 
 def test_gauge_facts() -> None:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import parse_yaml
-from pipeline.recording.tables import read_encoder, read_frame_table
+from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 
 relaxed = settings(
     max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
@@ -39,12 +39,52 @@ def test_encoder_round_trip(tmp_path: Path, distances: list[float]) -> None:
     np.testing.assert_array_equal(read_encoder(file).distance_mm, distances)
 
 
-@pytest.mark.parametrize("read", [read_frame_table, read_encoder])
+@relaxed
+@given(
+    rates=st.lists(st.tuples(*[st.floats(-50, 50)] * 3), min_size=2, max_size=20),
+    order=st.permutations(["time_s", "gx", "gy", "gz", "ax", "ay", "az"]),
+)
+def test_imu_round_trip(tmp_path: Path, rates: list[tuple[float, ...]], order: list[str]) -> None:
+    file = tmp_path / "imu.csv"
+    names = ["time_s", "gx", "gy", "gz", "ax", "ay", "az"]
+    rows = [[0.01 * i, *r, 0.1 * i, -9.8, 0.5] for i, r in enumerate(rates)]
+    cells = [",".join(repr(float(r[names.index(n)])) for n in order) for r in rows]
+    file.write_text(",".join(order) + "\n" + "\n".join(cells))
+    found = read_imu(file)
+    table = np.column_stack([found.time_s, found.rate_rad_s, found.force_m_s2])
+    np.testing.assert_array_equal(table, np.array(rows))
+
+
+@pytest.mark.parametrize(
+    ("row", "complaint"),
+    [
+        ("0.02,0,0,0,0,0,-1", "usually shows 1 m/s²"),
+        ("0.02,300,0,0,0,0,-9.8", "a rate is 300 rad/s"),
+        ("0.00,0,0,0,0,0,-9.8", "time_s goes from 0.01 to 0"),
+        ("0.02,0,0,nan,0,0,-9.8", "gz is 'nan'"),
+        ("0.02,0,0,0,0,-9.8", "has 6 cells"),
+    ],
+)
+def test_imu_in_other_units_or_broken_is_refused_by_name(tmp_path: Path, row: str, complaint: str) -> None:
+    file = tmp_path / "imu.csv"
+    usual = "-1" if complaint.startswith("usually") else "-9.8"
+    rows = [f"{t},0,0,0,0,0,{usual}" for t in ("0.00", "0.01")]
+    file.write_text("time_s,gx,gy,gz,ax,ay,az\n" + "\n".join([*rows, row]))
+    with pytest.raises(InputError) as refused:
+        read_imu(file)
+    assert complaint in str(refused.value)
+
+
+@pytest.mark.parametrize("read", [read_frame_table, read_encoder, read_imu])
 @relaxed
 @given(body=st.text(alphabet='0123456789.,-en"\n\r;laserdboth\x00é', max_size=200))
 def test_any_text_is_read_or_refused(tmp_path: Path, read, body: str) -> None:
     file = tmp_path / "table.csv"
-    header = "frame,time_s,illumination\n" if read is read_frame_table else "time_s,distance_mm\n"
+    header = {
+        read_frame_table: "frame,time_s,illumination\n",
+        read_encoder: "time_s,distance_mm\n",
+        read_imu: "time_s,gx,gy,gz,ax,ay,az\n",
+    }[read]
     file.write_bytes((header + body).encode())
     try:
         table = read(file)

@@ -1,0 +1,168 @@
+"""Preintegration: an IMU's readings as rotations from node to node and mean forces about them, in C.
+
+C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", 2017, § V.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.adjustment.robust import robust_spread
+from pipeline.arrays import Float
+from pipeline.geometry.rigid import rotation_from_vector, vector_from_rotation
+from pipeline.instrument.probe import ImuMount
+from pipeline.machine.stage import Context
+from pipeline.recording.base import Imu
+from stages.motion.route.rotation_graph import STANDARD_GRAVITY, Inertia, Rest
+
+_MEAN_S = 1.0
+"""Time about a node over which forces are averaged: longer than a wobble of the probe (some Hz), shorter than
+the way between nodes. A choice."""
+_LONGEST_GAP_S = 0.1
+"""A gap in the readings over which the rate is not taken as even: ten readings of a slow IMU at 100 Hz."""
+_STILL_S, _STILL_MM, _EASED_S = 2.0, 0.1, 0.3
+"""A probe stands that moves by less than 0.1 mm in 2 s; 0.3 s at both ends are left out. Not measured."""
+_LEAST_BIAS_RAD_S = 2e-6
+"""Least 1 σ of a bias at rest: the Earth turns by 7e-5 rad/s, and a probe by some degrees on its way."""
+_LEAST_FORCE_M_S2 = 0.01
+"""Smallest 1 σ of a mean force that is believed: a milligravity."""
+_TURNING, _APART = 3.0, 0.5
+"""A camera turns enough to judge a gyroscope from three σ of it on; then the two may differ by half. A mount
+that is wrong by 30° makes them differ by that."""
+_NOT_GRAVITY = 0.1
+"""Share by which the usual force may differ from gravity before it is not used. Consumer accelerometers err
+by 4 % at most (their data sheets)."""
+
+
+def inertia_at(
+    imu: Imu,
+    mount: ImuMount,
+    time_s: Float,
+    R_pc: Float,
+    still: Sequence[tuple[float, float]],
+    context: Context,
+) -> Inertia | None:
+    """Return what an IMU says at and between nodes; None, with a warning, where it does not cover the run.
+
+    Parameters
+    ----------
+    imu, mount
+    time_s : (K,)
+        Of the nodes, on the recording's clock, which the IMU is taken to share; ascending.
+    R_pc : (K, 3, 3)
+        Camera's rotations there by vision, to see by how much forces scatter.
+    still
+        Times from and to which the probe stood: the gyroscope shows its bias then.
+    context
+    """
+    refusal = _refusal(imu, time_s)
+    if refusal:
+        context.warn(
+            f"the IMU is not used: {refusal}. What to do: check clock (s, as in frames.csv) and units"
+        )
+        return None
+    R_step = _rotations(imu, mount, time_s)
+    step_s = np.diff(time_s)
+    force_c = _mean_forces(imu, time_s) @ mount.R_ci.T
+    shown = np.einsum("kij,kj->ki", R_pc, force_c)
+    # Second differences leave out gravity, of which vision's rotation is known only slowly: their σ is √6.
+    scatter = robust_spread(np.diff(shown, 2, axis=0).ravel()) / np.sqrt(6) if len(shown) > 4 else 0.0
+    noise = mount.accelerometer_noise_density / np.sqrt(_MEAN_S)
+    return Inertia(
+        R_step, step_s, mount.gyroscope_noise_density**2 * step_s,
+        mount.gyroscope_random_walk**2 * step_s, force_c,
+        float(max(scatter, noise, _LEAST_FORCE_M_S2)), mount.accelerometer_bias,
+        _rests(imu, mount, time_s, still),
+    )  # fmt: skip
+
+
+def contradicts(inertia: Inertia, R_pc: Float) -> bool:
+    """Return whether gyroscope and camera turn differently beyond a bias: another mount, unit or clock.
+
+    Where the camera turns by no more than the gyroscope errs nothing is told, and the IMU is believed.
+    """
+    step_s = inertia.step_s[:, None]
+    seen = vector_from_rotation(np.swapaxes(R_pc[:-1], 1, 2) @ R_pc[1:]) / step_s
+    told = vector_from_rotation(inertia.R_step) / step_s
+    noise = np.sqrt(np.median(inertia.step_variance / inertia.step_s**2) + inertia.walk_variance.sum())
+    apart, turning = (robust_spread((x - np.median(x, 0)).ravel()) for x in (seen - told, seen))
+    return bool(turning > _TURNING * noise and apart > _APART * turning)
+
+
+def still_spans(time_s: Float, distance_mm: Float) -> list[tuple[float, float]]:
+    """Return the times (from, to) through which a probe stood, from its distances (N,) at times (N,)."""
+    later = np.searchsorted(time_s, time_s + _STILL_S)
+    inside = np.flatnonzero(later < len(time_s))
+    still = inside[np.abs(distance_mm[later[inside]] - distance_mm[inside]) < _STILL_MM]
+    out: list[tuple[float, float]] = []
+    for k in still.tolist():
+        begin, end = float(time_s[k]), float(time_s[later[k]])
+        if out and begin <= out[-1][1]:
+            out[-1] = (out[-1][0], end)
+        else:
+            out.append((begin, end))
+    return out
+
+
+def _rests(
+    imu: Imu, mount: ImuMount, time_s: Float, still: Sequence[tuple[float, float]]
+) -> tuple[Rest, ...]:
+    out = []
+    for begin, end in still:
+        during = (imu.time_s >= begin + _EASED_S) & (imu.time_s <= end - _EASED_S)
+        if during.sum() < 2:
+            continue
+        node = int(np.argmin(np.abs(time_s - (begin + end) / 2)))
+        sigma = mount.gyroscope_noise_density / np.sqrt(end - begin - 2 * _EASED_S)
+        rate_c = imu.rate_rad_s[during].mean(0) @ mount.R_ci.T
+        out.append(Rest(node, rate_c, float(np.hypot(sigma, _LEAST_BIAS_RAD_S))))
+    return tuple(out)
+
+
+def _refusal(imu: Imu, time_s: Float) -> str:
+    """Return why an IMU cannot be used, empty where it can."""
+    if imu.time_s[0] > time_s[0] + _LONGEST_GAP_S or imu.time_s[-1] < time_s[-1] - _LONGEST_GAP_S:
+        return (
+            f"its readings last from {imu.time_s[0]:.2f} to {imu.time_s[-1]:.2f} s, the frames from "
+            f"{time_s[0]:.2f} to {time_s[-1]:.2f} s"
+        )
+    inside = (imu.time_s >= time_s[0]) & (imu.time_s <= time_s[-1])
+    gap = float(np.diff(imu.time_s[inside]).max(initial=0.0))
+    if gap > _LONGEST_GAP_S:
+        return f"its readings pause for {gap:.2f} s"
+    usual = float(np.median(np.linalg.norm(imu.force_m_s2, axis=1)))
+    if abs(usual - STANDARD_GRAVITY) > _NOT_GRAVITY * STANDARD_GRAVITY:
+        return f"its accelerometer usually shows {usual:.2f} m/s², which is not gravity"
+    return ""
+
+
+def _rotations(imu: Imu, mount: ImuMount, time_s: Float) -> Float:
+    """Return the rotations (K - 1, 3, 3) in C from each time to the next, rates linear between readings."""
+    inner = (imu.time_s > time_s[0]) & (imu.time_s < time_s[-1])
+    at = np.unique(np.concatenate([time_s, imu.time_s[inner]]))
+    rate = np.stack([np.interp(at, imu.time_s, imu.rate_rad_s[:, i]) for i in range(3)], -1) @ mount.R_ci.T
+    small = rotation_from_vector((rate[1:] + rate[:-1]) / 2 * np.diff(at)[:, None])
+    place = np.searchsorted(at, time_s)
+    return np.stack([_product(small[a:b]) for a, b in pairwise(place.tolist())])
+
+
+def _product(rotation: Float) -> Float:
+    """Return the product (3, 3) of rotations (n, 3, 3) in their order, by halves."""
+    while len(rotation) > 1:
+        odd = rotation[-1:] if len(rotation) % 2 else rotation[:0]
+        even = rotation[: len(rotation) - len(odd)]
+        rotation = np.concatenate([even[::2] @ even[1::2], odd])
+    return np.asarray(rotation[0] if len(rotation) else np.eye(3))
+
+
+def _mean_forces(imu: Imu, time_s: Float) -> Float:
+    """Return the mean force (K, 3) in I about each time."""
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(imu.force_m_s2, 0)])
+    first = np.searchsorted(imu.time_s, time_s - _MEAN_S / 2)
+    last = np.maximum(np.searchsorted(imu.time_s, time_s + _MEAN_S / 2), first + 1)
+    last = np.minimum(last, len(imu.time_s))
+    first = np.minimum(first, last - 1)
+    return np.asarray((total[last] - total[first]) / (last - first)[:, None])

@@ -1,0 +1,181 @@
+"""Laying the route: lengths and bends of the pipe, and the run turned as these, a plan and an IMU say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays import Int
+from pipeline.artefacts.measured import PipePiece, Trajectory
+from pipeline.geometry.axis import distance_along, frames_at
+from pipeline.instrument.probe import ImuMount, Probe
+from pipeline.machine.stage import Context
+from pipeline.recording.base import PlannedPiece, Recording
+from stages.motion.route.alignment import HEADING_DRIFT, find_pieces
+from stages.motion.route.inertial import contradicts, inertia_at, still_spans
+from stages.motion.route.relaying import relaid, turned_upright
+from stages.motion.route.rotation_graph import STRAIGHT_MM, Inertia, Nodes, PlannedTurn, RotationGraph
+
+_MOST_NODES = 120
+"""Nodes at most: the graph is solved densely, and a way between two is 0.8 % of the run."""
+_NODE_MM = 30.0
+"""Least way between nodes: a knot of the axis' spline."""
+_LEAST_VARIANCE = 1e-10
+"""Least variance, rad², of a turn by vision between nodes: (10 µrad)², far below any pose's."""
+_PLAN_RAD = np.radians(1.0)
+"""1 σ of the angle of a planned bend as it is built: elbows are within 1 % of their angle (EN 10253-2), and
+weld gaps add about half a degree. A choice."""
+_TOO_FAR = 4.0
+"""σ by which a plan's angle may differ from the measured one before the plan is not believed."""
+_STEEP = 0.3
+"""Least share of gravity across the pipe's start for which a 12 o'clock is defined: pipes up to 72° steep."""
+
+
+def lay_route(trajectory: Trajectory, recording: Recording, probe: Probe, context: Context) -> Trajectory:
+    """Return the trajectory with its straight lengths and bends, laid as these, plan and IMU say.
+
+    Straightness says nothing over less than half of a tube: without plan and IMU shorter runs stay as they
+    are, but for the list of their pieces.
+    """
+    found = _with_pieces(trajectory)
+    nodes, frame = _nodes(found)
+    if len(frame) < 3:
+        return found
+    planned = _planned_turns(found.pieces, recording.pipe.plan, context)
+    inertia = _inertia(recording, probe, found, frame, context)
+    way = float(np.ptp(nodes.distance_mm))
+    if inertia is not None or planned or way > STRAIGHT_MM:
+        rotations = RotationGraph(nodes, inertia, planned).solve()
+        found = relaid(found, nodes.distance_mm, rotations)
+        if rotations.up_p is not None:
+            found = _upright(found, rotations.up_p, rotations.up_sigma_rad, context)
+        found = _with_pieces(found)
+    _report(found, context)
+    return found
+
+
+def _with_pieces(trajectory: Trajectory) -> Trajectory:
+    s = distance_along(trajectory.axis, trajectory.T_pc)
+    pieces = find_pieces(
+        trajectory.axis,
+        float(s.min()),
+        float(s.max()),
+        2 * trajectory.radius_mm,
+        trajectory.distance_sigma_mm,
+    )
+    return replace(trajectory, pieces=pieces)
+
+
+def _nodes(trajectory: Trajectory) -> tuple[Nodes, Int]:
+    """Return nodes along the way ahead, and the frames (K,) in which the probe first came to them."""
+    s = distance_along(trajectory.axis, trajectory.T_pc)
+    count = int(np.clip((s.max() - s[0]) / _NODE_MM, 1, _MOST_NODES - 1)) + 1
+    reached = np.maximum.accumulate(s)
+    frame = np.unique(np.searchsorted(reached, np.linspace(s[0], s.max(), count)))
+    distance = reached[frame]
+    at = frames_at(trajectory.axis, distance)[1]
+    own = np.diagonal(trajectory.covariance[frame][:, 3:, 3:], axis1=1, axis2=2)
+    variance = np.maximum(np.diff(own, axis=0), _LEAST_VARIANCE)
+    length = _length_of(distance, trajectory.pieces)
+    return Nodes(distance, trajectory.T_pc[frame, :3, :3], at[:, :, 2], variance, length), frame
+
+
+def _length_of(distance_mm: np.ndarray, pieces: tuple[PipePiece, ...]) -> Int:
+    """Return which straight length each distance lies in, −1 in a bend; those without a node do not count."""
+    out = np.full(len(distance_mm), -1)
+    for j, piece in enumerate(p for p in pieces if p.kind == "straight"):
+        out[(distance_mm >= piece.from_mm - 1e-6) & (distance_mm <= piece.to_mm + 1e-6)] = j
+    known = out >= 0
+    out[known] = np.unique(out[known], return_inverse=True)[1]
+    return out
+
+
+def _planned_turns(
+    pieces: tuple[PipePiece, ...], plan: tuple[PlannedPiece, ...], context: Context
+) -> tuple[PlannedTurn, ...]:
+    """Return the plan's angles between straight lengths; none, with a warning, where the pipe is another."""
+    planned, bends = [p for p in plan if p.bend_deg], [p for p in pieces if p.kind == "bend"]
+    if not plan:
+        return ()
+    if len(planned) != len(bends):
+        context.warn(
+            f"the plan in recording.yaml is not used: it has {len(planned)} bends, the pipe as measured "
+            f"{len(bends)}. What to do: list the bends between the run's start and end, in order"
+        )
+        return ()
+    out: list[PlannedTurn] = []
+    length = -1
+    for piece in pieces:
+        if piece.kind == "straight":
+            length += 1
+            continue
+        angle = np.radians(planned[len(out)].bend_deg)
+        if abs(angle - piece.angle_rad) > _TOO_FAR * np.hypot(_PLAN_RAD, piece.angle_sigma_rad):
+            context.warn(
+                f"the plan in recording.yaml is not used: its bend {len(out) + 1} turns by "
+                f"{np.degrees(angle):.1f}°, the pipe at {piece.from_mm:.0f} mm by "
+                f"{np.degrees(piece.angle_rad):.1f}°. What to do: check the order of the bends"
+            )
+            return ()
+        out.append(PlannedTurn(length, float(angle), float(_PLAN_RAD)))
+    lengths = sum(p.kind == "straight" for p in pieces)
+    return tuple(t for t in out if 0 <= t.length < lengths - 1)
+
+
+def _inertia(
+    recording: Recording, probe: Probe, trajectory: Trajectory, frame: Int, context: Context
+) -> Inertia | None:
+    if recording.imu is None:
+        return None
+    mount = probe.imu
+    if mount is None:
+        context.warn(
+            "the IMU is not used: probe.yaml does not say how it sits on the camera. What to do: give the "
+            "section imu with R_ci, the rotation from the IMU's to the camera's directions"
+        )
+        return None
+    return _believed(recording, mount, trajectory, frame, context)
+
+
+def _believed(
+    recording: Recording, mount: ImuMount, trajectory: Trajectory, frame: Int, context: Context
+) -> Inertia | None:
+    assert recording.imu is not None
+    R_pc = trajectory.T_pc[frame, :3, :3]
+    s = distance_along(trajectory.axis, trajectory.T_pc)
+    still = still_spans(trajectory.time_s, s)
+    found = inertia_at(recording.imu, mount, trajectory.time_s[frame], R_pc, still, context)
+    if found is not None and contradicts(found, R_pc):
+        context.warn(
+            "the IMU is not used: its gyroscope turns otherwise than the camera. What to do: check R_ci in "
+            "probe.yaml, the unit (rad/s) and the clock (s, as in frames.csv) of imu.csv"
+        )
+        return None
+    return found
+
+
+def _upright(trajectory: Trajectory, up_p: np.ndarray, sigma_rad: float, context: Context) -> Trajectory:
+    across = float(np.hypot(up_p[0], up_p[1]))
+    if across < _STEEP:
+        context.report("12 o'clock", "the pipe is too steep: as the camera at the first frame", "")
+        return trajectory
+    context.report("1 σ of 12 o'clock, by gravity", float(np.degrees(sigma_rad / across)), "°")
+    context.report(
+        "slope of the pipe at its start", float(np.degrees(np.arcsin(np.clip(up_p[2], -1, 1)))), "°"
+    )
+    return turned_upright(trajectory, up_p)
+
+
+def _report(trajectory: Trajectory, context: Context) -> None:
+    bends = [p for p in trajectory.pieces if p.kind == "bend"]
+    context.report("straight lengths", len(trajectory.pieces) - len(bends), "")
+    context.report("bends", len(bends), "")
+    across = float(np.sqrt(np.diagonal(trajectory.covariance[-1])[:2].max()))
+    context.report("1 σ across the pipe at the end, its lengths taken as straight", across, "mm")
+    way = sum(p.to_mm - p.from_mm for p in trajectory.pieces)
+    # A length that curves as evenly as the camera's heading drifts is off by κ L² / 2 at its end.
+    curving = float(HEADING_DRIFT * way**2 / 2)
+    context.report(
+        "1 σ across the pipe at the end, should its lengths curve", float(np.hypot(across, curving)), "mm"
+    )

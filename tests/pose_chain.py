@@ -1,0 +1,97 @@
+"""Long runs as chains of poses, without pictures: a pipe, a camera that errs as vision does, and an IMU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.artefacts.measured import Trajectory
+from pipeline.geometry.axis import PipeAxis, axis_through, frames_at
+from pipeline.geometry.rigid import from_parts, rotation_from_vector, vector_from_rotation
+from pipeline.instrument.probe import ImuMount
+from pipeline.recording.base import Imu
+
+STEP_MM, SPEED_MM_S, RADIUS_MM = 50.0, 150.0, 50.0
+WALK = 1e-4 / np.sqrt(1000.0)
+"""1 σ of vision's heading, rad/√mm: 0.1 mrad after a metre, 1 mrad after a hundred."""
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A run as vision has it, and its true poses (N, 4, 4) in the same frame at the start."""
+
+    seen: Trajectory
+    T_pc: Float
+    axis: PipeAxis
+
+
+def curved(*pieces: tuple[float, float, float]) -> PipeAxis:
+    """Return an axis of pieces: (length mm, angle rad, azimuth toward which it turns)."""
+    tangent, across = [], np.eye(3)
+    for length, angle, toward in pieces:
+        count = max(round(length / STEP_MM), 1)
+        turn = angle / count * np.array([-np.sin(toward), np.cos(toward), 0.0])
+        for _ in range(count):
+            tangent.append(across[:, 2] * length / count)
+            across = across @ rotation_from_vector(turn)
+    origin = np.concatenate([np.zeros((1, 3)), np.cumsum(tangent, 0)])
+    return axis_through(origin, np.array([1.0, 0.0, 0.0]), 0.0)
+
+
+def chain(
+    axis: PipeAxis, drift: tuple[float, float] = (0.0, 0.0), seed: int = 0, rest_s: float = 0.0
+) -> Chain:
+    """Return a run along an axis, its camera's heading drifting by ``drift``, rad/mm about x and y of C.
+
+    The probe stands for ``rest_s`` before it starts and after it has come to the end.
+    """
+    random = np.random.default_rng(seed)
+    stops = round(rest_s * SPEED_MM_S / STEP_MM)
+    s = np.concatenate([np.zeros(stops), axis.distance_mm, np.full(stops, axis.distance_mm[-1])])
+    time_s = np.arange(len(s)) * STEP_MM / SPEED_MM_S
+    origin, section = frames_at(axis, s)
+    wobble = np.stack([0.01 * np.sin(s / 400), 0.008 * np.sin(s / 310), 0.3 * np.sin(s / 9000)], -1)
+    R_true = section @ rotation_from_vector(wobble - wobble[0])
+    step = np.swapaxes(R_true[:-1], 1, 2) @ R_true[1:]
+    ds = np.diff(s)[:, None]
+    error = ds * np.array([*drift, 0.0]) + WALK * np.sqrt(ds) * random.standard_normal((len(ds), 3))
+    R_seen = [R_true[0]]
+    for turn, off in zip(step, rotation_from_vector(error), strict=True):
+        R_seen.append(R_seen[-1] @ turn @ off)
+    R = np.array(R_seen)
+    way = np.einsum("kij,kj->ki", _middle(R) @ np.swapaxes(_middle(R_true), 1, 2), np.diff(origin, axis=0))
+    place = np.concatenate([np.zeros((1, 3)), np.cumsum(way, 0)])
+    covariance = np.zeros((len(s), 6, 6))
+    covariance[:, [3, 4, 5], [3, 4, 5]] = (WALK**2 * (s - s[0]))[:, None]
+    covariance[:, 2, 2] = (1e-4 * (s - s[0])) ** 2
+    seen_axis = axis_through(place[np.append(True, np.diff(s) > 0)], np.array([1.0, 0.0, 0.0]), 0.0)
+    seen = Trajectory(
+        np.arange(len(s)), time_s, from_parts(R, place), covariance, seen_axis, RADIUS_MM,
+        1.0, 0.0, 0.0, (), distance_sigma_mm=1e-4 * float(s[-1]),
+    )  # fmt: skip
+    return Chain(seen, from_parts(R_true, origin), axis)
+
+
+def _middle(R: Float) -> Float:
+    """Return the rotations (N - 1, 3, 3) halfway from one to the next of (N, 3, 3)."""
+    return R[:-1] @ rotation_from_vector(vector_from_rotation(np.swapaxes(R[:-1], 1, 2) @ R[1:]) / 2)
+
+
+def drawn_imu(run: Chain, mount: ImuMount, up_p: Float, seed: int = 0, rate_hz: float = 100.0) -> Imu:
+    """Return the readings of an IMU on the true run, its errors drawn from what its mount states."""
+    random, time_s = np.random.default_rng(seed), run.seen.time_s
+    turn = vector_from_rotation(np.swapaxes(run.T_pc[:-1, :3, :3], 1, 2) @ run.T_pc[1:, :3, :3])
+    rate = turn / np.diff(time_s)[:, None]
+    at = np.arange(time_s[0], time_s[-1] + 1 / rate_hz, 1 / rate_hz)
+    place = np.clip(np.searchsorted(time_s, at, "right") - 1, 0, len(rate) - 1)
+    n = (len(at), 3)
+    walk = np.cumsum(random.standard_normal(n), 0) * mount.gyroscope_random_walk / np.sqrt(rate_hz)
+    bias = 0.02 * random.standard_normal(3) + walk
+    gyro = rate[place] @ mount.R_ci + bias
+    gyro += mount.gyroscope_noise_density * np.sqrt(rate_hz) * random.standard_normal(n)
+    force = np.einsum("nij,i->nj", run.T_pc[place, :3, :3], 9.81 * up_p) @ mount.R_ci
+    force += mount.accelerometer_bias * random.standard_normal(3)
+    force += mount.accelerometer_noise_density * np.sqrt(rate_hz) * random.standard_normal(n)
+    return Imu(at, gyro, force)
