@@ -16,7 +16,8 @@ What a bag cannot say stands in a YAML file beside it: ``run.recording.yaml`` fo
 or the folder ``run``, else ``recording.yaml`` in the same folder (for a ROS 2 bag: inside it). Its keys are
 those of a recording folder without ``video``, ``frames`` and ``encoder``; ``frame_rate`` may be left out;
 ``topics`` may name ``image``, ``illumination``, ``encoder`` and ``imu``; without an illumination topic, the
-key ``illumination`` lists the pattern that repeats, such as ``[laser, led]``. ``probe`` is relative to that file.
+key ``illumination`` lists the pattern that repeats, such as ``[laser, led]``. ``probe`` is relative to that
+file.
 """
 
 from __future__ import annotations

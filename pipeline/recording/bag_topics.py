@@ -177,7 +177,7 @@ def imu_of(bag: Bag, topics: Topics, start_ns: int) -> Imu | None:
         number = int(wrong[0]) + 1
         raise InputError(file, "is not finite", place=f"{place}, message {number}", expected="finite numbers")
     same_clock = bool(np.all(np.abs(stamped_ns - recorded_ns) < _SAME_CLOCK_NS))
-    time_s = ((stamped_ns if same_clock else recorded_ns) - start_ns) * 1e-9
+    time_s = np.asarray(((stamped_ns if same_clock else recorded_ns) - start_ns) * 1e-9, float)
     refuse_backward(file, time_s, f"the time of {topics.imu}", strictly=True)
     imu = Imu(time_s, values[:, :3], values[:, 3:])
     refuse_other_units(file, imu)

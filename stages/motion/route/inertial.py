@@ -16,7 +16,8 @@ from pipeline.geometry.rigid import rotation_from_vector, vector_from_rotation
 from pipeline.instrument.probe import ImuMount
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Imu
-from stages.motion.route.rotation_graph import STANDARD_GRAVITY, Inertia, Rest
+from stages.motion.route.nodes import Inertia, Rest
+from stages.motion.route.rotation_graph import STANDARD_GRAVITY
 
 _MEAN_S = 1.0
 """Time about a node over which forces are averaged: longer than a wobble of the probe (some Hz), shorter than

@@ -14,8 +14,9 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import PlannedPiece, Recording
 from stages.motion.route.alignment import HEADING_DRIFT, find_pieces
 from stages.motion.route.inertial import contradicts, inertia_at, still_spans
+from stages.motion.route.nodes import Inertia, Nodes, PlannedTurn
 from stages.motion.route.relaying import relaid, turned_upright
-from stages.motion.route.rotation_graph import STRAIGHT_MM, Inertia, Nodes, PlannedTurn, RotationGraph
+from stages.motion.route.rotation_graph import STRAIGHT_MM, RotationGraph
 
 _MOST_NODES = 120
 """Nodes at most: the graph is solved densely, and a way between two is 0.8 % of the run."""
