@@ -24,6 +24,8 @@ _DRIFTS = 4.0
 """A bend turns by more than so many σ of that drift: radii up to 25 m. Larger ones pass for straight."""
 _CELL_MM = 60.0
 """Cells in which turns are summed: two knots of the axis' spline, so that cells are nearly independent."""
+_FEWEST_CELLS = 4
+"""Cells below which nothing is said: a bend cannot be told from the noise of three."""
 _CELLS_IN_DIAMETERS = 0.5
 """In wide pipes cells are half a diameter long: the shortest standard bend, 1 D through 90°, has three."""
 _WORTH = 30.0
@@ -52,7 +54,7 @@ class _Bend:
 def find_pieces(
     axis: PipeAxis, from_mm: float, to_mm: float, diameter_mm: float, distance_sigma_mm: float
 ) -> tuple[PipePiece, ...]:
-    """Return the straight lengths and bends of an axis between two distances.
+    """Return the straight lengths and bends of an axis between two distances; none where these are near.
 
     Parameters
     ----------
@@ -66,15 +68,14 @@ def find_pieces(
     """
     cell_mm = max(_CELL_MM, _CELLS_IN_DIAMETERS * diameter_mm)
     count = int((to_mm - from_mm) / cell_mm)
-    bends: list[_Bend] = []
-    if count >= 2:
-        limits = np.linspace(from_mm, to_mm, count + 1)
-        turn = _turns(axis, limits)
-        noise = max(robust_spread(np.diff(turn, axis=0).ravel()) / np.sqrt(2), _LEAST_NOISE_RAD)
-        found = _bends_in(turn, 0, noise, (to_mm - from_mm) / count)
-        bends = [_refined(axis, limits, a, b, noise) for a, b in _merged(found, turn)]
-    noise_of_run = noise if count >= 2 else float("nan")
-    return tuple(_pieces(bends, from_mm, to_mm, diameter_mm, distance_sigma_mm, noise_of_run))
+    if count < _FEWEST_CELLS:
+        return ()
+    limits = np.linspace(from_mm, to_mm, count + 1)
+    turn = _turns(axis, limits)
+    noise = max(robust_spread(np.diff(turn, axis=0).ravel()) / np.sqrt(2), _LEAST_NOISE_RAD)
+    found = _merged(_bends_in(turn, 0, noise, (to_mm - from_mm) / count), turn)
+    bends = [_refined(axis, limits, a, b, noise) for a, b in found]
+    return tuple(_pieces(bends, from_mm, to_mm, diameter_mm, distance_sigma_mm, noise))
 
 
 def _turns(axis: PipeAxis, limits: Float) -> Float:

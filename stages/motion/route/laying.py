@@ -41,7 +41,7 @@ def lay_route(trajectory: Trajectory, recording: Recording, probe: Probe, contex
     """
     found = _with_pieces(trajectory)
     nodes, frame = _nodes(found)
-    if len(frame) < 3:
+    if len(frame) < 3 or not found.pieces:
         return found
     planned = _planned_turns(found.pieces, recording.pipe.plan, context)
     inertia = _inertia(recording, probe, found, frame, context)
