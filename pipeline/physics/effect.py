@@ -17,12 +17,13 @@ class FixedTo(StrEnum):
 
 
 class Channel(StrEnum):
-    """Which of the four kinds of measurement an effect shows in first."""
+    """Which kind of measurement an effect shows in first."""
 
     RING = "ring"
     PROFILE = "profile"
     TEXTURE = "texture"
     MOTION = "motion"
+    PICTURE = "picture"
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Effect:
     name : str
         Canonical name.
     family : str
-        ``laser``, ``camera``, ``window``, ``pose`` or ``photometric``.
+        ``laser``, ``camera``, ``window``, ``pose``, ``photometric`` or ``picture``.
     quantities : tuple of Quantity
         In the order in which a switch takes them.
     harmonic : int or None

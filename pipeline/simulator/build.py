@@ -20,6 +20,7 @@ from pipeline.simulator.instrument import (
     TrueInstrument,
     TrueLaser,
     TrueSensor,
+    lamp_azimuth_rad,
 )
 from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.motion import Odometer, motion_of
@@ -105,7 +106,7 @@ def _light(scene: LightScene, stated: Probe, wall: Wall) -> LedRing:
         lighting.leds, lighting.radius_mm, lighting.z_mm, 1.0, scene.lobe, scene.even, scene.colour_bgr
     )
     ahead = np.linspace(1.0, 4.0 * _radius(wall), 400)
-    around = 2 * np.pi * (np.arange(ring.leds) + 0.5) / ring.leds
+    around = lamp_azimuth_rad(ring.leds)
     x = _radius(wall) - ring.radius_mm * np.cos(around)
     y = ring.radius_mm * np.sin(around)
     z = (ahead - ring.z_mm)[:, None]

@@ -124,6 +124,20 @@ class SheetWave:
 
 
 @dataclass(frozen=True)
+class Sector:
+    """A sector of the sheet that has lost light: the share lost, its middle and its width at half of that."""
+
+    lost: float
+    azimuth_rad: float
+    width_rad: float
+
+    def left(self, azimuth_rad: Float) -> Float:
+        """Return the share of light (...) that is left at azimuths (...)."""
+        away = np.angle(np.exp(1j * (np.asarray(azimuth_rad) - self.azimuth_rad)))
+        return np.asarray(1 - self.lost * 0.5 ** ((2 * away / self.width_rad) ** 8))
+
+
+@dataclass(frozen=True)
 class TrueLaser:
     """The laser sheet as it is.
 
@@ -140,6 +154,8 @@ class TrueLaser:
         the sheet meets squarely; falls with 1/distance.
     brightness : (float, float)
         Relative first harmonic (cos, sin) of the power around the ring.
+    sectors : tuple of Sector
+        Where the sheet is dimmed or blocked.
     colour_bgr : Bgr
         Share of each channel; the largest is 1.
     ghost_relative : float
@@ -156,6 +172,7 @@ class TrueLaser:
     profile: LineProfile = field(default_factory=LineProfile)
     power_mm: float = 0.6
     brightness: tuple[float, float] = (0.0, 0.0)
+    sectors: tuple[Sector, ...] = ()
     colour_bgr: Bgr = (0.35, 1.0, 0.15)
     ghost_relative: float = 0.0
     speckle_contrast: float = 0.0
@@ -176,6 +193,8 @@ class LedRing:
     lobe, even : float
         Emission even + (1 − even) cos^m about the forward direction, with exponent m = lobe; none backward.
     colour_bgr : Bgr
+    pattern : tuple of float
+        Light of each LED over its share of the whole; empty: all 1.
     """
 
     leds: int = 8
@@ -185,6 +204,25 @@ class LedRing:
     lobe: float = 1.0
     even: float = 0.0
     colour_bgr: Bgr = (1.0, 1.0, 1.0)
+    pattern: tuple[float, ...] = ()
+
+
+def lamp_azimuth_rad(leds: int) -> Float:
+    """Return the azimuths (leds,) of the LEDs of a ring in C."""
+    return np.asarray(2 * np.pi * (np.arange(leds) + 0.5) / leds)
+
+
+@dataclass(frozen=True)
+class Flicker:
+    """Lights whose power is 1 + relative · sin 2πft of its mean."""
+
+    relative: float = 0.0
+    frequency_hz: float = 1.0
+
+    def mean(self, middle_s: Float, exposure_s: float) -> Float:
+        """Return the mean power (...) over exposures about moments (...)."""
+        part = self.relative * np.sinc(self.frequency_hz * exposure_s)
+        return np.asarray(1 + part * np.sin(2 * np.pi * self.frequency_hz * np.asarray(middle_s)))
 
 
 @dataclass(frozen=True)
@@ -203,14 +241,15 @@ class TrueSensor:
     Attributes
     ----------
     full_well_e : float
-        Electrons at which the sensor clips; nothing blooms, as with CMOS sensors.
+        Electrons at which the sensor clips.
     read_noise_e : float
     black_level : float
         Grey level without light, of 255.
     gamma : float
         Grey = 255 · light^gamma.
-    psf_sigma_px : float
-        1 σ of the lens' blur.
+    psf_sigma_px, psf_edge_px : float
+        1 σ of the lens' blur in the middle, and what is added in quadrature at half the picture's smaller
+        side from there, growing with the square of that way.
     veil_relative, veil_sigma_px : float
         Share of the light spread widely by glare, and 1 σ of that spread.
     vignetting : float
@@ -220,6 +259,16 @@ class TrueSensor:
     fixed_pattern : float
         1 σ of the pixels' relative gain.
     dust : tuple of Dust
+    scatter : tuple of Dust
+        Spots whose ``attenuation`` is scattered, not lost.
+    drops : tuple of Dust
+        Drops: ``attenuation`` is their power, ``sigma_px`` their radius.
+    bloom_relative, bloom_px : float
+        Share of the light above full scale that leaks along columns, and how far (1/e).
+    dark_pattern : float
+        1 σ of the pixels' dark signal, full scales.
+    defective_share, hot_level : float
+        Share of pixels that are hot, and as many that are dead; dark signal of the hot ones, full scales.
     """
 
     full_well_e: float = 10000.0
@@ -227,12 +276,20 @@ class TrueSensor:
     black_level: float = 0.0
     gamma: float = 1.0
     psf_sigma_px: float = 0.7
+    psf_edge_px: float = 0.0
     veil_relative: float = 0.0
     veil_sigma_px: float = 60.0
     vignetting: float = 0.0
     ambient: float = 0.0
     fixed_pattern: float = 0.0
     dust: tuple[Dust, ...] = ()
+    scatter: tuple[Dust, ...] = ()
+    drops: tuple[Dust, ...] = ()
+    bloom_relative: float = 0.0
+    bloom_px: float = 6.0
+    dark_pattern: float = 0.0
+    defective_share: float = 0.0
+    hot_level: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -244,6 +301,7 @@ class TrueInstrument:
     light: LedRing = LedRing()
     sensor: TrueSensor = TrueSensor()
     shutter: Shutter = field(default_factory=Shutter)
+    flicker: Flicker = Flicker()
 
 
 class Change(Protocol):

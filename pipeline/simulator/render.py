@@ -62,6 +62,7 @@ class Renderer:
             lasers=tuple(truth.instrument_at(float(t)).laser for t in moments),
             rendering=truth.rendering,
             seed=truth.seed,
+            row_gain=instrument.flicker.mean(opened.mean(axis=1), instrument.shutter.exposure_s),
         )
 
     def _time_s(self, number: int) -> float:

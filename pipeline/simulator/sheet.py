@@ -96,7 +96,10 @@ def ghost_table(surface: Surface, laser: TrueLaser, T_wc: Float, distance_mm: fl
 
 def _weight(laser: TrueLaser, azimuth: Float) -> Float:
     cos, sin = laser.brightness
-    return np.asarray(laser.power_mm * (1 + cos * np.cos(azimuth) + sin * np.sin(azimuth)))
+    weight = laser.power_mm * (1 + cos * np.cos(azimuth) + sin * np.sin(azimuth))
+    for sector in laser.sectors:
+        weight = weight * sector.left(azimuth)
+    return np.asarray(weight)
 
 
 def _tabled(origin: Float, ray: Float, weight: Float, azimuth: Float) -> tuple[Float, Float, Float]:

@@ -8,7 +8,7 @@ of one wall lays it out once with `scenery_of`; rays and shade of a camera are k
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import cv2
@@ -23,7 +23,7 @@ from pipeline.simulator.kernel import in_bands
 from pipeline.simulator.line_light import add_line
 from pipeline.simulator.rays import RayTable, focal_px, ray_table
 from pipeline.simulator.scene import Rendering
-from pipeline.simulator.sensor import shade_of, through_lens
+from pipeline.simulator.sensor import shade_of, through_lens, with_dark_signal
 from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
 from pipeline.simulator.surface import Surface, Texture, surface_of, texture_of
 from pipeline.simulator.view import Line, View, line_of, line_tiles
@@ -72,7 +72,9 @@ class Shot:
         The laser at evenly spaced moments of that span; one where it does not change.
     rendering : Rendering
     seed : int
-        Of the speckle.
+        Of the speckle and of the pixels' dark signals and defects.
+    row_gain : (rows or 1,)
+        Power of all lights, over the usual, in each row's exposure.
     """
 
     instrument: TrueInstrument
@@ -82,6 +84,7 @@ class Shot:
     lasers: tuple[TrueLaser, ...]
     rendering: Rendering
     seed: int = 0
+    row_gain: Float = field(default_factory=lambda: np.ones(1))
 
 
 def still(
@@ -113,7 +116,9 @@ def seen(scenery: Scenery, shot: Shot) -> Float32:
     """Return the light (H, W, 3) at each pixel, through the lens and without noise, in full scales."""
     instrument = shot.instrument
     shade = _shade(instrument.camera, instrument.sensor)
-    return through_lens(light(scenery, shot), instrument.sensor, shade)
+    return with_dark_signal(
+        through_lens(light(scenery, shot), instrument.sensor, shade), instrument.sensor, shot.seed
+    )
 
 
 def light(scenery: Scenery, shot: Shot) -> Float32:
@@ -126,6 +131,8 @@ def light(scenery: Scenery, shot: Shot) -> Float32:
     if shot.illumination != Illumination.LASER.value:
         ring = shot.instrument.light
         add_wall(view, lamps_of(ring), np.array(ring.colour_bgr), shot.rendering.wall_samples, image)
+    if np.any(shot.row_gain != 1.0):
+        image *= shot.row_gain.astype(np.float32)[:, None, None]
     return image
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.simulator.instrument import LedRing
+from pipeline.simulator.instrument import LedRing, lamp_azimuth_rad
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.raycast import azimuth_of, first_hit, normal_at, radius_at
@@ -43,10 +43,11 @@ class Lamps(NamedTuple):
 
 def lamps_of(ring: LedRing) -> Lamps:
     """Return the lamps of a ring of LEDs."""
-    around = 2 * np.pi * (np.arange(ring.leds) + 0.5) / ring.leds
+    around = lamp_azimuth_rad(ring.leds)
     across = ring.radius_mm * np.stack([np.cos(around), np.sin(around)])
     place = np.concatenate([across, np.full((1, ring.leds), ring.z_mm)])
-    return Lamps(place, np.full(ring.leds, ring.level / ring.leds), ring.lobe, ring.even, 0.0)
+    share = ring.level / ring.leds * np.array(ring.pattern or (1.0,) * ring.leds)
+    return Lamps(place, share, ring.lobe, ring.even, 0.0)
 
 
 def stray_light(level: float) -> Lamps:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.errors import InputError
-from pipeline.physics.catalogue import EFFECTS
+from pipeline.physics.catalogue import ALL_EFFECTS as EFFECTS
 from pipeline.simulator.effects import EFFECT_FUNCTIONS, switch_on
 from pipeline.simulator.effects.photometric import line_peak
 from pipeline.simulator.effects.switch import (
@@ -71,6 +71,18 @@ TOUCHES = {
     "ambient_light": {"instrument.sensor.ambient"},
     "fixed_pattern": {"instrument.sensor.fixed_pattern"},
     "dust": {"instrument.sensor.dust"},
+    "light_flicker": {"instrument.flicker.relative", "instrument.flicker.frequency_hz"},
+    "led_dead": {"instrument.light.pattern"},
+    "laser_sector": {"instrument.laser.sectors"},
+    "bloom": {"instrument.sensor.bloom_relative"},
+    "black_level": {"instrument.sensor.black_level"},
+    "defocus": {"instrument.sensor.psf_sigma_px", "instrument.sensor.psf_edge_px"},
+    "window_scatter": {"instrument.sensor.scatter"},
+    "droplet": {"instrument.sensor.drops"},
+    "defective_pixels": {"instrument.sensor.defective_share", "instrument.sensor.hot_level"},
+    "read_noise": {"instrument.sensor.read_noise_e"},
+    "full_well": {"instrument.sensor.full_well_e"},
+    "dark_pattern": {"instrument.sensor.dark_pattern"},
 }
 
 
@@ -114,7 +126,7 @@ NOTHING_AT_ZERO = (
     "focal_scale", "radial_distortion", "sensor_tilt", "pixel_aspect", "pupil_shift", "baseline_drift",
     "focal_drift", "centre_drift", "pixel_locking", "pipe_bend", "ovality", "encoder_scale",
     "encoder_backlash", "time_offset", "slope_bias", "subsurface", "ghost_ring", "line_skew", "speckle",
-    "vignetting", "ambient_light", "fixed_pattern",
+    "vignetting", "ambient_light", "fixed_pattern", "read_noise", "dark_pattern",
 )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.physics.catalogue import EFFECTS, effect
+from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Effect, Quantity
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -58,7 +58,7 @@ class Switch:
     @property
     def effect(self) -> Effect:
         """Its entry in the catalogue."""
-        return EFFECTS[self.name]
+        return effect(self.name)
 
     @property
     def quantities(self) -> dict[str, float]:

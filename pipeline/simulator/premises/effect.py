@@ -55,7 +55,7 @@ class SeenRing:
 
 
 def effect_premises(plain: SceneTruth, switches: Sequence[Switch]) -> list[Premise]:
-    """Return for every effect by how much it exceeds the floor, all others being on.
+    """Return by how much every effect but those on pictures alone exceeds the floor, all others being on.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def effect_premises(plain: SceneTruth, switches: Sequence[Switch]) -> list[Premi
     frames = _frames(plain)
     seen = _rings(full, frames)
     found = []
-    for one in switches:
+    for one in (s for s in switches if s.effect.family != "picture"):
         others = switch_on(plain, [s for s in switches if s is not one])
         without = _rings(others, frames)
         times = max(
