@@ -77,7 +77,11 @@ class _Commands(TyperGroup):
         """Return a command's name, the command, and the words that are left for it."""
         name, command, rest = super().resolve_command(ctx, args)
         attached = next((a for a in _ATTACHED if a.name == name), None)
-        return name, command if attached is None else attached.loaded(), rest
+        if attached is None:
+            return name, command, rest
+        if sys.stderr.isatty() and not ctx.resilient_parsing:  # what is imported next can take seconds
+            typer.echo(f"boresight {name} is starting", err=True)
+        return name, attached.loaded(), rest
 
 
 app = typer.Typer(name="boresight", cls=_Commands, no_args_is_help=True, pretty_exceptions_enable=False)

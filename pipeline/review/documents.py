@@ -36,7 +36,8 @@ class Strength:
     """Estimated failure pressure, MPa, by both criteria, and what it rests on.
 
     It is stated without ±: the σ of the depth would give a few kPa, while burst tests scatter about both
-    criteria by far more, and that scatter is not known for the pipe at hand.
+    criteria by far more (W. Zhou, G. Huang, S. Zhang, Model error assessment of burst capacity models for
+    corroded pipes, IPC2012-90335), and that scatter is not known for the pipe at hand.
     """
 
     b31g_mpa: float

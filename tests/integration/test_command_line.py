@@ -97,6 +97,14 @@ def test_the_shell_completes_commands_and_their_options(typed: str, offered: str
     assert offered in told.stdout.split(), told
 
 
+def test_a_command_says_at_once_that_it_starts(
+    boresight: Callable[..., Told], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "is starting" not in boresight("verify", "--help").err, "not into a pipe or a log"
+    monkeypatch.setattr("pipeline.cli.sys.stderr.isatty", lambda: True)
+    assert boresight("verify", "--help").err.startswith("boresight verify is starting")
+
+
 def test_stages_are_listed_in_order(boresight: Callable[..., Told]) -> None:
     lines = [line for line in boresight("stages").out.splitlines() if not line.startswith(" ")]
     assert [line.split()[0] for line in lines] == [s.name for s in PIPELINE]
