@@ -16,8 +16,12 @@ _MINUTES_ROUND = 720
 
 
 def clock(hours: float) -> str:
-    """Return a clock position given in hours, as ``h:mm``."""
-    minutes = round(hours * 60) % _MINUTES_ROUND
+    """Return a clock position given in hours, as ``h:mm``.
+
+    Outlines run along the edges of cells, which lie at half minutes: these are rounded up whether the number
+    comes exactly or from a file with few decimals, so that all papers say the same.
+    """
+    minutes = math.floor(round(hours * 60, 1) + 0.5) % _MINUTES_ROUND
     return f"{minutes // 60 or 12}:{minutes % 60:02d}"
 
 

@@ -113,7 +113,7 @@ def _legend(overlay: Overlay) -> Legend:
     stops = ", ".join("rgb({2},{1},{0})".format(*overlay.palette_bgr[k]) for k in range(1, 256, 16))
     middle = (overlay.low_mm + overlay.high_mm) / 2
     note = f"{100 * overlay.beyond:.1f} % of the wall lies beyond the ends" if overlay.beyond > 0 else ""
-    low, mid, high = (f"{v:.3g} mm" for v in (overlay.low_mm, middle, overlay.high_mm))
+    low, mid, high = (f"{v:.3g} mm".replace("-", "−") for v in (overlay.low_mm, middle, overlay.high_mm))
     return Legend(stops, low, mid, high, note)
 
 
