@@ -53,6 +53,7 @@ _INSPECT, _INSTRUMENT, _SIMULATE, _MANY = (
 _ATTACHED = (
     _Attached(_INSPECT, "review", "Go through a run in the browser: decide on each finding, measure, sign."),
     _Attached(_INSPECT, "verify", "Compare a run with a known bore, a reference or truth: a certificate."),
+    _Attached(_INSPECT, "twin", "Recorded frames beside the same, re-rendered: where they differ, and why."),
     _Attached(_INSPECT, "reproduce", "Compute a run again from its record, and compare every file."),
     _Attached(_INSTRUMENT, "calibrate", "Find camera and laser sheet, with covariance, from a gauge run."),
     _Attached(_INSTRUMENT, "calibrate-camera", "Calibrate a camera from pictures of boards."),

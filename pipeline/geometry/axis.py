@@ -121,11 +121,11 @@ def _nearest(axis: PipeAxis, p: Float) -> Float:
 def _frames(distance, origin, rotation, s, out_origin, out_rotation):  # type: ignore[no-untyped-def]
     """Write the axis' point and section frame at every distance ``s`` (N,)."""
     for n in range(len(s)):
-        _frame(distance, origin, rotation, s[n], out_origin[n], out_rotation[n])
+        section_frame(distance, origin, rotation, s[n], out_origin[n], out_rotation[n])
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _frame(distance, origin, rotation, s, o, m):  # type: ignore[no-untyped-def]
+def section_frame(distance, origin, rotation, s, o, m):  # type: ignore[no-untyped-def]
     """Write point ``o`` (3,) and frame ``m`` (3, 3): z is kept, x made square to it."""
     k = min(max(np.searchsorted(distance, s) - 1, 0), len(distance) - 2)
     span = distance[k + 1] - distance[k]
@@ -161,7 +161,7 @@ def _locate(distance, origin, rotation, p, s, psi, radius):  # type: ignore[no-u
     for n in range(len(s)):
         x, y = 0.0, 0.0
         for _ in range(_STEPS):
-            _frame(distance, origin, rotation, s[n], o, m)
+            section_frame(distance, origin, rotation, s[n], o, m)
             dx, dy, dz = p[n, 0] - o[0], p[n, 1] - o[1], p[n, 2] - o[2]
             x = m[0, 0] * dx + m[1, 0] * dy + m[2, 0] * dz
             y = m[0, 1] * dx + m[1, 1] * dy + m[2, 1] * dz

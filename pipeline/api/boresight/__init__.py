@@ -27,6 +27,7 @@ from pipeline.api.calibration.calibrate import Calibration, calibrate
 from pipeline.api.diagnosis.diagnose import DiagnosisFolder, diagnose, open_diagnosis
 from pipeline.api.run import run
 from pipeline.api.simulate import Simulated, simulate, simulate_pairs
+from pipeline.api.twin import twin
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 from pipeline.files.shipped import PARAMETERS, PRIORS, SCENES, shipped_names
 from stages.diagnose.drill.answer import Answer
@@ -53,4 +54,5 @@ __all__ = [
     "shipped_names",
     "simulate",
     "simulate_pairs",
+    "twin",
 ]

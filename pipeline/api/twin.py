@@ -1,0 +1,157 @@
+"""A run's frames beside the same frames re-rendered, from a script, as `boresight twin` makes them."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from pipeline.api.job import Job, open_job, result_of, run_job
+from pipeline.arrays import Byte
+from pipeline.artefacts.twin import Mismatch, NamedFigure, Twin, TwinView
+from pipeline.errors import InputError
+from pipeline.files.provenance import MadeBy
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import Display, SilentDisplay
+from pipeline.machine.exporter import Exporter
+from pipeline.machine.plan import Selection
+from pipeline.machine.reproduce import check_inputs_unchanged, read_run_record
+from pipeline.pages import page_template
+from stages.catalogue import PIPELINE
+from stages.texture import TEXTURE
+from stages.twin import TWIN
+
+_MEASURED = PIPELINE[: PIPELINE.index(TEXTURE) + 1]
+
+
+def twin(
+    run: Path | str,
+    output: Path | str,
+    *,
+    diagnosis: Path | str | None = None,
+    settings: Sequence[str] = (),
+    display: Display | None = None,
+) -> Twin:
+    """Re-render frames of a run, compare them with the recorded ones, and say where and why they differ.
+
+    What the run holds is not computed again, unless the program or, with ``diagnosis``, the probe is another.
+
+    Parameters
+    ----------
+    run : path
+        A run folder, best of a run with ``premises.withhold=10``: frames that no stage has measured.
+    output : path
+        Folder for twin.json and twin.html.
+    diagnosis : path, optional
+        Folder of a diagnosis, whose corrected probe takes the place of the run's: wall, motion and photo are
+        worked out again with it.
+    settings : sequence of str
+        Single parameters, each ``stage.name=value``; they go before those of the run.
+    display : Display, optional
+        Is told how the stages stand; nothing is shown when it is left out.
+
+    Raises
+    ------
+    InputError
+        When run, recording, diagnosis or folder cannot be used.
+    UnusableError
+        When no frame can be re-rendered.
+    Cancelled
+        When the user stopped it with Ctrl-C; the same call goes on where it was.
+    """
+    job = twin_job(Path(run), Path(output), None if diagnosis is None else Path(diagnosis), settings)
+    run_job(job, Selection(), display or SilentDisplay())
+    return result_of(job, Twin)
+
+
+def twin_job(run: Path, output: Path, diagnosis: Path | None, settings: Sequence[str]) -> Job:
+    """Open the inputs of a twin without starting it; raises as `twin`."""
+    record = read_run_record(run)
+    probe = record.probe
+    if diagnosis is not None:
+        probe = diagnosis / "probe.yaml"
+        if not probe.is_file():
+            raise InputError(diagnosis, "holds no probe.yaml", expected="the folder of boresight diagnose")
+    earlier = {s.name: record.configuration[s.name] for s in _MEASURED if s.name in record.configuration}
+    stages = (*_MEASURED, TWIN)
+    configuration = resolve(stages, None, settings, earlier, run / "run.json")
+    job = open_job(record.recording, output, probe, stages, EXPORTERS, configuration, "twin")
+    if diagnosis is None:
+        check_inputs_unchanged(record, {s.kind.__name__.lower(): s.key for s in job.sources})
+    return Job(
+        job.command, job.sources, job.stages, job.exporters, job.configuration, job.folder, job.about, (run,)
+    )
+
+
+def twin_document(found: Twin) -> dict[str, Any]:
+    """Return a twin as plain data; what is not known is None."""
+    return {
+        "format": 1,
+        "frames": [int(f) for f in found.frame],
+        "withheld": found.withheld,
+        "noise": _figures(found.noise),
+        "state": _figures(found.state),
+        "regions": {
+            r.name: {
+                "pixels": r.pixels,
+                "chi2_before": _known(r.chi2_before),
+                "chi2_after": _known(r.chi2_after),
+            }
+            for r in found.regions
+        },
+        "found": [_mismatch(m) for m in found.found],
+        "psnr_db": _known(found.psnr_db),
+        "psnr_noise_free_db": _known(found.psnr_noise_free_db),
+        "seen": found.seen,
+        "cannot_tell": list(found.cannot_tell),
+    }
+
+
+def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
+    plain = asdict(mismatch)
+    figures = {"place": _figures(mismatch.place), "parameters": _figures(mismatch.parameters)}
+    chi2 = {name: _known(plain[name]) for name in ("chi2_before", "chi2_after")}
+    return plain | figures | chi2 | {"name": mismatch.name or None}
+
+
+def _figures(figures: Sequence[NamedFigure]) -> dict[str, Any]:
+    return {f.name: {"value": _known(f.value), "sd": _known(f.sd), "unit": f.unit} for f in figures}
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def write_twin(found: Twin, made_by: MadeBy, folder: Path) -> None:
+    """Write twin.json and twin.html."""
+    document = twin_document(found) | {"made_by": made_by.document()}
+    (folder / "twin.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    views = [_shown(v) for v in found.views]
+    page = page_template("twin").render(d=document, views=views)
+    (folder / "twin.html").write_text(page, "utf-8")
+
+
+def _shown(view: TwinView) -> dict[str, Any]:
+    return {
+        "frame": view.frame,
+        "light": view.light,
+        "chi2": round(view.chi2, 2),
+        "recorded": _picture(view.recorded),
+        "twin": _picture(view.twin),
+        "z": _picture(view.z),
+    }
+
+
+def _picture(grey: Byte) -> str:
+    # Half the quality of a still keeps forty frames on one page; the figures come from whole frames.
+    data = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
+    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
+
+
+EXPORTERS = (Exporter("twin", write_twin),)

@@ -1,0 +1,128 @@
+"""What the comparison of recorded frames with re-rendered ones finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.arrays import Byte, Int
+
+
+@dataclass(frozen=True)
+class NamedFigure:
+    """A number with its 1 σ; infinite σ where the recording cannot tell it."""
+
+    name: str
+    value: float
+    sd: float
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class RegionFit:
+    """χ² per pixel of what pixels of one kind show, before and after what was found is put in.
+
+    Kinds: ``line_core`` and ``line_flank`` within and beyond one width of the laser line, ``wall`` lit by
+    the LEDs, ``dark`` surroundings, ``edge`` of the view. χ² is NaN where there are no pixels.
+    """
+
+    name: str
+    pixels: int
+    chi2_before: float
+    chi2_after: float
+
+
+@dataclass(frozen=True)
+class Mismatch:
+    """A place where recorded and re-rendered frames differ.
+
+    Attributes
+    ----------
+    name : str
+        Of the effect; empty where none explains it.
+    channel : str
+        ``intensity`` or ``line``.
+    fixed_to : str
+        ``image``, ``wall``, ``time`` or ``line``.
+    place : tuple of NamedFigure
+        Where: pixels, distance and azimuth, or frames.
+    parameters : tuple of NamedFigure
+        Its size.
+    probability : float
+        That chance alone would show as much anywhere.
+    chi2_before, chi2_after : float
+        Per pixel there, in the compared frames, without and with it.
+    statement : str
+    """
+
+    name: str
+    channel: str
+    fixed_to: str
+    place: tuple[NamedFigure, ...]
+    parameters: tuple[NamedFigure, ...]
+    probability: float
+    chi2_before: float
+    chi2_after: float
+    statement: str
+
+
+@dataclass(frozen=True)
+class TwinView:
+    """A compared frame at half its size, for looking at.
+
+    Attributes
+    ----------
+    frame : int
+    light : str
+    chi2 : float
+        Per pixel of line and lit wall.
+    recorded, twin : (h, w) uint8
+        Grey levels.
+    z : (h, w) uint8
+        128 + 32 z, z the mean of four pixels; 0 where the wall is unknown.
+    """
+
+    frame: int
+    light: str
+    chi2: float
+    recorded: Byte
+    twin: Byte
+    z: Byte
+
+
+@dataclass(frozen=True)
+class Twin:
+    """Recorded frames beside the same frames re-rendered.
+
+    Attributes
+    ----------
+    frame : (F,) int
+        The compared frames.
+    withheld : bool
+        Whether no stage of the run had measured them.
+    noise : tuple of NamedFigure
+        The camera's noise and response.
+    state : tuple of NamedFigure
+        Lamps, laser and lens.
+    regions : tuple of RegionFit
+    found : tuple of Mismatch
+    psnr_db, psnr_noise_free_db : float
+        Of the lit wall against a full scale of 255 levels: of the difference, and of what of it the noise
+        does not explain; infinite where the noise explains all of it.
+    seen : float
+        Share of the view's pixels whose wall is known, in lit frames.
+    cannot_tell : tuple of str
+        What the recording does not tell.
+    views : tuple of TwinView
+    """
+
+    frame: Int
+    withheld: bool
+    noise: tuple[NamedFigure, ...]
+    state: tuple[NamedFigure, ...]
+    regions: tuple[RegionFit, ...]
+    found: tuple[Mismatch, ...]
+    psnr_db: float
+    psnr_noise_free_db: float
+    seen: float
+    cannot_tell: tuple[str, ...]
+    views: tuple[TwinView, ...]

@@ -1,0 +1,45 @@
+"""``boresight twin``: recorded frames of a run beside the same frames, re-rendered."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from pipeline.api.job import result_of
+from pipeline.api.twin import twin_job
+from pipeline.artefacts.twin import Twin
+from pipeline.commands.working import Assignments, worked
+
+
+def twin(
+    run: Annotated[Path, typer.Argument(help="run folder, best of a run with --set premises.withhold=10")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")],
+    diagnosis: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="diagnosis whose corrected probe takes the place of the run's"),
+    ] = None,
+    assignments: Assignments = None,
+) -> None:
+    """Re-render frames from what a run has measured, and say where and why the recorded ones differ.
+
+    Writes twin.json and twin.html. Frames tell most when the run was told to withhold them from measurement.
+    """
+    console = Console(stderr=True)
+    job = twin_job(run, output, diagnosis, assignments or ())
+    worked(job, console)
+    _show(result_of(job, Twin), output)
+
+
+def _show(found: Twin, output: Path) -> None:
+    kind = "withheld" if found.withheld else "measured"
+    typer.echo(f"{len(found.frame)} {kind} frames compared")
+    typer.echo(f"{'region':<14}{'pixels':>12}{'χ² before':>12}{'after':>10}")
+    for r in found.regions:
+        typer.echo(f"{r.name:<14}{r.pixels:>12}{r.chi2_before:>12.2f}{r.chi2_after:>10.2f}")
+    typer.echo(f"lit wall: {found.psnr_db:.1f} dB, without the noise {found.psnr_noise_free_db:.1f} dB")
+    for mismatch in found.found:
+        typer.echo(f"found: {mismatch.name or 'without a name'}: {mismatch.statement}")
+    typer.echo(f"Page: {output / 'twin.html'}")

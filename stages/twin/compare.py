@@ -1,0 +1,133 @@
+"""Recorded frames less re-rendered ones, over the noise: χ² by region, maps, and the frames to look at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from pipeline.arrays import Bool, Float, Float32
+from pipeline.artefacts.twin import RegionFit, TwinView
+from pipeline.recording.base import Illumination
+from stages.twin.render import Region, TwinFrame
+
+BLOCK_PX = 8
+"""Side of the blocks in which a difference is looked for that stays in one place of the image."""
+_FULL_SCALE = 255.0
+_COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
+
+
+@dataclass
+class Comparison:
+    """Sums over compared frames.
+
+    Attributes
+    ----------
+    pixels, before, after : (6,)
+        Per `Region`: pixels, and χ² without and with what was found.
+    square, noise, lit : float
+        Of lit wall: squared differences, their variance by the noise, and pixels.
+    seen, view : float
+        Pixels whose wall is known, and all within the view, in lit frames.
+    views : list of TwinView
+    """
+
+    pixels: Float = field(default_factory=lambda: np.zeros(len(Region)))
+    before: Float = field(default_factory=lambda: np.zeros(len(Region)))
+    after: Float = field(default_factory=lambda: np.zeros(len(Region)))
+    square: float = 0.0
+    noise: float = 0.0
+    lit: float = 0.0
+    seen: float = 0.0
+    view: float = 0.0
+    views: list[TwinView] = field(default_factory=list)
+
+    def add(
+        self, frame: int, light: Illumination, above_black: Float32, before: TwinFrame, after: TwinFrame,
+        black: float,
+    ) -> None:  # fmt: skip
+        """Count a frame, its grey levels (H, W) given above black."""
+        region = before.region
+        z = np.asarray((above_black - after.level) / np.sqrt(after.variance), np.float32)
+        size = np.bincount(region.ravel(), minlength=len(Region)).astype(float)
+        self.pixels += size
+        self.before += np.bincount(region.ravel(), _chi2(above_black, before).ravel(), len(Region))
+        after_sum = np.bincount(region.ravel(), (z**2).ravel(), len(Region))
+        self.after += after_sum
+        wall = region == Region.WALL
+        if light != Illumination.LASER:
+            self.square += float(((above_black - after.level)[wall].astype(float) ** 2).sum())
+            self.noise += float(after.variance[wall].sum(dtype=float))
+            self.lit += float(wall.sum())
+            self.seen += float(size.sum() - size[Region.UNSEEN] - size[Region.DARK])
+            self.view += float(size.sum() - size[Region.DARK])
+        counted = [int(r) for r in _COUNTED]
+        chi2 = after_sum[counted].sum() / max(size[counted].sum(), 1.0)
+        self.views.append(_view(frame, light, chi2, above_black, after, z, black))
+
+    def regions(self) -> tuple[RegionFit, ...]:
+        """Return χ² per pixel by region."""
+        return tuple(
+            RegionFit(
+                r.name.lower(), int(self.pixels[r]), self._mean(self.before, r), self._mean(self.after, r)
+            )
+            for r in Region
+            if r != Region.UNSEEN
+        )
+
+    def _mean(self, total: Float, region: Region) -> float:
+        return float(total[region] / self.pixels[region]) if self.pixels[region] else float("nan")
+
+    def psnr_db(self, without_noise: bool) -> float:
+        """Return 20 log of full scale over the root mean square difference of lit wall; NaN without any."""
+        left = self.square - (self.noise if without_noise else 0.0)
+        if not self.lit:
+            return float("nan")
+        return float(10 * np.log10(_FULL_SCALE**2 * self.lit / left)) if left > 0 else float("inf")
+
+
+def _chi2(above_black: Float32, twin: TwinFrame) -> Float32:
+    return np.asarray((above_black - twin.level) ** 2 / twin.variance)
+
+
+def _view(
+    frame: int, light: Illumination, chi2: float, above_black: Float32, twin: TwinFrame, z: Float32,
+    black: float,
+) -> TwinView:  # fmt: skip
+    def half(values: Float32) -> Float32:
+        small = cv2.resize(values, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        return np.asarray(small, np.float32)
+
+    shown = np.clip(128.5 + 32 * half(np.where(twin.region == Region.UNSEEN, 0, z)), 1, 255)
+    unseen = half((twin.region == Region.UNSEEN).astype(np.float32)) > 0.5
+    recorded, rendered = (np.clip(half(a) + black + 0.5, 0, 255) for a in (above_black, twin.level))
+    return TwinView(
+        frame, light.value, float(chi2), recorded.astype(np.uint8), rendered.astype(np.uint8),
+        np.where(unseen, 0, shown).astype(np.uint8),
+    )  # fmt: skip
+
+
+def exposure_of(above_black: Float32, twin: TwinFrame) -> float:
+    """Return the logarithm by which a frame is brighter than its twin, over line and lit wall."""
+    use = np.isin(twin.region, [int(Region.LINE_CORE), int(Region.WALL)])
+    if not use.any():
+        return 0.0
+    level, weight = twin.level[use].astype(float), 1 / twin.variance[use].astype(float)
+    ratio = float((weight * level * above_black[use]).sum() / (weight * level**2).sum())
+    return float(np.log(max(ratio, 1e-3)))
+
+
+def block_ratios(above_black: Float32, twin: TwinFrame, white_above_black: float) -> Float32:
+    """Return by how much each block is brighter than its twin; NaN where not all of it is lit wall."""
+    use = (twin.region == Region.WALL) & (above_black < white_above_black)
+    rows, columns = (n // BLOCK_PX for n in use.shape)
+
+    def summed(values: Float32 | Bool) -> Float32:
+        inside = values[: rows * BLOCK_PX, : columns * BLOCK_PX].astype(np.float32)
+        return np.asarray(cv2.resize(inside, (columns, rows), interpolation=cv2.INTER_AREA))
+
+    level = np.where(use, twin.level, np.float32(0))
+    above, below = summed(level * above_black), summed(level * level)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(summed(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)

@@ -1,0 +1,104 @@
+"""Differences that stay in one place of the image: dirt on the window, dust, a droplet.
+
+The ratio of recorded to re-rendered brightness of blocks, its median over frames and freed of what is broad,
+is 1 but for noise. Its spread is read off the picture of all blocks itself, robustly: whatever makes blocks
+vary, alike neighbours included, is in it. The bound is that which the largest of so many normal numbers
+passes with the stated probability.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.stats import norm
+
+from pipeline.adjustment.robust import spread_about_median
+from pipeline.arrays import Bool, Float32
+from stages.twin.compare import BLOCK_PX
+
+FALSE_ALARM = 0.01
+"""Probability that a recording without dirt shows a place of dirt anywhere. Chosen."""
+_BROAD_BLOCKS, _FEWEST_FRAMES, _FEWEST_BLOCKS = 25, 3, 2
+"""What is broader than 25 blocks is light, not dirt. A place is seen in three frames and two blocks or
+more."""
+_LEAST_CHANGE = 0.03
+"""Smallest relative change that counts as dirt: what the photo leaves over on clean
+recordings stays below it."""
+
+
+@dataclass(frozen=True)
+class ImagePlace:
+    """A place of the image that is darker or brighter than it should be.
+
+    Attributes
+    ----------
+    u_px, v_px, radius_px : float
+        Middle, and radius of a circle of its area.
+    change, sd : float
+        Largest relative change of brightness, negative where darker, and its 1 σ.
+    probability : float
+        That chance shows as much anywhere.
+    """
+
+    u_px: float
+    v_px: float
+    radius_px: float
+    change: float
+    sd: float
+    probability: float
+
+
+def places_in_image(ratios: list[Float32]) -> tuple[tuple[ImagePlace, ...], Float32 | None]:
+    """Return the places, and the gain (rows, columns) of the blocks, 1 elsewhere; None without any."""
+    if len(ratios) < _FEWEST_FRAMES:
+        return (), None
+    stack = np.stack(ratios)
+    known = np.isfinite(stack).sum(0) >= _FEWEST_FRAMES
+    if not known.any():
+        return (), None
+    middle = np.ones(known.shape, np.float32)
+    middle[known] = np.nanmedian(stack[:, known], axis=0)
+    change = np.where(known, middle / _broad(middle, known) - 1, 0).astype(np.float32)
+    spread = spread_about_median(change[known])
+    bound = max(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, _LEAST_CHANGE)
+    count, label, _, centre = cv2.connectedComponentsWithStats((np.abs(change) > bound).astype(np.uint8))
+    places, gain = [], np.ones_like(change)
+    for k in range(1, count):
+        inside = label == k
+        if inside.sum() < _FEWEST_BLOCKS:
+            continue
+        grown = cv2.dilate(inside.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        gain[grown & known] = 1 + change[grown & known]
+        places.append(_place(inside, centre[k], change, spread, int(known.sum())))
+    return tuple(places), gain if places else None
+
+
+def _broad(values: Float32, known: Bool) -> Float32:
+    """Return the local level about every block, dirt left out by a median of medians."""
+    filled = np.where(known, values, np.float32(1))
+    scaled = np.clip((filled - 0.5) * 255, 0, 255).astype(np.uint8)
+    coarse = cv2.medianBlur(scaled, _BROAD_BLOCKS).astype(np.float32) / 255 + 0.5
+    weight = cv2.GaussianBlur(known.astype(np.float32), (0, 0), _BROAD_BLOCKS / 4)
+    near = np.abs(filled - coarse) < 0.05
+    use = (known & near).astype(np.float32)
+    total = cv2.GaussianBlur(filled * use, (0, 0), _BROAD_BLOCKS / 4)
+    share = cv2.GaussianBlur(use, (0, 0), _BROAD_BLOCKS / 4)
+    return np.where((share > 0.05 * weight) & (share > 1e-6), total / np.maximum(share, 1e-6), coarse)
+
+
+def _place(inside: Bool, centre: Float32, change: Float32, spread: float, blocks: int) -> ImagePlace:
+    strongest = float(change[inside][np.argmax(np.abs(change[inside]))])
+    chance = min(1.0, 2 * blocks * float(norm.sf(abs(strongest) / max(spread, 1e-9))))
+    middle = (np.asarray(centre) + 0.5) * BLOCK_PX - 0.5
+    radius = BLOCK_PX * float(np.sqrt(inside.sum() / np.pi))
+    return ImagePlace(float(middle[0]), float(middle[1]), radius, strongest, spread, chance)
+
+
+def full_size(gain: Float32, shape: tuple[int, ...]) -> Float32:
+    """Return the gain of blocks at all pixels (H, W)."""
+    out = np.ones(shape, np.float32)
+    big = cv2.resize(gain, None, fx=BLOCK_PX, fy=BLOCK_PX, interpolation=cv2.INTER_LINEAR)
+    out[: big.shape[0], : big.shape[1]] = big
+    return out

@@ -1,0 +1,181 @@
+"""The camera's noise from the frames themselves, by EMVA 1288's model of the photon transfer.
+
+Variance over level of what the twin leaves over in small windows of frames that it was made from. Model
+errors only add variance, so that in each range of levels the quietest windows show the noise: with an even
+response variance = read² + level / (electrons per grey level) + (non-uniformity · level)². A power response
+I^(1/γ) makes the shot noise's variance go with level^(2 − γ) instead, which gives γ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.stats import chi2
+
+from pipeline.arrays import Bool, Float, Float32
+from stages.twin.photometry import Figure
+
+_WINDOW_PX = 12
+"""Side of a window: the variance of 144 pixels is known to some 12 %, also where neighbours are alike."""
+_QUIET = 0.25
+"""Quantile of the windows' variances that counts as noise alone. A quarter is quieter than the model's errors
+let the usual window be, and far from the tail of chance."""
+_LEVELS, _FEWEST = 14, 40
+_LEAST_VARIANCE = 1 / 12
+"""Of rounding to whole grey levels."""
+_RANGE_FOR_GAMMA = 3.0
+"""Ratio of brightest to darkest level needed to tell the response's exponent."""
+
+
+@dataclass(frozen=True)
+class CameraNoise:
+    """Noise of one pixel.
+
+    Attributes
+    ----------
+    black : Figure
+        Grey level without light.
+    white : float
+        Grey level from which pixels are clipped.
+    read_variance, variance_per_level, uneven : Figure
+        Of EMVA 1288's model, in grey levels squared, grey levels, and relative.
+    gamma : Figure
+        Exponent γ of the response; σ is infinite where the frames cannot tell.
+    """
+
+    black: Figure
+    white: float
+    read_variance: Figure
+    variance_per_level: Figure
+    uneven: Figure
+    gamma: Figure
+
+    def variance(self, above_black: Float32) -> Float32:
+        """Return the variance (...) of pixels so many grey levels above black."""
+        level = np.maximum(above_black, 0)
+        return np.asarray(
+            np.float32(max(self.read_variance.value, _LEAST_VARIANCE))
+            + np.float32(self.variance_per_level.value) * level
+            + np.float32(self.uneven.value**2) * level**2,
+            np.float32,
+        )
+
+    @property
+    def electrons_per_level(self) -> Figure:
+        """Conversion of the photon transfer; infinite where no shot noise shows."""
+        k = self.variance_per_level
+        return Figure(np.inf, np.inf) if k.value <= 0 else Figure(1 / k.value, k.sd / k.value**2)
+
+    @property
+    def read_electrons(self) -> Figure:
+        """Read noise, 1 σ, in electrons."""
+        e, read = self.electrons_per_level.value, np.sqrt(self.read_variance.value)
+        sd = 0.5 * self.read_variance.sd / max(float(read), 1e-9)
+        return Figure(float(read * e), float(sd * e))
+
+
+@dataclass(frozen=True)
+class QuietWindows:
+    """Level above black and variance, (N,) each, of the windows of one frame.
+
+    ``freedom`` is the number of independent pixels in a window: a codec makes neighbours alike.
+    """
+
+    level: Float
+    variance: Float
+    freedom: float
+
+
+def windows_of(left_over: Float32, level: Float32, use: Bool) -> QuietWindows:
+    """Return the windows of a frame in which all pixels may be used, slopes taken out of each.
+
+    Parameters
+    ----------
+    left_over, level, use : (H, W)
+        Recorded less predicted, predicted above black, and which pixels count.
+    """
+    rows, columns = (n // _WINDOW_PX for n in left_over.shape)
+
+    def cut(values: Float32) -> Float32:
+        inside = values[: rows * _WINDOW_PX, : columns * _WINDOW_PX]
+        shape = (rows, _WINDOW_PX, columns, _WINDOW_PX)
+        return inside.reshape(shape).transpose(0, 2, 1, 3).reshape(-1, _WINDOW_PX**2)
+
+    whole = cut(use.astype(np.float32)).all(1)
+    rest = cut(np.nan_to_num(left_over))[whole].astype(float)
+    side = np.arange(_WINDOW_PX) - (_WINDOW_PX - 1) / 2
+    plane = np.stack([np.ones(_WINDOW_PX**2), np.repeat(side, _WINDOW_PX), np.tile(side, _WINDOW_PX)], 1)
+    plane /= np.linalg.norm(plane, axis=0)
+    rest -= (rest @ plane) @ plane.T
+    variance = (rest**2).sum(1) / (_WINDOW_PX**2 - 3)
+    level_mean = cut(np.nan_to_num(level))[whole].mean(1).astype(float)
+    return QuietWindows(level_mean, variance, _freedom(rest.reshape(-1, _WINDOW_PX, _WINDOW_PX)))
+
+
+def _freedom(rest: Float) -> float:
+    """Return how many independent pixels a window (N, n, n) is worth: its pixels over the sum of ρ²."""
+    if not len(rest):
+        return 1.0
+    total = (rest**2).mean()
+    square = 0.0
+    for down in range(-3, 4):
+        for right in range(-3, 4):
+            a = rest[:, max(down, 0) : _WINDOW_PX + min(down, 0), max(right, 0) : _WINDOW_PX + min(right, 0)]
+            b = rest[
+                :, max(-down, 0) : _WINDOW_PX + min(-down, 0), max(-right, 0) : _WINDOW_PX + min(-right, 0)
+            ]
+            square += float((a * b).mean() / max(total, 1e-12)) ** 2
+    return max((_WINDOW_PX**2 - 3) / square, 1.0)
+
+
+def photon_transfer(windows: list[QuietWindows], black: Figure, white: float) -> CameraNoise:
+    """Return the noise that quiet windows of several frames show; σ from leaving out one frame at a time."""
+    whole = _fitted(windows)
+    if len(windows) < 2:
+        return _camera_noise(whole, np.full(4, np.inf), black, white)
+    without = np.array([_fitted(windows[:k] + windows[k + 1 :]) for k in range(len(windows))])
+    n = len(windows)
+    sd = np.sqrt((n - 1) / n * ((without - without.mean(0)) ** 2).sum(0))
+    return _camera_noise(whole, sd, black, white)
+
+
+def _camera_noise(value: Float, sd: Float, black: Figure, white: float) -> CameraNoise:
+    read, per_level, uneven, gamma = (Figure(float(v), float(s)) for v, s in zip(value, sd, strict=True))
+    if not np.isfinite(gamma.value):
+        gamma = Figure(1.0, np.inf)
+    return CameraNoise(black, white, read, per_level, uneven, gamma)
+
+
+def _fitted(windows: list[QuietWindows]) -> Float:
+    """Return read variance, variance per level, unevenness and γ."""
+    level = np.concatenate([w.level for w in windows])
+    variance = np.concatenate([w.variance for w in windows])
+    if len(level) < _FEWEST:
+        return np.array([_LEAST_VARIANCE, 0.0, 0.0, np.nan])
+    edges = np.quantile(level, np.linspace(0, 1, _LEVELS + 1))
+    cell = np.clip(np.searchsorted(edges, level) - 1, 0, _LEVELS - 1)
+    used = [k for k in range(_LEVELS) if (cell == k).sum() >= _FEWEST // 2]
+    x = np.array([level[cell == k].mean() for k in used])
+    freedom = float(np.median([w.freedom for w in windows]))
+    quiet = chi2.ppf(_QUIET, freedom) / freedom
+    y = np.array([np.quantile(variance[cell == k], _QUIET) / quiet for k in used])
+    design = np.stack([np.ones_like(x), x, x**2], 1) / y[:, None]
+    (read, per_level, square), _ = nnls(design, np.ones_like(x))
+    shot = y - _LEAST_VARIANCE
+    wide = len(x) > 3 and x.max() > _RANGE_FOR_GAMMA * max(x.min(), 1.0) and (shot > 0).all()
+    gamma = 2 - np.polyfit(np.log(np.maximum(x, 1.0)), np.log(shot), 1)[0] if wide else np.nan
+    return np.array([max(read, _LEAST_VARIANCE), per_level, np.sqrt(square), gamma])
+
+
+def black_and_white(images: list[Float32]) -> tuple[Figure, float]:
+    """Return the level of the darkest tenth of the pixels, and the level at which pixels pile up, if any."""
+    dark = [float(np.median(i[i <= np.quantile(i, 0.1)])) for i in images]
+    black = Figure(float(np.median(dark)), float(np.std(dark) / np.sqrt(len(dark))))
+    every = [np.bincount(np.clip(i, 0, 255).astype(np.uint8).ravel(), minlength=256) for i in images]
+    counts = np.sum(every, 0)
+    top = int(np.flatnonzero(counts)[-1])
+    near = counts[max(top - 6, 0) : top]
+    piled = len(near) and counts[top] > 3 * max(float(near.max()), 1.0)
+    return black, float(top) if piled else float(np.inf)

@@ -1,0 +1,379 @@
+"""The photometric state: how bright lamps, laser and camera make the scene, in few numbers with their σ.
+
+A lit pixel is  black + gain(frame) · exp(f(θ) + pattern(φ)) · E · ρ,  E the irradiance of evenly shining
+LEDs and ρ the wall's reflectance; f is the LEDs' lobe times the lens' vignetting, which pictures alone cannot
+tell apart. Next to the laser line a pixel is  black + power(frame) · p(φ) · ρ · s/w · profile(x/w),  x the
+distance across the line, s the sheet's own thickness and w its width after the lens, both in px.
+Exposure, vignette and response are separated as in direct visual odometry (J. Engel et al., "A
+photometrically calibrated benchmark for monocular visual
+odometry", 2016), but for the response: see `stages.twin.noise`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from pipeline.adjustment.robust import robust_spread
+from pipeline.arrays import Float, Float32, Int
+from stages.twin.scene import LineSight, LitSight, Scene
+
+_THETA_KNOTS, _HARMONICS, _SECTORS = 24, 2, 36
+_DARK, _ITERATIONS = 4.0, 4
+_WEAK = 1e-3
+"""Weight with which unknowns that no sample touches are drawn to zero."""
+_SAMPLES = 2500
+PROFILE_WIDTHS = 6.0
+"""The line's profile is described so many widths to each side; the halo beyond is left to the residual."""
+_CORE_WIDTHS = 1.0
+_MIDDLE_WIDTHS = 0.4
+
+PixelNoise = Callable[[Float32], Float32]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number and its 1 σ."""
+
+    value: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class Course:
+    """A number of every frame, known in some of them.
+
+    Attributes
+    ----------
+    frame : (F,) int
+    log_value, sd : (F,)
+        Natural logarithm, relative to the mean of all, and its 1 σ.
+    """
+
+    frame: Int
+    log_value: Float
+    sd: Float
+
+    def at(self, frame: int) -> float:
+        """Return the logarithm at a frame, linear between those in which it is known."""
+        return float(np.interp(frame, self.frame, self.log_value)) if len(self.frame) else 0.0
+
+    @property
+    def spread(self) -> float:
+        """Robust 1 σ of the steps from frame to frame, over √2: a drift does not count."""
+        return robust_spread(np.diff(self.log_value)) / np.sqrt(2) if len(self.frame) > 2 else 0.0
+
+
+@dataclass(frozen=True)
+class LampLight:
+    """What the LEDs and the lens do.
+
+    Attributes
+    ----------
+    level : float
+        Grey levels of white wall at the ring.
+    theta_rad, log_falloff, falloff_sd : (K,)
+        LEDs' lobe times vignetting over polar angle, 0 at the ring.
+    pattern : (4,)
+        cos and sin of the first and second harmonic around the image, and their 1 σ in ``pattern_sd``.
+    gain : Course
+        Exposure.
+    """
+
+    level: float
+    theta_rad: Float
+    log_falloff: Float
+    falloff_sd: Float
+    pattern: Float
+    pattern_sd: Float
+    gain: Course
+
+    def factor(self, theta_rad: Float32, phi_rad: Float32) -> Float32:
+        """Return the grey levels (H, W) of even light on the wall, per unit of the photo."""
+        first, step = self.theta_rad[0], self.theta_rad[1] - self.theta_rad[0]
+        index = np.clip((theta_rad - np.float32(first)) / np.float32(step), 0, len(self.theta_rad) - 1)
+        log = map_coordinates(self.log_falloff.astype(np.float32), [np.nan_to_num(index)], order=1)
+        for k, (basis, m) in enumerate(_around(_HARMONICS)):
+            log += np.float32(self.pattern[k]) * basis(np.float32(m) * phi_rad)
+        return np.asarray(np.float32(self.level) * np.exp(log), np.float32)
+
+
+@dataclass(frozen=True)
+class LineLight:
+    """What the laser and the lens do.
+
+    Attributes
+    ----------
+    level : float
+        Grey levels of the middle of a line as wide as its sheet on white wall.
+    log_power, power_sd : (36,)
+        Logarithm of the power over image azimuth, sectors uniform from −π, mean 0.
+    course : Course
+        Power over time.
+    sheet_mm, blur_px : Figure
+        1 σ of the sheet's thickness along the pipe, and of lens and pixel.
+    profile_x, profile : (X,)
+        Mean profile over x/w, 1 in the middle.
+    halo, skewness : Figure
+        Share of light beyond three widths; third moment of the profile over width³.
+    speckle : Figure
+        Relative 1 σ of a pixel's brightness in the line's middle that neither reflectance nor power explains:
+        the laser's speckle, and reflectance finer than the photo shows.
+    spread : (X,)
+        Variance of single pixels over the square of the peak, over x/w: speckle, relief finer than the
+        radius map, and the codec's ringing about the line.
+    """
+
+    level: float
+    log_power: Float
+    power_sd: Float
+    course: Course
+    sheet_mm: Figure
+    blur_px: Figure
+    profile_x: Float
+    profile: Float
+    halo: Figure
+    skewness: Figure
+    speckle: Figure
+    spread: Float
+
+    def peak(self, sight: LineSight) -> tuple[Float32, Float32]:
+        """Return the grey level (N,) at the middle of the line next to each pixel, and its width in px."""
+        sheet_px = self.sheet_mm.value / sight.mm_per_px
+        width = np.sqrt(sheet_px**2 + self.blur_px.value**2)
+        column = (sight.phi_rad + np.pi) / (2 * np.pi) * len(self.log_power) - 0.5
+        power = map_coordinates(self.log_power, [column], order=1, mode="grid-wrap")
+        peak = self.level * np.exp(power) * sight.reflectance * sheet_px / width
+        return peak.astype(np.float32), width.astype(np.float32)
+
+    def line_and_slope(self, sight: LineSight, log_power: float) -> tuple[Float32, Float32]:
+        """Return the grey levels (N,) that the line adds to pixels, and their slope per px across it."""
+        peak, width = self.peak(sight)
+        x, scale = sight.offset_px / width, np.exp(log_power) * peak
+        shape = np.interp(x, self.profile_x, self.profile, left=0.0, right=0.0)
+        slope = np.interp(x, self.profile_x, np.gradient(self.profile, self.profile_x), left=0.0, right=0.0)
+        return (scale * shape).astype(np.float32), (scale * slope / width).astype(np.float32)
+
+    def variance(self, sight: LineSight, log_power: float) -> Float32:
+        """Return the variance (N,) of pixels near the line beyond the camera's noise."""
+        peak, width = self.peak(sight)
+        spread = np.interp(sight.offset_px / width, self.profile_x, self.spread, left=0.0, right=0.0)
+        return np.asarray(spread * (np.exp(log_power) * peak) ** 2, np.float32)
+
+
+def _around(harmonics: int) -> list[tuple[np.ufunc, int]]:
+    return [(basis, m) for m in range(1, harmonics + 1) for basis in (np.cos, np.sin)]
+
+
+class LampSamples:
+    """Ratios of recorded brightness to reflectance under even light, taken frame by frame."""
+
+    def __init__(self, scene: Scene, black: float, white: float) -> None:
+        self._scene, self._black, self._white = scene, black, white
+        self._frame: list[int] = []
+        self._parts: list[tuple[Float32, Float32, Float32]] = []
+
+    def add(self, frame: int, image: Float32, sight: LitSight, random: np.random.Generator) -> None:
+        """Take samples of a frame (H, W)."""
+        theta, phi, _ = self._scene.polar
+        rows, columns = (random.integers(0, n, 4 * _SAMPLES) for n in image.shape)
+        grey = image[rows, columns] - self._black
+        even = (sight.reflectance * sight.irradiance)[rows, columns]
+        use = (grey > _DARK) & (image[rows, columns] < self._white) & (even > _DARK)
+        if int(use.sum()) < _THETA_KNOTS:
+            return
+        self._frame.append(frame)
+        self._parts.append(
+            (theta[rows, columns][use], phi[rows, columns][use], np.log(grey[use] / even[use]))
+        )
+
+    def solve(self) -> LampLight | None:
+        """Return the light that explains the samples; None where there are none."""
+        if not self._parts:
+            return None
+        theta, phi, ratio = (np.concatenate([p[k] for p in self._parts]).astype(float) for k in range(3))
+        view = np.repeat(np.arange(len(self._parts)), [len(p[0]) for p in self._parts])
+        knots = np.linspace(theta.min(), theta.max(), _THETA_KNOTS)
+        ring = np.arctan2(self._scene.surface.mean_radius_mm, self._scene.probe.laser.baseline_mm)
+        hats = _hats(theta, knots) - _hats(np.array([ring]), knots)
+        waves = np.stack([basis(m * phi) for basis, m in _around(_HARMONICS)], 1)
+        views = np.eye(len(self._parts))[view]
+        solution, sd = _robust_least_squares(np.concatenate([hats, waves, views], 1), ratio)
+        a, b = _THETA_KNOTS, _THETA_KNOTS + 2 * _HARMONICS
+        mean = float(solution[b:].mean())
+        gain = Course(np.array(self._frame), solution[b:] - mean, sd[b:])
+        at_ring = float(np.interp(ring, knots, solution[:a]))
+        return LampLight(
+            float(np.exp(mean)), knots, solution[:a] - at_ring, sd[:a], solution[a:b], sd[a:b], gain
+        )
+
+
+class LineSamples:
+    """Brightness of the line in sectors of frames, and its profile."""
+
+    def __init__(self, scene: Scene, black: float, white: float, sheet_mm: float, width_px: float) -> None:
+        self._scene, self._black, self._white = scene, black, white
+        self._sheet_mm, self._width_px = sheet_mm, width_px
+        self._kept: list[tuple[int, LineSight, Float32]] = []
+
+    def add(self, frame: int, image: Float32, sight: LineSight) -> None:
+        """Take the pixels near the line of a frame (H, W)."""
+        self._kept.append((frame, sight, image[sight.row, sight.column] - np.float32(self._black)))
+
+    def solve(self) -> LineLight | None:
+        """Return the light that explains the samples; None where there are none."""
+        if not self._kept:
+            return None
+        sheet_px = np.median(np.concatenate([self._sheet_mm / s.mm_per_px for _, s, _ in self._kept]))
+        blur = float(np.sqrt(max(self._width_px**2 - sheet_px**2, 0.3**2)))
+        start = _plain_line(self._sheet_mm, blur)
+        ratio = np.stack([self._sector_ratios(start, s, grey) for _, s, grey in self._kept])
+        level, power, power_sd, course, course_sd = _two_way(np.log(np.where(ratio > 0, ratio, np.nan)))
+        frames = np.array([f for f, _, _ in self._kept])
+        lit = LineLight(
+            float(np.exp(level)), power, power_sd, Course(frames, course, course_sd), start.sheet_mm,
+            start.blur_px, start.profile_x, start.profile, start.halo, start.skewness,
+            start.speckle, start.spread,
+        )  # fmt: skip
+        return self._with_profile(lit)
+
+    def with_speckle(self, light: LineLight, noise: PixelNoise) -> LineLight:
+        """Return the light with how much single pixels vary across the line, beyond the camera's noise.
+
+        Brightness and place of the line are first fitted in every sector of every frame, so that a line that
+        is displaced or dim over more than a sector does not count as speckle.
+        """
+        spread = np.median([self._spread_in(light, noise, *kept) for kept in self._kept], 0)
+        middle = np.abs(light.profile_x) < _MIDDLE_WIDTHS
+        contrast = float(np.sqrt(spread[middle].mean()))
+        each = [np.sqrt(self._spread_in(light, noise, *kept)[middle].mean()) for kept in self._kept]
+        speckle = Figure(contrast, 1.25 * float(np.std(each)) / np.sqrt(len(each)))
+        return replace(light, spread=spread, speckle=speckle)
+
+    def _spread_in(
+        self, light: LineLight, noise: PixelNoise, frame: int, sight: LineSight, grey: Float32
+    ) -> Float:
+        """Return the variance (X,) over the square of the peak, across the line in one frame."""
+        line, slope = light.line_and_slope(sight, light.course.at(frame))
+        peak, width = light.peak(sight)
+        use = np.isfinite(line) & (peak > _DARK) & (grey + self._black < self._white)
+        sector, rest = _sector_of(sight.phi_rad)[use], (grey - line)[use].astype(float)
+        for basis in (line[use].astype(float), slope[use].astype(float)):
+            above, below = (np.bincount(sector, basis * v, _SECTORS) for v in (rest, basis))
+            rest = rest - (above / np.maximum(below, 1e-9))[sector] * basis
+        step = light.profile_x[1] - light.profile_x[0]
+        cell = np.round(((sight.offset_px / width)[use] - light.profile_x[0]) / step).astype(int)
+        inside = (cell >= 0) & (cell < len(light.profile_x))
+        excess = rest**2 - noise(line[use])
+        above = np.bincount(cell[inside], excess[inside], len(light.profile_x))
+        below = np.bincount(cell[inside], peak[use][inside].astype(float) ** 2, len(light.profile_x))
+        return np.asarray(np.maximum(above / np.maximum(below, 1e-9), 0.0))
+
+    def _sector_ratios(self, light: LineLight, sight: LineSight, grey: Float32) -> Float:
+        """Return recorded over predicted brightness (36,) of the line's core; NaN where clipped or unseen."""
+        predicted, _ = light.line_and_slope(sight, 0.0)
+        sector = _sector_of(sight.phi_rad)
+        _, width = light.peak(sight)
+        core = (np.abs(sight.offset_px) < _CORE_WIDTHS * width) & np.isfinite(predicted)
+        clipped = core & (grey + self._black >= self._white)
+        spoiled = np.bincount(sector[clipped], minlength=_SECTORS) > 0.05 * np.bincount(
+            sector[core], minlength=_SECTORS
+        )
+        total = np.bincount(sector[core], (grey * predicted)[core], _SECTORS)
+        square = np.bincount(sector[core], (predicted**2)[core], _SECTORS)
+        return np.where((square > 0) & ~spoiled, total / np.maximum(square, 1e-9), np.nan)
+
+    def _with_profile(self, light: LineLight) -> LineLight:
+        """Return the light with the mean profile of all frames, its halo and its skewness."""
+        edges = np.linspace(-PROFILE_WIDTHS, PROFILE_WIDTHS, 97)
+        middle = (edges[1:] + edges[:-1]) / 2
+        rows = []
+        for frame, sight, grey in self._kept:
+            peak, width = light.peak(sight)
+            scale = peak * np.exp(light.course.at(frame))
+            use = np.isfinite(scale) & (scale > _DARK) & (grey + self._black < self._white)
+            cell = np.digitize((sight.offset_px / width)[use], edges) - 1
+            inside = (cell >= 0) & (cell < len(middle))
+            above = np.bincount(cell[inside], grey[use][inside], len(middle))
+            below = np.bincount(cell[inside], scale[use][inside], len(middle))
+            rows.append(above / np.maximum(below, 1e-9))
+        profile = np.median(rows, 0)
+        sd = 1.25 * np.std(rows, 0) / np.sqrt(max(len(rows), 1))
+        wide = np.abs(middle) > 3.0
+        halo = Figure(
+            float(profile[wide].sum() / profile.sum()),
+            float(np.linalg.norm(sd[wide]) / profile.sum()),
+        )
+        weight = np.where(np.abs(middle) < 3.0, profile, 0.0) / profile[np.abs(middle) < 3.0].sum()
+        first = float(weight @ middle)
+        second = float(weight @ (middle - first) ** 2)
+        skewness = float(weight @ (middle - first) ** 3) / second**1.5
+        noise = float(np.linalg.norm(sd * np.abs(middle) ** 3 * (np.abs(middle) < 3.0)) / profile.sum())
+        skew = Figure(skewness, noise / second**1.5)
+        spread = np.zeros_like(middle)
+        return replace(light, profile_x=middle, profile=profile, halo=halo, skewness=skew, spread=spread)
+
+
+def _sector_of(phi_rad: Float32) -> Int:
+    return np.asarray(((phi_rad + np.pi) / (2 * np.pi) * _SECTORS).astype(int) % _SECTORS)
+
+
+def _plain_line(sheet_mm: float, blur_px: float) -> LineLight:
+    """Return a line with a Gaussian profile and even power."""
+    x = np.linspace(-PROFILE_WIDTHS, PROFILE_WIDTHS, 193)
+    nothing, unknown = np.zeros(0), Figure(0.0, 0.0)
+    return LineLight(
+        1.0, np.zeros(_SECTORS), np.zeros(_SECTORS), Course(nothing.astype(np.int64), nothing, nothing),
+        Figure(sheet_mm, 0.1 * sheet_mm), Figure(blur_px, 0.1 * blur_px), x, np.exp(-0.5 * x**2), unknown,
+        unknown, unknown, np.zeros_like(x),
+    )  # fmt: skip
+
+
+def _hats(value: Float, knots: Float) -> Float:
+    """Return hat functions (N, K) of values (N,) over uniform knots (K,)."""
+    x = (value - knots[0]) / (knots[1] - knots[0])
+    return np.asarray(np.maximum(0.0, 1 - np.abs(x[:, None] - np.arange(len(knots)))))
+
+
+def _robust_least_squares(design: Float, value: Float) -> tuple[Float, Float]:
+    """Return solution and 1 σ (U,) with Huber weights, samples counting as independent."""
+    weight = np.ones(len(value))
+    ridge = _WEAK * np.eye(design.shape[1])
+    for _ in range(_ITERATIONS):
+        normal = (design.T * weight) @ design + ridge
+        solution = np.linalg.solve(normal, (design.T * weight) @ value)
+        rest = value - design @ solution
+        spread = robust_spread(rest)
+        weight = np.minimum(1, 1.345 * spread / np.maximum(np.abs(rest), 1e-9))
+    return np.asarray(solution, float), spread * np.sqrt(np.diag(np.linalg.inv(normal)))
+
+
+def _two_way(table: Float) -> tuple[float, Float, Float, Float, Float]:
+    """Split a table (F, S) with gaps into level, columns and rows by medians (Tukey's median polish).
+
+    Returns
+    -------
+    level, columns (S,), their 1 σ (S,), rows (F,), their 1 σ (F,)
+    """
+    rest = table.copy()
+    rows, columns = np.zeros(table.shape[0]), np.zeros(table.shape[1])
+    for _ in range(6):
+        by_row = np.nan_to_num(_median(rest, 1))
+        rest, rows = rest - by_row[:, None], rows + by_row
+        by_column = np.nan_to_num(_median(rest, 0))
+        rest, columns = rest - by_column, columns + by_column
+    level = float(rows.mean() + columns.mean())
+    spread = robust_spread(rest[np.isfinite(rest)]) if np.isfinite(rest).any() else 0.0
+    seen = np.isfinite(table)
+    column_sd, row_sd = (1.25 * spread / np.sqrt(np.maximum(seen.sum(axis), 1)) for axis in (0, 1))
+    return level, columns - columns.mean(), column_sd, rows - rows.mean(), row_sd
+
+
+def _median(table: Float, axis: int) -> Float:
+    """Return medians without the gaps; 0 where there is nothing else."""
+    known = np.isfinite(table).any(axis)
+    filled = np.where(np.expand_dims(known, axis), table, 0.0)
+    return np.asarray(np.nanmedian(filled, axis))

@@ -1,0 +1,228 @@
+"""The scene of a run: what each pixel of a frame looks at, before any light is put on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
+from pipeline.instrument.probe import Lighting, Probe
+from stages.texture.surface import WallSurface, wall_surface
+from stages.texture.views import sheet_distance_mm
+from stages.twin.reflectance import Reflectance, reflectance_of
+from stages.twin.sight import wall_seen
+
+_STEP_PX = 4
+"""Spacing of the pixels whose rays are met with the wall; between them places are interpolated."""
+_BAND_PX = 14.0
+"""Half width of the band about the line that is rendered exactly, pixel by pixel: four line widths and the
+wander of the ring within four pixels."""
+SMOOTHING_MM, SHADING_MM = 0.2, 0.4
+"""1 σ of the smoothing of radii and slopes: the defaults of the stage texture, whose photo is used."""
+
+
+@dataclass(frozen=True)
+class LitSight:
+    """What the pixels of a lit frame look at, all (H, W) float32; NaN where the wall is unknown.
+
+    Attributes
+    ----------
+    reflectance
+        Grey of the wall's photo, × 255.
+    irradiance
+        Of lamps that shine alike in every direction, relative to the ring of a centred probe.
+    distance_mm, azimuth_rad
+        Place on the wall.
+    """
+
+    reflectance: Float32
+    irradiance: Float32
+    distance_mm: Float32
+    azimuth_rad: Float32
+
+
+@dataclass(frozen=True)
+class LineSight:
+    """The pixels near the laser line of a frame, (N,) each.
+
+    Attributes
+    ----------
+    row, column : int
+    offset_px
+        Distance from the sheet's middle, px across the line, positive away from the camera.
+    mm_per_px
+        Of the sheet's own coordinate across the line.
+    reflectance
+        Of the wall where the sheet meets it next to the pixel, × 255, times mean radius over the distance
+        from the laser's axis.
+    theta_rad, phi_rad
+        Where in the image.
+    distance_mm, azimuth_rad
+        Place on the wall.
+    """
+
+    row: Int
+    column: Int
+    offset_px: Float32
+    mm_per_px: Float32
+    reflectance: Float32
+    theta_rad: Float32
+    phi_rad: Float32
+    distance_mm: Float32
+    azimuth_rad: Float32
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Wall, probe and poses of a run.
+
+    Attributes
+    ----------
+    probe : Probe
+        As the run's motion found it.
+    surface : WallSurface
+    reflectance : Reflectance
+    trajectory : Trajectory
+    """
+
+    probe: Probe
+    surface: WallSurface
+    reflectance: Reflectance
+    trajectory: Trajectory
+
+    def pose(self, frame: int) -> Float:
+        """Return T_pc (4, 4) of a frame."""
+        return np.asarray(self.trajectory.T_pc[int(np.searchsorted(self.trajectory.frame, frame))])
+
+    @cached_property
+    def polar(self) -> tuple[Float32, Float32, Bool]:
+        """Polar angle, image azimuth and validity of every pixel, each (H, W)."""
+        nodes = self._rays
+        theta = np.arctan2(np.hypot(nodes[..., 0], nodes[..., 1]), nodes[..., 2])
+        width, height = self.probe.camera.image_size
+        centre = self.probe.camera.centre_px
+        v, u = np.mgrid[0:height, 0:width].astype(np.float32)
+        phi = np.arctan2(v - np.float32(centre[1]), u - np.float32(centre[0]))
+        full = self._enlarged(theta)
+        return full, phi, np.isfinite(full)
+
+    @cached_property
+    def _rays(self) -> Float:
+        width, height = self.probe.camera.image_size
+        u, v = (np.arange(-(-n // _STEP_PX)) * _STEP_PX + (_STEP_PX - 1) / 2 for n in (width, height))
+        rays = self.probe.camera.unproject(np.stack(np.meshgrid(u, v), -1))
+        return np.where(rays.valid[..., None], rays.ray, np.nan)
+
+    @cached_property
+    def _phi_nodes(self) -> Float:
+        return np.arctan2(self._rays[..., 1], self._rays[..., 0])
+
+    def lit(self, T_pc: Float) -> LitSight:
+        """Return what a frame with the LEDs on looks at from a pose (4, 4)."""
+        shape = self._rays.shape[:2]
+        seen = wall_seen(self.surface, T_pc, self._rays.reshape(-1, 3))
+        light = even_light(self.probe.lighting, seen.xyz_c, seen.normal_c) / self._reference
+        turn = seen.azimuth_rad - self._phi_nodes.ravel()
+        turn = np.mod(turn + np.pi, 2 * np.pi) - np.pi
+        middle = _circular_middle(turn)
+        turn = np.mod(turn - middle + np.pi, 2 * np.pi) - np.pi
+        theta, phi, _ = self.polar
+        distance = self._enlarged(seen.distance_mm.reshape(shape))
+        azimuth = phi + self._enlarged(turn.reshape(shape)) + np.float32(middle)
+        reflectance = self.reflectance.grey(distance, azimuth, theta)
+        return LitSight(reflectance, self._enlarged(light.reshape(shape)), distance, azimuth)
+
+    def line(self, T_pc: Float) -> LineSight:
+        """Return the pixels near the laser line of a frame from a pose (4, 4)."""
+        row, column = self._near_line(T_pc)
+        uv = np.stack([column, row], -1).astype(float)
+        rays = self.probe.camera.unproject(uv).ray
+        seen = wall_seen(self.surface, T_pc, rays)
+        offset = sheet_distance_mm(self.probe.laser, seen.xyz_c)
+        width, height = self.probe.camera.image_size
+        dense = np.full((height, width), np.nan, np.float32)
+        dense[row, column] = offset
+        slope = np.hypot(*(_central(dense, axis)[row, column] for axis in (0, 1)))
+        keep = np.isfinite(slope) & (slope > 0)
+        row, column, offset, slope = row[keep], column[keep], offset[keep], slope[keep]
+        distance, azimuth = seen.distance_mm[keep], seen.azimuth_rad[keep]
+        theta = np.arctan2(np.hypot(rays[keep, 0], rays[keep, 1]), rays[keep, 2])
+        phi = np.arctan2(rays[keep, 1], rays[keep, 0])
+        reflectance = self.reflectance.of_line((distance - offset).astype(np.float32), azimuth)
+        # The sheet's light spreads over a circle that grows with the distance from the laser's axis.
+        reflectance *= (self.surface.mean_radius_mm / np.hypot(*seen.xyz_c[keep, :2].T)).astype(np.float32)
+        return LineSight(
+            row, column, (offset / slope).astype(np.float32), slope.astype(np.float32), reflectance,
+            theta.astype(np.float32), phi.astype(np.float32), distance, azimuth,
+        )  # fmt: skip
+
+    def _near_line(self, T_pc: Float) -> tuple[Int, Int]:
+        """Return rows and columns of pixels within a band about the line, found on the nodes."""
+        seen = wall_seen(self.surface, T_pc, self._rays.reshape(-1, 3))
+        offset = sheet_distance_mm(self.probe.laser, seen.xyz_c).reshape(self._rays.shape[:2])
+        slope = np.hypot(*np.gradient(offset)) / _STEP_PX
+        near = np.abs(offset) < _BAND_PX * np.maximum(slope, 1e-6)
+        width, height = self.probe.camera.image_size
+        big = np.kron(near.astype(np.uint8), np.ones((_STEP_PX, _STEP_PX), np.uint8))[:height, :width]
+        found = np.nonzero(big)
+        return found[0], found[1]
+
+    @cached_property
+    def _reference(self) -> float:
+        """Irradiance at the ring of a centred probe."""
+        point = np.array([self.surface.mean_radius_mm, 0.0, self.probe.laser.baseline_mm])
+        return float(even_light(self.probe.lighting, point, np.array([-1.0, 0.0, 0.0])))
+
+    def _enlarged(self, nodes: Float | Float32) -> Float32:
+        """Return node values (h, w) at all pixels (H, W), linearly between nodes."""
+        width, height = self.probe.camera.image_size
+        big = cv2.resize(nodes.astype(np.float32), None, fx=_STEP_PX, fy=_STEP_PX)
+        return np.asarray(big[:height, :width], np.float32)
+
+
+def scene_of(probe: Probe, trajectory: Trajectory, wall: Wall, texture: WallTexture, blur_px: float) -> Scene:
+    """Return the scene of a run; ``blur_px`` is the 1 σ of lens and pixel.
+
+    Raises
+    ------
+    UnusableError
+        When the radius map holds hardly any radii.
+    """
+    found = probe.as_found_in(trajectory)
+    surface = wall_surface(wall, SMOOTHING_MM, SHADING_MM)
+    reflectance = reflectance_of(texture, found, surface.mean_radius_mm, blur_px)
+    return Scene(found, surface, reflectance, trajectory)
+
+
+def even_light(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
+    """Return the irradiance (...), 1/mm², of wall points (..., 3) by LEDs that shine alike in all directions.
+
+    cos(at wall) / distance², mean over the LEDs. Their own lobe is estimated from the frames.
+    """
+    turn = 2 * np.pi * np.arange(lighting.leds) / lighting.leds
+    total = np.zeros(xyz_c.shape[:-1])
+    for x, y in zip(lighting.radius_mm * np.cos(turn), lighting.radius_mm * np.sin(turn), strict=True):
+        away = xyz_c - np.array([x, y, lighting.z_mm])
+        square = np.einsum("...i,...i->...", away, away)
+        total += np.maximum(-np.einsum("...i,...i->...", away, normal_c), 0) / (square * np.sqrt(square))
+    return total / lighting.leds
+
+
+def _circular_middle(angle: Float) -> float:
+    """Return the mean direction of angles, those that are NaN left out."""
+    known = angle[np.isfinite(angle)]
+    return float(np.arctan2(np.sin(known).mean(), np.cos(known).mean())) if len(known) else 0.0
+
+
+def _central(values: Float32, axis: int) -> Float32:
+    """Return central differences, NaN at the edges."""
+    out = np.full_like(values, np.nan)
+    if axis == 0:
+        out[1:-1] = (values[2:] - values[:-2]) / 2
+    else:
+        out[:, 1:-1] = (values[:, 2:] - values[:, :-2]) / 2
+    return out

@@ -1,0 +1,146 @@
+"""Estimates the photometric state of a run from frames that its measurement used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.artefacts.measured import RingSamples
+from pipeline.machine.stage import Context
+from pipeline.recording.base import Illumination, Recording
+from stages.twin.noise import CameraNoise, QuietWindows, black_and_white, photon_transfer, windows_of
+from stages.twin.photometry import LampLight, LampSamples, LineLight, LineSamples
+from stages.twin.scene import LitSight, Scene
+
+_LEAST_LEVEL = 4.0
+"""Grey levels above black below which a lit wall tells nothing."""
+_USUAL_WIDTH_PX = 1.2
+_ZONES = 4
+_NOISE_FRAMES = 6
+_OUTSIDE_LEVEL, _EDGE_PX = 6.0, 8
+"""Pixels that no lit frame shows brighter lie outside the view; the border is what lies this near to it."""
+
+
+@dataclass(frozen=True)
+class PhotometricState:
+    """What turns a scene into grey levels, and their noise.
+
+    Attributes
+    ----------
+    noise : CameraNoise
+    lamp : LampLight or None
+        None where no lit frame could be used.
+    line : LineLight or None
+        None where no laser frame could be used.
+    sharpness_theta, sharpness : (Z,)
+        By how much the frames are sharper than the photo at polar angles: half the difference of the two
+        blurs' variances, px²; positive where the frames are more blurred.
+    outside, edge : (H, W) bool
+        Pixels outside the camera's view, and next to its border.
+    gain_map : (H, W) float32 or None
+        What the window lets through, where dirt was found on it.
+    """
+
+    noise: CameraNoise
+    lamp: LampLight | None
+    line: LineLight | None
+    sharpness_theta: Float
+    sharpness: Float
+    outside: Bool
+    edge: Bool
+    gain_map: Float32 | None = None
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A frame of the sample: number, light, and picture (H, W)."""
+
+    frame: int
+    light: Illumination
+    image: Float32
+
+
+def sample_frames(recording: Recording, usable: Int, light: NDArray[np.str_], most: int) -> list[Sampled]:
+    """Read up to ``most`` frames of each light, spread over the recording."""
+    kinds = np.asarray(light)
+    chosen = np.sort(np.concatenate([
+        own[np.unique(np.linspace(0, len(own) - 1, min(most, len(own))).round().astype(int))]
+        for own in (np.asarray(usable)[kinds == kind] for kind in np.unique(kinds))
+    ]))  # fmt: skip
+    of = dict(zip(np.asarray(usable).tolist(), kinds.tolist(), strict=True))
+    return [
+        Sampled(frame, Illumination(of[frame]), image.astype(np.float32))
+        for frame, image in recording.read(chosen, "grey")
+        if image is not None
+    ]
+
+
+def estimate_state(
+    scene: Scene, sampled: list[Sampled], rings: RingSamples, context: Context
+) -> PhotometricState:
+    """Return the state that explains the sampled frames best."""
+    black, white = black_and_white([s.image for s in sampled])
+    width = float(np.nanmedian(rings.width_px)) if np.isfinite(rings.width_px).any() else _USUAL_WIDTH_PX
+    lamps = LampSamples(scene, black.value, white)
+    lines = LineSamples(scene, black.value, white, scene.probe.laser.line_sigma_mm, width)
+    lit: list[tuple[Sampled, LitSight]] = []
+    for done, s in enumerate(sampled):
+        T_pc = scene.pose(s.frame)
+        if s.light != Illumination.LASER:
+            lit.append((s, scene.lit(T_pc)))
+            lamps.add(s.frame, s.image, lit[-1][1], context.random)
+        if s.light == Illumination.LASER:
+            lines.add(s.frame, s.image, scene.line(T_pc))
+        context.progress(done, 2 * len(sampled))
+    lamp, line = lamps.solve(), lines.solve()
+    outside, edge = _view([s.image for s, _ in lit], black.value, scene)
+    at, sharpness, windows = _sharpness_and_noise(scene, lamp, lit, black.value, white, edge | outside)
+    noise = photon_transfer(windows, black, white)
+    if line is not None:
+        line = lines.with_speckle(line, noise.variance)
+    return PhotometricState(noise, lamp, line, at, sharpness, outside, edge)
+
+
+def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
+    """Return which pixels no lit frame shows, and which lie next to those."""
+    valid = scene.polar[2]
+    if not lit:
+        return ~valid, np.zeros_like(valid)
+    outside = (np.max(lit, 0) < black + _OUTSIDE_LEVEL) | ~valid
+    # The dark middle of the pipe and dark wall are inside: only what joins the picture's corners is not.
+    count, label = cv2.connectedComponents(outside.astype(np.uint8))
+    corners = {int(label[r, c]) for r in (0, -1) for c in (0, -1) if outside[r, c]}
+    outside = np.isin(label, list(corners)) if count > 1 and corners else np.zeros_like(outside)
+    kernel = np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8)
+    border = cv2.dilate(outside.astype(np.uint8), kernel) - cv2.erode(outside.astype(np.uint8), kernel)
+    return outside, border > 0
+
+
+def _sharpness_and_noise(
+    scene: Scene, lamp: LampLight | None, lit: list[tuple[Sampled, LitSight]], black: float, white: float,
+    border: Bool,
+) -> tuple[Float, Float, list[QuietWindows]]:  # fmt: skip
+    """Return polar angles, how much blurrier than the photo the frames are there, and windows for noise."""
+    theta, phi, _ = scene.polar
+    if lamp is None or not lit:
+        return np.zeros(2), np.zeros(2), []
+    zones = np.linspace(lamp.theta_rad[0], lamp.theta_rad[-1], _ZONES + 1)
+    above, below = np.zeros(_ZONES), np.zeros(_ZONES)
+    left: list[tuple[Float32, Float32, Bool, Float32]] = []
+    white_wall = lamp.factor(theta, phi)
+    for s, sight in lit[:: max(len(lit) // _NOISE_FRAMES, 1)]:
+        level = white_wall * sight.reflectance * sight.irradiance * np.float32(np.exp(lamp.gain.at(s.frame)))
+        use = np.isfinite(level) & (level > _LEAST_LEVEL) & (s.image < white) & ~border
+        rest = s.image - np.float32(black) - level
+        curved = cv2.Laplacian(np.nan_to_num(level), cv2.CV_32F)
+        zone = np.clip(np.searchsorted(zones, theta[use]) - 1, 0, _ZONES - 1)
+        above += np.bincount(zone, (rest * curved)[use], _ZONES)
+        below += np.bincount(zone, (curved**2)[use], _ZONES)
+        left.append((rest, level, use, curved))
+    at, sharpness = (zones[1:] + zones[:-1]) / 2, above / np.maximum(below, 1e-9)
+    sharp = np.interp(theta, at, sharpness).astype(np.float32)
+    return at, sharpness, [windows_of(r - sharp * c, level, use) for r, level, use, c in left]

@@ -1,0 +1,171 @@
+"""The twin's parts on made pictures: where rays meet the wall, noise, dirt, exposure, and what is written."""
+
+import json
+
+import numpy as np
+import pytest
+
+from pipeline.api.twin import twin_document, write_twin
+from pipeline.artefacts.twin import Mismatch, NamedFigure, RegionFit, Twin, TwinView
+from pipeline.files.provenance import MadeBy
+from pipeline.geometry.axis import straight_axis
+from pipeline.recording.base import Illumination
+from stages.texture.surface import WallSurface
+from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
+from stages.twin.locate import full_size, places_in_image
+from stages.twin.name import dirt
+from stages.twin.noise import photon_transfer, windows_of
+from stages.twin.photometry import Figure
+from stages.twin.render import Region, TwinFrame
+from stages.twin.sight import wall_seen
+
+BLACK = Figure(16.0, 0.1)
+
+
+def _bore(radius_mm=50.0, bump_mm=0.0):
+    distance = np.arange(0.0, 300.0, 0.5)
+    radius = np.full((len(distance), 360), radius_mm, np.float32)
+    radius[:, 100:140] += bump_mm
+    flat = np.zeros_like(radius)
+    return WallSurface(straight_axis(-100, 500), distance, radius, flat, flat, (0.0, 299.5))
+
+
+def _rays(count=200):
+    theta = np.linspace(0.5, 1.5, count)
+    phi = np.linspace(-3.0, 3.0, count)
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+
+
+@pytest.mark.parametrize("bump_mm", [0.0, 1.5])
+def test_rays_meet_the_wall_where_it_is(bump_mm):
+    T_pc = np.eye(4)
+    T_pc[:3, 3] = 2.0, -1.0, 80.0
+    surface, rays = _bore(bump_mm=bump_mm), _rays()
+    seen = wall_seen(surface, T_pc, rays)
+    assert seen.seen.all()
+    at = T_pc[:3, 3] + seen.xyz_c
+    column = np.mod((seen.azimuth_rad + np.pi) / (2 * np.pi), 1) * 360
+    inside = np.interp(column, np.arange(360), surface.radius_mm[0])
+    np.testing.assert_allclose(np.hypot(at[:, 0], at[:, 1]), inside, atol=0.01)
+    np.testing.assert_allclose(seen.distance_mm, at[:, 2], atol=1e-3)
+    np.testing.assert_allclose(np.cross(seen.xyz_c, rays), 0, atol=1e-6)
+
+
+def test_a_ray_that_is_not_there_meets_nothing():
+    rays = _rays(3)
+    rays[1] = np.nan
+    np.testing.assert_array_equal(wall_seen(_bore(), np.eye(4), rays).seen, [True, False, True])
+
+
+def _noisy_frames(read, electrons, frames=4):
+    random = np.random.default_rng(5)
+    level = np.tile(np.linspace(10, 180, 480, dtype=np.float32), (360, 1))
+    whole = np.ones(level.shape, bool)
+    for _ in range(frames):
+        noise = random.standard_normal(level.shape) * np.sqrt(read**2 + level / electrons)
+        yield windows_of(noise.astype(np.float32), level, whole)
+
+
+def test_photon_transfer_finds_the_noise_that_was_put_in():
+    noise = photon_transfer(list(_noisy_frames(1.5, 40.0)), BLACK, 255.0)
+    assert noise.electrons_per_level.value == pytest.approx(40.0, rel=0.12)
+    assert noise.read_electrons.value == pytest.approx(60.0, rel=0.15)
+    level = np.array([20.0, 90.0, 170.0], np.float32)
+    np.testing.assert_allclose(noise.variance(level), 1.5**2 + level / 40, rtol=0.05)
+
+
+def test_other_noise_gives_another_answer():
+    quiet, loud = (photon_transfer(list(_noisy_frames(1.0, e)), BLACK, 255.0) for e in (200.0, 20.0))
+    assert loud.variance_per_level.value > 5 * quiet.variance_per_level.value
+
+
+def _ratios(random, spot=None, frames=8):
+    shape = (75, 100)
+    v, u = np.mgrid[0 : shape[0], 0 : shape[1]]
+    fixed = 1 + 0.002 * random.standard_normal(shape)
+    if spot is not None:
+        fixed -= spot[2] * np.exp(-0.5 * ((u - spot[0]) ** 2 + (v - spot[1]) ** 2) / 2.0**2)
+    return [(fixed + 0.004 * random.standard_normal(shape)).astype(np.float32) for _ in range(frames)]
+
+
+def test_clean_windows_show_no_dirt():
+    found = [places_in_image(_ratios(np.random.default_rng(k))) for k in range(30)]
+    assert [len(places) for places, _ in found] == [0] * 30
+
+
+def test_dirt_is_found_where_it_lies():
+    (place,), gain = places_in_image(_ratios(np.random.default_rng(3), (40, 30, 0.3)))
+    middle = (np.array([40, 30]) + 0.5) * BLOCK_PX - 0.5
+    assert np.hypot(place.u_px - middle[0], place.v_px - middle[1]) < BLOCK_PX
+    assert place.change == pytest.approx(-0.3, abs=0.02)
+    assert place.probability < 1e-6
+    whole = full_size(gain, (600, 800))
+    assert whole.shape == (600, 800)
+    assert whole.min() == pytest.approx(0.7, abs=0.03)
+    assert np.median(whole) == 1
+
+
+def _frame(level, region=Region.WALL):
+    unknown = np.full(level.shape, np.nan, np.float32)
+    return TwinFrame(
+        level, np.full(level.shape, 4.0, np.float32), np.full(level.shape, region, np.uint8), unknown, unknown
+    )
+
+
+def _level():
+    return np.tile(np.linspace(40, 160, 160, dtype=np.float32), (120, 1))
+
+
+def test_exposure_and_blocks_are_relative_to_the_twin():
+    level, random = _level(), np.random.default_rng(1)
+    recorded = (1.1 * level + 2 * random.standard_normal(level.shape)).astype(np.float32)
+    assert exposure_of(recorded, _frame(level)) == pytest.approx(np.log(1.1), abs=1e-3)
+    np.testing.assert_allclose(block_ratios(recorded, _frame(level), 1e9), 1.1, atol=0.05)
+    assert np.isnan(block_ratios(recorded, _frame(level, Region.UNSEEN), 1e9)).all()
+
+
+def test_chi_square_is_one_for_noise_and_more_for_a_difference():
+    level, random = _level(), np.random.default_rng(1)
+    recorded = (level + 2 * random.standard_normal(level.shape)).astype(np.float32)
+    comparison = Comparison()
+    wrong = _frame(1.05 * level)
+    comparison.add(7, Illumination.LED, recorded, wrong, _frame(level), 16.0)
+    fit = next(r for r in comparison.regions() if r.name == "wall")
+    assert fit.pixels == level.size
+    assert fit.chi2_after == pytest.approx(1.0, abs=0.03)
+    assert fit.chi2_before > 3
+    assert comparison.psnr_db(False) == pytest.approx(20 * np.log10(255 / 2), abs=0.1)
+
+
+def test_dirt_that_frames_do_not_bear_out_is_withdrawn():
+    random = np.random.default_rng(3)
+    places, _ = places_in_image(_ratios(random, (10, 7, 0.3)))
+    level = _level()
+    dirty = level.copy()
+    dirty[40:80, 60:110] *= 0.7
+    for recorded, accepted in ((dirty, 1), (level, 0)):
+        count = dirt(places, level.shape)
+        count.add(recorded, _frame(level), _frame(dirty))
+        assert len(count.accepted()) == accepted
+
+
+def _twin():
+    picture = np.full((30, 40), 90, np.uint8)
+    nameless = Mismatch("", "intensity", "image", (), (), 1e-5, 3.0, 2.0, "Brighter </script> here.")
+    return Twin(
+        np.array([4]), True, (NamedFigure("white_dn", float("inf"), 0.0),), (),
+        (RegionFit("wall", 0, float("nan"), float("nan")),), (nameless,), 45.0, float("inf"), 0.9, (),
+        (TwinView(4, "led", 1.2, picture, picture, picture),),
+    )  # fmt: skip
+
+
+def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
+    write_twin(_twin(), MadeBy("twin", {}, {}), tmp_path)
+    document = json.loads((tmp_path / "twin.json").read_text("utf-8"))
+    assert document["noise"]["white_dn"]["value"] is None
+    assert document["regions"]["wall"]["chi2_after"] is None
+    assert document["found"][0]["name"] is None
+    assert document | {"made_by": 0} == twin_document(_twin()) | {"made_by": 0}
+    page = (tmp_path / "twin.html").read_text("utf-8")
+    assert page.count("data:image/jpeg;base64") == 3
+    assert page.count("</script>") == 1
