@@ -25,7 +25,10 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
             "stages.mesh", "stages.sections", "stages.defects", "stages.overlays",
         ),
     ),
-    ("steps built on others", ("stages.motion", "stages.calibrate", "stages.preview", "stages.compare", "stages.twin")),
+    (
+        "steps built on others",
+        ("stages.motion", "stages.calibrate", "stages.preview", "stages.compare", "stages.twin"),
+    ),
     ("diagnosis", ("stages.diagnose",)),
     ("order of the steps", ("stages.catalogue",)),
     ("files for people", ("pipeline.export",)),
