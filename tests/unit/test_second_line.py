@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.finding import FOUND_Z, Size, finding
+from stages.diagnose.profile.finding import FOUND_P, FOUND_Z, Size, finding
 from stages.diagnose.profile.ghost import bounced
 from stages.diagnose.profile.matched_filter import responses
 from stages.diagnose.second_line import SheetByRings, against_rings
@@ -53,6 +53,18 @@ def test_a_second_line_beyond_the_skirt_is_found_where_it_is(skirt):
     assert line.test.z > FOUND_Z
     assert line.relative == pytest.approx(0.03, abs=4 * line.test.sigma)
     np.testing.assert_allclose(np.arctan2(line.parameters[1], line.parameters[0]), 1.0, atol=0.1)
+
+
+def test_light_beside_a_few_parts_of_the_ring_is_no_second_line():
+    drawn = cells(0.03, 0.0)
+    elsewhere = np.abs(drawn.azimuth_rad - 1.0) > np.radians(20)
+    apart = 10 * np.cos(drawn.azimuth_rad - 1.0)
+    light = 0.03 * np.exp(-0.5 * ((OFFSET - apart[:, None]) / WIDTH_PX) ** 2)
+    line = bounced(responses(drawn), drawn, FLOOR).test
+    partial = bounced(responses(p := drawn.less(light * elsewhere[:, None])), p, FLOOR).test
+    assert line.z > FOUND_Z
+    assert line.p_value < FOUND_P
+    assert partial.p_value > FOUND_P
 
 
 def ghost(tilt_x: float, tilt_y: float, cone: float):

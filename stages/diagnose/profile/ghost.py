@@ -17,7 +17,7 @@ from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Tested, tested
 from stages.diagnose.profile.matched_filter import STEP_PX, Responses
 
-_LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.04), np.radians(0.08)
+_LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.08), np.radians(0.16)
 _LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04
 _CLEAR_WIDTHS = 2.5
 # Seen through a filter as wide as the line, a copy of it is 10 % high this many widths from its middle.
@@ -27,6 +27,8 @@ _SECTORS_A_GROUP = 6
 # A part of the ring tells how its sides differ if it has this share of the best part's information.
 _LEAST_SHARE = 0.1
 _SHRINK, _HALVINGS = 0.5, 9
+# A step moves a second line by 1 px in the mean; the filter sees the same light over 2 px.
+_TRIES_A_STEP = 0.5
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,12 @@ class SecondLine:
         Height over that of the line, its random 1 σ, and what image formation may leave at its distances.
     information : float
         How well the cells show a line there; the misfit falls by relative² × information.
-    blocks : int
+    groups : int
+        Blocks or parts of the ring, whichever are fewer, on which the σ rests.
     distance_px : (N,)
         From the line, in every cell.
+    tries : float
+        Hypotheses among which it was the best and which do not find the same light.
     """
 
     parameters: Float
@@ -51,14 +56,16 @@ class SecondLine:
     random: float
     floor: float
     information: float
-    blocks: int
+    groups: int
     distance_px: Float
     parameter_covariance: Float
+    tries: float = 1.0
 
     @property
     def test(self) -> Tested:
-        """Height against its σ, for this one hypothesis."""
-        return tested(self.relative, self.random, self.floor, self.blocks)
+        """Height against its σ, the best of all hypotheses that were tried (Bonferroni)."""
+        one = tested(self.relative, self.random, self.floor, self.groups)
+        return replace(one, p_value=min(1.0, self.tries * one.p_value))
 
     @property
     def misfit_drop(self) -> float:
@@ -86,17 +93,8 @@ def copied(found: Responses, cells: Cells, floor: float) -> SecondLine:
     """Return the best copy at a constant axial distance, mm, forward positive."""
     w = cells.whole
     grid = np.arange(-_LARGEST_MM, _LARGEST_MM + 1e-9, _COPY_STEP_MM)[:, None]
-    design = -cells.px_per_mm[w][:, None]
-    return _best(
-        found,
-        design,
-        grid,
-        np.array([_COPY_STEP_MM]),
-        cells.block[w],
-        cells.sector[w],
-        cells.width_px[w],
-        floor,
-    )
+    design, steps = -cells.px_per_mm[w][:, None], np.array([_COPY_STEP_MM])
+    return _best(found, design, grid, steps, cells.block[w], cells.sector[w], cells.width_px[w], floor)
 
 
 def _best(
@@ -120,9 +118,9 @@ def _best(
         around = _around(best, steps)
         best = around[int(np.argmax(rated(around)))]
         steps = steps * _SHRINK
-    line = _sized(found, design, best, block, floor)
+    line = _sized(found, design, best, block, sector, floor)
     left = _skirt(found, line, float(np.median(width_px)), sector)
-    return replace(line, floor=float(np.hypot(floor, left)))
+    return replace(line, floor=float(np.hypot(floor, left)), tries=_TRIES_A_STEP ** len(steps) * len(grid))
 
 
 def _around(best: Float, steps: Float) -> Float:
@@ -162,21 +160,31 @@ def _rate(score, information, design, parameters, block, clear):  # type: ignore
     return out
 
 
-def _sized(found: Responses, design: Float, best: Float, block: Int, floor: float) -> SecondLine:
-    """Return height, σ and the parameters' covariance at the best place."""
+def _sized(found: Responses, design: Float, best: Float, block: Int, sector: Int, floor: float) -> SecondLine:
+    """Return height, σ and the parameters' covariance at the best place.
+
+    A second line is as high in all frames and all round: the height errs as parts of either disagree.
+    """
     at = design @ best
     score, information = _at(found.score, found, at), _at(found.information, found, at)
-    blocks = np.unique(block)
-    parts = np.array([(score[block == b].sum(), information[block == b].sum()) for b in blocks])
+    of_blocks = _jackknife(score, information, [block == b for b in np.unique(block)])
+    of_parts = _jackknife(score, information, _parts(sector))
+    groups, height = min(of_blocks[1], of_parts[1]), float(score.sum() / information.sum())
+    return SecondLine(
+        best, height, float(np.hypot(of_blocks[0], of_parts[0])), floor, float(information.sum()), groups,
+        at, _place_covariance(found, design, at, height, block),
+    )  # fmt: skip
+
+
+def _jackknife(score: Float, information: Float, groups: list[Bool]) -> tuple[float, int]:
+    """Return the σ of Σ score / Σ information by leaving out groups, and how many groups it rests on."""
+    parts = np.array([(score[g].sum(), information[g].sum()) for g in groups])
     total = parts.sum(0)
     left = total - parts
-    height = total[0] / total[1]
     others = left[:, 0] / np.maximum(left[:, 1], 1e-12)
-    random = np.sqrt((len(blocks) - 1) / len(blocks) * np.sum((others - height) ** 2))
-    return SecondLine(
-        best, float(height), float(random), floor, float(total[1]), len(blocks), at,
-        _place_covariance(found, design, at, height, block),
-    )  # fmt: skip
+    count = len(groups)
+    sigma = np.sqrt((count - 1) / count * np.sum((others - total[0] / total[1]) ** 2))
+    return float(sigma), int(np.sum(parts[:, 1] > _LEAST_SHARE * parts[:, 1].max()))
 
 
 def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> float:
