@@ -248,7 +248,8 @@ class WallTexture:
     Attributes
     ----------
     bgra : (H, W, 4) uint8
-        Linear reflectance × 255 in B, G, R after one common gain; alpha 0 where nothing was textured.
+        Grey levels in B, G, R as the camera recorded them where the laser ring meets the wall; alpha 0 where
+        nothing was textured.
     distance_from_mm, mm_per_px : float
         Row i's centre is at ``distance_from_mm + i * mm_per_px``.
     azimuth_from_rad, rad_per_px : float

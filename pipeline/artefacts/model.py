@@ -126,7 +126,7 @@ class MeshTile:
     face : (T, 3) int32
         Counter-clockwise seen from inside.
     photo_bgr : (H, W, 3) uint8
-        sRGB colours; grey where nothing was textured.
+        Colours as recorded; grey where nothing was textured.
     errors : tuple of ErrorTexture
         On the same UV, possibly coarser.
     distance_mm : (float, float)

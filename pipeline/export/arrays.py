@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Byte
 from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, Wall, WallTexture
-from pipeline.export.pictures import display_colours
 
 # Points written at a time (50 bytes each), for memory's sake.
 _AT_ONCE = 1 << 20
@@ -52,13 +51,13 @@ def _rows(cloud: PointCloud, texture: WallTexture) -> NDArray[np.void]:
 
 
 def point_colours(cloud: PointCloud, texture: WallTexture) -> Byte:
-    """Return the display colours BGR (M, 3) of the texels next to the points."""
+    """Return the colours BGR (M, 3) of the texels next to the points."""
     rows, columns = texture.bgra.shape[:2]
     i = np.rint((cloud.distance_mm - texture.distance_from_mm) / texture.mm_per_px).astype(np.int64)
     j = np.rint((cloud.azimuth_rad - texture.azimuth_from_rad) / texture.rad_per_px).astype(np.int64)
     bgra = texture.bgra[np.clip(i, 0, rows - 1), j % columns]
     seen = (i >= 0) & (i < rows) & (bgra[:, 3] > 0)
-    return np.where(seen[:, None], display_colours(bgra)[:, :3], _GREY).astype(np.uint8)
+    return np.where(seen[:, None], bgra[:, :3], _GREY).astype(np.uint8)
 
 
 def _header(points: int) -> str:

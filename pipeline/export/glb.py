@@ -173,9 +173,10 @@ def tile_primitive(
 
 
 def _materials(builder: GlbBuilder, tile: MeshTile, number: int) -> Sequence[int]:
-    """Return the tile's materials in the order of the variants; error colours are unlit, hence true."""
+    """Return the tile's materials in the order of the variants; all are unlit, hence true in every viewer."""
     errors = {e.variant: e for e in tile.errors}
-    photo = builder.material(f"photo {number}", _jpeg(tile.photo_bgr), "image/jpeg")
+    # The photo holds the light of the camera's own lamps; a viewer's would come on top of it.
+    photo = builder.material(f"photo {number}", _jpeg(tile.photo_bgr), "image/jpeg", _UNLIT)
     return [
         photo,
         *(

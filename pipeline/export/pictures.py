@@ -17,8 +17,6 @@ from pipeline.pages import notation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Exponent of the encoding for the screen: close to that of sRGB (IEC 61966-2-1), and simple to undo.
-_GAMMA = 2.2
 # Common viewers and graphics cards refuse pictures with a side of more than 16384 px.
 _MOST_ROWS = 16384
 # Of an overlay's figure: dots per inch, mm of pipe per inch, the longest figure (12000 px at 120 dpi, which
@@ -26,16 +24,8 @@ _MOST_ROWS = 16384
 _DPI, _MM_PER_INCH, _LONGEST_INCH = 120, 30.0, 100.0
 
 
-def display_colours(bgra: Byte) -> Byte:
-    """Return linear reflectance (..., 4) encoded for the screen (power 1 / 2.2); alpha is kept."""
-    table = np.round(255 * (np.arange(256) / 255) ** (1 / _GAMMA)).astype(np.uint8)
-    out = table[bgra]
-    out[..., 3] = bgra[..., 3]
-    return np.asarray(out)
-
-
 def write_unrolled(texture: WallTexture, folder: Path) -> None:
-    """Write ``unrolled.png`` (BGRA, display colours) and ``unrolled.json`` (where its pixels lie).
+    """Write ``unrolled.png`` (BGRA, as recorded) and ``unrolled.json`` (where its pixels lie).
 
     A picture too long for other programs is written shrunk along the pipe, and in full in sheets, listed in
     ``unrolled.json``: ``unrolled-001.png`` and so on.
@@ -57,7 +47,7 @@ def write_unrolled(texture: WallTexture, folder: Path) -> None:
         "mm_per_px": texture.mm_per_px * step,
         "azimuth_from_rad": texture.azimuth_from_rad,
         "rad_per_px": texture.rad_per_px,
-        "encoding": "display, power 1 / 2.2",
+        "encoding": "grey levels of the recorded frames",
     }
     if sheets:
         place["sheets"] = [
@@ -86,7 +76,7 @@ def _shrunk_along(bgra: Byte, step: int) -> Byte:
 
 
 def _write_png(path: Path, bgra: Byte) -> None:
-    encoded, png = cv2.imencode(".png", display_colours(bgra), [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    encoded, png = cv2.imencode(".png", bgra, [cv2.IMWRITE_PNG_COMPRESSION, 3])
     if not encoded:
         raise OSError(f"{path.name}: the picture cannot be encoded")
     path.write_bytes(png.tobytes())

@@ -15,7 +15,6 @@ import numpy as np
 from pipeline.arrays import Byte, Float, Float32, Int
 from pipeline.artefacts.measured import RadiusMap, WallTexture
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays
-from pipeline.export.pictures import display_colours
 from pipeline.geometry.axis import PipeAxis, from_pipe
 
 # A tube keeps at least 36 facets (10°): its chord errs by 0.4 % of the radius.
@@ -60,7 +59,7 @@ def flat_of(texture: WallTexture, overlays: Overlays, from_mm: float, to_mm: flo
     bgra = np.zeros((last - first, texture.bgra.shape[1], 4), np.uint8)
     low, high = max(first, 0), min(last, len(texture.bgra))
     if high > low:
-        bgra[low - first : high - first] = display_colours(texture.bgra[low:high])
+        bgra[low - first : high - first] = texture.bgra[low:high]
     rows = slice(*np.searchsorted(overlays.distance_mm, [from_mm - 1e-6, to_mm + 1e-6]))
     return Flat(bgra, tuple(overlays.of_variant(v).level[rows] for v in VARIANTS[1:]))
 

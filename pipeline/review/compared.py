@@ -36,6 +36,7 @@ from pipeline.review.growth_table import COLUMNS, growth_rows
 from pipeline.review.papers.tables import csv_text
 from pipeline.review.review import Review, State, open_review
 from pipeline.review.run_files import RunFiles
+from pipeline.review.values import Limits
 
 DIFFERENCE = ("difference", "difference_sigma")
 EARLIER = "earlier-"
@@ -148,8 +149,10 @@ class Compared:
         """Return the names of the layers that it adds to those of the later run."""
         return (*DIFFERENCE, *(EARLIER + name for name in layers_of(self.pair.earlier.files)))
 
-    def picture(self, layer: str) -> FlatPicture:
+    def picture(self, layer: str, limits: Limits | None = None) -> FlatPicture:
         """Return a layer: one of the difference, of the earlier run, or of the later one.
+
+        Limits are those of both runs alike; the difference has its own.
 
         Raises
         ------
@@ -159,8 +162,8 @@ class Compared:
         if layer in DIFFERENCE:
             return overlay_picture(self.pair.now.files.artefact(Overlays), self._overlay(layer))
         if layer.startswith(EARLIER):
-            return picture_of(self.pair.earlier.files, layer.removeprefix(EARLIER))
-        return picture_of(self.pair.now.files, layer)
+            return picture_of(self.pair.earlier.files, layer.removeprefix(EARLIER), limits)
+        return picture_of(self.pair.now.files, layer, limits)
 
     def table(self, name: str) -> tuple[str, bytes]:
         """Return a table's media type and content.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -20,6 +21,7 @@ from pipeline.review.flat_tiles import FlatPicture
 from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
+from pipeline.review.values import WALL_LOSS, full_range_mm, overlay_of
 
 _LEGEND_STEPS = 64
 _FLOW_ABOVE_YIELD_MPA = 69.0
@@ -90,7 +92,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "wall_thickness_mm": pipe.wall_thickness_mm if pipe is not None else None,
         "distance_mm": [float(overlays.distance_mm[0]), float(overlays.distance_mm[-1])],
         "radius_mm": float(np.median(overlays.reference_radius_mm)),
-        "overlays": [overlay_document(o) for o in overlays.pictures],
+        "overlays": [*_value_layers(files, overlays)],
         "defects": parse_json(files.defects_text()),
         "unconfirmed": files.unconfirmed(),
         "kinds": [kind.value for kind in DefectKind],
@@ -226,6 +228,15 @@ def overlay_document(overlay: Overlay) -> dict[str, Any]:
         "high_mm": overlay.high_mm,
         "colours": [f"#{r:02x}{g:02x}{b:02x}" for b, g, r in overlay.palette_bgr[at]],
     }
+
+
+def _value_layers(files: RunFiles, overlays: Overlays) -> Iterator[dict[str, Any]]:
+    """Yield the overlays of a run with their full range, and wall loss, for which the page needs the wall."""
+    for overlay in overlays.pictures:
+        yield overlay_document(overlay) | {"full_mm": full_range_mm(files, overlay.name)}
+    loss = overlay_document(overlay_of(overlays, WALL_LOSS))
+    full = (0.0, max(full_range_mm(files, WALL_LOSS)[1], 0.0))
+    yield loss | {"name": WALL_LOSS, "title": "Wall loss", "low_mm": 0.0, "high_mm": full[1], "full_mm": full}
 
 
 def _diagnosis(files: RunFiles) -> dict[str, Any] | None:

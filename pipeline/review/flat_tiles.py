@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 
-from pipeline.arrays import Byte
+from pipeline.arrays import Byte, Float32
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import InputError
-from pipeline.export.pictures import display_colours
 from pipeline.review.run_files import RunFiles
+from pipeline.review.values import Limits, Values, overlay_of, values_of
 
 TILE_PX = 512
 PHOTO = "photo"
@@ -28,15 +29,15 @@ class FlatPicture:
     Attributes
     ----------
     stored : (S, A) or (S, A, 4)
-        Rows along distance, possibly still on disk.
+        Rows along distance, possibly still on disk, or values that are worked out when asked for.
     colours : callable
         Gives BGRA of a part of it.
     distance_from_mm, distance_to_mm, azimuth_from_rad : float
         Edges of the picture, not centres of its pixels; it covers the whole turn.
     """
 
-    stored: Byte
-    colours: Callable[[Byte], Byte]
+    stored: Byte | Values
+    colours: Callable[[Any], Byte]
     distance_from_mm: float
     distance_to_mm: float
     azimuth_from_rad: float
@@ -83,12 +84,14 @@ class FlatPicture:
             raise InputError("tile", f"tile {level}/{column}/{row} cannot be encoded")
         return png.tobytes()
 
-    def _bgra(self, part: Byte) -> Byte:
+    def _bgra(self, part: Byte | Float32) -> Byte:
         return np.ascontiguousarray(self.colours(np.asarray(part)).transpose(1, 0, 2))
 
 
-def picture_of(files: RunFiles, layer: str) -> FlatPicture:
+def picture_of(files: RunFiles, layer: str, limits: Limits | None = None) -> FlatPicture:
     """Return a layer of the flat view: the photo, or an overlay by its name.
+
+    Without limits an overlay is coloured as in the run's own pictures.
 
     Raises
     ------
@@ -98,6 +101,8 @@ def picture_of(files: RunFiles, layer: str) -> FlatPicture:
     if layer == PHOTO:
         return photo_picture(files.artefact(WallTexture))
     overlays = files.artefact(Overlays)
+    if limits is not None:
+        return value_picture(overlays, overlay_of(overlays, layer), values_of(files, layer), limits)
     found = {o.name: o for o in overlays.pictures}
     if layer not in found:
         raise InputError("layer", f"there is no {layer[:40]!r}", expected=", ".join([PHOTO, *found]))
@@ -111,22 +116,31 @@ def layers_of(files: RunFiles) -> tuple[str, ...]:
 
 def overlay_picture(overlays: Overlays, overlay: Overlay) -> FlatPicture:
     """Return an overlay's colours, clear where nothing was measured."""
+    return _on_the_map(overlays, overlay.level, _palette(overlay).__getitem__)
+
+
+def value_picture(overlays: Overlays, overlay: Overlay, values: Values, limits: Limits) -> FlatPicture:
+    """Return values in an overlay's colours between limits, clear where nothing was measured."""
+    palette = _palette(overlay)
+    return _on_the_map(overlays, values, lambda part: palette[limits.levels(part)])
+
+
+def _palette(overlay: Overlay) -> Byte:
+    clear = np.append([0], np.full(255, 255)).astype(np.uint8)
+    return np.column_stack([overlay.palette_bgr, clear])
+
+
+def _on_the_map(overlays: Overlays, stored: Byte | Values, colours: Callable[[Any], Byte]) -> FlatPicture:
     s, psi = overlays.distance_mm, overlays.azimuth_rad
     half_mm, half_rad = float(s[1] - s[0]) / 2, float(psi[1] - psi[0]) / 2
-    clear = np.append([0], np.full(255, 255)).astype(np.uint8)
-    palette = np.column_stack([overlay.palette_bgr, clear])
     return FlatPicture(
-        overlay.level,
-        palette.__getitem__,
-        float(s[0]) - half_mm,
-        float(s[-1]) + half_mm,
-        float(psi[0]) - half_rad,
+        stored, colours, float(s[0]) - half_mm, float(s[-1]) + half_mm, float(psi[0]) - half_rad
     )
 
 
 def photo_picture(texture: WallTexture) -> FlatPicture:
-    """Return the wall's photo in display colours."""
+    """Return the wall's photo as it was recorded."""
     start = texture.distance_from_mm - texture.mm_per_px / 2
     end = start + texture.mm_per_px * len(texture.bgra)
     top = texture.azimuth_from_rad - texture.rad_per_px / 2
-    return FlatPicture(texture.bgra, display_colours, start, end, top)
+    return FlatPicture(texture.bgra, np.asarray, start, end, top)

@@ -27,6 +27,7 @@ from pipeline.review.measuring import Tool, readings
 from pipeline.review.model_stretches import model_of
 from pipeline.review.quality import quality_document
 from pipeline.review.review import Review
+from pipeline.review.values import Limits
 
 if TYPE_CHECKING:  # a review of one run alone need not wait for it
     from pipeline.review.compared import Compared
@@ -195,16 +196,19 @@ class ReviewApp:
         return Response(jpeg, media_type="image/jpeg")
 
     def _layer(self, request: Request, _: bytes) -> Response:
-        picture = self._picture(request.path_params["layer"])
+        picture = self._picture(request)
         return JSONResponse(documents.layer_document(picture))
 
     def _tile(self, request: Request, _: bytes) -> Response:
         at: dict[str, Any] = request.path_params
-        picture = self._picture(at["layer"])
+        picture = self._picture(request)
         return Response(picture.tile(at["level"], at["column"], at["row"]), media_type="image/png")
 
-    def _picture(self, layer: str) -> FlatPicture:
-        return picture_of(self.review.files, layer) if self.compared is None else self.compared.picture(layer)
+    def _picture(self, request: Request) -> FlatPicture:
+        layer, limits = request.path_params["layer"], _limits(request)
+        if self.compared is None:
+            return picture_of(self.review.files, layer, limits)
+        return self.compared.picture(layer, limits)
 
     def _comparison(self, _: Request, __: bytes) -> Response:
         """Answer null where the review is of one run alone."""
@@ -245,6 +249,16 @@ def _number(request: Request, name: str) -> float:
     if not abs(value) < 1e9:
         raise InputError("request", f"{name} is {text[:40]!r}", expected="a number within reason")
     return value
+
+
+def _limits(request: Request) -> Limits | None:
+    """Return between which values a layer is coloured, None where the request leaves it to the run."""
+    if not {"low", "high"} & set(request.query_params):
+        return None
+    low, high = _number(request, "low"), _number(request, "high")
+    if not low < high:
+        raise InputError("request", f"low {low:g} is not below high {high:g}", expected="low < high")
+    return Limits(low, high)
 
 
 def _code_of(error: BoresightError) -> int:

@@ -195,4 +195,4 @@ def _report(mesh: TexturedMesh, context: Context) -> None:
     context.report("mesh: RMS decimation error", mesh.decimation_rms_mm, "mm")
 
 
-MESH = Stage("mesh", "3", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")
+MESH = Stage("mesh", "4", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")

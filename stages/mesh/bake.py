@@ -18,7 +18,7 @@ from stages.mesh.surface import Surface
 
 # Error colours vary slowly: their texels are three times as large as the photo's.
 _ERROR_COARSER = 3
-_UNTEXTURED = 55  # linear grey, 128 as sRGB
+_UNTEXTURED = 128  # middle grey
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def _nearest_places(chart: Chart, px: Float, x: Float, y: Float, unrolled: Unrol
 
 
 def _photo(texture: WallTexture, places: TexelPlaces) -> Byte:
-    """Return the sRGB photo (H, W, 3) at texels."""
+    """Return the photo (H, W, 3) at texels."""
     rows = len(texture.bgra)
     row = (places.distance_mm - texture.distance_from_mm) / texture.mm_per_px
     first = int(np.clip(np.nanmin(row) - 1, 0, rows - 1))
@@ -123,7 +123,7 @@ def _photo(texture: WallTexture, places: TexelPlaces) -> Byte:
     )
     sampled[beyond] = 0
     grey = ((255 - sampled[..., 3:].astype(np.uint16)) * _UNTEXTURED // 255).astype(np.uint8)
-    return np.asarray(_SRGB[cv2.add(sampled[..., :3], np.repeat(grey, 3, axis=-1))])
+    return np.asarray(cv2.add(sampled[..., :3], np.repeat(grey, 3, axis=-1)))
 
 
 def _error(variant: str, overlays: Overlays, places: TexelPlaces) -> ErrorTexture:
@@ -137,16 +137,6 @@ def _error(variant: str, overlays: Overlays, places: TexelPlaces) -> ErrorTextur
     row = np.clip(np.nan_to_num(row), 0, rows - 1).astype(np.int64)
     level = overlay.level[row, np.nan_to_num(column).astype(np.int64)]
     return ErrorTexture(variant, overlay.palette_bgr, np.where(outside, 0, level).astype(np.uint8))
-
-
-def _srgb_table() -> Byte:
-    """Return the sRGB value of each linear one (IEC 61966-2-1)."""
-    linear = np.arange(256) / 255
-    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(255 * curve).astype(np.uint8))
-
-
-_SRGB = _srgb_table()
 
 
 _ARRAYS: dict[str, tuple[str, tuple[int, ...]]] = {

@@ -32,5 +32,5 @@ TEXTURE = Stage(
     "4",
     TextureParameters,
     _texture_of_run,
-    "lit frames to the wall's reflectance as a flat picture, light divided out",
+    "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",
 )

@@ -13,6 +13,7 @@ from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Recording
+from stages.texture.blend import REFLECTANCE_SCALE
 from stages.texture.chain import LightChain, cut_plan
 from stages.texture.grid import FlatGrid, flat_grid
 from stages.texture.mosaic import Blended, Mosaic
@@ -49,7 +50,7 @@ class TextureParameters(Parameters):
         description="frames whose light is worked out together; a longer pipe is cut in stretches of so many",
     )
     white_quantile: float = Field(
-        0.9995, ge=0.5, le=1.0, description="quantile of the brightest colour that becomes 250 of 255"
+        0.9995, ge=0.5, le=1.0, description="quantile of the brightest colour that stays below 250 of 255"
     )
 
 
@@ -61,7 +62,7 @@ def photograph_wall(
     parameters: TextureParameters,
     context: Context,
 ) -> WallTexture:
-    """Return the wall's reflectance as a flat picture; where no lit frame shows it, alpha is 0."""
+    """Return the wall as a photo, evenly lit, as bright as recorded; alpha 0 where no lit frame shows it."""
     surface = wall_surface(wall, parameters.smoothing_mm, parameters.shading_mm, context.scratch)
     grid = flat_grid(surface, probe, parameters.oversampling, parameters.tile_mm)
     views = lit_views(recording, trajectory)
@@ -117,7 +118,7 @@ def _report_light(lights: LightChain, context: Context) -> None:
 
 
 def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, context: Context) -> WallTexture:
-    """Scale by one common gain to 8 bits."""
+    """Return the picture in 8 bits: as bright as recorded at the laser ring, darker where that would clip."""
     parts = [slice(a, a + grid.tile_rows) for a in range(0, grid.rows, grid.tile_rows)]
     brightness, views = np.zeros(1 << 16, np.int64), np.zeros(1 << 8, np.int64)
     for part in parts:
@@ -125,9 +126,11 @@ def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, conte
         brightness += np.bincount(picture.colour[part].max(2)[count > 0], minlength=len(brightness))
         views += np.bincount(count.ravel(), minlength=len(views))
     white = quantile_of_counts(brightness, white_quantile) if brightness.any() else 1.0
+    gain = np.float32(min(1 / REFLECTANCE_SCALE, _WHITE / white))
+    context.report("brightness of the photo against the recorded frames", float(gain * REFLECTANCE_SCALE), "")
     bgra = context.scratch.zeros((grid.rows, grid.columns, 4), np.uint8)
     for part in parts:
-        bgra[part, :, :3] = np.minimum(picture.colour[part] * np.float32(_WHITE / white) + 0.5, 255)
+        bgra[part, :, :3] = np.minimum(picture.colour[part] * gain + 0.5, 255)
         bgra[part, :, 3] = np.where(picture.count[part] > 0, 255, 0)
     context.report("wall textured", float(1 - views[0] / views.sum()), "fraction")
     context.report("views behind a pixel, median", quantile_of_counts(views, 0.5), "views")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import WallTexture
-from pipeline.export.pictures import display_colours, write_unrolled
+from pipeline.export.pictures import write_unrolled
 from pipeline.export.report.pictures import TOP_RAD, Window, photo, seen_through
 
 ROWS, COLUMNS = 40000, 48
@@ -31,7 +31,7 @@ def test_what_is_shown_is_the_mean_of_what_is_there(long_photo: WallTexture) -> 
     assert shown.shape == (60, 200, 3)
     s = (np.arange(200) + 0.5) * ROWS / 200
     level = np.rint(60 + 120 * s / ROWS + 5).astype(np.uint8)
-    wanted = display_colours(np.dstack([level] * 3 + [np.full_like(level, 255)]))[0, :, 0].astype(float)
+    wanted = level.astype(float)
     away = (s < 19500) | (s > 24500)
     assert np.abs(shown[:, away, 0] - wanted[away]).max() < 8
     assert np.all(shown[:, (s > 20500) & (s < 23500)] == 235), "paper where there is no photo"
@@ -49,7 +49,7 @@ def test_sheets_hold_every_row_and_say_where_they_lie(long_photo, tmp_path, monk
     place = json.loads((tmp_path / "unrolled.json").read_text())
     assert len(place["sheets"]) == 3
     parts = [cv2.imread(str(tmp_path / s["file"]), cv2.IMREAD_UNCHANGED) for s in place["sheets"]]
-    assert np.array_equal(np.concatenate(parts), display_colours(long_photo.bgra))
+    assert np.array_equal(np.concatenate(parts), long_photo.bgra)
     assert [s["distance_from_mm"] for s in place["sheets"]] == [0.0, 8000.0, 16000.0]
     shrunk = cv2.imread(str(tmp_path / "unrolled.png"), cv2.IMREAD_UNCHANGED)
     assert len(shrunk) <= 16000

@@ -16,7 +16,6 @@ from pipeline.arrays import Byte, Float
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
-from pipeline.export.pictures import display_colours
 from pipeline.export.report.page import Flat, Legend, Mark, Strip, Tick, round_ticks
 from pipeline.export.report.summary import RunSummary
 
@@ -157,7 +156,7 @@ class Window:
 def photo(texture: WallTexture) -> FlatImage:
     """Return the wall's photo, encoded for the screen."""
     return FlatImage(
-        texture.bgra, display_colours, texture.distance_from_mm, texture.mm_per_px, texture.azimuth_from_rad,
+        texture.bgra, np.asarray, texture.distance_from_mm, texture.mm_per_px, texture.azimuth_from_rad,
         texture.rad_per_px,
     )  # fmt: skip
 

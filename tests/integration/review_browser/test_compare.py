@@ -96,6 +96,16 @@ def test_the_table_tells_what_the_server_found(compared: tuple[Tab, ReviewServer
     assert f"{told['registration']['agreeing']} of {told['registration']['blocks']}" in text
 
 
+def test_both_halves_are_drawn_as_soon_as_the_tab_opens(compared: tuple[Tab, ReviewServer]) -> None:
+    page, _ = compared
+    spread = """(() => { const c = document.querySelector('#view-compare canvas'), d = c.getContext('2d');
+      return [0.1, 0.6].map((at) => {
+        const px = d.getImageData(c.width * at, 0, c.width * 0.3, c.height).data;
+        const v = []; for (let k = 0; k < px.length; k += 404) v.push(px[k]);
+        return Math.max(...v) - Math.min(...v); }); })()"""
+    page.until(f"Math.min(...{spread}) > 20")
+
+
 def test_a_finding_of_the_table_is_shown_in_every_view(compared: tuple[Tab, ReviewServer]) -> None:
     page, server = compared
     for k, change in enumerate(server.ask("/api/comparison").json()["changes"]):

@@ -15,12 +15,14 @@ def test_decisions_by_keyboard_alone(page: Tab) -> None:
     page.choose("1")
     with page.one_change():
         page.keys("a")
-    page.keys("n")
     chosen = page.js("boresight.session.selected")
+    assert chosen != "1", "a decision leads on to the next undecided finding"
     page.keys("r")
     page.page.keyboard.type("reflection")
     with page.one_change():
         page.keys("Enter")
+    page.until(f"boresight.session.selected !== {chosen!r}")
+    page.choose(chosen)
     page.keys("c")
     page.page.keyboard.type("seen in frame 12")
     with page.one_change():
@@ -107,6 +109,56 @@ def test_an_outline_is_drawn_with_the_keyboard_alone(page: Tab) -> None:
     made = page.finding(f"a{page.revision}")
     assert (made["kind"], made["status"], len(made["outline"])) == ("gouge", "accepted", 3)
     assert made["size"]["depth_sigma_mm"] > 0
+
+
+def test_a_kind_that_contradicts_the_measured_depth_warns(page: Tab) -> None:
+    pit = next(f for f in page.standing() if page.finding(f)["size"]["depth_mm"] > 0.5)
+    with page.one_change():
+        page.js(
+            "void boresight.session.act({do: 'add', kind: 'deposit',"
+            f" outline: boresight.session.state.findings.find((f) => f.id === {pit!r}).outline}})"
+        )
+    page.choose(f"a{page.revision}")
+    assert "A deposit stands into the bore, but" in page.page.locator(".detail .caution").inner_text()
+    assert "4 (added) deposit" in page.page.locator(".list").inner_text()
+    page.page_of("Sign-off")
+    assert "added a deposit" in page.page.locator(".history").inner_text()
+
+
+def test_an_outline_is_changed_by_dragging_its_points_and_says_why_the_depth_changed(page: Tab) -> None:
+    page.choose("2")
+    page.js("(boresight.flat.view.mmPerPx *= 1.0, boresight.flat.paint())")
+    page.keys("e")
+    before = page.js("boresight.session.drawn")
+    assert len(before) == len(page.finding("2")["outline"])
+    x, y = page.js("(([s, a]) => [boresight.flat.x(s), boresight.flat.y(a)])(boresight.session.drawn[0])")
+    box = page.page.locator(".flat canvas").bounding_box()
+    page.page.mouse.move(box["x"] + x, box["y"] + y)
+    page.page.mouse.down()
+    page.page.mouse.move(box["x"] + x - 10, box["y"] + y - 10, steps=3)
+    page.page.mouse.up()
+    after = page.js("boresight.session.drawn")
+    assert after[0] != before[0]
+    assert after[1:] == before[1:]
+    with page.one_change():
+        page.page.click("text=Done")
+    assert (
+        "Read in this way, the run's own outline gives" in page.page.locator(".detail .caution").inner_text()
+    )
+
+
+def test_caps_lock_and_focus_do_not_change_what_a_key_does(page: Tab) -> None:
+    page.choose("1")
+    with page.one_change():
+        page.js(
+            "document.activeElement.dispatchEvent(new KeyboardEvent('keydown', {key: 'A', bubbles: true}))"
+        )
+    assert page.finding("1")["status"] == "accepted"
+    page.choose("2")
+    page.keys("g")
+    page.keys("r")
+    assert "Why reject finding 2?" in page.page.locator("form.reason").inner_text()
+    page.keys("Escape")
 
 
 def test_merge_and_split(page: Tab) -> None:

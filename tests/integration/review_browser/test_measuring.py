@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -29,11 +30,19 @@ def test_every_tool_gives_its_sigma(page: Tab, tool: str, places: list[Any], nam
     assert said.count("±") == len(names)
     if tool == "Distance":
         assert 20 < float(said.split("straight ")[1].split(" ")[0]) < 40
+        page.page.click("#view-flat .status >> text=Save")
+        with page.page.expect_download() as taken:
+            page.page.click("text=1 saved (CSV)")
+        rows = Path(taken.value.path()).read_text("utf-8").splitlines()
+        assert len(rows) == 1 + len(names)
+        assert all(name in row and "50.0" in row for name, row in zip(names, rows[1:], strict=True))
+        page.page.click("text=Clear")
 
 
 def test_the_model_can_be_measured_on(page: Tab) -> None:
     page.page.click('.tools button:text-is("Point")')
-    page.js("boresight.model.flown = 20, boresight.model.look = {yaw: 0, pitch: 0}, boresight.model.fly(0)")
+    page.page.click("text=Home")
+    page.js("boresight.model.flown = 20, boresight.model.fly(0)")
     box = page.page.locator(".model canvas").bounding_box()
     page.page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 0.5 * box["height"])
     page.until("document.querySelector('#view-flat .status').textContent.includes('±')")

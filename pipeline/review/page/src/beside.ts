@@ -1,13 +1,14 @@
 /** The same piece of wall in both runs, side by side or one wiped over the other, or their difference. */
+import { colourBar } from "./legend";
 import type { Session } from "./session";
 import { TileLayer, type Ground } from "./tiles";
 import type { Change, Comparison, Overlay, Point } from "./types";
-import { TURN, clock, element, number, wrapped } from "./words";
+import { CHOSEN_COLOUR, TURN, clock, element, number, wrapped } from "./words";
 
 type Way = "swipe" | "beside" | "difference" | "difference_sigma";
 const WAYS: [Way, string][] = [["swipe", "Swipe"], ["beside", "Side by side"], ["difference", "Later less earlier"], ["difference_sigma", "1 σ of the difference"]];
 const LAYERS: [string, string][] = [["photo", "Photo"], ["deviation", "Deviation from the fitted pipe"]];
-const [CASING, NOW, THEN, CURSOR] = ["#000000", "#ffffff", "#7cc7ff", "#ffc400"];
+const [CASING, NOW, THEN, CURSOR] = ["#000000", "#ffffff", "#7cc7ff", CHOSEN_COLOUR];
 const GAP_PX = 4;
 
 export class CompareView {
@@ -37,6 +38,7 @@ export class CompareView {
     this.way.addEventListener("change", () => this.load());
     this.layer.addEventListener("change", () => this.load());
     this.wipe.addEventListener("input", () => this.paint());
+    session.on(["limits"], () => this.load());
     session.on(["cursor"], () => { this.follow(); this.tell(); this.paint(); });
     new ResizeObserver(() => this.resize()).observe(this.box);
     this.canvas.addEventListener("pointerdown", (e) => this.press(e));
@@ -72,9 +74,10 @@ export class CompareView {
     this.layer.disabled = apart;
     this.wipe.disabled = mode !== "swipe";
     const wanted: [TileLayer, string][] = apart ? [[this.apart, mode]] : [[this.now, this.layer.value], [this.then, `earlier-${this.layer.value}`]];
-    for (const [layer, name] of wanted) layer.load(name).catch((error: Error) => this.session.say(error.message));
+    const limits = apart ? null : this.session.source.readOnly ? null : this.session.limits(this.layer.value); // one for both runs
+    for (const [layer, name] of wanted) layer.load(name, limits).catch((error: Error) => this.session.say(error.message));
     const shown = (apart ? this.found.overlays : this.session.run.overlays).find((o) => o.name === (apart ? mode : this.layer.value));
-    this.legend.replaceChildren(...(shown ? legend(shown) : []));
+    this.legend.replaceChildren(...(shown ? legend(shown, limits ?? [shown.low_mm, shown.high_mm]) : []));
     this.paint();
   }
 
@@ -267,11 +270,6 @@ function between(x: number, at: number[], values: number[]): number {
   return values[k - 1]! + share * (values[k]! - values[k - 1]!);
 }
 
-function legend({ low_mm, high_mm, colours }: Overlay): HTMLElement[] {
-  const bar = element("span", { class: "colours" }, ...colours.map((colour) => {
-    const part = element("i", {});
-    part.style.background = colour;
-    return part;
-  }));
-  return [element("span", {}, number(low_mm)), bar, element("span", {}, `${number(high_mm)} mm`)];
+function legend({ colours }: Overlay, [low, high]: Point): HTMLElement[] {
+  return [element("span", {}, number(low)), colourBar(colours), element("span", {}, `${number(high)} mm`)];
 }

@@ -19,9 +19,12 @@ export function chart(curve: Curve, title: string): HTMLElement {
     drawn("line", { x1: LEFT, x2: WIDTH - 6, y1: y(0), y2: y(0), class: "zero" }),
     drawn("path", { d: `M${line(0).join("L")}`, class: "curve" }),
     drawn("text", { x: LEFT - 4, y: y(0) + 4, "text-anchor": "end" }, "0"),
-    drawn("text", { x: LEFT - 4, y: y(reach) , "text-anchor": "end" }, `+${reach.toFixed(1)}`),
+    drawn("text", { x: LEFT - 4, y: y(-reach) + 8, "text-anchor": "end", class: "inward" }, reach.toFixed(1)),
+    drawn("text", { x: LEFT + 2, y: y(-reach) + 8, class: "inward" }, "inward"),
+    drawn("text", { x: LEFT - 4, y: y(reach), "text-anchor": "end", class: "deep" }, reach.toFixed(1)),
+    drawn("text", { x: LEFT + 2, y: y(reach), class: "deep" }, "deep"),
     drawn("text", { x: LEFT, y: HEIGHT - 5 }, `${x0.toFixed(0)} mm`),
     drawn("text", { x: WIDTH - 6, y: HEIGHT - 5, "text-anchor": "end" }, `${x1.toFixed(0)} mm`),
   );
-  return element("figure", {}, element("figcaption", {}, `${title}; depth in mm, into the wall downward`), root);
+  return element("figure", {}, element("figcaption", {}, `${title}: depth in mm, into the wall downward; band: 1 σ`), root);
 }

@@ -66,10 +66,10 @@ export class CoarseWall {
     const at = (px: number) => layer.distance_mm[0] + Math.min(px, layer.width) * perPx;
     const [from, to] = [at(column * (TILE << level)), at((column + 1) * (TILE << level))];
     const rings = Math.max(1, Math.ceil((to - from) / (this.session.run.radius_mm / 2)));
-    const plain = name === "photo" ? new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }) : new THREE.MeshBasicMaterial({ side: THREE.DoubleSide });
+    const plain = new THREE.MeshBasicMaterial({ side: THREE.DoubleSide });
     plain.color.set(0x808080);
     const mesh = new THREE.Mesh(this.tube(from, to, rings, layer.azimuth_rad), [plain]);
-    return { mesh, from, to, rings, address: this.session.source.tile(name, level, column, 0), isDressed: false };
+    return { mesh, from, to, rings, address: this.session.source.tile(name, level, column, 0, this.session.limits(name)), isDressed: false };
   }
 
   private tube(from: number, to: number, rings: number, azimuth: number): THREE.BufferGeometry {

@@ -1,9 +1,11 @@
 /** The list of findings and what can be done with the chosen one. */
 import { chart } from "./chart";
-import { bySeverity, type Session } from "./session";
+import { unconfirmed, warnings } from "./notices";
+import { bySeverity, peakOf, type Session } from "./session";
 import type { Finding } from "./types";
-import { clockOfHours, depth, element, measured, moment, number } from "./words";
+import { clockExtent, clockOfHours, depth, distanceExtent, element, measured, moment, number } from "./words";
 
+const STANDING: Record<string, string> = { open: "undecided", accepted: "accepted", rejected: "rejected" };
 const REASONS = ["reflection", "loose deposit", "shadow or stain, no relief", "part of the pipe (joint, branch, fitting)", "below the reporting limit"];
 
 export class FindingsPanel {
@@ -14,7 +16,7 @@ export class FindingsPanel {
   private wanted = 0;
 
   constructor(private readonly session: Session) {
-    this.root.append(this.progress, this.list, this.detail);
+    this.root.append(warnings(session.run.warnings), this.progress, this.list, this.detail, unconfirmed(session));
     session.on(["state", "selection"], () => this.paint());
     session.on(["reject"], () => this.askReason());
     this.paint();
@@ -28,8 +30,7 @@ export class FindingsPanel {
     const order = this.order;
     if (!order.length) return;
     const at = order.findIndex((f) => f.id === this.session.selected);
-    this.session.select(order[(at + step + order.length) % order.length]!.id);
-    this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus();
+    this.go(order[(at + step + order.length) % order.length]!.id);
   }
 
   private paint(): void {
@@ -62,7 +63,7 @@ export class FindingsPanel {
   /** The finding's row; made anew only when it has changed, for a long pipe has thousands. */
   private kept(finding: Finding): HTMLElement {
     const { selected, marked } = this.session;
-    const key = JSON.stringify([finding.status, finding.kind, finding.size, finding.id === selected, marked.has(finding.id)]);
+    const key = JSON.stringify([finding.label, finding.status, finding.kind, finding.size, finding.id === selected, marked.has(finding.id)]);
     const known = this.rows.get(finding.id);
     if (known?.key === key) return known.row;
     const row = this.row(finding);
@@ -84,7 +85,7 @@ export class FindingsPanel {
   private row(finding: Finding): HTMLElement {
     const { session } = this;
     const mark = element("input", {
-      type: "checkbox", checked: session.marked.has(finding.id), title: "tick two or more to merge them", "aria-label": `mark ${finding.id} for merging`,
+      type: "checkbox", checked: session.marked.has(finding.id), title: "tick two or more to merge them", "aria-label": `mark ${finding.label} for merging`,
       change: () => this.tick(finding.id),
     });
     const size = finding.size;
@@ -92,9 +93,9 @@ export class FindingsPanel {
       class: "row", "aria-current": String(finding.id === session.selected), click: () => session.select(finding.id),
     },
       element("span", { class: `dot ${finding.status}` , title: finding.status }),
-      element("strong", {}, `${finding.id} ${finding.kind}`),
-      element("span", {}, finding.status),
-      element("span", { class: "quiet" }, `${depth(size.depth_mm, size.depth_sigma_mm)}; ${number(size.distance_from_mm, 0)} mm, ${clockOfHours(size.clock_from)}`));
+      element("strong", {}, `${finding.label} ${finding.kind}`),
+      element("span", {}, STANDING[finding.status] ?? finding.status),
+      element("span", { class: "quiet" }, `${depth(size.depth_mm, size.depth_sigma_mm)}; ${number(peakOf(finding)[0], 0)} mm, ${size.peak_clock === null ? clockExtent(size.clock_from, size.clock_to) : clockOfHours(size.peak_clock)}`));
     return element("li", {}, session.source.readOnly ? null : mark, face);
   }
 
@@ -107,9 +108,10 @@ export class FindingsPanel {
     }
     const wrong = this.session.run.defects.find((d) => d.id === finding.original);
     this.detail.replaceChildren(
-      element("h3", {}, `${finding.id}: ${finding.kind}, ${finding.status}`),
+      element("h3", {}, `Finding ${finding.label}: ${finding.kind}, ${STANDING[finding.status]}`),
       this.session.source.readOnly ? "" : this.buttons(finding),
-      finding.covers.length ? element("p", { class: "caution" }, `Its outline also covers ${finding.covers.join(", ")}, so that its depth and extent may be theirs. Redraw it, or merge them too.`) : "",
+      finding.covers.length ? element("p", { class: "caution" }, `Its outline also covers finding ${finding.covers.map((id) => this.session.called(id)).join(", ")}, so that its depth and extent may be theirs. Redraw it, or merge them too.`) : "",
+      ...finding.cautions.map((text) => element("p", { class: "caution" }, text)),
       this.table(finding),
       wrong && finding.edited ? element("p", { class: "original" }, `As measured: ${wrong.statement}`)
         : element("p", {}, wrong?.statement ?? "Drawn manually."),
@@ -132,8 +134,8 @@ export class FindingsPanel {
     const rows: [string, string][] = [
       ["depth", depth(s.depth_mm, s.depth_sigma_mm)],
       ["along × around", `${number(s.length_mm, 1)} × ${number(s.width_mm, 1)} mm`],
-      ["distance", `${number(s.distance_from_mm, 1)} to ${number(s.distance_to_mm, 1)} mm`],
-      ["clock", `${clockOfHours(s.clock_from)} to ${clockOfHours(s.clock_to)}`],
+      ["distance of the peak (extent)", distanceExtent(s.peak_distance_mm, s.distance_from_mm, s.distance_to_mm)],
+      ["clock of the peak (extent)", s.peak_clock === null ? clockExtent(s.clock_from, s.clock_to) : `${clockOfHours(s.peak_clock)} (${clockExtent(s.clock_from, s.clock_to)})`],
     ];
     if (finding.wall_loss_percent !== null) rows.push(["wall loss", measured(finding.wall_loss_percent, finding.wall_loss_sigma_percent, "%")]);
     if (finding.strength) {
@@ -143,7 +145,7 @@ export class FindingsPanel {
     }
     if (finding.decided_by) rows.push(["decided", `${finding.decided_by}, ${moment(finding.decided_at)}`]);
     if (finding.reason) rows.push(["reason", finding.reason]);
-    if (finding.made_of.length) rows.push(["made of", finding.made_of.join(", ")]);
+    if (finding.made_of.length) rows.push(["made of", finding.made_of.map((id) => this.session.called(id)).join(", ")]);
     return element("table", {}, ...rows.map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, v))));
   }
 
@@ -155,13 +157,26 @@ export class FindingsPanel {
     }, ...session.run.kinds.map((k) => element("option", { value: k, selected: k === finding.kind }, k)));
     const marked = [...session.marked];
     return element("div", { class: "buttons" },
-      finding.status !== "accepted" ? element("button", { class: "accept", click: () => act({ do: "accept" }), title: "key A" }, "Accept") : null,
+      finding.status !== "accepted" ? element("button", { class: "accept", click: () => void this.decide({ do: "accept" }), title: "key A" }, "Accept") : null,
       finding.status !== "rejected" ? element("button", { class: "reject", click: () => this.askReason(), title: "key R" }, "Reject…") : null,
       finding.status !== "open" ? element("button", { click: () => act({ do: "reopen" }) }, "Reopen") : null,
       element("label", {}, "kind ", kind),
       element("button", { click: () => session.take("redraw") }, "Redraw"),
       element("button", { click: () => session.take("split") }, "Split"),
-      marked.length > 1 ? element("button", { title: "key M", click: () => void this.merge() }, `Merge ${marked.join(" + ")}`) : null);
+      marked.length > 1 ? element("button", { title: "key M", click: () => void this.merge() }, `Merge ${marked.map((id) => session.called(id)).join(" + ")}`) : null);
+  }
+
+  /** Accept or reject the chosen finding and go to the next that is undecided. */
+  async decide(action: object): Promise<void> {
+    const { session } = this, order = this.order, at = order.findIndex((f) => f.id === session.selected);
+    if (at < 0 || !(await session.act({ ...action, finding: order[at]!.id }))) return;
+    const left = [...order.slice(at + 1), ...order.slice(0, at)].find((f) => session.standing.some((now) => now.id === f.id && now.status === "open"));
+    if (left) this.go(left.id);
+  }
+
+  private go(id: string): void {
+    this.session.select(id);
+    this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus();
   }
 
   /** Merge the ticked findings and go to what they have become. */
@@ -182,10 +197,10 @@ export class FindingsPanel {
       class: "reason", submit: (e) => {
         e.preventDefault();
         form.remove();
-        void this.session.act({ do: "reject", finding: finding.id, reason: text.value.trim() });
+        void this.decide({ do: "reject", reason: text.value.trim() });
       },
       keydown: (e) => { if ((e as KeyboardEvent).key === "Escape") leave(); },
-    }, element("label", { for: "reason" }, `Why reject finding ${finding.id}?`), text, usual,
+    }, element("label", { for: "reason" }, `Why reject finding ${finding.label}?`), text, usual,
       element("button", { class: "accept" }, "Reject"), element("button", { type: "button", click: leave }, "Cancel"));
     this.detail.querySelector(".buttons")?.after(form);
     text.focus();

@@ -1,12 +1,14 @@
 /** The unrolled wall: distance to the right, clock downward from 6 over 12 to 6, tiles loaded as they are seen. */
+import { Pinch } from "./graphics";
 import type { Session } from "./session";
 import { TileLayer, type Ground } from "./tiles";
 import type { Finding, Point } from "./types";
-import { TURN, clock, element } from "./words";
+import { CHOSEN_COLOUR, TURN, clock, element } from "./words";
 
 const TOP = -1.5 * Math.PI; // 6 o'clock
 // Outlines lie on pictures of any colour, in light and dark alike: bright on a black casing.
-const [CASING, OUTLINE, CHOSEN] = ["#000000", "#ffffff", "#ffc400"];
+const [CASING, OUTLINE, CHOSEN] = ["#000000", "#ffffff", CHOSEN_COLOUR];
+const GRAB_PX = 12;
 const MARKS: Record<string, string> = { open: "?", accepted: "✓", rejected: "✕" };
 
 interface View { distance: number; azimuth: number; mmPerPx: number }
@@ -19,14 +21,15 @@ export class FlatView {
   });
   private readonly picture: TileLayer;
   private view: View;
-  private drag: { x: number; y: number; view: View; moved: boolean } | null = null;
+  private drag: { x: number; y: number; view: View; moved: boolean; corner: number } | null = null;
+  private readonly pinch = new Pinch();
 
   constructor(private readonly session: Session) {
     this.root = element("div", { class: "flat" }, this.canvas);
     const { run } = session;
     this.picture = new TileLayer(session.source, () => this.paint());
     this.view = { distance: session.cursor[0], azimuth: TOP + Math.PI, mmPerPx: (TURN * run.radius_mm) / 320 };
-    session.on(["layer"], () => this.load());
+    session.on(["layer", "limits"], () => this.load());
     session.on(["state", "selection", "shape", "tool"], () => this.paint());
     session.on(["cursor"], () => this.follow());
     session.on(["selection"], () => this.reveal());
@@ -34,6 +37,7 @@ export class FlatView {
     this.canvas.addEventListener("pointerdown", (e) => this.press(e));
     this.canvas.addEventListener("pointermove", (e) => this.move(e));
     this.canvas.addEventListener("pointerup", (e) => this.release(e));
+    this.canvas.addEventListener("pointercancel", (e) => { this.pinch.up(e); this.drag = null; });
     this.canvas.addEventListener("wheel", (e) => this.wheel(e), { passive: false });
     this.canvas.addEventListener("keydown", (e) => this.key(e));
     this.load();
@@ -55,7 +59,7 @@ export class FlatView {
   }
 
   private load(): void {
-    this.picture.load(this.session.layer).catch((error: Error) => this.session.say(error.message));
+    this.picture.load(this.session.layer, this.session.source.readOnly ? null : this.session.limits()).catch((error: Error) => this.session.say(error.message));
   }
 
   private get ground(): Ground {
@@ -163,7 +167,7 @@ export class FlatView {
     context.lineWidth = 4;
     context.strokeStyle = CASING;
     context.fillStyle = chosen ? CHOSEN : OUTLINE;
-    const text = `${finding.id} ${MARKS[finding.status] ?? ""}`;
+    const text = `${finding.label.split(" ")[0]} ${MARKS[finding.status] ?? ""}`;
     context.strokeText(text, x, y);
     context.fillText(text, x, y);
   }
@@ -212,22 +216,36 @@ export class FlatView {
 
   private press(event: PointerEvent): void {
     this.canvas.setPointerCapture(event.pointerId);
-    this.drag = { x: event.offsetX, y: event.offsetY, view: { ...this.view }, moved: false };
+    this.pinch.down(event);
+    this.drag = { x: event.offsetX, y: event.offsetY, view: { ...this.view }, moved: false, corner: this.cornerAt(event.offsetX, event.offsetY) };
   }
 
   private move(event: PointerEvent): void {
+    const { spread } = this.pinch.move(event);
     if (!this.drag) return;
+    if (this.pinch.isTwo) {
+      this.drag.moved = true;
+      this.zoom(Math.exp(-spread * 0.006), event.offsetX, event.offsetY);
+      return;
+    }
     const [dx, dy] = [event.offsetX - this.drag.x, event.offsetY - this.drag.y];
     this.drag.moved ||= Math.hypot(dx, dy) > 4;
     if (!this.drag.moved) return;
+    if (this.drag.corner >= 0) { this.session.replace(this.drag.corner, this.point(event.offsetX, event.offsetY)); return; }
     this.view.distance = this.drag.view.distance - dx * this.view.mmPerPx;
     this.view.azimuth = this.drag.view.azimuth - dy / this.perRad;
     this.keepInside();
     this.paint();
   }
 
+  /** The drawn corner under a pixel, -1 where there is none. */
+  private cornerAt(x: number, y: number): number {
+    return this.session.drawn.findIndex(([s, a]) => Math.hypot(this.x(s) - x, this.y(a) - y) < GRAB_PX);
+  }
+
   private release(event: PointerEvent): void {
-    const clicked = this.drag && !this.drag.moved;
+    this.pinch.up(event);
+    const clicked = this.drag && !this.drag.moved && this.drag.corner < 0;
     this.drag = null;
     if (clicked) this.pick(this.point(event.offsetX, event.offsetY));
   }

@@ -1,4 +1,4 @@
-/** The recorded frames that show the spot, with the spot and the laser's ring marked. */
+/** The recorded frames that show the spot, lit and laser beside each other, with the spot and the laser's ring marked. */
 import type { Session } from "./session";
 import type { Sight } from "./types";
 import { drawn, element } from "./words";
@@ -8,22 +8,17 @@ const CLOSE = 4;
 
 export class FrameView {
   readonly root = element("div", { class: "frames" });
-  private readonly tabs = element("div", { class: "bar", role: "tablist" });
-  private readonly image = element("img", { alt: "" });
-  private readonly marks = drawn("svg", { "aria-hidden": "true" });
   private readonly told = element("p", { class: "told" });
   private timer = 0;
   private readonly close = element("input", { type: "checkbox", id: "close-up", checked: true });
   private readonly light = element("input", { type: "range", min: "1", max: "8", step: "0.5", value: "1", id: "brighten" });
-  private readonly frame = element("div", { class: "zoomed", title: "a click moves the spot" }, this.image, this.marks);
-  private kind = "";
-  private shown: Sight | null = null;
+  private readonly row = element("div", { class: "shots" });
+  private shots: Shot[] = [];
 
   constructor(private readonly session: Session) {
-    this.root.append(element("div", { class: "picture" }, this.frame), this.told);
+    this.root.append(this.row, this.told);
     this.close.addEventListener("change", () => this.zoom());
-    this.light.addEventListener("input", () => { this.image.style.filter = `brightness(${this.light.value})`; });
-    this.frame.addEventListener("click", (e) => void this.pick(e));
+    this.light.addEventListener("input", () => this.brighten());
     new ResizeObserver(() => this.zoom()).observe(this.root);
     session.on(["cursor"], () => this.later());
     this.later();
@@ -31,18 +26,12 @@ export class FrameView {
 
   /** What stands beside the pane's title. */
   bar(): HTMLElement {
-    return element("div", { class: "bar" }, this.tabs, element("label", { for: "close-up" }, this.close, " close-up"),
+    return element("div", { class: "bar" }, element("label", { for: "close-up" }, this.close, " close-up"),
       element("label", { for: "brighten" }, "brighter ", this.light));
   }
 
-  /** Bring the spot to the middle, enlarged, or show the whole frame. */
-  private zoom(): void {
-    const box = this.frame.parentElement!, [w, h] = [this.image.naturalWidth, this.image.naturalHeight];
-    if (!this.shown || !w || !this.close.checked) { this.frame.style.transform = ""; return; }
-    const fit = Math.min(box.clientWidth / w, box.clientHeight / h);
-    const [x, y] = [(this.shown.spot_px[0] - w / 2) * fit, (this.shown.spot_px[1] - h / 2) * fit];
-    this.frame.style.transform = `scale(${CLOSE}) translate(${-x}px, ${-y}px)`;
-  }
+  private zoom(): void { for (const shot of this.shots) shot.zoom(this.close.checked); }
+  private brighten(): void { for (const shot of this.shots) shot.image.style.filter = `brightness(${this.light.value})`; }
 
   private later(): void {
     window.clearTimeout(this.timer);
@@ -52,41 +41,69 @@ export class FrameView {
   private async load(): Promise<void> {
     const [distance, azimuth] = this.session.cursor;
     try {
-      const sights = await this.session.source.sights(distance, azimuth);
-      this.offer(sights);
+      this.show(await this.session.source.sights(distance, azimuth));
     } catch (error) {
-      this.tabs.replaceChildren();
-      this.shown = null;
-      this.image.removeAttribute("src");
-      this.marks.replaceChildren();
+      this.shots = [];
+      this.row.replaceChildren();
       this.told.textContent = error instanceof Error ? error.message : String(error);
     }
   }
 
-  private offer(sights: Sight[]): void {
-    const chosen = sights.find((s) => s.illumination === this.kind) ?? sights[0]!;
-    this.tabs.replaceChildren(...sights.map((s) => element("button", {
-      role: "tab", "aria-selected": String(s === chosen), click: () => { this.kind = s.illumination; this.offer(sights); },
-    }, `${s.illumination === "led" ? "lit" : s.illumination} frame ${s.frame}`)));
-    this.put(chosen);
+  private show(sights: Sight[]): void {
+    const ordered = [...sights].sort((a, b) => Number(a.illumination === "laser") - Number(b.illumination === "laser")); // lit first
+    while (this.shots.length < ordered.length) this.shots.push(new Shot((sight, u, v) => void this.pick(sight, u, v)));
+    this.shots.length = ordered.length;
+    this.row.replaceChildren(...this.shots.map((s) => s.root));
+    ordered.forEach((sight, k) => this.shots[k]!.put(sight, this.session.source.frame(sight.frame), () => this.zoom()));
+    this.brighten();
+    const has = ordered.some((s) => s.ring_px.length);
+    this.told.textContent = `${ordered.map((s) => `Frame ${s.frame} (${lightOf(s)}) at ${s.time_s.toFixed(2)} s`).join(", ")}; spot circled${has ? ", measured laser line dotted" : ""}.`;
   }
 
   /** Move the spot to what was clicked. */
-  private async pick(event: MouseEvent): Promise<void> {
-    const matrix = (this.marks as SVGSVGElement).getScreenCTM();
-    if (!this.shown || !matrix) return;
-    const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
+  private async pick(sight: Sight, u: number, v: number): Promise<void> {
     try {
-      this.session.moveTo(await this.session.source.spot(this.shown.frame, at.x, at.y));
+      this.session.moveTo(await this.session.source.spot(sight.frame, u, v));
     } catch (error) {
       this.told.textContent = error instanceof Error ? error.message : String(error);
     }
   }
+}
 
-  private put(sight: Sight): void {
-    this.shown = sight;
+function lightOf({ illumination }: Sight): string { return illumination === "led" ? "lit" : illumination === "both" ? "lit, laser on" : illumination; }
+
+/** One recorded frame. */
+class Shot {
+  readonly image = element("img", { alt: "" });
+  private readonly marks = drawn("svg", { "aria-hidden": "true" });
+  private readonly frame = element("div", { class: "zoomed", title: "a click moves the spot" }, this.image, this.marks);
+  private readonly name = element("span", { class: "over name" });
+  readonly root = element("div", { class: "picture" }, this.frame, this.name);
+  private sight: Sight | null = null;
+
+  constructor(picked: (sight: Sight, u: number, v: number) => void) {
+    this.frame.addEventListener("click", (event) => {
+      const matrix = (this.marks as SVGSVGElement).getScreenCTM();
+      if (!this.sight || !matrix) return;
+      const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
+      picked(this.sight, at.x, at.y);
+    });
+  }
+
+  /** Bring the spot to the middle, enlarged, or show the whole frame. */
+  zoom(isClose: boolean): void {
+    const box = this.root, [w, h] = [this.image.naturalWidth, this.image.naturalHeight];
+    if (!this.sight || !w || !isClose) { this.frame.style.transform = ""; return; }
+    const fit = Math.min(box.clientWidth / w, box.clientHeight / h);
+    const close = Math.max(CLOSE, (CLOSE * box.clientHeight) / (h * fit) / 2); // half a picture beside another is no smaller for it
+    const [x, y] = [(this.sight.spot_px[0] - w / 2) * fit, (this.sight.spot_px[1] - h / 2) * fit];
+    this.frame.style.transform = `scale(${close}) translate(${-x}px, ${-y}px)`;
+  }
+
+  put(sight: Sight, address: string, ready: () => void): void {
+    this.sight = sight;
     this.image.onload = () => {
-      this.zoom();
+      ready();
       this.marks.setAttribute("viewBox", `0 0 ${this.image.naturalWidth} ${this.image.naturalHeight}`);
       const [u, v] = sight.spot_px;
       this.marks.replaceChildren(
@@ -94,8 +111,8 @@ export class FrameView {
         drawn("circle", { cx: u, cy: v, r: 26, class: "halo" }), drawn("circle", { cx: u, cy: v, r: 26, class: "spot" }),
       );
     };
-    this.image.src = this.session.source.frame(sight.frame);
-    this.image.alt = `Recorded frame ${sight.frame}, the spot circled`;
-    this.told.textContent = `Frame ${sight.frame}, ${sight.time_s.toFixed(2)} s; spot circled${sight.ring_px.length ? ", measured laser line dotted" : ""}.`;
+    this.image.src = address;
+    this.image.alt = `Recorded frame ${sight.frame}, ${lightOf(sight)}, the spot circled`;
+    this.name.textContent = `${lightOf(sight)} frame ${sight.frame}`;
   }
 }

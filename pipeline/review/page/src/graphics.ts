@@ -41,3 +41,26 @@ export function drawsPlainly(): boolean {
   THREE.ColorManagement.enabled = !isSlow;
   return isSlow;
 }
+
+/** Fingers or pens on a view: how far the last moved, and by how much two of them spread. */
+export class Pinch {
+  private readonly at = new Map<number, { x: number; y: number }>();
+
+  down(event: PointerEvent): void { this.at.set(event.pointerId, { x: event.clientX, y: event.clientY }); }
+  up(event: PointerEvent): void { this.at.delete(event.pointerId); }
+
+  get isTwo(): boolean { return this.at.size > 1; }
+
+  move(event: PointerEvent): { spread: number; dx: number; dy: number } {
+    const before = this.at.get(event.pointerId);
+    if (!before) return { spread: 0, dx: 0, dy: 0 };
+    const apart = this.apart();
+    this.down(event);
+    return { spread: this.isTwo ? this.apart() - apart : 0, dx: event.clientX - before.x, dy: event.clientY - before.y };
+  }
+
+  private apart(): number {
+    const [a, b] = [...this.at.values()];
+    return a && b ? Math.hypot(a.x - b.x, a.y - b.y) : 0;
+  }
+}

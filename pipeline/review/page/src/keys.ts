@@ -4,6 +4,8 @@ import type { Session } from "./session";
 import type { ToolBar } from "./tools";
 import { element } from "./words";
 
+// In the model these fly and look; everything else does there what it does everywhere.
+const FLIGHT = new Set(["w", "a", "s", "d"]);
 const KEYS: [string, string][] = [
   ["N, P", "next, previous finding"], ["A", "accept"], ["R", "reject, with a reason"], ["O", "reopen"], ["C", "comment"],
   ["E", "redraw the outline"], ["S", "split"], ["X, M", "tick for merging; merge the ticked"], ["D", "add a missed defect"],
@@ -32,8 +34,9 @@ export function keys(session: Session, reach: Reach): void {
     if (event.ctrlKey || event.metaKey) { if (!typing) withControl(event, session, reach); return; }
     if (typing || event.altKey) return;
     const flying = target.closest(".model") !== null;
-    const act = looking(reach)[event.key]
-      ?? (session.source.readOnly || flying ? undefined : deciding(session, reach)[event.key]);
+    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key; // Caps Lock changes nothing
+    const act = looking(reach)[key]
+      ?? (session.source.readOnly || (flying && FLIGHT.has(key)) ? undefined : deciding(session, reach)[key]);
     if (!act) return;
     event.preventDefault();
     act();
@@ -65,7 +68,7 @@ function deciding(session: Session, { findings, tools }: Reach): Record<string, 
   const act = (what: string) => () => void session.act({ do: what, finding: chosen.id });
   const draw = (tool: "redraw" | "split") => () => { session.take(tool); toFlat(); };
   return {
-    a: act("accept"), o: act("reopen"), r: () => session.askToReject(), e: draw("redraw"), s: draw("split"), d: add,
+    a: () => void findings.decide({ do: "accept" }), o: act("reopen"), r: () => session.askToReject(), e: draw("redraw"), s: draw("split"), d: add,
     m: () => void findings.merge(), x: () => findings.tick(chosen.id),
     c: () => document.querySelector<HTMLElement>(".comment input")?.focus(),
     ...(session.tool === "split" ? { ",": () => tools.nextPart() } : {}),

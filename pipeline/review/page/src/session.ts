@@ -1,9 +1,12 @@
 /** What the page shows now, and who wants to know when it changes. */
 import { LostError, RefusedError, type Source } from "./source";
-import type { Finding, Point, ReviewState, Run, Seal, Tool } from "./types";
-import { wrapped } from "./words";
+import type { Finding, Overlay, Point, ReviewState, Run, SavedReading, Seal, Tool } from "./types";
+import { azimuthOf, wrapped } from "./words";
 
-export type Topic = "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "named" | "recomputed";
+// Least that the end colours of a layer mean: about the depth from which findings are told.
+const [LEAST_RANGE_MM, LEAST_SIGMA_MM] = [0.25, 0.05];
+
+export type Topic = "limits" | "readings" | "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "named" | "recomputed";
 
 export class Session {
   selected: string | null = null;
@@ -13,13 +16,18 @@ export class Session {
   tool: Tool = "none";
   drawn: Point[] = [];
   message = "";
+  private isGiven = false; // whether what is drawn is the finding's own outline, untouched
   /** Null while the server still reads what a signature binds. */
   seal: Seal | null = null;
+  /** What was measured in this browser on this run, newest last. */
+  readings: SavedReading[] = [];
+  private readonly fixed = new Map<string, Point>();
   private isLost = false;
   private isAsking = false;
   private readonly listeners = new Map<Topic, (() => void)[]>();
 
   constructor(readonly source: Source, readonly run: Run, public state: ReviewState) {
+    this.readings = JSON.parse(localStorage.getItem(`boresight-readings-${run.version}`) ?? "[]") as SavedReading[];
     this.cursor = [(run.distance_mm[0] + run.distance_mm[1]) / 2, -Math.PI / 2];
   }
 
@@ -40,7 +48,7 @@ export class Session {
   select(id: string | null): void {
     this.selected = id;
     const found = this.finding;
-    if (found) this.moveTo(middle(found.outline));
+    if (found) this.moveTo(peakOf(found));
     this.tell("selection");
   }
 
@@ -52,9 +60,53 @@ export class Session {
 
   show(layer: string): void { this.layer = layer; this.tell("layer"); }
 
-  take(tool: Tool): void { this.tool = tool; this.drawn = []; this.tell("tool"); this.tell("shape"); }
+  /** What a finding is called; ids of the ledger are no words for people. */
+  called(id: string): string { return this.state.findings.find((f) => f.id === id)?.label ?? id; }
 
-  draw(at: Point): void { this.drawn = [...this.drawn, at]; this.tell("shape"); }
+  overlay(layer = this.layer): Overlay | null { return this.run.overlays.find((o) => o.name === layer) ?? null; }
+
+  /** Between which values, mm, a layer is coloured: those that were fixed, else its full range; null for the photo. */
+  limits(layer = this.layer): Point | null {
+    const overlay = this.overlay(layer);
+    if (!overlay) return null;
+    if (this.source.readOnly || !overlay.full_mm) return [overlay.low_mm, overlay.high_mm];
+    return this.fixed.get(layer) ?? wholeRange(overlay);
+  }
+
+  isFixed(layer = this.layer): boolean { return this.fixed.has(layer); }
+
+  /** Fix between which values, mm, a layer is coloured; null: its full range. */
+  fix(limits: Point | null, layer = this.layer): void {
+    if (limits) this.fixed.set(layer, limits); else this.fixed.delete(layer);
+    this.tell("limits");
+  }
+
+  keep(reading: SavedReading): void { this.store([...this.readings, reading]); }
+  forget(): void { this.store([]); }
+
+  private store(readings: SavedReading[]): void {
+    this.readings = readings;
+    localStorage.setItem(`boresight-readings-${this.run.version}`, JSON.stringify(readings));
+    this.tell("readings");
+  }
+
+  take(tool: Tool): void {
+    this.tool = tool;
+    this.drawn = tool === "redraw" && this.finding ? [...this.finding.outline] : [];
+    this.isGiven = this.drawn.length > 0;
+    this.tell("tool");
+    this.tell("shape");
+  }
+
+  /** Draw a point; the first one beside an outline that was given begins a new outline. */
+  draw(at: Point): void {
+    this.drawn = this.isGiven ? [at] : [...this.drawn, at];
+    this.isGiven = false;
+    this.tell("shape");
+  }
+
+  /** Move a drawn point. */
+  replace(corner: number, at: Point): void { this.drawn = this.drawn.map((p, k) => (k === corner ? at : p)); this.isGiven = false; this.tell("shape"); }
 
   /** The azimuth, whole turns added, that lies next to the last drawn point. */
   beside(azimuth: number): number {
@@ -129,6 +181,21 @@ export class Session {
     this.tell("state");
     this.tell("selection");
   }
+}
+
+/** Where a finding is deepest, or highest; its middle where that is not known. */
+export function peakOf({ outline, size }: Finding): Point {
+  const [distance, azimuth] = middle(outline);
+  const { peak_distance_mm: peak, peak_clock: hours } = size;
+  return [peak ?? distance, hours === null || hours === undefined ? azimuth : azimuth + wrapped(azimuthOf(hours) - azimuth)];
+}
+
+/** All of a layer; what is signed is symmetric, and as wide that noise is not shown in alarming colours. */
+export function wholeRange({ name, low_mm, high_mm, full_mm }: Overlay): Point {
+  const [low, high] = full_mm ?? [low_mm, high_mm];
+  if (low_mm >= 0) return [0, Math.max(high, name === "uncertainty" ? LEAST_SIGMA_MM : LEAST_RANGE_MM)];
+  const reach = Math.max(-low, high, LEAST_RANGE_MM);
+  return [-reach, reach];
 }
 
 export function middle(outline: Point[]): Point {

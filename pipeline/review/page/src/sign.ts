@@ -42,19 +42,27 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
   const folder = session.source.readOnly ? "" : "/api/papers/";
   made.push(element("section", {}, element("h2", {}, "Downloads"), element("ul", { class: "papers" },
     ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: folder + file, target: "_blank", rel: "noopener" }, name))))));
-  const lost = state.lost.map((e) => element("li", {}, `${e.who}: ${e.action.do} ${String(e.action["finding"] ?? "")}`));
+  const lost = state.lost.map((e) => element("li", {}, `${e.who} ${told(session, e.action)}`));
   if (lost.length) made.push(element("section", {}, element("h2", {}, "Decisions without their finding"),
     element("p", {}, "The run was computed again and no longer shows what these were taken on."), element("ul", {}, ...lost)));
   made.push(element("section", {}, element("h2", {}, "History"), element("ol", { class: "history" },
-    ...state.history.map((e) => element("li", {}, `${moment(e.at)} ${e.who}: ${told(e.action)}`)))));
+    ...state.history.map((e) => element("li", {}, `${moment(e.at)} ${e.who}: ${told(session, e.action)}`)))));
   return made;
 }
 
-function told(action: Record<string, unknown> & { do: string }): string {
-  const about = action["finding"] ?? (Array.isArray(action["findings"]) ? (action["findings"] as string[]).join(" + ") : "");
-  if (action.do === "assume") return `sets wall thickness ${String(action["wall_thickness_mm"] ?? "–")} mm, yield strength ${String(action["yield_mpa"] ?? "–")} MPa`;
-  const more = action["text"] ?? action["kind"] ?? action["reason"] ?? "";
-  return [action.do, about, more].filter((t) => t !== "").map(String).join(" ");
+const DEEDS: Record<string, string> = {
+  accept: "accepted", reject: "rejected", reopen: "reopened", reclassify: "changed the kind of", redraw: "drew the outline again of",
+  merge: "merged", split: "split", add: "added", comment: "commented on", undo: "undid", redo: "redid",
+};
+
+/** An entry of the ledger as a sentence. */
+function told(session: Session, action: Record<string, unknown> & { do: string }): string {
+  if (action.do === "assume") return `set the wall thickness to ${String(action["wall_thickness_mm"] ?? "–")} mm, the yield strength to ${String(action["yield_mpa"] ?? "–")} MPa`;
+  const ids = Array.isArray(action["findings"]) ? (action["findings"] as string[]) : action["finding"] ? [String(action["finding"])] : [];
+  const about = ids.length ? ` finding${ids.length > 1 ? "s" : ""} ${ids.map((id) => session.called(id)).join(" and ")}` : "";
+  const more = String(action["text"] ?? action["reason"] ?? action["kind"] ?? "");
+  const link = action.do === "reclassify" ? " to " : action.do === "add" ? " a " : ": ";
+  return `${DEEDS[action.do] ?? action.do}${about}${more ? `${link}${more}` : ""}`;
 }
 
 function signature(session: Session): HTMLElement {

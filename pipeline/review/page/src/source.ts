@@ -20,7 +20,8 @@ export interface Source {
   profile(distance: number, azimuth: number, half: number): Promise<Profile>;
   sights(distance: number, azimuth: number): Promise<Sight[]>;
   layer(name: string): Promise<Layer>;
-  tile(layer: string, level: number, column: number, row: number): string;
+  /** Where a tile is; between limits (mm) where they are given and the server can be asked. */
+  tile(layer: string, level: number, column: number, row: number, limits?: Point | null): string;
   frame(frame: number): string;
   spot(frame: number, u: number, v: number): Promise<Point>;
   stretches(): Promise<Stretch[]>;
@@ -65,8 +66,10 @@ export class Server implements Source {
     get<Profile>(`/api/profile?distance=${distance}&azimuth=${azimuth}&half=${half}`);
   sights = async (distance: number, azimuth: number) =>
     (await get<{ sights: Sight[] }>(`/api/sights?distance=${distance}&azimuth=${azimuth}`)).sights;
-  layer = (name: string) => get<Layer>(`/api/tiles/${name}`);
-  tile = (layer: string, level: number, column: number, row: number) => `/api/tiles/${layer}/${level}/${column}/${row}.png`;
+  // Wall loss is deviation in other colours: it has its own place on the server only between limits.
+  layer = (name: string) => get<Layer>(`/api/tiles/${name}${name.endsWith("wall_loss") ? "?low=0&high=1" : ""}`);
+  tile = (layer: string, level: number, column: number, row: number, limits?: Point | null) =>
+    `/api/tiles/${layer}/${level}/${column}/${row}.png${limits ? `?low=${limits[0]}&high=${limits[1]}` : ""}`;
   frame = (frame: number) => `/api/frames/${frame}.jpg`;
   spot = async (frame: number, u: number, v: number) =>
     (await get<{ point: Point }>(`/api/frames/${frame}/spot?u=${u}&v=${v}`)).point;

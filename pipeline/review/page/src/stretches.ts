@@ -1,17 +1,24 @@
 /** The detailed model, stretch by stretch: those next to the eye are loaded, those far from it are let go. */
 import * as THREE from "three";
 import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
-import type { Pipe } from "./pipe";
+import { byPlace, placesOf, Strip } from "./painted";
+import type { Pipe, Vector } from "./pipe";
 import type { Session } from "./session";
-import type { Stretch } from "./types";
+import type { Point, Stretch } from "./types";
 
 const MM = 1e-3;
+const PHOTO = "photo", LIT = "photo, lit";
+// The variants of model.glb, for a copy that may not hand its pictures to the model.
 const VARIANTS: Record<string, string> = { deviation_nominal: "deviation" };
+const ANISOTROPY = 8;
 // What a browser without a graphics card can still turn, and what keeps the tab's memory small.
 const MOST_TRIANGLES = 215_000;
 const AT_ONCE = 2;
 
-interface Part { mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material> }
+interface Part {
+  mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material>; at: Point[]; span: Point;
+  painted: { strip: Strip; material: THREE.Material } | null; wanted: string;
+}
 
 export class Stretches {
   readonly group = new THREE.Group();
@@ -20,6 +27,7 @@ export class Stretches {
   private readonly coming = new Set<number>();
   private at = 0;
   private gain = 1;
+  private isLit = false;
 
   constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly isPlain: boolean, private readonly changed: () => void) {}
 
@@ -45,9 +53,35 @@ export class Stretches {
     if (next.length) await Promise.all(next.map((k) => this.load(k)));
   }
 
-  dress(): void {
-    const wanted = VARIANTS[this.session.layer] ?? this.session.layer;
-    for (const { mesh, variants } of this.parts) mesh.material = variants.get(wanted) ?? variants.get("photo") ?? mesh.material;
+  /** Show the chosen layer: the photo as it was recorded, or lit so that its relief reads; or error colours. */
+  dress(isLit = this.isLit): void {
+    this.isLit = isLit;
+    for (const part of this.parts) this.wear(part);
+  }
+
+  private wear(part: Part): void {
+    const { session } = this, { mesh, variants } = part;
+    const isPhoto = session.layer === PHOTO;
+    part.wanted = isPhoto ? PHOTO : `${session.layer} ${session.limits()!.join(" ")}`;
+    if (isPhoto) mesh.material = variants.get(this.isLit ? LIT : PHOTO)!;
+    else if (session.source.readOnly) mesh.material = variants.get(VARIANTS[session.layer] ?? session.layer) ?? variants.get(PHOTO)!;
+    else if (part.painted?.material.name === part.wanted) mesh.material = part.painted.material;
+    else void this.paint(part, part.wanted).catch((e: Error) => session.say(e.message));
+  }
+
+  /** Colour a part by the flat view's tiles; what was asked for meanwhile is not overtaken. */
+  private async paint(part: Part, name: string): Promise<void> {
+    const strip = await Strip.load(this.session, this.session.layer, part.span, this.isPlain);
+    if (part.wanted !== name) { strip.dispose(); return; }
+    const old = part.painted;
+    const material = byPlace(strip.texture, name);
+    material.clippingPlanes = [];
+    part.mesh.geometry.setAttribute("place", placesOf(part.at, part.span, strip.azimuth));
+    part.painted = { strip, material };
+    part.mesh.material = material;
+    old?.strip.dispose();
+    old?.material.dispose();
+    this.changed();
   }
 
   exaggerate(gain: number): void {
@@ -110,10 +144,12 @@ export class Stretches {
       gltf.parser.assignFinalMaterial(mesh);
       for (const k of mapping.variants) variants.set(names[k] ?? "", material);
     }
-    const photo = variants.get("photo") as THREE.MeshStandardMaterial;
-    // A matt wall needs no more than this; the loader's own material costs three times as much without a graphics card.
-    variants.set("photo", mesh.material = new THREE.MeshLambertMaterial({ map: photo.map, name: photo.name }));
-    photo.dispose();
+    const { map: picture, name: title } = variants.get(PHOTO) as THREE.MeshStandardMaterial;
+    variants.get(PHOTO)!.dispose();
+    if (picture) picture.anisotropy = this.isPlain ? 1 : ANISOTROPY;
+    // As recorded: the camera has seen the wall in its own light, and no other is put on it.
+    variants.set(PHOTO, mesh.material = new THREE.MeshBasicMaterial({ map: picture, name: title }));
+    variants.set(LIT, new THREE.MeshLambertMaterial({ map: picture, name: `${title}, lit` }));
     for (const material of variants.values()) {
       const { map } = material as THREE.MeshBasicMaterial;
       // Colours pass as they are and one level of the picture is enough: both are dear without a graphics card.
@@ -121,23 +157,31 @@ export class Stretches {
       material.side = THREE.DoubleSide;
       material.clippingPlanes = [];
     }
-    const part = { mesh, base: Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array), away: this.away(mesh), variants };
+    const at = this.coordinates(mesh), span = spanOf(at);
+    const part: Part = { painted: null, wanted: "", at: at.map(([s, a]) => [s, a] as Point), span, mesh, base: Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array), away: this.away(at, mesh), variants };
     if (this.gain !== 1) shape(part, this.gain);
     return part;
   }
 
-  /** How far each vertex lies off the round pipe, as a vector. */
-  private away(mesh: THREE.Mesh): Float32Array {
+  /** Distance, azimuth and radius of each vertex; vertices are stored in the pipe's own frame, only the node above turns them. */
+  private coordinates(mesh: THREE.Mesh): [number, number, number, Vector][] {
     const base = (mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array;
-    const away = new Float32Array(base.length);
-    for (let k = 0; k < base.length; k += 3) {
-      // vertices are stored in the pipe's own frame; only the node above turns them for glTF
-      const at = this.pipe.coordinates([base[k]! / MM, base[k + 1]! / MM, base[k + 2]! / MM]);
-      const off = (at.radius - this.session.run.radius_mm) * MM;
-      away.set(at.outward.map((n) => n * off), k);
-    }
+    return Array.from({ length: base.length / 3 }, (_, k) => {
+      const at = this.pipe.coordinates([base[3 * k]! / MM, base[3 * k + 1]! / MM, base[3 * k + 2]! / MM]);
+      return [at.distance, at.azimuth, at.radius, at.outward];
+    });
+  }
+
+  /** How far each vertex lies off the round pipe, as a vector. */
+  private away(at: [number, number, number, Vector][], mesh: THREE.Mesh): Float32Array {
+    const away = new Float32Array((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array.length);
+    at.forEach(([, , radius, outward], k) => away.set(outward.map((n) => n * (radius - this.session.run.radius_mm) * MM), 3 * k));
     return away;
   }
+}
+
+function spanOf(at: [number, number, number, Vector][]): Point {
+  return at.reduce<Point>(([low, high], [s]) => [Math.min(low, s), Math.max(high, s)], [Infinity, -Infinity]);
 }
 
 function shape({ mesh, base, away }: Part, gain: number): void {
@@ -147,8 +191,10 @@ function shape({ mesh, base, away }: Part, gain: number): void {
   position.needsUpdate = true;
 }
 
-function free({ mesh, variants }: Part): void {
+function free({ mesh, variants, painted }: Part): void {
   mesh.geometry.dispose();
+  painted?.strip.dispose();
+  painted?.material.dispose();
   for (const material of new Set(variants.values())) {
     const map = (material as THREE.MeshStandardMaterial).map;
     map?.dispose();

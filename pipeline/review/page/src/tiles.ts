@@ -1,6 +1,6 @@
 /** A layer of an unrolled wall, painted from tiles that are loaded as they are seen. */
 import type { Source } from "./source";
-import type { Layer } from "./types";
+import type { Layer, Point } from "./types";
 import { TURN } from "./words";
 
 const TILE = 512;
@@ -19,15 +19,18 @@ export class TileLayer {
   layer: Layer | null = null;
   private readonly tiles = new Map<string, HTMLImageElement>();
   private wanted = "";
+  private limits: Point | null = null;
   private shown = ""; // the layer whose levels are known
 
   constructor(private readonly source: Source, private readonly repaint: () => void) {}
 
-  async load(name: string): Promise<void> {
+  /** Show a layer, its colours between limits, mm, where they are given. */
+  async load(name: string, limits: Point | null = null): Promise<void> {
     this.wanted = name;
     const layer = await this.source.layer(name);
     if (name !== this.wanted) return;
     this.layer = layer;
+    this.limits = limits;
     this.shown = name;
     this.repaint();
   }
@@ -58,7 +61,7 @@ export class TileLayer {
   }
 
   private tile(level: number, column: number, row: number): HTMLImageElement | null {
-    const address = this.source.tile(this.shown, level, column, row);
+    const address = this.source.tile(this.shown, level, column, row, this.limits);
     const known = this.tiles.get(address);
     if (known) {
       this.tiles.delete(address);

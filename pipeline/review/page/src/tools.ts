@@ -1,7 +1,8 @@
 /** The bar above the flat view: layers with their legend, measuring tools, drawing. */
 import type { Session } from "./session";
-import type { Tool } from "./types";
-import { clock, element, measured, number } from "./words";
+import type { Reading, SavedReading, Tool } from "./types";
+import { layerChoice, legend } from "./legend";
+import { clock, clockOfHours, element, measured, moment } from "./words";
 
 const TOOLS: [Tool, string, number][] = [
   ["point", "Point", 1], ["distance", "Distance", 2], ["area", "Area", 3], ["depth", "Depth", 3], ["diameter", "Diameter", 1],
@@ -12,7 +13,7 @@ const HELP: Partial<Record<Tool, string>> = {
   area: "Area: click three or more corners.",
   depth: "Depth against the wall around: click three or more corners around it.",
   diameter: "Diameter: click a point; it is measured through the axis.",
-  redraw: "New outline: click around the defect, then Done.",
+  redraw: "Drag the outline's points, or click around the defect for a new outline; then Done.",
   add: "Missed defect: click around it, choose its kind, then Done.",
   split: "Click around the first part, Next part, around the second, then Done.",
 };
@@ -21,43 +22,23 @@ const KEYS_HINT = " Keyboard: arrows, Enter sets a point, Backspace takes it bac
 export class ToolBar {
   readonly root = element("div", { class: "tools" });
   readonly status = element("p", { class: "status", role: "status" });
-  private readonly layers = element("select", { "aria-label": "what the wall shows" });
-  private readonly legend = element("div", { class: "legend" });
   private readonly buttons = element("div", { class: "bar" });
   private readonly kind = element("select", { "aria-label": "kind of the missed defect" });
   private parts: [number, number][][] = [];
 
   constructor(private readonly session: Session) {
-    const titles: [string, string][] = [["photo", "Photo"], ...session.run.overlays.map((o) => [o.name, o.title] as [string, string])];
-    this.layers.append(...titles.map(([name, title]) => element("option", { value: name }, title)));
-    this.layers.addEventListener("change", () => session.show(this.layers.value));
     this.kind.append(element("option", { value: "" }, "kind…"), ...session.run.kinds.map((k) => element("option", { value: k }, k)));
     this.root.append(this.buttons);
-    session.on(["layer"], () => this.explain());
-    session.on(["tool", "selection"], () => this.offer());
+    session.on(["tool", "selection", "readings"], () => this.offer());
     session.on(["shape"], () => void this.drawn());
     session.on(["cursor"], () => this.place());
-    this.explain();
     this.offer();
     this.place();
   }
 
   /** What stands beside the pane's title: what both views of the wall show, and its colours. */
   bar(): HTMLElement {
-    return element("div", { class: "bar" }, element("label", {}, "shows ", this.layers), this.legend);
-  }
-
-  private explain(): void {
-    this.layers.value = this.session.layer;
-    const overlay = this.session.run.overlays.find((o) => o.name === this.session.layer);
-    if (!overlay) { this.legend.replaceChildren(); return; }
-    const bar = element("span", { class: "colours" }, ...overlay.colours.map((colour) => {
-      const step = element("i");
-      step.style.background = colour;
-      return step;
-    }));
-    const ends = overlay.low_mm < 0 ? ["inward", "deep"] : ["", ""];
-    this.legend.replaceChildren(`${number(overlay.low_mm, 2)} ${ends[0]}`, bar, `${number(overlay.high_mm, 2)} ${ends[1]} mm; grey: not seen`);
+    return element("div", { class: "bar" }, element("label", {}, "shows ", layerChoice(this.session, "what the wall shows")), legend(this.session));
   }
 
   private offer(): void {
@@ -71,9 +52,18 @@ export class ToolBar {
     this.buttons.replaceChildren(toggles.length ? "Measure " : "", ...toggles, add ?? "",
       session.tool === "add" ? this.kind : "", drawing ? element("button", { class: "accept", click: () => void this.finish() }, "Done") : "",
       session.tool === "split" ? element("button", { click: () => this.nextPart() }, "Next part") : "",
-      session.tool !== "none" ? element("button", { click: () => this.leave() }, "Cancel") : "");
+      session.tool !== "none" ? element("button", { click: () => this.leave() }, "Cancel") : "", this.saved());
     if (session.tool === "none") this.place();
     else this.status.textContent = (HELP[session.tool] ?? "") + KEYS_HINT;
+  }
+
+  /** The saved measurements: how many, as a table to take away, and how to be rid of them. */
+  private saved(): HTMLElement | string {
+    const { session } = this, { readings } = session;
+    if (!readings.length) return "";
+    const table = `data:text/csv;charset=utf-8,${encodeURIComponent(csv(readings))}`;
+    return element("span", { class: "bar" }, element("a", { href: table, download: `${session.run.name}-measurements.csv`, title: readings.map((r) => sentence(r.readings)).join("\n") },
+      `${readings.length} saved (CSV)`), element("button", { title: "delete the saved measurements", click: () => session.forget() }, "Clear"));
   }
 
   leave(): void { this.parts = []; this.kind.value = ""; this.session.take("none"); }
@@ -93,7 +83,11 @@ export class ToolBar {
     const done = session.tool === "redraw" ? await session.act({ do: "redraw", finding: session.selected, outline })
       : session.tool === "add" ? await session.act({ do: "add", kind: this.kind.value, outline })
         : await session.act({ do: "split", finding: session.selected, outlines: [...this.parts, outline] });
-    if (done) this.leave();
+    if (!done) return;
+    const made = session.tool === "add" ? session.state.findings.find((f) => f.id === `a${session.state.revision}`) : session.finding;
+    this.leave();
+    if (made && made.id !== session.selected) session.select(made.id);
+    if (made?.cautions.length) session.say(`Finding ${made.label}: ${made.cautions[0]}`);
   }
 
   private async drawn(): Promise<void> {
@@ -104,7 +98,9 @@ export class ToolBar {
     if (points.length !== session.drawn.length) { session.drawn = points; session.tell("shape"); return; }
     try {
       const readings = await session.source.measure(session.tool, points);
-      this.status.textContent = readings.map((r) => `${r.name} ${measured(r.value, r.sigma, r.unit)}`).join("; ");
+      this.status.replaceChildren(sentence(readings), " ", element("button", {
+        click: () => session.keep({ tool: session.tool, at: new Date().toISOString(), points, readings }),
+      }, "Save"));
     } catch (error) {
       this.status.textContent = error instanceof Error ? error.message : String(error);
     }
@@ -114,4 +110,15 @@ export class ToolBar {
     const [distance, azimuth] = this.session.cursor;
     if (this.session.tool === "none") this.status.textContent = `Spot at ${distance.toFixed(1)} mm, ${clock(azimuth)} o'clock.`;
   }
+}
+
+/** Readings in words; a clock position is no number with decimals. */
+function sentence(readings: Reading[]): string {
+  return readings.map((r) => (r.unit === "h" ? `${r.name} ${clockOfHours(r.value)} ± ${(60 * r.sigma).toFixed(1)} min` : `${r.name} ${measured(r.value, r.sigma, r.unit)}`)).join("; ");
+}
+
+function csv(saved: SavedReading[]): string {
+  const rows = saved.flatMap((m) => m.readings.map((r) => [moment(m.at), m.tool, r.name, r.value, r.sigma, r.unit,
+    m.points.map(([s, a]) => `${s.toFixed(2)} mm at ${clock(a)}`).join(" / ")].join(",")));
+  return ["measured at,tool,quantity,value,1 sigma,unit,points", ...rows].join("\n") + "\n";
 }

@@ -1,7 +1,8 @@
 /** What the server tells, in its own words; lengths mm, angles rad, clock positions hours. */
 export type Point = [number, number]; // distance, azimuth
 
-export interface Overlay { name: string; title: string; low_mm: number; high_mm: number; colours: string[] }
+/** ``low_mm`` and ``high_mm`` are those of the run's own pictures; ``full_mm`` holds every measured value. */
+export interface Overlay { name: string; title: string; low_mm: number; high_mm: number; colours: string[]; full_mm?: [number, number] }
 export interface Quantity { name: string; value: number | string | null; unit: string }
 
 export interface Axis { distance_mm: number[]; origin_p: number[][]; x_p: number[][]; y_p: number[][] }
@@ -12,11 +13,14 @@ export interface MeasuredDefect {
   statement: string; clock_from: number; clock_to: number; distance_from_mm: number; distance_to_mm: number;
 }
 
+/** What one ring alone shows: to be looked at, not counted. */
+export interface Unconfirmed extends MeasuredDefect { outline: Point[]; peak_distance_mm?: number; peak_clock?: number }
+
 export interface Run {
   name: string; metrics: Quantity[]; numbers: { stage: string; numbers: Quantity[] }[]; warnings: string[];
   program: { name: string; version: string }; inputs: Record<string, string>; has_recording: boolean;
   nominal_diameter_mm: number; wall_thickness_mm: number | null; distance_mm: [number, number]; radius_mm: number;
-  overlays: Overlay[]; kinds: string[]; defects: MeasuredDefect[]; axis: Axis; diagnosis: Diagnosis | null;
+  overlays: Overlay[]; kinds: string[]; defects: MeasuredDefect[]; unconfirmed: Unconfirmed[]; axis: Axis; diagnosis: Diagnosis | null;
   version: string;
 }
 
@@ -29,7 +33,7 @@ export interface Quality { plots: Plot[]; samples: Count[]; facts: Quantity[]; p
 
 export interface Size {
   distance_from_mm: number; distance_to_mm: number; clock_from: number; clock_to: number; length_mm: number;
-  width_mm: number; depth_mm: number | null; depth_sigma_mm: number | null;
+  width_mm: number; depth_mm: number | null; depth_sigma_mm: number | null; peak_distance_mm: number | null; peak_clock: number | null;
 }
 
 export interface Strength { b31g_mpa: number; modified_mpa: number; assumptions: string }
@@ -37,7 +41,7 @@ export interface Strength { b31g_mpa: number; modified_mpa: number; assumptions:
 export type Status = "open" | "accepted" | "rejected" | "gone";
 
 export interface Finding {
-  id: string; kind: string; outline: Point[]; size: Size; status: Status; original: number | null; edited: boolean;
+  id: string; label: string; kind: string; outline: Point[]; size: Size; cautions: string[]; status: Status; original: number | null; edited: boolean;
   decided_by: string; decided_at: string; reason: string; remarks: { who: string; at: string; text: string }[];
   made_of: string[]; covers: string[]; wall_loss_percent: number | null; wall_loss_sigma_percent: number | null; strength: Strength | null;
 }
@@ -88,4 +92,6 @@ export interface Layer { levels: number; width: number; height: number; distance
 /** A part of the model between two distances. */
 export interface Stretch { from_mm: number; to_mm: number; triangles: number }
 export interface Reading { name: string; value: number; sigma: number; unit: string }
+/** A measurement as it was kept, where, and of what. */
+export interface SavedReading { tool: Tool; at: string; points: Point[]; readings: Reading[] }
 export type Tool = "none" | "point" | "distance" | "area" | "depth" | "diameter" | "redraw" | "add" | "split";

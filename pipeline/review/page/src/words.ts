@@ -1,5 +1,7 @@
 /** Numbers and places in words. */
 export const TURN = 2 * Math.PI;
+// Of the chosen finding and the spot: no colour map and no wall has it.
+export const CHOSEN_COLOUR = "#ff4fd8";
 
 export function clock(azimuth: number): string {
   const hours = ((((azimuth * 180) / Math.PI / 30 + 3) % 12) + 12) % 12;
@@ -7,8 +9,19 @@ export function clock(azimuth: number): string {
   return `${Math.floor(minutes / 60) || 12}:${String(minutes % 60).padStart(2, "0")}`;
 }
 
-export function clockOfHours(hours: number): string {
-  return clock(((hours - 3) * 30 * Math.PI) / 180);
+export function clockOfHours(hours: number): string { return clock(azimuthOf(hours)); }
+
+export function azimuthOf(hours: number): number { return ((hours - 3) * 30 * Math.PI) / 180; }
+
+/** The same words as `pipeline/pages/notation.py`: an extent on the clock, clockwise. */
+export function clockExtent(from: number, to: number): string {
+  return to - from >= 12 ? "all round" : `${clockOfHours(from)}–${clockOfHours(to)}`;
+}
+
+/** A distance along the pipe: the peak, and the extent in brackets; without a peak the extent. */
+export function distanceExtent(peak: number | null | undefined, from: number, to: number): string {
+  const extent = `${number(from, 1)}–${number(to, 1)} mm`;
+  return peak === null || peak === undefined ? extent : `${number(peak, 1)} mm (${extent})`;
 }
 
 export function number(value: number | null | undefined, digits = 2): string {

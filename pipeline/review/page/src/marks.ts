@@ -1,0 +1,176 @@
+/** What is drawn on the model beside the wall: findings with their numbers, distances, clock, ends, a scale bar. */
+import * as THREE from "three";
+import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
+import { LineSegments2 } from "three/examples/jsm/lines/LineSegments2.js";
+import { LineSegmentsGeometry } from "three/examples/jsm/lines/LineSegmentsGeometry.js";
+import { toModel } from "./graphics";
+import type { Pipe } from "./pipe";
+import { peakOf, type Session } from "./session";
+import type { Finding, Point } from "./types";
+import { CHOSEN_COLOUR, TURN, element } from "./words";
+
+const MM = 1e-3;
+// Findings and distances are marked within so many radii of the eye; all of a long pipe would be a crowd.
+const NEAR_RADII = 14, RINGS_AHEAD_RADII = 7, CLOCK_RADII = 1.4;
+const STEP_RAD = 0.06;
+const [WITHIN, AROUND] = [0.985, 1.015]; // radii of marks, seen from inside and from outside
+const BAR_PX: Point = [50, 150];
+
+interface Label { at: THREE.Vector3; root: HTMLElement; outward: THREE.Vector3 | null }
+
+export class Marks {
+  readonly layer = element("div", { class: "marks" });
+  readonly group = new THREE.Group();
+  private readonly findings = new THREE.Group();
+  private readonly rings = new THREE.Group();
+  private readonly ends: THREE.Mesh[];
+  private readonly bar = element("div", { class: "scale-bar" }, element("i"), element("span"));
+  private readonly end = element("span", { class: "mark end" });
+  private labels: Label[] = [];
+  private at = NaN;
+  private isInside = true;
+
+  constructor(private readonly session: Session, private readonly pipe: Pipe) {
+    const { run } = session;
+    this.ends = run.distance_mm.map((mm) => this.cap(mm));
+    this.group.add(this.findings, this.rings, ...this.ends);
+    this.layer.append(this.bar);
+  }
+
+  /** Draw the marks near a distance anew; only where the eye has gone far, unless `anew`. */
+  around(distance: number, isInside: boolean, anew = false): void {
+    const moved = Math.abs(distance - this.at) > this.session.run.radius_mm / 2;
+    if (!anew && !moved && isInside === this.isInside) return;
+    this.at = distance;
+    this.isInside = isInside;
+    for (const label of this.labels) label.root.remove();
+    this.labels = [];
+    for (const group of [this.findings, this.rings]) clear(group);
+    this.ends.forEach((end) => { end.visible = isInside; });
+    const near = NEAR_RADII * this.session.run.radius_mm;
+    for (const finding of this.session.standing) {
+      if (finding.size.distance_to_mm > distance - near && finding.size.distance_from_mm < distance + near) this.outline(finding);
+    }
+    this.distances();
+    this.clock();
+    const last = this.session.run.distance_mm[1];
+    this.end.textContent = `end of the measured wall, ${last.toFixed(0)} mm`;
+    if (isInside) this.put(this.place(last, 0, 0), this.end, null);
+  }
+
+  /** Bring the words to where their places are seen. */
+  follow(camera: THREE.PerspectiveCamera, width: number, height: number, spot: Point): void {
+    const forward = camera.getWorldDirection(new THREE.Vector3());
+    for (const { at, root, outward } of this.labels) {
+      const away = at.clone().sub(camera.position);
+      const seen = at.clone().project(camera);
+      const isHidden = away.dot(forward) <= 0 || Math.abs(seen.x) > 1 || Math.abs(seen.y) > 1
+        || (this.isInside ? away.length() > NEAR_RADII * this.session.run.radius_mm * MM : outward !== null && outward.dot(away) > 0);
+      root.hidden = isHidden;
+      if (!isHidden) root.style.transform = `translate(${(((seen.x + 1) / 2) * width).toFixed(0)}px, ${(((1 - seen.y) / 2) * height).toFixed(0)}px)`;
+    }
+    this.measure(camera, height, forward, spot);
+  }
+
+  /** The bar is as long as its number at the spot, or at the target seen from outside. */
+  private measure(camera: THREE.PerspectiveCamera, height: number, forward: THREE.Vector3, spot: Point): void {
+    const far = this.place(spot[0], spot[1], this.isInside ? 1 : 0).sub(camera.position).dot(forward);
+    const pxPerMm = (height / 2 / Math.tan((camera.fov * Math.PI) / 360) / far) * MM;
+    const mm = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000].find((n) => n * pxPerMm >= BAR_PX[0]) ?? 0;
+    this.bar.hidden = !(far > 0) || !mm || mm * pxPerMm > 2 * BAR_PX[1];
+    (this.bar.firstChild as HTMLElement).style.width = `${(mm * pxPerMm).toFixed(0)}px`;
+    this.bar.lastChild!.textContent = `${mm} mm ${this.isInside ? "at the spot" : "at the axis"}`;
+  }
+
+  private outline(finding: Finding): void {
+    const chosen = finding.id === this.session.selected;
+    for (const radii of [WITHIN, AROUND]) {
+      if (radii === WITHIN ? !this.isInside : this.isInside) continue;
+      const place = this.segments(finding.outline, radii);
+      for (const [colour, width, order] of [["#000000", chosen ? 5.5 : 4, 2], [chosen ? CHOSEN_COLOUR : "#ffffff", chosen ? 3 : 1.8, 3]] as [string, number, number][]) {
+        const material = new LineMaterial({ color: colour, linewidth: width, dashed: false, depthTest: !this.isInside, transparent: true });
+        const line = new LineSegments2(new LineSegmentsGeometry().setPositions(place), material);
+        line.renderOrder = order;
+        this.findings.add(line);
+      }
+    }
+    const [s, a] = peakOf(finding);
+    const name = element("button", {
+      class: `mark finding${chosen ? " chosen" : ""}`, tabindex: "-1", "data-finding": finding.id, title: `${finding.label}: ${finding.kind}`,
+      click: () => this.session.select(finding.id),
+    }, finding.label.split(" ")[0]!);
+    const from = Math.max(...finding.outline.map((p) => p[0]));
+    this.put(this.place(Math.max(s, from), a, this.isInside ? WITHIN : AROUND), name, this.outward(s, a));
+  }
+
+  private segments(outline: Point[], radii: number): number[] {
+    const out: number[] = [];
+    outline.forEach(([s, a], k) => {
+      const [s1, a1] = outline[(k + 1) % outline.length]!;
+      const parts = Math.max(1, Math.ceil(Math.abs(a1 - a) / STEP_RAD));
+      for (let n = 0; n < parts; n++) {
+        for (const t of [n / parts, (n + 1) / parts]) out.push(...this.place(s + t * (s1 - s), a + t * (a1 - a), radii).toArray());
+      }
+    });
+    return out;
+  }
+
+  /** Thin rings at round distances, with their number at half past one. */
+  private distances(): void {
+    const { distance_mm: [from, to], radius_mm: radius } = this.session.run;
+    const step = [5, 10, 20, 50, 100, 200, 500, 1000].find((n) => n >= 0.9 * radius) ?? 2000;
+    const [first, last] = this.isInside ? [this.at + 0.6 * radius, this.at + RINGS_AHEAD_RADII * radius] : [this.at - NEAR_RADII * radius, this.at + NEAR_RADII * radius];
+    for (let s = Math.ceil(Math.max(first, from) / step) * step; s <= Math.min(last, to); s += step) {
+      const points = Array.from({ length: 65 }, (_, k) => this.place(s, (k / 64) * TURN, this.isInside ? 0.99 : AROUND));
+      const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints(points), new THREE.LineBasicMaterial({ color: 0xffffff, transparent: true, opacity: 0.45 }));
+      line.renderOrder = 1;
+      this.rings.add(line);
+      const a = this.isInside ? -Math.PI / 4 : -Math.PI / 2;
+      this.put(this.place(s, a, this.isInside ? 0.95 : 1.08), element("span", { class: "mark" }, `${s} mm`), null);
+    }
+  }
+
+  private clock(): void {
+    const { distance_mm: [from, to], radius_mm: radius } = this.session.run;
+    const where = this.isInside ? [Math.min(this.at + CLOCK_RADII * radius, to)] : [Math.max(from, this.at - NEAR_RADII * radius)];
+    for (const s of where) {
+      for (const hour of [12, 3, 6, 9]) {
+        const a = ((hour - 3) * Math.PI) / 6;
+        this.put(this.place(s, a, this.isInside ? 0.8 : 1.12), element("span", { class: "mark hour" }, String(hour)), null);
+      }
+    }
+  }
+
+  private put(at: THREE.Vector3, root: HTMLElement, outward: THREE.Vector3 | null): void {
+    root.hidden = true;
+    this.labels.push({ at, root, outward });
+    this.layer.append(root);
+  }
+
+  /** A place in the model, its distance from the axis in radii. */
+  private place(distance: number, azimuth: number, radii: number): THREE.Vector3 {
+    return toModel(this.pipe.point(distance, azimuth, radii * this.session.run.radius_mm)).multiplyScalar(MM);
+  }
+
+  private outward(distance: number, azimuth: number): THREE.Vector3 {
+    return this.place(distance, azimuth, 1).sub(this.place(distance, azimuth, 0)).normalize();
+  }
+
+  /** Where the measured wall ends, a dark disc, so that an end is not taken for a fault. */
+  private cap(distance: number): THREE.Mesh {
+    const disc = new THREE.Mesh(new THREE.CircleGeometry(1.03 * this.session.run.radius_mm * MM, 48),
+      new THREE.MeshBasicMaterial({ color: 0x46525e, side: THREE.DoubleSide }));
+    disc.position.copy(this.place(distance, 0, 0));
+    disc.lookAt(this.place(distance, 0, 0).add(toModel(this.pipe.at(distance).tangent)));
+    return disc;
+  }
+}
+
+function clear(group: THREE.Group): void {
+  for (const child of group.children) {
+    const { geometry, material } = child as THREE.Mesh;
+    geometry.dispose();
+    (material as THREE.Material).dispose();
+  }
+  group.clear();
+}

@@ -1,0 +1,105 @@
+"""The wall's values as coloured pictures between limits that are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import Byte, Float, Float32
+from pipeline.artefacts.measured import Wall
+from pipeline.artefacts.model import Overlay, Overlays
+from pipeline.errors import InputError
+from pipeline.review.run_files import RunFiles
+
+WALL_LOSS = "wall_loss"
+_LEVELS = 254
+# Rows looked through at a time, for memory's sake.
+_ROWS = 4096
+
+
+@dataclass(frozen=True)
+class Values:
+    """A quantity of every cell of the wall, mm, worked out where it is asked for.
+
+    Attributes
+    ----------
+    cells : (S, A)
+    less : (A,)
+        What is taken from every row.
+    """
+
+    cells: Float32
+    less: Float
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Rows along distance, columns along azimuth."""
+        return self.cells.shape
+
+    def __getitem__(self, part: Any) -> Float32:
+        columns = part[1] if isinstance(part, tuple) else slice(None)
+        return np.asarray(self.cells[part] - self.less[columns], np.float32)
+
+    def range_mm(self) -> tuple[float, float]:
+        """Return the smallest and the largest value; 0 where nothing was measured."""
+        parts = [self[a : a + _ROWS] for a in range(0, len(self), _ROWS)]
+        known = [p[np.isfinite(p)] for p in parts]
+        ends = [(float(p.min()), float(p.max())) for p in known if len(p)]
+        return min((e[0] for e in ends), default=0.0), max((e[1] for e in ends), default=0.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Values, mm, that get the first and the last colour."""
+
+    low_mm: float
+    high_mm: float
+
+    def levels(self, value_mm: Float32) -> Byte:
+        """Return the level of each value: 0 where it was not measured, else 1 to 255."""
+        known = np.isfinite(value_mm)
+        share = (np.where(known, value_mm, 0.0) - self.low_mm) / (self.high_mm - self.low_mm)
+        return np.where(known, 1 + np.rint(np.clip(share, 0, 1) * _LEVELS), 0).astype(np.uint8)
+
+
+def values_of(files: RunFiles, layer: str) -> Values:
+    """Return what a layer shows.
+
+    Raises
+    ------
+    InputError
+        When there is none of that name.
+    """
+    wall, overlays = files.artefact(Wall).radius_map, files.artefact(Overlays)
+    nothing = np.zeros(len(overlays.azimuth_rad))
+    known: dict[str, tuple[Float32, Float]] = {
+        "deviation": (wall.radius_mm, overlays.reference_radius_mm),
+        WALL_LOSS: (wall.radius_mm, overlays.reference_radius_mm),
+        "deviation_nominal": (wall.radius_mm, nothing + overlays.nominal_radius_mm),
+        "uncertainty": (wall.sigma_mm, nothing),
+        "misalignment": (wall.misalignment_mm, nothing),
+    }
+    if layer not in known:
+        raise InputError("layer", f"there is no {layer[:40]!r} between limits", expected=", ".join(known))
+    return Values(*known[layer])
+
+
+def overlay_of(overlays: Overlays, layer: str) -> Overlay:
+    """Return the overlay whose colours a layer wears: wall loss those of what only grows."""
+    return overlays.uncertainty if layer == WALL_LOSS else overlays.of_variant(layer)
+
+
+def full_range_mm(files: RunFiles, layer: str) -> tuple[float, float]:
+    """Return the smallest and the largest value of a layer."""
+    return _full_range(files, files.version, layer)
+
+
+@lru_cache(maxsize=32)
+def _full_range(files: RunFiles, _version: str, layer: str) -> tuple[float, float]:
+    return values_of(files, layer).range_mm()

@@ -1,0 +1,150 @@
+"""The model's pane: it turns to what is chosen, marks findings, distances and ends, in true colours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.review_browser import Tab
+
+_SPOT_ON_SCREEN = """(([s, a]) => {
+  const m = boresight.model;
+  boresight.session.moveTo([s, a]);
+  m.camera.updateMatrixWorld();
+  const p = m.marker.position.clone().project(m.camera);
+  return [p.x, p.y, p.z]; })"""
+
+
+def marks(page: Tab, kind: str) -> list[str]:
+    return page.js(
+        f"[...document.querySelectorAll('.mark{kind}')].filter((e) => !e.hidden).map((e) => e.textContent)"
+    )
+
+
+@pytest.mark.parametrize("hour", [12, 3, 6, 9, 1.5])
+def test_the_view_turns_to_a_place_whatever_its_clock(page: Tab, hour: float) -> None:
+    azimuth = np.radians(30 * (hour - 3))
+    x, y, depth = page.js(f"{_SPOT_ON_SCREEN}([60, {azimuth}])")
+    assert max(abs(x), abs(y)) < 0.3
+    assert depth < 1, "in front of the eye"
+
+
+def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
+    for name in page.standing():
+        page.choose(name)
+        page.until(
+            f"document.querySelector('.mark.finding.chosen:not([hidden])')?.dataset.finding === '{name}'"
+        )
+    page.page.click("text=Home")
+    page.until("document.querySelectorAll('.mark.hour:not([hidden])').length > 0")
+    assert any(text.endswith(" mm") for text in marks(page, ":not(.hour, .finding, .end)"))
+    page.js("boresight.model.fly(1e4)")
+    page.until("document.querySelector('.mark.end:not([hidden])')")
+    last = page.js("boresight.session.run.distance_mm[1]")
+    assert page.js("boresight.model.flown") < last, "the eye stays within the wall"
+    (said,) = marks(page, ".end")
+    assert float(said.removeprefix("end of the measured wall, ").split()[0]) == pytest.approx(last, abs=0.6)
+    page.js("boresight.session.select('1')")
+    page.until(
+        "/^\\d+ mm at the spot$/.test(document.querySelector('.scale-bar:not([hidden]) span')?.textContent)"
+    )
+    px = page.page.locator(".scale-bar i").bounding_box()["width"]
+    mm = float(page.page.locator(".scale-bar span").inner_text().split()[0])
+    eye, high = page.js(
+        "(({camera, marker, canvas}) => [camera.position.distanceTo(marker.position), canvas.clientHeight])"
+        "(boresight.model)"
+    )
+    fov = np.radians(page.js("boresight.model.camera.fov"))
+    assert px / mm == pytest.approx(high / 2 / np.tan(fov / 2) / (1000 * eye), rel=0.05)
+
+
+def test_from_outside_the_pipe_fills_the_pane(page: Tab) -> None:
+    page.page.click("text=Outside")
+    corners = page.js("""(() => {
+      const { pipe, camera } = boresight.model, { distance_mm, radius_mm } = boresight.session.run;
+      camera.updateMatrixWorld();
+      const turn = [...Array(24).keys()];
+      return distance_mm.flatMap((s) => turn.map((k) => {
+        const [x, y, z] = pipe.point(s, k * Math.PI / 12, radius_mm);
+        const at = camera.position.clone().set(x / 1e3, -y / 1e3, -z / 1e3);
+        return at.project(camera).toArray(); })); })()""")
+    reach = np.abs(np.array(corners)[:, :2]).max()
+    assert 0.8 < reach <= 1, "all of it is seen, and large"
+    page.page.click("text=Inside")
+
+
+def test_the_model_alone_and_back(page: Tab) -> None:
+    before = page.page.locator(".model .stage").bounding_box()
+    page.page.click("text=Maximise")
+    after = page.page.locator(".model .stage").bounding_box()
+    assert after["width"] * after["height"] > 2 * before["width"] * before["height"]
+    assert page.page.locator(".foot .hint").is_visible()
+    page.page.click("text=Restore")
+    assert page.page.locator(".model .stage").bounding_box() == before
+
+
+def test_captions_are_seen_at_720_lines(page: Tab) -> None:
+    page.page.locator(".foot .hint").wait_for(state="visible")
+    for pane in ("#view-frame .told", "#view-section .told", "#view-flat .status"):
+        box = page.page.locator(pane).bounding_box()
+        assert box["y"] + box["height"] <= 720
+
+
+def test_the_photo_is_shown_as_it_was_recorded(page: Tab) -> None:
+    """No light of the viewer is put on the photo; raking light is, on request, and shows the dent."""
+    kind = "boresight.model.parts.map((p) => p.mesh.material.type)"
+    dent = next(f for f in page.standing() if page.finding(f)["kind"] == "dent")
+    page.choose(dent)
+    assert set(page.js(kind)) == {"MeshBasicMaterial"}
+    contrast = """(() => {
+      const m = boresight.model, gl = m.renderer.getContext();
+      const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+      const [maps, seen] = [m.parts.map((p) => p.mesh.material.map), []];
+      for (const part of m.parts) { part.mesh.material.map = null; part.mesh.material.needsUpdate = true; }
+      m.marks.group.visible = m.marker.visible = false;
+      m.shine(); m.renderer.render(m.scene, m.camera);
+      const px = new Uint8Array(4 * w * h);
+      gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, px);
+      for (let y = Math.round(h * .43); y < h * .57; y += 2)
+        for (let x = Math.round(w * .43); x < w * .57; x += 2) seen.push(px[4 * (y * w + x)]);
+      m.parts.forEach((p, k) => { p.mesh.material.map = maps[k]; p.mesh.material.needsUpdate = true; });
+      m.marks.group.visible = m.marker.visible = true;
+      seen.sort((a, b) => a - b);
+      return (seen[Math.floor(.98 * seen.length)] - seen[Math.floor(.02 * seen.length)]) / 255; })()"""
+    assert page.js(contrast) < 0.02
+    page.page.check("#raking")
+    assert page.js(contrast) > 0.25, "a dent of 1.6 mm reads by light and shadow"
+    page.page.uncheck("#raking")
+
+
+def test_colours_hold_every_value_and_can_be_fixed(page: Tab) -> None:
+    page.js("boresight.session.show('deviation')")
+    overlay = page.js("boresight.session.overlay()")
+    low, high = page.js("boresight.session.limits()")
+    assert low <= overlay["full_mm"][0] <= overlay["full_mm"][1] <= high == -low
+    page.js("boresight.session.show('misalignment')")
+    assert page.js("boresight.session.limits()")[1] >= 0.25, "no alarming colour at some hundredths"
+    page.js("boresight.session.show('deviation')")
+    page.page.click("#view-model .legend >> text=Set limits")
+    page.page.fill("#view-model [aria-label='value of the first colour']", "-0.5")
+    page.page.fill("#view-model [aria-label='value of the last colour']", "0.5")
+    page.keys("Enter")
+    for pane in ("#view-model", "#view-flat"):
+        assert "0.50 inward" in page.page.locator(f"{pane} .legend").inner_text()
+    page.until("[...boresight.flat.picture.tiles.keys()].some((t) => t.endsWith('low=-0.5&high=0.5'))")
+    page.until("boresight.model.parts.every((p) => p.mesh.material.name === 'deviation -0.5 0.5')")
+    page.page.click("#view-model .legend >> text=Full range")
+    page.js("boresight.session.show('photo')")
+
+
+def test_wall_loss_is_a_layer_in_percent(page: Tab) -> None:
+    option = page.page.locator("select[aria-label='what the model shows'] option[value=wall_loss]")
+    assert option.get_attribute("disabled") is not None
+    with page.one_change():
+        page.js("void boresight.session.act({do: 'assume', wall_thickness_mm: 5, yield_mpa: null})")
+    page.page.select_option("select[aria-label='what the model shows']", "wall_loss")
+    assert "% of the wall" in page.page.locator("#view-model .legend").inner_text()
+    high = page.js("boresight.session.limits()[1]")
+    assert f"{100 * high / 5:.2f} %" in page.page.locator("#view-flat .legend").inner_text()
+    page.until("boresight.model.parts.every((p) => p.mesh.material.name.startsWith('wall_loss 0'))")
+    page.js("boresight.session.show('photo')")
