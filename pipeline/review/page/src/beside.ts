@@ -81,6 +81,14 @@ export class CompareView {
     this.paint();
   }
 
+  /** Fill the view with wall, in both halves, as far as there is any. */
+  private keepInside(): void {
+    const [from, to] = this.session.run.distance_mm, width = this.frame(1)[1];
+    this.view.mmPerPx = Math.min(this.view.mmPerPx, (to - from) / width);
+    const half = (width / 2) * this.view.mmPerPx;
+    this.view.distance = Math.min(Math.max(this.view.distance, from + half), to - half);
+  }
+
   private follow(): void {
     const [s, a] = this.session.cursor, half = (this.frame(1)[1] / 2) * this.view.mmPerPx;
     if (Math.abs(s - this.view.distance) > half * 0.9) this.view.distance = s;
@@ -126,6 +134,7 @@ export class CompareView {
   private paint(): void {
     const context = this.canvas.getContext("2d");
     if (!context || !this.size[0]) return;
+    this.keepInside();
     const ratio = window.devicePixelRatio || 1, style = getComputedStyle(this.root), width = this.size[0];
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.fillStyle = style.getPropertyValue("--ground");

@@ -35,20 +35,20 @@ function parts(session: Session, found: Comparison, view: CompareView): HTMLElem
     view.root,
     element("section", {}, element("h2", {}, "Outcome of each finding"),
       element("p", { class: "quiet" }, "Depths are read on both walls with one method within one outline; growth is positive into the wall. Its σ holds noise as clean wall beside it shows it, the maps' resolution, registration and calibration. p is after Holm over all findings; ◆ marks what is declared a change."),
-      element("div", { class: "scroll" }, growthTable(found, view)),
+      element("div", { class: "scroll" }, growthTable(session, found, view)),
       element("p", {}, element("a", { href: `${folder}growth.csv`, download: "growth.csv" }, "growth.csv"), " ", element("a", { href: `${folder}growth.json`, download: "growth.json" }, "growth.json"))),
     element("section", {}, element("h2", {}, "How the runs lie on each other"), registrationTable(found), element("div", { class: "plots" }, ...courses(found.registration))),
   ];
 }
 
-function growthTable({ changes, years }: Comparison, view: CompareView): HTMLElement {
-  const heads = ["finding", "kind", "place", "what became of it", "depth then", "depth now", "growth", "p", "length", "width", "area", ...(years ? ["growth a year"] : [])];
+function growthTable(session: Session, { changes, years }: Comparison, view: CompareView): HTMLElement {
+  const heads = ["finding", "kind", "place", "outcome", "depth then", "depth now", "growth", "p", "length", "width", "area", ...(years ? ["growth a year"] : [])];
   const rows = changes.map((c) => {
-    const open = element("button", { click: () => { view.show(c); view.root.scrollIntoView({ block: "nearest" }); } }, c.id ?? `earlier ${c.earlier_id}`);
+    const open = element("button", { click: () => { view.show(c); view.root.scrollIntoView({ block: "nearest" }); } }, c.id ? session.called(c.id) : `earlier ${c.earlier_id}`);
     const rate = c.depth_rate_mm_per_year === null ? "–" : measured(c.depth_rate_mm_per_year, c.depth_rate_sigma_mm_per_year, "mm");
     const loss = c.wall_loss_rate_percent_per_year === null ? "" : `, ${measured(c.wall_loss_rate_percent_per_year, c.wall_loss_rate_sigma_percent_per_year, "% of the wall")}`;
     const cells = [c.kind, `${number(c.distance_mm, 0)} mm, ${clock(c.azimuth_rad)}`, `${c.changed ? "◆ " : ""}${c.fate}`,
-      number(c.earlier_depth_mm), number(c.depth_mm), growth(c.depth_growth_mm, c.depth_growth_sigma_mm, "mm"), chance(c), growth(c.length_growth_mm, c.length_growth_sigma_mm, "mm"),
+      way(c.earlier_depth_mm), way(c.depth_mm), growth(c.depth_growth_mm, c.depth_growth_sigma_mm, "mm"), chance(c), growth(c.length_growth_mm, c.length_growth_sigma_mm, "mm"),
       growth(c.width_growth_mm, c.width_growth_sigma_mm, "mm"), growth(c.area_growth_mm2, c.area_growth_sigma_mm2, "mm²"), ...(years ? [rate + loss] : [])];
     return element("tr", { class: c.changed ? "strong" : "" }, element("td", {}, open), ...cells.map((text) => element("td", {}, text)));
   });
@@ -58,6 +58,9 @@ function growthTable({ changes, years }: Comparison, view: CompareView): HTMLEle
 function growth(value: number | null, sigma: number | null, unit: string): string {
   return value === null ? "–" : `${value > 0 ? "+" : ""}${measured(value, sigma, unit)}`;
 }
+
+/** A depth without its σ, which belongs to the growth. */
+function way(mm: number | null): string { return mm === null ? "–" : `${number(Math.abs(mm))} mm ${mm < 0 ? "inward" : "deep"}`; }
 
 function chance({ p_adjusted: p }: Change): string {
   return p === null ? "–" : p < 1e-4 ? "< 0.0001" : p.toPrecision(2);
