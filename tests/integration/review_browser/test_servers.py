@@ -40,10 +40,11 @@ def test_nothing_is_lost_when_the_server_dies(browser, sample: Path, tmp_path: P
         with tab(context, server.origin) as page:
             page.open(server.address)
             page.named("Ada")
-            page.choose("1")
             for keys in ("a", "o", "a"):
+                page.choose("1")  # a decision leads on to the next
                 with page.one_change():
                     page.keys(keys)
+            page.choose("1")
             page.keys("c")
             page.page.keyboard.type("half written")
             page.js("setTimeout(() => void boresight.session.act({do: 'accept', finding: '2'}), 0)")
