@@ -219,7 +219,9 @@ def test_what_was_mended_is_told(
     recording = spoilt(good, tmp_path, spoil)
     told = boresight("run", recording, "-o", tmp_path / "run", "--only", "premises", *QUICK)
     assert told.code == 0, told.err
-    assert noticed in told.err
+    first, last = told.err.index("Look at this first"), told.err.index("Before you rely on this run")
+    assert noticed in told.err[first:last], "said before anything else"
+    assert noticed in told.err[last:], "and again in the end"
     warnings = json.loads((tmp_path / "run" / "run.json").read_text())["reader_warnings"]
     assert any(noticed in w for w in warnings)
 
