@@ -18,6 +18,10 @@ from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, cosin
 _TUBE_THICKNESS_MM = 2.0
 _TUBE_RADIUS_MM = 15.0
 _DOME_POWER_PER_MM = (GLASS_INDEX - 1) * DOME_THICKNESS_MM / (GLASS_INDEX * DOME_RADIUS_MM**2)
+# Glasses and clear plastics of windows have an index of 1.45 to 1.55 (fused silica 1.458, PMMA 1.491, BK7
+# 1.517), here evenly. The shift grows as 1 − 1/n, so that a size found with n = 1.5 errs
+# by the share dn / (n (n − 1)).
+_BY_INDEX = 0.1 / np.sqrt(12) / (GLASS_INDEX * (GLASS_INDEX - 1))
 _STEPS = 6
 
 
@@ -26,6 +30,7 @@ class HousingGlass(Scalar):
 
     name = "housing_glass"
     amplitudes = one(name, 1.0)
+    law_sigma = float(_BY_INDEX)
     words = "A coaxial glass tube {thickness_mm:+.3f} mm thicker than stated stands before the wall."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -39,6 +44,7 @@ class TubeWedge(Directed):
 
     name = "tube_wedge"
     amplitudes = along_x_and_y(name, 0.1)
+    law_sigma = float(_BY_INDEX)
     words = (
         "The glass tube is {wedge_mm:.3f} mm thicker toward azimuth {direction_deg:.1f}°, thinner opposite."
     )
