@@ -39,7 +39,7 @@ from stages.diagnose.gauge.examine import examine
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.resimulate import Resimulated, resimulate
-from stages.diagnose.result import Diagnosis
+from stages.diagnose.result import Diagnosis, FitQuality
 from stages.diagnose.second_line import held_against_rings, sheet_by_rings
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.premises import PREMISES
@@ -185,10 +185,21 @@ def diagnosed(
     simulated = resimulate(of_gauge)
     image = image_of(seen, field.recording if field else None, gauge.recording if gauge else None)
     context.report("verdict", str(found.verdict))
-    return Diagnosed(
-        replace(found, shortcomings=(*noticed.sentences, *found.shortcomings)),
-        correction.probe if correction is not None else probe, simulated, image,
-    )  # fmt: skip
+    found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
+    if correction is None or not (correction.put_in or correction.unsaid) or not _worse(found.fit):
+        return Diagnosed(found, correction.probe if correction is not None else probe, simulated, image)
+    return Diagnosed(replace(found, notes=(*found.notes, _NOT_CORRECTED)), probe, simulated, image)
+
+
+_NOT_CORRECTED = (
+    "The probe file is written as it was stated: with what was found put in, rings that had no say in it fit "
+    "worse."
+)
+
+
+def _worse(fit: FitQuality | None) -> bool:
+    """Return whether measurements that were held out fit worse after the correction than before."""
+    return fit is not None and fit.heldout_after > fit.heldout_before
 
 
 def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
