@@ -83,7 +83,7 @@ def simulate(
     """
     file = file_or_shipped(Path(scene), SCENES)
     described = read_scene(file)
-    switched = {s.name: s.quantities for s in parse_switches(effects)}
+    switched = {s.key: s.numbers for s in parse_switches(effects)}
     changes: dict[str, object] = {"effects": {**described.effects, **switched}}
     if seed is not None:
         changes["seed"] = seed

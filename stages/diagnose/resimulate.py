@@ -14,6 +14,7 @@ from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
 from pipeline.geometry.axis import straight_axis
 from pipeline.physics.catalogue import EFFECTS, effect
+from pipeline.physics.course import Course
 from pipeline.recording.base import Recording
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
@@ -32,6 +33,7 @@ from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.grid import Wall, WallGrid
 from stages.calibrate.gauge.geometry import gauge_of
 from stages.diagnose.channels import Seen
+from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
 
@@ -121,17 +123,19 @@ def _compared(recording: Recording, run: GaugeRun, frames: Int, without: Fit, fo
 
 def _switchable(term: Term) -> bool:
     """Return whether the simulator has the effect, and all its quantities are known."""
-    if term.model.name not in EFFECTS:
+    if term.model.law not in EFFECTS:
         return False
     known = term.model.quantities(term.shape, term.amplitude)
-    return all(q.name in known for q in effect(term.model.name).quantities)
+    return all(q.name in known for q in effect(term.model.law).quantities)
 
 
 def _switch(term: Term) -> Switch:
     sizes = term.model.quantities(term.shape, term.amplitude)
-    return Switch(
-        term.model.name, tuple(float(f"{sizes[q.name]:.5g}") for q in effect(term.model.name).quantities)
-    )
+    values = tuple(float(f"{sizes[q.name]:.5g}") for q in effect(term.model.law).quantities)
+    if not isinstance(term.model, Coursed):
+        return Switch(term.model.law, values)
+    numbers = term.model.course(term.shape, term.amplitude).values()
+    return Switch(term.model.law, values, Course(term.model.kind, tuple(float(f"{n:.5g}") for n in numbers)))
 
 
 def scene_of(recording: Recording, found: Fit) -> SceneTruth:

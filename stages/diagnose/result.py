@@ -90,6 +90,15 @@ class Confirmation:
 
 
 @dataclass(frozen=True)
+class CourseFound:
+    """How an effect's size changes: a kind of `pipeline.physics.course`, and its numbers."""
+
+    kind: str
+    parameters: dict[str, Value]
+    probability: float = 1.0
+
+
+@dataclass(frozen=True)
 class EffectFound:
     """An effect with its size, the chance that it is the right name, and what confirms it."""
 
@@ -99,6 +108,7 @@ class EffectFound:
     statement: str
     equation: str
     confirmed_by: tuple[Confirmation, ...] = ()
+    course: CourseFound | None = None
 
 
 @dataclass(frozen=True)
@@ -253,7 +263,13 @@ def _effect(found: EffectFound) -> dict[str, object]:
         "parameters": {k: _plain(v) for k, v in found.parameters.items()},
         "statement": found.statement, "equation": found.equation,
         "confirmed_by": [_plain(c) for c in found.confirmed_by],
+        "course": None if found.course is None else _course(found.course),
     }  # fmt: skip
+
+
+def _course(found: CourseFound) -> dict[str, object]:
+    numbers = {k: _plain(v) for k, v in found.parameters.items()}
+    return {"kind": found.kind, **numbers, "probability": _number(found.probability)}
 
 
 def _location(found: Location) -> dict[str, object]:

@@ -1,7 +1,7 @@
 """Counts of the diagnosis on drawn gauge runs at ring level, one case after the other, to be gone on with.
 
 ``python -m tests.benchmarks.bench_diagnosis run RESULTS.jsonl --mode nulls --first 0 --count 300`` appends
-one line a case and leaves out those that are there; modes are nulls, singles, pairs and leftout.
+one line a case and leaves out those that are there; modes are nulls, singles, pairs, leftout and courses.
 ``python -m tests.benchmarks.bench_diagnosis summary RESULTS.jsonl... [--proof PROOF.json]...`` prints the
 table of figures, those of rendered recordings (``boresight prove``) beside those of ring level.
 """
@@ -24,8 +24,9 @@ from scipy.stats import kstest
 from pipeline.errors import BoresightError, UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
+from pipeline.physics.course import Course, CourseKind
 from pipeline.simulator.effects.switch import Switch, switches_from_mapping
-from pipeline.simulator.prior import draw_pair, read_prior
+from pipeline.simulator.prior import Prior, draw_pair, read_prior
 from pipeline.simulator.scene import Scene
 from stages.diagnose.channels import Seen, gauge_travel
 from stages.diagnose.compose import composed
@@ -34,6 +35,7 @@ from stages.diagnose.drill.answer import Answer, Concealed
 from stages.diagnose.drill.figures import figures
 from stages.diagnose.drill.score import Trial
 from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.scan import scan
@@ -46,6 +48,8 @@ PRIOR = Path(__file__).with_name("ring_level.yaml")
 # Fewer frames at a lower rate: the same way and time, for less computing.
 _FRAMES = 2 / 3
 _TEXEL_MM = 1.0
+# How near to its time a step is to be found.
+_NEAR_S = 0.1
 _KEPT = ("verdict", "global_p", "location", "effects", "class", "fit", "feasibility", "identifiable")
 app = typer.Typer()
 
@@ -57,6 +61,7 @@ class Mode(StrEnum):
     SINGLES = "singles"
     PAIRS = "pairs"
     LEFTOUT = "leftout"
+    COURSES = "courses"
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ def drawn(mode: Mode, seed: int) -> Drawn:
     """Return case ``seed`` of a mode; single effects take their turns, so that all come equally often."""
     prior = read_prior(PRIOR)
     turn = prior.effects[seed % len(prior.effects)]
-    concealed = {Mode.NULLS: (1.0,), Mode.PAIRS: (0.0, 0.0, 1.0)}.get(mode, (0.0, 1.0))
+    concealed = {Mode.NULLS: (1.0,), Mode.COURSES: (1.0,), Mode.PAIRS: (0.0, 0.0, 1.0)}.get(mode, (0.0, 1.0))
     changes: dict[str, object] = {"concealed": concealed}
     if mode in (Mode.SINGLES, Mode.LEFTOUT):
         changes["effects"] = (turn,)
@@ -86,7 +91,30 @@ def drawn(mode: Mode, seed: int) -> Drawn:
     # Nobody looks at the wall's paint.
     pipe = pair.gauge.pipe.model_copy(update={"texel_mm": _TEXEL_MM})
     scene = pair.gauge.model_copy(update={"frames": frames, "frame_rate": rate, "pipe": pipe, "effects": {}})
-    return Drawn(scene, pair.folder / "scene.yaml", switches_from_mapping(pair.gauge.effects, PRIOR), noise)
+    switches = switches_from_mapping(pair.gauge.effects, PRIOR)
+    if mode is Mode.COURSES:
+        switches = (_with_course(prior, seed, frames / rate),)
+    return Drawn(scene, pair.folder / "scene.yaml", switches, noise)
+
+
+def _with_course(prior: Prior, seed: int, duration_s: float) -> Switch:
+    """Return a law with a course, both drawn; they take their turns."""
+    random = np.random.default_rng([seed, 13])
+    models = [m for m in with_courses(LIBRARY).values() if isinstance(m, Coursed)]
+    model = models[random.permutation(len(models))[0]]
+    size = next(e.size for e in prior.effects if e.name == model.law)
+    values = {q.name: q.typical for q in effect(model.law).quantities}
+    first = effect(model.law).quantities[0]
+    sign = random.choice([-1.0, 1.0]) if first.low < 0 else 1.0
+    values[first.name] *= float(sign * np.exp(random.uniform(*np.log(size))))
+    values |= {"direction_deg": float(random.uniform(-180, 180))} if "direction_deg" in values else {}
+    values |= {"order": model.own[0]} if "order" in values else {}
+    numbers = {
+        CourseKind.STEP: (random.uniform(0.15, 0.85) * duration_s,), CourseKind.RAMP: (duration_s,),
+        CourseKind.EXPONENTIAL: (random.uniform(0.15, 0.6) * duration_s,), CourseKind.SPEED: (20.0,),
+        CourseKind.DISTANCE: (100.0,),
+    }.get(model.kind, ())  # fmt: skip
+    return Switch(model.law, tuple(values.values()), Course(model.kind, tuple(map(float, numbers))))
 
 
 def of_positions(library: Mapping[str, EffectModel]) -> dict[str, EffectModel]:
@@ -134,7 +162,12 @@ def oracle_snr(
     if geometry is None or name not in of_positions(LIBRARY):
         return None
     searched = geometry.searched
-    for s in scan(searched.run, searched.nothing, {name: LIBRARY[name]}, stated_belief(stated)):
+    library = {name: LIBRARY[name]}
+    if switch.course.kind is not CourseKind.CONSTANT:
+        coursed = with_courses(library, (switch.course.kind,))
+        order = switch.quantities.get("order")
+        library = {n: m for n, m in coursed.items() if isinstance(m, Coursed) and m.own in ((), (order,))}
+    for s in scan(searched.run, searched.nothing, library, stated_belief(stated)):
         found = abs(s.model.quantities(s.shape, s.score.amplitude)[switch.effect.quantities[0].name])
         return float(np.sqrt(s.score.statistic) * size / max(found, 1e-12))
     return None
@@ -202,7 +235,7 @@ def _tell(line: dict[str, Any]) -> None:
     said = ", ".join(f"{e['name']} {e['probability']:.3f}" for e in answer["effects"]) or ", ".join(
         answer["class"]
     )
-    told = " ".join(f"{n} {v[0]:.4g}" for n, v in line["concealed"]) or "nothing"
+    told = " ".join(f"{n} {v[0]:.4g} {''.join(map(str, c))}" for n, v, *c in line["concealed"]) or "nothing"
     typer.echo(
         f"{line['mode']} {line['seed']}: {told} (snr {line['snr']}) -> {answer['verdict']} {said} "
         f"p {answer.get('global_p') or 0:.2g} {line['cpu_s']} s {line.get('failed', '')}"
@@ -211,7 +244,7 @@ def _tell(line: dict[str, Any]) -> None:
 
 def trial_from(line: dict[str, Any]) -> Trial:
     """Return the trial of one line of results."""
-    concealed = tuple(Concealed(name=n, values=tuple(map(float, v))) for n, v in line["concealed"])
+    concealed = tuple(Concealed(name=n, values=tuple(map(float, v))) for n, v, *_ in line["concealed"])
     seen = [s for s in line["snr"] if s is not None]
     snr = min(seen) if seen and len(seen) == len(concealed) else None
     name = f"{line['mode']}-{line['seed']}"
@@ -231,6 +264,8 @@ def summary(
     for file in proof or ():
         for rate in json.loads(file.read_text("utf-8"))["figures"]:
             typer.echo(f"rendered   | {rate['text']}")
+    for text in _course_figures(lines):
+        typer.echo(text)
     failed = sum("failed" in line for line in lines)
     typer.echo(f"ended without an answer, counted as having identified nothing: {failed} of {len(lines)}")
     nulls = [line for line in lines if not line["concealed"] and "failed" not in line]
@@ -244,6 +279,25 @@ def summary(
         )
     typer.echo(f"CPU s a case: {np.median([line['cpu_s'] for line in lines]):.0f} (median)")
     typer.echo(f"versions: {', '.join(sorted({line['version'] for line in lines}))}")
+
+
+def _course_figures(lines: Sequence[dict[str, Any]]) -> Iterator[str]:
+    """Yield how often the course of what was rightly named is right, and the time of a step."""
+    named = [
+        (line["concealed"][0][2], e["course"])
+        for line in lines
+        if line["mode"] == Mode.COURSES and line["answer"]["verdict"] == "named"
+        for e in line["answer"]["effects"]
+        if e["name"] == line["concealed"][0][0]
+    ]
+    if not named:
+        return
+    right = [(true, found) for true, found in named if true["kind"] == found["kind"]]
+    yield f"Course right where the law is named: {len(right)} of {len(named)}"
+    steps = [(t["time_s"], f["time_s"]) for t, f in right if t["kind"] == CourseKind.STEP]
+    near = sum(abs(f["value"] - t) <= _NEAR_S for t, f in steps)
+    inside = sum(abs(f["value"] - t) <= 2 * f["sd"] for t, f in steps)
+    yield f"Steps within {_NEAR_S} s: {near} of {len(steps)}; within 2 σ: {inside} of {len(steps)}"
 
 
 def _lines(files: list[Path]) -> Iterator[dict[str, Any]]:

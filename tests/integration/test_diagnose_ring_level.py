@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.physics.course import CourseKind
 from pipeline.simulator.effects.switch import parse_switches
 from pipeline.simulator.scene import read_scene
 from stages.diagnose.effects.generic import GENERIC, STEADY
@@ -22,10 +23,12 @@ SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "gauge-4-in
 FEW = ("laser_tilt", "laser_cone", "baseline", "principal_point", "tube_tilt")
 
 
-def seen(switches: tuple[str, ...], names: tuple[str, ...], seed: int) -> Examined:
+def seen(
+    switches: tuple[str, ...], names: tuple[str, ...], seed: int, courses: tuple[CourseKind, ...] = ()
+) -> Examined:
     scene = read_scene(SCENE).model_copy(update={"seed": seed, "frames": 120, "frame_rate": 15.0})
     run = ring_level_run(scene, SCENE, parse_switches(switches) if switches else ())
-    return examine(run.measured, {name: LIBRARY[name] for name in names}, run.truth.stated)
+    return examine(run.measured, {n: LIBRARY[n] for n in names}, run.truth.stated, courses=courses)
 
 
 def test_a_run_with_nothing_hidden_is_consistent_and_tells_what_it_could_see():
@@ -83,6 +86,21 @@ def test_a_drift_is_sized_with_its_time_constant():
     for name, true in (("relative", 0.003), ("time_s", 2.2)):
         assert effect.parameters[name].value == pytest.approx(true, abs=4 * effect.parameters[name].sd)
         assert 0 < effect.parameters[name].sd < 0.25 * true
+
+
+def test_a_knock_is_named_as_a_step_at_its_time():
+    found = seen(
+        ("laser_tilt~step=0.3@-70/4.63s",), ("laser_tilt", "principal_point"), 66, (CourseKind.STEP,)
+    )
+    (effect,) = effects_found(found)
+    assert verdict_of(found) is Verdict.NAMED
+    assert (effect.name, effect.course.kind) == ("laser_tilt", "step")
+    time, size = effect.course.parameters["time_s"], effect.parameters["tilt_deg"]
+    assert time.value == pytest.approx(4.63, abs=0.1)
+    assert 0.01 < time.sd < 0.1
+    assert size.value == pytest.approx(0.3, abs=4 * size.sd)
+    assert found.location is not None
+    assert (found.location.fixed_to, found.location.time) == ("laser", "event")
 
 
 def test_rings_beyond_the_last_fiducials_do_not_count():

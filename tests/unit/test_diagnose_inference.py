@@ -201,7 +201,7 @@ def examined(
     named: bool = True, chance: float = 0.9999, left: float = 0.5, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),),
 ) -> Any:  # fmt: skip
-    best = SimpleNamespace(named=named, names=("laser_tilt",))
+    best = SimpleNamespace(named=named, laws=("laser_tilt",))
     verdicts = SimpleNamespace(adequacy=left, chance_of=lambda name: chance)
     return cast(Any, SimpleNamespace(best=best, verdicts=verdicts, confirmed=confirmed, unsplit=unsplit))
 

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 
+import numpy as np
+
+from pipeline.errors import InputError
 from pipeline.physics.catalogue import ALL_EFFECTS
+from pipeline.physics.course import CourseKind
 from pipeline.simulator.effects import camera, laser, photometric, picture, pose, window
 from pipeline.simulator.effects.switch import Switch
+from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.truth import SceneTruth
 
 EffectFunction = Callable[..., SceneTruth]
+_STEP_S = 1e-3
 _FAMILIES = {
     "laser": laser, "camera": camera, "window": window, "pose": pose, "photometric": photometric,
     "picture": picture,
@@ -32,5 +39,42 @@ def switch_on(truth: SceneTruth, switches: Sequence[Switch]) -> SceneTruth:
     """
     order = list(ALL_EFFECTS)
     for switch in sorted(switches, key=lambda s: order.index(s.name)):
-        truth = EFFECT_FUNCTIONS[switch.name](truth, **switch.quantities)
+        if switch.course.kind is CourseKind.CONSTANT:
+            truth = EFFECT_FUNCTIONS[switch.name](truth, **switch.quantities)
+        else:
+            truth = replace(truth, changes=(*truth.changes, Coursed.of(truth, switch)))
     return truth
+
+
+@dataclass(frozen=True)
+class Coursed:
+    """An effect on the instrument whose size follows a course; ``scene`` is the truth without it."""
+
+    scene: SceneTruth
+    switch: Switch
+
+    @classmethod
+    def of(cls, scene: SceneTruth, switch: Switch) -> Coursed:
+        """Return the change that a switch makes.
+
+        Raises
+        ------
+        InputError
+            When the effect changes anything but camera or laser, so that it has no course.
+        """
+        after = EFFECT_FUNCTIONS[switch.name](scene, **switch.quantities)
+        others = (f.name for f in fields(scene) if f.name != "instrument")
+        if any(getattr(after, name) is not getattr(scene, name) for name in others):
+            raise InputError(switch.key, "has no course", expected="an effect on camera, laser or window")
+        return cls(replace(scene, changes=()), switch)
+
+    def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
+        """See `pipeline.simulator.instrument.Change`."""
+        motion, start = self.scene.motion.distance_mm, float(self.scene.frames.time_s[0])
+        around = motion.at(np.array([start, time_s - _STEP_S, time_s, time_s + _STEP_S]))
+        speed = (around[3] - around[1]) / (2 * _STEP_S)
+        part = self.switch.course.factor(time_s - start, around[2] - around[0], speed)
+        size, *others = self.switch.quantities.items()
+        scene = replace(self.scene, instrument=instrument)
+        sizes = {size[0]: float(part) * size[1], **dict(others)}
+        return EFFECT_FUNCTIONS[self.switch.name](scene, **sizes).instrument

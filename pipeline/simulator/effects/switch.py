@@ -8,7 +8,8 @@ The text is ``NAME`` alone for the typical size, or ``NAME=VALUE`` followed by a
 ``/40s``    any other quantity, told by its unit         ``baseline_drift=0.05/40s``
 ==========  ===========================================  ============================
 
-in any order, as in ``laser_rocking=1@40/5.3Hz``. What is left out is the catalogue's typical size.
+in any order, as in ``laser_rocking=1@40/5.3Hz``. What is left out is the catalogue's typical size. A course
+follows the effect's name, and its numbers the effect's: ``laser_tilt~step=0.6@40/4.6s``.
 """
 
 from __future__ import annotations
@@ -21,8 +22,10 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import effect
+from pipeline.physics.course import CONSTANTLY, COURSES, Course, CourseKind
 from pipeline.physics.effect import Effect, Quantity
 
+_COURSE = "~"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _SIZE = re.compile(rf"(?P<value>{_NUMBER})(?P<unit>[a-zA-Z]*?)(?=[@/]|x[-+.\d]|$)")
 _PART = re.compile(rf"(?P<mark>[@x/])(?P<value>{_NUMBER})(?P<unit>[a-zA-Z]*?)(?=[@/]|x[-+.\d]|$)")
@@ -38,6 +41,8 @@ class Switch:
         Of the catalogue.
     values : tuple of float
         The catalogue's quantities, in its order and units.
+    course : Course
+        How the size changes.
 
     Raises
     ------
@@ -47,6 +52,7 @@ class Switch:
 
     name: str
     values: tuple[float, ...]
+    course: Course = CONSTANTLY
 
     def __post_init__(self) -> None:
         quantities = effect(self.name).quantities
@@ -54,6 +60,17 @@ class Switch:
             raise _refusal(self.name, self.name, f"{len(self.values)} values given for {len(quantities)}")
         for quantity, value in zip(quantities, self.values, strict=True):
             _require_range(self.name, quantity, value)
+
+    @property
+    def key(self) -> str:
+        """Name and kind of course, as in ``laser_tilt~step``; the name alone of what is constant."""
+        constant = self.course.kind is CourseKind.CONSTANT
+        return self.name if constant else f"{self.name}{_COURSE}{self.course.kind}"
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Values of the effect and of its course by the name of their quantity."""
+        return self.quantities | self.course.quantities
 
     @property
     def effect(self) -> Effect:
@@ -68,13 +85,14 @@ class Switch:
     @property
     def text(self) -> str:
         """The switch as `parse_switch` reads it."""
-        size, *others = zip(self.effect.quantities, self.values, strict=True)
-        return f"{self.name}={size[1]!r}" + "".join(_part_text(q, v) for q, v in others)
+        size, *others = zip(_quantities(self.key), self.numbers.values(), strict=True)
+        return f"{self.key}={size[1]!r}" + "".join(_part_text(q, v) for q, v in others)
 
     @property
     def truth(self) -> list[object]:
-        """``[name, [values...]]``, as truth.json contains it."""
-        return [self.name, list(self.values)]
+        """``[name, [values...]]`` and the course if it has one, as truth.json contains it."""
+        course = [{"kind": str(self.course.kind), **self.course.quantities}] if self.key != self.name else []
+        return [self.name, list(self.values), *course]
 
 
 def typical_switch(name: str) -> Switch:
@@ -90,21 +108,39 @@ def parse_switch(text: str) -> Switch:
     InputError
         Naming the quantities that the effect takes, their units and ranges.
     """
-    name, equals, sizes = text.partition("=")
-    quantities = effect(name).quantities
-    values = {q.name: q.typical for q in quantities}
+    key, equals, sizes = text.partition("=")
+    values = {q.name: q.typical for q in _quantities(key)}
     if equals:
-        _read_sizes(name, text, sizes, values)
-    return Switch(name, tuple(values.values()))
+        _read_sizes(key, text, sizes, values)
+    return _switch(key, values)
+
+
+def _switch(key: str, values: Mapping[str, float]) -> Switch:
+    name, _, kind = key.partition(_COURSE)
+    sizes = tuple(values[q.name] for q in effect(name).quantities)
+    return Switch(name, sizes, Course(_kind(kind), tuple(values.values())[len(sizes) :]))
+
+
+def _quantities(key: str) -> tuple[Quantity, ...]:
+    """Return the quantities of an effect and of its course."""
+    name, _, kind = key.partition(_COURSE)
+    return (*effect(name).quantities, *COURSES[_kind(kind)])
+
+
+def _kind(text: str) -> CourseKind:
+    kinds = [str(k) for k in CourseKind]
+    if text and text not in kinds:
+        raise InputError("course", f"{text!r} is not known", expected=", ".join(kinds))
+    return CourseKind(text or CourseKind.CONSTANT)
 
 
 def parse_switches(texts: Sequence[str]) -> tuple[Switch, ...]:
     """Return the switches of several texts; no effect may be given twice."""
     switches = tuple(parse_switch(text) for text in texts)
-    names = [switch.name for switch in switches]
+    names = [switch.key for switch in switches]
     for name in names:
         if names.count(name) > 1:
-            raise _refusal(name, name, "is given twice")
+            raise _refusal(name.partition(_COURSE)[0], name, "is given twice")
     return switches
 
 
@@ -122,22 +158,23 @@ def switches_from_mapping(effects: object, file: Path | str) -> tuple[Switch, ..
 
 
 def _from_mapping(name: str, sizes: object, file: Path | str) -> Switch:
-    values = {q.name: q.typical for q in effect(name).quantities}
+    key, name = name, name.partition(_COURSE)[0]
+    values = {q.name: q.typical for q in _quantities(key)}
     given = {} if sizes is None else sizes
     if not isinstance(given, Mapping):
         raise _refusal(name, f"effects.{name}", "is no mapping", file)
-    for key, value in given.items():
-        if key not in values:
-            raise _refusal(name, f"effects.{name}", f"has no quantity {key!r}", file)
+    for quantity, value in given.items():
+        if quantity not in values:
+            raise _refusal(name, f"effects.{key}", f"has no quantity {quantity!r}", file)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise _refusal(name, f"effects.{name}.{key}", f"{value!r} is no number", file)
-        values[key] = float(value)
-    return Switch(name, tuple(values.values()))
+            raise _refusal(name, f"effects.{key}.{quantity}", f"{value!r} is no number", file)
+        values[quantity] = float(value)
+    return _switch(key, values)
 
 
-def _read_sizes(name: str, text: str, sizes: str, values: dict[str, float]) -> None:
+def _read_sizes(key: str, text: str, sizes: str, values: dict[str, float]) -> None:
     """Put the sizes of a text into ``values``."""
-    quantities = effect(name).quantities
+    name, quantities = key.partition(_COURSE)[0], _quantities(key)
     first = _SIZE.match(sizes)
     if first is None or first["unit"] not in ("", quantities[0].unit):
         raise _refusal(name, text, f"{sizes!r} does not begin with a size")

@@ -142,7 +142,7 @@ def read_concealed(file: Path) -> tuple[Concealed, ...]:
     document = _json(file)
     listed = document.get("effects") if isinstance(document, dict) else None
     try:
-        return tuple(Concealed(name=name, values=_numbers(values)) for name, values in listed or ())
+        return tuple(Concealed(name=name, values=_numbers(values)) for name, values, *_ in listed or ())
     except (TypeError, ValueError) as error:
         expected = '"effects": [["laser_tilt", [0.6, 40.0]]], a list of names and numbers'
         raise InputError(file, "its effects cannot be read", place="effects", expected=expected) from error

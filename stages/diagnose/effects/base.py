@@ -17,6 +17,7 @@ from pipeline.arrays import Float, Int
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
+from pipeline.physics.course import CourseKind
 
 Shape = tuple[float, ...]
 _STEP_RAD = 1e-5
@@ -227,8 +228,18 @@ class EffectModel(ABC):
 
     name: str
     amplitudes: tuple[Amplitude, ...]
+    kind: CourseKind = CourseKind.CONSTANT
     # 1 σ of what the law leaves out, as a part of the effect's size.
     law_sigma: float = 0.002
+
+    @property
+    def law(self) -> str:
+        """Name of the law in the catalogue, whatever its course."""
+        return self.name
+
+    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the numbers of the effect's course by name."""
+        return {}
 
     def shape_step(self, shape: Shape) -> float | None:
         """Return by how much the shape's number may be off the grid; None where it is a choice."""
@@ -269,10 +280,10 @@ class EffectModel(ABC):
     def equation(self, shape: Shape, amplitude: Float) -> str:
         """Return the catalogue's law with the numbers to put into it."""
         numbers = (f"{name} = {value:.5g}" for name, value in self.quantities(shape, amplitude).items())
-        return f"{effect(self.name).law}, {', '.join(numbers)}"
+        return f"{effect(self.law).law}, {', '.join(numbers)}"
 
     def possible(self, shape: Shape, amplitude: Float) -> bool:
         """Return whether every quantity lies within the catalogue's range."""
-        ranges = {q.name: (q.low, q.high) for q in effect(self.name).quantities}
+        ranges = {q.name: (q.low, q.high) for q in effect(self.law).quantities}
         found = self.quantities(shape, amplitude)
         return all(low <= found[name] <= high for name, (low, high) in ranges.items() if name in found)

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
+from pipeline.physics.course import CourseKind
 from pipeline.physics.effect import Quantity
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 
@@ -47,6 +48,7 @@ class Drifting(Worded):
     """A static effect that comes up as 1 − exp(−t/t₀); the shape is t₀ in s."""
 
     static: EffectModel
+    kind = CourseKind.EXPONENTIAL
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return time constants from the shortest, a step at the start, to the longest, a straight line."""
@@ -57,19 +59,23 @@ class Drifting(Worded):
         """Return a part of the time constant."""
         return 0.3 * shape[0]
 
-    def course(self, time_s: Float, shape: Shape) -> Float:
+    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the time constant."""
+        return {"time_s": shape[0]}
+
+    def reached(self, time_s: Float, shape: Shape) -> Float:
         """Return (M,) the part of the final size that is reached."""
         return np.asarray(-np.expm1(-time_s / shape[0]))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the static shift times the share of its final size that is reached."""
         static = self.static.image_shift_px(points, (), amplitude)
-        return np.asarray(self.course(points.time_s, shape)[:, None] * static)
+        return np.asarray(self.reached(points.time_s, shape)[:, None] * static)
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the static shift times the share of its final size that is reached."""
         return np.asarray(
-            self.course(points.time_s, shape) * self.static.sheet_shift_mm(points, (), amplitude)
+            self.reached(points.time_s, shape) * self.static.sheet_shift_mm(points, (), amplitude)
         )
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
@@ -84,6 +90,12 @@ class Periodic(Worded):
 
     The frequency found is the lowest of all that look the same in these frames, |f − k · frame rate|.
     """
+
+    kind = CourseKind.SINUSOID
+
+    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the frequency."""
+        return {"frequency_hz": shape[0]}
 
     @abstractmethod
     def moved_px(self, points: ImagePoints, size: Float) -> Float:

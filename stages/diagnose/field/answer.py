@@ -137,7 +137,7 @@ def with_field(
     found = replace(found, global_p=_both(found.global_p, alone.global_p))
     if examined is not None and examined.best is not None and examined.best.fit.terms:
         met = met_in_field(examined, field.field, stated)
-        names = [t.model.name for t in examined.best.fit.terms]
+        names = [t.model.law for t in examined.best.fit.terms]
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
         return _alone(found, alone, field.field, gauge is not None)

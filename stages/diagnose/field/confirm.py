@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.arrays import Float
 from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.effects.library import columns
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.run import ring_points
@@ -85,6 +86,10 @@ def met_in_field(
         return ()
     out: list[InField | None] = []
     for term in best.fit.terms:
+        if isinstance(term.model, Coursed) and term.model.kind in OWN_CLOCK:
+            # What happens at a time of the gauge run need not happen in another recording.
+            out.append(None)
+            continue
         own = partial_of("all", best.evidence, best, term, stated)
         known = own is not None and np.isfinite(own.covariance).all()
         covariance = own.covariance if own is not None and known else np.zeros((len(term.amplitude),) * 2)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from stages.diagnose.gauge.confirm import quantities
+from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.examine import ADEQUATE, Examined
-from stages.diagnose.result import Candidate, EffectFound, Picture, Verdict
+from stages.diagnose.gauge.judge import Verdicts
+from stages.diagnose.gauge.run import Term
+from stages.diagnose.result import Candidate, Confirmation, EffectFound, Picture, Verdict
 
 # Likelihoods do not contain the small errors of laws and of image formation, so that odds of 1000 to 1 are
 # asked for instead of 30 to 1: a drawn focal length was once called a cone at 0.99. Debt: data/debts.md.
@@ -21,13 +25,15 @@ def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     if best is None or verdicts is None or not best.named:
         return ()
     each = zip(best.fit.terms, examined.sizes, examined.confirmed, strict=True)
-    return tuple(
-        EffectFound(
-            term.model.name, verdicts.chance_of(term.model.name), quantities(sized),
-            term.model.statement(term.shape, term.amplitude), term.model.equation(term.shape, term.amplitude),
-            confirmed,
-        )
-        for term, sized, confirmed in each
+    return tuple(_found(verdicts, term, sized, confirmed) for term, sized, confirmed in each)
+
+
+def _found(verdicts: Verdicts, term: Term, sized: Sized, confirmed: tuple[Confirmation, ...]) -> EffectFound:
+    model, shape = term.model, term.shape if sized.time_s is None else (sized.time_s.value,)
+    return EffectFound(
+        model.law, verdicts.chance_of(model.law), quantities(sized),
+        model.statement(shape, term.amplitude), model.equation(shape, term.amplitude),
+        confirmed, replace(course_of(sized), probability=verdicts.chance_of_course(model)),
     )  # fmt: skip
 
 
@@ -51,7 +57,7 @@ def members(examined: Examined) -> tuple[str, ...]:
     if examined.verdicts is None:
         return ()
     pairs = zip(examined.verdicts.probability, examined.verdicts.judged, strict=True)
-    names = [n for p, j in pairs if p > _IN_CLASS and j.named for n in j.names]
+    names = [n for p, j in pairs if p > _IN_CLASS and j.named for n in j.laws]
     return tuple(dict.fromkeys([*names, *examined.unsplit]))
 
 
@@ -93,7 +99,7 @@ def verdict_of(examined: Examined) -> Verdict:
     contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
     if contradicted and all(contradicted):
         return Verdict.UNEXPLAINED
-    sure = all(verdicts.chance_of(n) > CONFIDENT for n in best.names)
+    sure = all(verdicts.chance_of(law) > CONFIDENT for law in best.laws)
     confirmed = all(each for each in examined.confirmed)
     # An effect that is contradicted by the field is withdrawn; the others stay.
     doubted = any(contradicted) or bool(examined.unsplit)

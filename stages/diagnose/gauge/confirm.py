@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.arrays import Float
+from pipeline.physics.course import CourseKind
 from stages.diagnose.agreement import TELLING, same
+from stages.diagnose.effects.base import Shape
+from stages.diagnose.gauge.change_point import change_time
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import freed
 from stages.diagnose.inference import Evidence, Stated, estimate
-from stages.diagnose.result import Confirmation, Value
+from stages.diagnose.result import Confirmation, CourseFound, Value
 
 # Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is
 # compared about five times, and noise may contradict it once in a thousand times.
@@ -38,7 +41,7 @@ def confirmations(
     run: GaugeRun, judged: Judged, regimes: Sequence[Regime], term: Term, stated: Stated
 ) -> tuple[Confirmation, ...]:
     """Return what disjoint parts of the run say of a term, each against all the others."""
-    parts = [*by_bore(regimes), *_by_direction(run, judged), *_by_half(run)]
+    parts = [*by_bore(regimes), *_by_direction(run, judged), *_by_half(run, term)]
     _, *each = evidence(run, judged.fit, (), [part for _, part in parts])
     found = [
         partial
@@ -81,9 +84,14 @@ def _by_direction(run: GaugeRun, judged: Judged) -> list[tuple[str, Part]]:
     return [(where, Part(mask)) for where, mask in masks]
 
 
-def _by_half(run: GaugeRun) -> list[tuple[str, Part]]:
-    middle = run.time_s[len(run.time_s) // 2]
-    return [("first half", Part(run.time_s < middle)), ("second half", Part(run.time_s >= middle))]
+def _by_half(run: GaugeRun, term: Term) -> list[tuple[str, Part]]:
+    """Return the halves of the run, or of what comes after a step."""
+    step = term.model.kind is CourseKind.STEP
+    begun = run.time_s - run.time_s[0] >= (term.shape[0] if step else 0.0)
+    if begun.sum() < 2 * _LEAST_FRAMES:
+        return []
+    early = run.time_s < np.median(run.time_s[begun])
+    return [("first half", Part(begun & early)), ("second half", Part(begun & ~early))]
 
 
 def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
@@ -142,18 +150,26 @@ def _words(term: Term, part: Partial) -> str:
 
 @dataclass(frozen=True)
 class Sized:
-    """A term, its continuous shape free, with the covariance (Q, Q) of its amplitudes."""
+    """A term, its continuous shape free, with the covariance (Q, Q) of its amplitudes.
+
+    ``time_s`` is when it came, if it came in a step.
+    """
 
     term: Term
     covariance: Float
+    time_s: Value | None = None
 
 
-def sizes_of(run: GaugeRun, judged: Judged, stated: Stated) -> tuple[Sized, ...]:
+def sizes_of(run: GaugeRun, judged: Judged, stated: Stated, alike: float) -> tuple[Sized, ...]:
     """Return the terms of a hypothesis with covariances: by the data, shapes, and laws."""
     free = freed(run, judged.fit)
     whole = judged.evidence if free.terms == judged.fit.terms else evidence(run, free, ())[0]
     about = replace(judged, fit=free, evidence=whole)
-    return tuple(_sized(about, term, stated) for term in free.terms)
+    sized = [_sized(about, term, stated) for term in free.terms]
+    return tuple(
+        replace(s, time_s=change_time(run, free, k, alike)) if s.term.model.kind is CourseKind.STEP else s
+        for k, s in enumerate(sized)
+    )
 
 
 def _sized(judged: Judged, term: Term, stated: Stated) -> Sized:
@@ -164,15 +180,28 @@ def _sized(judged: Judged, term: Term, stated: Stated) -> Sized:
 
 
 def quantities(sized: Sized) -> dict[str, Value]:
-    """Return the catalogue's quantities with 1 σ, by draws of the amplitudes."""
+    """Return the catalogue's quantities with 1 σ."""
+    return _drawn(sized, sized.term.model.quantities)
+
+
+def course_of(sized: Sized) -> CourseFound:
+    """Return the term's course with 1 σ."""
+    numbers = _drawn(sized, sized.term.model.course)
+    if sized.time_s is not None:
+        numbers["time_s"] = sized.time_s
+    return CourseFound(str(sized.term.model.kind), numbers)
+
+
+def _drawn(sized: Sized, numbers: Callable[[Shape, Float], dict[str, float]]) -> dict[str, Value]:
+    """Return numbers of a term with 1 σ, by draws of the amplitudes."""
     term, random = sized.term, np.random.default_rng(0)
     draws = random.multivariate_normal(term.amplitude, sized.covariance, _DRAWS, check_valid="ignore")
-    middle = term.model.quantities(term.shape, term.amplitude)
-    drawn = [term.model.quantities(term.shape, a) for a in draws]
+    middle = numbers(term.shape, term.amplitude)
+    drawn = [numbers(term.shape, a) for a in draws]
     out = {}
     for name, value in middle.items():
         apart = np.array([d[name] for d in drawn]) - value
-        if name.endswith("_deg") and name.startswith("direction"):
+        if name in ("direction_deg", "phase_deg"):
             apart = (apart + 180) % 360 - 180
         out[name] = Value(value, float(np.sqrt(np.mean(apart**2))))
     return out

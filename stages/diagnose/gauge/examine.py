@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -12,8 +13,10 @@ from pipeline.arrays import Bool
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
+from pipeline.physics.course import CourseKind
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses
 from stages.diagnose.effects.generic import GenericTerm, Moves
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.confirm import Sized, by_bore, confirmations, partial_of, sizes_of
@@ -29,6 +32,11 @@ from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location,
 
 # A gauge is straight and round, so that effects of the pipe's own shape are not tested.
 OF_A_PIPE = frozenset({"ovality", "pipe_bend"})
+_IN_TIME = MappingProxyType({
+    CourseKind.CONSTANT: "static", CourseKind.STEP: "event", CourseKind.RAMP: "drift",
+    CourseKind.EXPONENTIAL: "drift", CourseKind.SINUSOID: "periodic", CourseKind.SPEED: "speed",
+    CourseKind.REVERSAL: "reversal", CourseKind.DISTANCE: "static",
+})  # fmt: skip
 # A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
@@ -55,9 +63,11 @@ def _pattern(term: Term) -> tuple[str, str, int | None]:
     if isinstance(model, Nameless):
         fixed_to, time, harmonic = model.goes_with(term.shape)
         return str(fixed_to), time, harmonic
-    known = EFFECTS[model.name]
-    order = int(term.shape[0]) if model.name == "sheet_waviness" else known.harmonic
-    return str(known.fixed_to), known.time, order
+    known = EFFECTS[model.law]
+    numbers = model.quantities(term.shape, term.amplitude)
+    order = int(numbers["order"]) if "order" in numbers else known.harmonic
+    time = _IN_TIME[model.kind] if isinstance(model, Coursed) else known.time
+    return str(known.fixed_to), time, order
 
 
 def _exponent(
@@ -94,7 +104,7 @@ def _own_exponent(judged: Judged, term: Term) -> float | None:
     """Return the law's own exponent over these bores."""
     if isinstance(term.model, GenericTerm):
         return float(term.model.exponent) if term.model.moves is Moves.LINE else None
-    known = EFFECTS.get(term.model.name)
+    known = EFFECTS.get(term.model.law)
     return known.radial_exponent if known is not None else None
 
 
@@ -151,9 +161,10 @@ class Examined:
 
 
 def examine(
-    run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe, without: Collection[str] = ()
-) -> Examined:
-    """Search a gauge run for left-out effects.
+    run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe, without: Collection[str] = (),
+    courses: tuple[CourseKind, ...] = SEARCHED,
+) -> Examined:  # fmt: skip
+    """Search a gauge run for left-out effects, each law also with each of ``courses``.
 
     What is known to look like an effect ``without`` whose model the library has to do is not told from it.
 
@@ -172,13 +183,14 @@ def examine(
             about, shapes = ability(measurements, nothing, library)
             table = feasibility(about, shapes, library, stated)
             groups = inseparable(table, about, shapes, library, stated)
-            searched = search(measurements, nothing, library, stated)
+            coursed = with_courses(library, courses)
+            searched = search(measurements, nothing, coursed, stated)
             # Effects that the library lacks move rings and fiducials as well.
             beyond = patterns_p(searched.run, searched.nothing, stated)
             seen = Examined(searched, None, (), table, groups, patterns_p=beyond)
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))
-            judged = _judged(replace(seen, verdicts=judge(searched, library, stated)), library, stated)
+            judged = _judged(replace(seen, verdicts=judge(searched, coursed, stated)), coursed, stated)
             return replace(judged, unsplit=(*judged.unsplit, *_untested(judged, without)))
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
@@ -187,7 +199,7 @@ def examine(
 def _untested(judged: Examined, without: Collection[str]) -> tuple[str, ...]:
     """Return the effects of the found ones' classes that there is no model of."""
     best = judged.best
-    names = best.names if best is not None and best.named else ()
+    names = best.laws if best is not None and best.named else ()
     return tuple(mate for name in names for mate in class_of(name) if mate in without)
 
 
@@ -213,7 +225,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
         seen,
         confirmed=tuple(confirmations(run, best, regimes, term, stated) for term in terms),
         unsplit=unsplit,
-        sizes=sizes_of(run, best, stated) if terms else (),
+        sizes=sizes_of(run, best, stated, alike) if terms else (),
         location=location_of(run, shown, regimes, stated),
         quality=fit_quality(run, nothing, shown, regimes, stated),
     )

@@ -12,7 +12,9 @@ import numpy as np
 
 from pipeline.arrays import Float, Int
 from pipeline.physics.catalogue import effect
+from pipeline.physics.course import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import span
@@ -75,18 +77,32 @@ def not_told_apart(
     alike: float,
 ) -> tuple[str, ...]:  # fmt: skip
     """Return the effects that this run is not expected to tell from one of the terms at the size found."""
-    shapes = {name: _middle(model.shapes(*span(run))) for name, model in library.items()}
-    shapes |= {t.model.name: t.shape for t in terms}
-    asked = [(library[name], shape) for name, shape in shapes.items() if shape is not None]
-    about = evidence(run, nothing, asked)[0].deflated(alike)
-    rivals = {m.name: places_of(about, m, s) for m, s in asked if m.name not in {t.model.name for t in terms}}
+    laws = {t.model.law for t in terms}
+    rivals = [
+        (model, shape)
+        for model in library.values()
+        if model.law not in laws
+        for shape in _shapes_beside(model, terms, _middle(model.shapes(*span(run))))
+    ]
+    about = evidence(run, nothing, [*((t.model, t.shape) for t in terms), *rivals])[0].deflated(alike)
     blocks = [(places_of(about, t.model, t.shape), t.amplitude) for t in terms]
-    return tuple(
-        name
-        for name, rival in rivals.items()
+    places = [(model.law, places_of(about, model, shape)) for model, shape in rivals]
+    near = (
+        law
+        for law, rival in places
         if np.diag(about.information)[rival].min() > 0
         and any(expected_gain(about, stated, block, size, rival) < APART for block, size in blocks)
     )
+    return tuple(dict.fromkeys(near))
+
+
+def _shapes_beside(model: EffectModel, terms: Sequence[Term], middle: Shape | None) -> set[Shape]:
+    """Return the shapes at which a model is a rival of terms: their own course's, else the middle one.
+
+    A law with a course rivals only terms with the same course.
+    """
+    beside = {t.shape for t in terms if t.model.kind is model.kind and model.kind is not CourseKind.CONSTANT}
+    return beside or ({middle} if middle is not None and not isinstance(model, Coursed) else set())
 
 
 def expected_gain(about: Evidence, stated: Stated, block: Int, amplitude: Float, rival: Int) -> float:

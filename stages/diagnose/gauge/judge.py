@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float
 from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import DECOYS, Nameless
 from stages.diagnose.gauge.elimination import Part
@@ -68,6 +69,11 @@ class Judged:
         return tuple(sorted(t.model.name for t in self.fit.terms))
 
     @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of the effects' laws, in order."""
+        return tuple(sorted({t.model.law for t in self.fit.terms}))
+
+    @property
     def named(self) -> bool:
         """Whether all its effects are of the library, and there are some."""
         return bool(self.fit.terms) and not any(isinstance(t.model, Nameless) for t in self.fit.terms)
@@ -96,9 +102,15 @@ class Verdicts:
     formula: Judged
     alike: float
 
-    def chance_of(self, name: str) -> float:
-        """Return the chance that an effect is among the causes."""
-        return float(sum(p for p, j in zip(self.probability, self.judged, strict=True) if name in j.names))
+    def chance_of(self, law: str) -> float:
+        """Return the chance that a law is among the causes, with whatever course."""
+        return float(sum(p for p, j in zip(self.probability, self.judged, strict=True) if law in j.laws))
+
+    def chance_of_course(self, model: EffectModel) -> float:
+        """Return the chance of an effect's course if its law is among the causes."""
+        pairs = zip(self.probability, self.judged, strict=True)
+        both = sum(p for p, j in pairs if model.name in j.names)
+        return float(min(both / max(self.chance_of(model.law), 1e-300), 1.0))
 
 
 def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
@@ -128,8 +140,10 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
         [searched.nothing, searched.found, *searched.rivals, *_decoyed(searched, stated), formula]
     )
     fits = [refined(run, f) for f in fits]
-    judged = [judged_of(run, f, regimes, stated, alike, beforehand(run, f, len(library))) for f in fits]
-    of_formula = next(j for j in judged if j.fit is formula) if formula.terms else judged[0]
+    laws = len({model.law for model in library.values()})
+    judged = [judged_of(run, f, regimes, stated, alike, beforehand(run, f, laws)) for f in fits]
+    patterns = [t.model.name for t in formula.terms]
+    of_formula = next((j for j in judged if [t.model.name for t in j.fit.terms] == patterns), judged[0])
     nothing = next(j for j in judged if not j.fit.terms)
     # A hypothesis that predicts held-out regimes worse than the stated instrument is discarded.
     allowed = np.array([j.heldout <= nothing.heldout for j in judged])
@@ -159,9 +173,11 @@ def beforehand(run: GaugeRun, found: Fit, effects: int) -> float:
     if nameless:
         chance *= _NAMELESS
     for t in found.terms:
-        formula = (t.model, t.shape) in VOCABULARY
-        rivals = len(VOCABULARY) if formula else effects
-        chance /= rivals * max(len(t.model.shapes(*span(run))) / _PEAK, 1.0) if not formula else rivals
+        if (t.model, t.shape) in VOCABULARY:
+            chance /= len(VOCABULARY)
+            continue
+        courses = len(SEARCHED) if isinstance(t.model, Coursed) else 1
+        chance /= effects * courses * max(len(t.model.shapes(*span(run))) / _PEAK, 1.0)
     return float(-2 * np.log(chance))
 
 

@@ -57,7 +57,7 @@ def ring_points(state: Unknowns, rings: BoreRings, time_s: Float, width_px: Floa
     passing = _passing(state, time_s, rings.frame, xyz_c)
     rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
     return ImagePoints(
-        state.probe, rings.frame, time_s[rings.frame], rings.uv, xyz_c, normal_c, along_c,
+        state.probe, rings.frame, time_s[rings.frame] - time_s[0], rings.uv, xyz_c, normal_c, along_c,
         rate[:, None] * rings.outward, speed_along(state, time_s)[rings.frame], True, width_px,
         np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2], per_px_c=along_ray,
     )  # fmt: skip
@@ -71,7 +71,7 @@ def edge_points(state: Unknowns, edges: Edges, time_s: Float) -> ImagePoints:
     passing = _passing(state, time_s, edges.frame, xyz_c)
     by_c = state.probe.camera.project_jacobian(xyz_c).by_point
     return ImagePoints(
-        state.probe, edges.frame, time_s[edges.frame], edges.uv, xyz_c, normal_c, along_c,
+        state.probe, edges.frame, time_s[edges.frame] - time_s[0], edges.uv, xyz_c, normal_c, along_c,
         np.einsum("mij,mj->mi", by_c, passing), speed_along(state, time_s)[edges.frame], False,
         np.full(len(edges.uv), np.nan), np.arctan2(edges.xyz_p[:, 1], edges.xyz_p[:, 0]), edges.xyz_p[:, 2],
     )  # fmt: skip

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipeline.arrays import Float
+from pipeline.physics.course import CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.gauge.change_point import retimed
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.inference import Score, Stated, places_of, score
@@ -41,14 +43,10 @@ def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: 
     shapes = {m.name: m.shapes(*span(run)) for m in models}
     few = [(m, s) for m in models if len(shapes[m.name]) <= _MANY for s in shapes[m.name]]
     best = _best(run, found, few, stated)
-    thin = thinned(run)
-    for m in models:
-        if len(shapes[m.name]) <= _MANY:
-            continue
-        coarse = _best(thin, found, [(m, s) for s in shapes[m.name]], stated)
-        for one in coarse:
-            fine = _best(run, found, [(m, s) for s in _near(one.shape, shapes[m.name])], stated)
-            best += [replace(f, tried=len(shapes[m.name])) for f in fine]
+    many = [(m, s) for m in models if len(shapes[m.name]) > _MANY for s in shapes[m.name]]
+    coarse = _best(thinned(run), found, many, stated)
+    near = [(c.model, s) for c in coarse for s in _near(c.shape, shapes[c.model.name])]
+    best += [replace(f, tried=len(shapes[f.model.name])) for f in _best(run, found, near, stated)]
     return sorted(best, key=lambda s: -s.score.statistic / max(len(s.score.amplitude), 1))
 
 
@@ -119,14 +117,25 @@ class FreeShape(EffectModel):
     step: float
     bounds: tuple[float, float]
     name: str = field(init=False)
+    kind: CourseKind = field(init=False)
     amplitudes: tuple[Amplitude, ...] = field(init=False)
     law_sigma: float = field(init=False)
 
     def __post_init__(self) -> None:
         off = Amplitude("shape off the middle", "", self.step)
         object.__setattr__(self, "name", self.model.name)
+        object.__setattr__(self, "kind", self.model.kind)
         object.__setattr__(self, "amplitudes", (*self.model.amplitudes, off))
         object.__setattr__(self, "law_sigma", self.model.law_sigma)
+
+    @property
+    def law(self) -> str:
+        """See `EffectModel.law`."""
+        return self.model.law
+
+    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the effect's."""
+        return self.model.course(*self.at(amplitude))
 
     def at(self, amplitude: Float) -> tuple[Shape, Float]:
         """Return the effect's own shape, within bounds, and its amplitudes."""
@@ -172,7 +181,8 @@ def freed(run: GaugeRun, found: Fit) -> Fit:
 
 
 def refined(run: GaugeRun, found: Fit) -> Fit:
-    """Return the fit with continuous shapes at their best, unless it then fits worse."""
+    """Return the fit with steps and continuous shapes at their best, unless it then fits worse."""
+    found = retimed(run, found)
     free = freed(run, found)
     if free.terms == found.terms:
         return found

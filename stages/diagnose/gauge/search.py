@@ -26,6 +26,7 @@ from stages.diagnose.inference import Stated
 # Debt: data/debts.md.
 DETECTED = 1e-4
 _REFITTED = 4
+_OTHER_COURSES = 2
 _MOST_EFFECTS = 3
 _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
@@ -197,13 +198,22 @@ def global_p(scores: Sequence[Scored]) -> float:
 
 def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored], most: int = _REFITTED) -> list[Fit]:
     """Return the fits with each of the most promising effects added, best first; no impossible sizes."""
-    promising = sorted(scores, key=lambda s: -s.score.gain)[:most]
+    promising = _promising(scores, most)
     worth = [s for s in promising if s.score.gain > _WORTH_REFITTING * promising[0].score.gain]
     # The linear prediction of a large effect is wrong, so that its fit starts from size zero.
     terms = [Term(s.model, s.shape, 0 * s.score.amplitude) for s in worth]
     fits = [fit(run, found.state, (*found.terms, term), _RIVAL_ITERATIONS) for term in terms]
     possible = [f for f in fits if f.terms[-1].model.possible(f.terms[-1].shape, f.terms[-1].amplitude)]
     return sorted(possible or fits, key=lambda f: f.cost)
+
+
+def _promising(scores: Sequence[Scored], most: int) -> list[Scored]:
+    """Return the scores of the most gain: so many laws with their best courses, and the best law's others."""
+    ranked = sorted(scores, key=lambda s: -s.score.gain)
+    laws = list(dict.fromkeys(s.model.law for s in ranked))[:most]
+    best = [next(s for s in ranked if s.model.law == law) for law in laws]
+    others = [s for s in ranked if laws and s.model.law == laws[0] and s is not best[0]]
+    return [*best, *others[:_OTHER_COURSES]]
 
 
 def alike(scores: Sequence[Scored]) -> float:

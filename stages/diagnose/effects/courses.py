@@ -1,0 +1,179 @@
+"""Laws of the library with a course: a knocked sheet, a lens that warms, a baseline that swings.
+
+Any geometric law may come with any course. A product that the catalogue has as an effect of its own
+(`laser_rocking`, `baseline_drift`, ...) keeps its own name and model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.physics.catalogue import effect
+from pipeline.physics.course import Course, CourseKind
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+
+# Laws of parts that a knock, heat or play can move during a recording, each with its shapes.
+_MOVABLE: Mapping[str, tuple[Shape, ...]] = {
+    "laser_tilt": ((),), "laser_cone": ((),), "baseline": ((),), "beam_decentre": ((),),
+    "sheet_waviness": ((2.0,), (3.0,)), "principal_point": ((),), "focal_scale": ((),),
+    "radial_distortion": ((),), "sensor_tilt": ((),), "pixel_aspect": ((),),
+}  # fmt: skip
+# What the catalogue has under names of its own.
+_NAMED = {
+    ("laser_tilt", CourseKind.SINUSOID), ("baseline", CourseKind.EXPONENTIAL),
+    ("focal_scale", CourseKind.EXPONENTIAL), ("principal_point", CourseKind.EXPONENTIAL),
+}  # fmt: skip
+# Courses that are searched for every law.
+SEARCHED = (
+    CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SPEED, CourseKind.REVERSAL,
+    CourseKind.DISTANCE,
+)  # fmt: skip
+# Courses that tell of times of their own recording alone.
+OWN_CLOCK = frozenset({CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SINUSOID})
+# Times of a step on the first grid: a step half a cell off (a 64th of the recording) still keeps 97 % of
+# its information in the middle of the recording, n (T − n) / T² of what is before and after.
+_TIMES = 32
+# Share of the recording at either end in which no step is searched: half a second of 7 s shows 8 rings at
+# 15 a second, and from fewer the spread of their common errors is not known.
+_EDGE = 1 / 14
+_SHARES = (0.1, 0.2, 0.4, 0.8, 1.6)
+_SPEED_MM_S, _DISTANCE_MM = 20.0, 100.0
+_WORDS: Mapping[CourseKind, str] = {
+    CourseKind.STEP: "a step at {time_s:.2f} s: before it there is none of it",
+    CourseKind.RAMP: "growing evenly from nothing at the first frame to this at {time_s:.1f} s",
+    CourseKind.EXPONENTIAL: "reached in the end, with a time constant of {time_s:.1f} s",
+    CourseKind.SINUSOID: "the amplitude of a swing at {frequency_hz:.2f} Hz",
+    CourseKind.SPEED: "at a speed of {speed_mm_s:.0f} mm/s, and in proportion to the speed",
+    CourseKind.REVERSAL: "while the probe travels forward, and the opposite while it travels backward",
+    CourseKind.DISTANCE: "after {distance_mm:.0f} mm, in proportion to the way travelled",
+}
+_FORMULAS: Mapping[CourseKind, str] = {
+    CourseKind.STEP: "0 before time_s, 1 from then on", CourseKind.RAMP: "t / time_s",
+    CourseKind.EXPONENTIAL: "1 − exp(−t / time_s)", CourseKind.SINUSOID: "sin(2π frequency_hz t + phase)",
+    CourseKind.SPEED: "v / speed_mm_s", CourseKind.REVERSAL: "sgn v", CourseKind.DISTANCE: "s / distance_mm",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Coursed(EffectModel):
+    """A law of the library at one shape of its own, with a course; the shape is the course's number.
+
+    A swing has every amplitude twice: of its sine, then of its cosine.
+    """
+
+    static: EffectModel
+    own: Shape
+    kind: CourseKind
+    name: str = field(init=False)
+    amplitudes: tuple[Amplitude, ...] = field(init=False)
+    law_sigma: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        amplitudes = self.static.amplitudes
+        if self.kind is CourseKind.SINUSOID:
+            amplitudes = tuple(
+                replace(a, name=f"{a.name}, {wave}") for wave in ("sine", "cosine") for a in amplitudes
+            )
+        order = "".join(f" {n:.0f}" for n in self.own)
+        object.__setattr__(self, "name", f"{self.static.name}{order}, {self.kind}")
+        object.__setattr__(self, "amplitudes", amplitudes)
+        object.__setattr__(self, "law_sigma", self.static.law_sigma)
+
+    @property
+    def law(self) -> str:
+        """See `EffectModel.law`."""
+        return self.static.law
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return the course's numbers to be searched; the size of the others is at a fixed reference."""
+        if self.kind is CourseKind.STEP:
+            inside = _EDGE + (1 - 2 * _EDGE) * (np.arange(_TIMES) + 0.5) / _TIMES
+            return tuple((float(t),) for t in duration_s * inside)
+        if self.kind is CourseKind.EXPONENTIAL:
+            return tuple((duration_s * share,) for share in _SHARES)
+        if self.kind is CourseKind.SINUSOID:
+            step = 0.5 / duration_s
+            return tuple((float(f),) for f in np.arange(2 * step, frame_rate / 2 + step / 2, step))
+        reference = {
+            CourseKind.RAMP: duration_s, CourseKind.SPEED: _SPEED_MM_S, CourseKind.DISTANCE: _DISTANCE_MM
+        }  # fmt: skip
+        return ((reference[self.kind],),) if self.kind in reference else ((),)
+
+    def shape_step(self, shape: Shape) -> float | None:
+        """Return a part of the time constant, the step of a frequency; None where nothing is continuous."""
+        return {CourseKind.EXPONENTIAL: 0.3 * sum(shape), CourseKind.SINUSOID: 0.05}.get(self.kind)
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift at each point's part of the size."""
+        parts = self._parts(points, shape, amplitude)
+        return np.asarray(sum(f[:, None] * self.static.image_shift_px(points, self.own, a) for f, a in parts))
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift at each point's part of the size."""
+        parts = self._parts(points, shape, amplitude)
+        return np.asarray(sum(f * self.static.sheet_shift_mm(points, self.own, a) for f, a in parts))
+
+    def _parts(self, points: ImagePoints, shape: Shape, amplitude: Float) -> list[tuple[Float, Float]]:
+        """Return factors (M,) with the law's amplitudes (Q,) that they multiply."""
+        way = np.zeros(len(points.uv))
+        if points.distance_mm is not None:
+            # Of the camera, not of the wall point.
+            way = points.distance_mm - np.sum(points.xyz_c * points.along_c, axis=1)
+        at = points.time_s, way, points.speed_mm_s
+        if self.kind is not CourseKind.SINUSOID:
+            return [(Course(self.kind, shape).factor(*at), np.asarray(amplitude))]
+        sine, cosine = np.split(np.asarray(amplitude), 2)
+        waves = (Course(self.kind, (shape[0], phase)).factor(*at) for phase in (0.0, 90.0))
+        return list(zip(waves, (sine, cosine), strict=True))
+
+    def _swing(self, amplitude: Float) -> tuple[Float, float]:
+        """Return the law's amplitudes (Q,) along the longer axis of a swing's ellipse, and the phase, deg."""
+        both = np.asarray(amplitude).reshape(2, -1)
+        axis = np.linalg.svd(both)[2][0]
+        sine, cosine = both @ axis
+        return np.asarray(np.hypot(sine, cosine) * axis), float(np.degrees(np.arctan2(cosine, sine)))
+
+    def _size(self, amplitude: Float) -> Float:
+        """Return the law's amplitudes (Q,)."""
+        return self._swing(amplitude)[0] if self.kind is CourseKind.SINUSOID else np.asarray(amplitude)
+
+    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the numbers of the course, the phase of a swing among them."""
+        values = shape
+        if self.kind is CourseKind.SINUSOID:
+            values = (shape[0], self._swing(amplitude)[1])
+        return Course(self.kind, values).quantities
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the law's quantities at its size; the course's numbers stand in `course`."""
+        return self.static.quantities(self.own, self._size(amplitude))
+
+    def statement(self, shape: Shape, amplitude: Float) -> str:
+        """Return the law's sentence, and how it comes."""
+        words = _WORDS[self.kind].format(**self.course(shape, amplitude))
+        return f"{self.static.statement(self.own, self._size(amplitude)).rstrip('.')} ({words})."
+
+    def equation(self, shape: Shape, amplitude: Float) -> str:
+        """Return the law and its course with the numbers to put into them."""
+        known = self.quantities(shape, amplitude) | self.course(shape, amplitude)
+        numbers = ", ".join(f"{name} = {value:.5g}" for name, value in known.items())
+        return f"({effect(self.law).law}) × ({_FORMULAS[self.kind]}), {numbers}"
+
+
+def with_courses(
+    library: Mapping[str, EffectModel], kinds: tuple[CourseKind, ...] = SEARCHED
+) -> dict[str, EffectModel]:
+    """Return the library with every movable law of it also with each course."""
+    more = [
+        Coursed(library[name], own, kind)
+        for name, shapes in _MOVABLE.items()
+        if name in library
+        for own in shapes
+        for kind in kinds
+        if (name, kind) not in _NAMED
+    ]
+    return {**library, **{model.name: model for model in more}}

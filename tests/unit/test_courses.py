@@ -1,0 +1,139 @@
+"""Courses of effects: what they mean, in the simulator and in the diagnosis' library."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import InputError
+from pipeline.physics.course import COURSES, Course, CourseKind
+from pipeline.simulator.effects import switch_on
+from pipeline.simulator.effects.switch import parse_switch, parse_switches, switches_from_mapping
+from pipeline.simulator.laws.bench import bench_truth
+from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses
+from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px, texture_shift_px, without
+from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
+
+BORE = Bore(42.0, (4.0, -7.0, 0.0), (0.03, -0.02, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("course", "factor"),
+    [
+        (Course(), 1.0),
+        (Course(CourseKind.STEP, (2.9,)), 1.0),
+        (Course(CourseKind.STEP, (3.1,)), 0.0),
+        (Course(CourseKind.RAMP, (6.0,)), 0.5),
+        (Course(CourseKind.EXPONENTIAL, (3.0,)), 1 - np.exp(-1)),
+        (Course(CourseKind.SINUSOID, (0.25, 0.0)), -1.0),
+        (Course(CourseKind.SINUSOID, (0.25, 90.0)), 0.0),
+        (Course(CourseKind.SPEED, (20.0,)), -0.4),
+        (Course(CourseKind.REVERSAL), -1.0),
+        (Course(CourseKind.DISTANCE, (100.0,)), 0.3),
+    ],
+)
+def test_a_course_gives_the_part_of_the_size(course, factor):
+    assert course.factor(3.0, 30.0, -8.0) == pytest.approx(factor, abs=1e-12)
+    assert course.factor(np.full(4, 3.0), np.full(4, 30.0), np.full(4, -8.0)).shape == (4,)
+
+
+def test_a_course_with_a_wrong_number_is_refused():
+    with pytest.raises(InputError, match="time_s"):
+        Course(CourseKind.STEP)
+    with pytest.raises(InputError, match="does not fit"):
+        Course(CourseKind.SPEED, (0.0,))
+
+
+def test_a_switch_with_a_course_is_read_as_it_is_written():
+    switch = parse_switch("laser_tilt~step=0.35@25/4.6s")
+    assert switch.course == Course(CourseKind.STEP, (4.6,))
+    assert parse_switch(switch.text) == switch
+    assert switch.truth == ["laser_tilt", [0.35, 25.0], {"kind": "step", "time_s": 4.6}]
+    assert switches_from_mapping({switch.key: switch.numbers}, "scene") == (switch,)
+    assert len(parse_switches(["laser_tilt=0.1@0", switch.text])) == 2
+    with pytest.raises(InputError, match="given twice"):
+        parse_switches([switch.text, switch.text])
+    with pytest.raises(InputError, match="constant, step"):
+        parse_switch("laser_tilt~jump=0.35")
+
+
+def test_the_simulated_sheet_is_knocked_at_its_time_and_keeps_other_changes():
+    texts = ["laser_tilt~step=0.35@25/4.6s", "baseline~ramp=0.2/8s", "laser_tilt=0.1@115"]
+    truth = switch_on(bench_truth(50.8), parse_switches(texts))
+    start = float(truth.frames.time_s[0])
+    before, after = (truth.instrument_at(start + t).laser.sheet for t in (4.5, 4.7))
+    along = np.array([np.cos(np.radians(25)), np.sin(np.radians(25))])
+    leap = np.array([after.tilt_x - before.tilt_x, after.tilt_y - before.tilt_y])
+    assert np.degrees(np.arctan(leap @ along)) == pytest.approx(0.35, rel=1e-4)
+    assert np.hypot(before.tilt_x, before.tilt_y) == pytest.approx(np.tan(np.radians(0.1)), rel=1e-6)
+    assert after.baseline_mm - before.baseline_mm == pytest.approx(0.2 * 0.2 / 8, rel=1e-6)
+
+
+@pytest.mark.parametrize("text", ["ovality~step=0.1", "encoder_scale~ramp=0.01"])
+def test_what_is_no_part_of_the_instrument_has_no_course(text):
+    with pytest.raises(InputError, match="has no course"):
+        switch_on(bench_truth(50.8), [parse_switch(text)])
+
+
+def coursed(name, kind, own=()):
+    return Coursed(LIBRARY[name], own, kind)
+
+
+@pytest.mark.parametrize("name", ["laser_tilt", "principal_point", "sensor_tilt"])
+def test_a_step_is_nothing_before_its_time_and_the_law_itself_after(name):
+    model, law = coursed(name, CourseKind.STEP), LIBRARY[name]
+    size = np.array([a.plausible for a in law.amplitudes])
+    for points, shift in (
+        (ring_points(plain_probe(), BORE, 40), ring_shift_px),
+        (texture_points(plain_probe(), BORE), texture_shift_px),
+    ):
+        assert not np.any(shift(model, points, (5.1,), size))
+        assert np.array_equal(shift(model, points, (4.9,), size), shift(law, points, (), size))
+
+
+def test_a_swing_has_the_phase_and_size_of_its_two_waves():
+    model = coursed("principal_point", CourseKind.SINUSOID)
+    sine, cosine = np.array([0.3, 0.4]) * np.cos(0.7), np.array([0.3, 0.4]) * np.sin(0.7)
+    amplitude = np.concatenate([sine, cosine])
+    assert model.course((1.3,), amplitude)["frequency_hz"] == 1.3
+    size, phase = model.quantities((1.3,), amplitude), model.course((1.3,), amplitude)["phase_deg"]
+    along = size["shift_px"] * np.exp(1j * np.radians(size["direction_deg"]))
+    # The other end of the axis with the opposite phase is the same swing.
+    back = np.cos(np.radians(phase) - 0.7)
+    assert along * back == pytest.approx(0.3 + 0.4j, abs=1e-9)
+    points = ring_points(plain_probe(), BORE, 40, time_s=2.0)
+    moved = model.image_shift_px(points, (1.3,), amplitude)
+    assert moved[0] == pytest.approx(np.array([0.3, 0.4]) * np.sin(2 * np.pi * 1.3 * 2.0 + 0.7))
+
+
+def test_the_way_is_the_cameras_and_not_that_of_the_wall_it_sees():
+    points = ring_points(plain_probe(), BORE, 40)
+    ahead = np.sum(points.xyz_c * points.along_c, axis=1)
+    points = replace(points, distance_mm=75.0 + ahead)
+    model = coursed("baseline", CourseKind.DISTANCE)
+    assert model.sheet_shift_mm(points, (150.0,), np.array([0.2])) == pytest.approx(0.1)
+
+
+def test_the_library_has_every_movable_law_with_every_course_and_no_product_twice():
+    every = with_courses(LIBRARY)
+    assert len({m.name for m in every.values()}) == len(every)
+    assert {m.kind for m in every.values()} >= set(SEARCHED)
+    assert "baseline, exponential" not in every
+    assert "laser_tilt, step" in every
+    left = with_courses(without(["laser_tilt"]))
+    assert not any(m.law == "laser_tilt" for m in left.values())
+
+
+def test_statements_and_equations_tell_the_course_and_columns_its_slope():
+    points = ring_points(plain_probe(), BORE, 24)
+    for model in with_courses(LIBRARY).values():
+        if not isinstance(model, Coursed):
+            continue
+        shape = model.shapes(8.0, 30.0)[0]
+        size = np.array([a.plausible for a in model.amplitudes])
+        numbers = model.course(shape, size)
+        assert set(numbers) == {q.name for q in COURSES[model.kind]}
+        assert all(name in model.equation(shape, size) for name in numbers)
+        assert model.statement(shape, size).endswith(").")
+        if shape:
+            assert np.isfinite(columns(model, points, shape)).all()
