@@ -122,4 +122,12 @@ PICTURE_EFFECTS = (
         FixedTo.CAMERA, "static", "each pixel adds an offset of its own", "mean of dark frames",
         ("fixed_pattern",),
     ),
+    _effect(
+        "interreflection",
+        (Quantity("relative", "", 1.0, 0.0, 5.0, "light bounced once over that of a dull round bore"),),
+        FixedTo.PIPE, "static",
+        "E₁(s) = A ∫ K(s − s′) E₀(s′) ds′, K dx = (1 − X(2X² + 3)/(2(X² + 1)^1.5)) dX, X = |x|/2r",
+        "a glow about the line that ends a bore's width away, brighter where the wall is paler",
+        ("ambient_light",),
+    ),
 )  # fmt: skip

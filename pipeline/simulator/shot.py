@@ -17,6 +17,7 @@ import numpy as np
 from pipeline.arrays import Float, Float32
 from pipeline.geometry.axis import PipeAxis, distance_along
 from pipeline.recording.base import Illumination
+from pipeline.simulator.bounce import glow_of_lamps, glow_of_line
 from pipeline.simulator.calm import clear_mm
 from pipeline.simulator.instrument import TrueCamera, TrueInstrument, TrueLaser, TrueSensor
 from pipeline.simulator.kernel import in_bands
@@ -42,16 +43,24 @@ class Scenery:
         The wall's axis in P.
     surface : Surface
     texture : Texture
+    radius_mm : float
+        Mean of the wall.
+    thrown_back : (3,)
+        Share of its light, by colour, that is rendered as bounced once: mean reflectance, or 0.
     """
 
     axis: PipeAxis
     surface: Surface
     texture: Texture
+    radius_mm: float
+    thrown_back: Float
 
 
 def scenery_of(wall: Wall) -> Scenery:
     """Lay a wall out for rendering; takes about a second, once for all frames."""
-    return Scenery(wall.axis, surface_of(wall), texture_of(wall))
+    thrown_back = wall.interreflection * wall.albedo_bgr.mean((0, 1), dtype=float)
+    radius = float(wall.radius_mm.mean(dtype=float))
+    return Scenery(wall.axis, surface_of(wall), texture_of(wall), radius, thrown_back)
 
 
 @dataclass(frozen=True)
@@ -127,10 +136,12 @@ def light(scenery: Scenery, shot: Shot) -> Float32:
     image = np.zeros((height, width, 3), np.float32)
     view = view_of(scenery, shot)
     if shot.illumination != Illumination.LED.value:
-        _add_laser(view, shot, image)
+        _add_laser(scenery, view, shot, image)
     if shot.illumination != Illumination.LASER.value:
-        ring = shot.instrument.light
-        add_wall(view, lamps_of(ring), np.array(ring.colour_bgr), shot.rendering.wall_samples, image)
+        ring, lamps = shot.instrument.light, lamps_of(shot.instrument.light)
+        if scenery.thrown_back.any():
+            lamps = glow_of_lamps(lamps, scenery.radius_mm, scenery.thrown_back, view.distance_mm)
+        add_wall(view, lamps, np.array(ring.colour_bgr), shot.rendering.wall_samples, image)
     if np.any(shot.row_gain != 1.0):
         image *= shot.row_gain.astype(np.float32)[:, None, None]
     return image
@@ -155,7 +166,7 @@ def view_of(scenery: Scenery, shot: Shot) -> View:
     )
 
 
-def _add_laser(view: View, shot: Shot, image: Float32) -> None:
+def _add_laser(scenery: Scenery, view: View, shot: Shot, image: Float32) -> None:
     laser, samples = shot.instrument.laser, shot.rendering.line_samples
     lines = _lines(view, shot)
     speckle = (laser.speckle_contrast, laser.speckle_grain_mm, shot.seed)
@@ -170,6 +181,9 @@ def _add_laser(view: View, shot: Shot, image: Float32) -> None:
     ambient = shot.instrument.sensor.ambient
     if ambient > 0:
         add_wall(view, stray_light(ambient), np.ones(3), 1, image)
+    if scenery.thrown_back.any():
+        dark, back = stray_light(0.0), scenery.thrown_back
+        add_wall(view, glow_of_line(dark, laser, scenery.radius_mm, back, view.distance_mm), colour, 1, image)
 
 
 def _lines(view: View, shot: Shot) -> tuple[Line, ...]:

@@ -17,6 +17,8 @@ from pipeline.simulator.view import View, Work, to_wall
 
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
 _CLOSE_MM = 5e-4
+# Spacing of the table of what the wall throws on itself: far below a bore's radius, its scale.
+GLOW_STEP_MM = 0.5
 
 
 class Lamps(NamedTuple):
@@ -32,6 +34,10 @@ class Lamps(NamedTuple):
         See `LedRing`.
     ambient : float
         Light, full scales, of a white wall under stray light.
+    glow : (K, 3)
+        Light, by colour, that the wall throws on itself, every `GLOW_STEP_MM` of distance; K may be 0.
+    glow_from_mm : float
+        Distance of the first.
     """
 
     place: Float
@@ -39,6 +45,8 @@ class Lamps(NamedTuple):
     lobe: float
     even: float
     ambient: float
+    glow: Float
+    glow_from_mm: float
 
 
 def lamps_of(ring: LedRing) -> Lamps:
@@ -47,12 +55,12 @@ def lamps_of(ring: LedRing) -> Lamps:
     across = ring.radius_mm * np.stack([np.cos(around), np.sin(around)])
     place = np.concatenate([across, np.full((1, ring.leds), ring.z_mm)])
     share = ring.level / ring.leds * np.array(ring.pattern or (1.0,) * ring.leds)
-    return Lamps(place, share, ring.lobe, ring.even, 0.0)
+    return Lamps(place, share, ring.lobe, ring.even, 0.0, np.zeros((0, 3)), 0.0)
 
 
 def stray_light(level: float) -> Lamps:
     """Return no lamps but even stray light."""
-    return Lamps(np.zeros((3, 0)), np.zeros(0), 1.0, 0.0, level)
+    return Lamps(np.zeros((3, 0)), np.zeros(0), 1.0, 0.0, level, np.zeros((0, 3)), 0.0)
 
 
 @kernel
@@ -61,7 +69,17 @@ def least_ahead(lamps: Lamps) -> float:
 
     LEDs face forward and sit about at the viewpoint; stray light comes from everywhere.
     """
-    return -0.05 if lamps.ambient == 0.0 else -1.0
+    return -0.05 if lamps.ambient == 0.0 and lamps.glow.shape[0] == 0 else -1.0
+
+
+@kernel
+def glow_at(lamps: Lamps, s: float, c: int) -> float:
+    """Return what the wall throws on itself at a distance, in one colour; 0 beyond the table."""
+    x = (s - lamps.glow_from_mm) * (1.0 / GLOW_STEP_MM)
+    if not (x >= 0.0 and x < lamps.glow.shape[0] - 1):
+        return 0.0
+    k = int(x)
+    return float(lamps.glow[k, c] + (x - k) * (lamps.glow[k + 1, c] - lamps.glow[k, c]))
 
 
 @kernel
@@ -98,7 +116,7 @@ def _ray_light(
     foot = hit[0] / (view.px_per_rad * samples * max(facing, 0.05))
     albedo_at(view.texture, hit[1], hit[2], foot, albedo)
     for c in range(3):
-        total[c] += light * albedo[c]
+        total[c] += (light + glow_at(lamps, hit[1], c)) * albedo[c]
 
 
 @kernel

@@ -17,7 +17,7 @@ from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.raycast import first_hit, normal_at
 from pipeline.simulator.surface import Texture, albedo_at, sheen_at
 from pipeline.simulator.view import View, Work, new_work, to_wall
-from pipeline.simulator.wall_light import Lamps, least_ahead, light_of_ray
+from pipeline.simulator.wall_light import Lamps, glow_at, least_ahead, light_of_ray
 
 # Side of a tile, px; the ray table's spacing, so that its nodes are the tiles' corners.
 TILE_PX = 8
@@ -224,7 +224,7 @@ def _add_pixel(
     foot = hit[0] / (view.px_per_rad * samples * max(facing, 0.05))
     albedo_at(view.texture, hit[1], hit[2], foot, albedo)
     for c in range(3):
-        image[v, u, c] += share[c] * light * albedo[c]
+        image[v, u, c] += share[c] * (light + glow_at(lamps, hit[1], c)) * albedo[c]
     return True
 
 

@@ -83,6 +83,7 @@ TOUCHES = {
     "read_noise": {"instrument.sensor.read_noise_e"},
     "full_well": {"instrument.sensor.full_well_e"},
     "dark_pattern": {"instrument.sensor.dark_pattern"},
+    "interreflection": {"wall.interreflection"},
 }
 
 
@@ -127,6 +128,7 @@ NOTHING_AT_ZERO = (
     "focal_drift", "centre_drift", "pixel_locking", "pipe_bend", "ovality", "encoder_scale",
     "encoder_backlash", "time_offset", "slope_bias", "subsurface", "ghost_ring", "line_skew", "speckle",
     "vignetting", "ambient_light", "fixed_pattern", "read_noise", "dark_pattern",
+    "interreflection",
 )  # fmt: skip
 
 

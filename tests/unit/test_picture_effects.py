@@ -7,12 +7,14 @@ import pytest
 
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.picture import PICTURE_EFFECTS
+from pipeline.simulator.bounce import glow_of_lamps, ring_to_ring
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueSensor
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import exposed, through_lens, with_dark_signal
 from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.wall_light import lamps_of
 from tests.unit.simulated_pipe import small_truth
 
 LASER, LED = 0, 1
@@ -171,3 +173,40 @@ def test_black_level_is_what_a_dark_pixel_shows():
     sensor = truth_with("black_level", 12.0).instrument.sensor
     grey = exposed(np.zeros((50, 50, 3), np.float32), replace(sensor, read_noise_e=0.0), 1, 0)
     assert (grey == 12).all()
+
+
+def test_what_a_ring_sends_to_a_ring_is_the_sum_over_their_elements():
+    """Lambert's law between two elements of a cylinder, added up around; and all light meets some wall."""
+    radius, around = 30.0, 2 * np.pi * (np.arange(20000) + 0.5) / 20000
+    for apart in (1.0, 12.0, 55.0):
+        across = radius * (1 - np.cos(around))
+        squared = 2 * radius * across + apart**2
+        by_hand = np.mean(across**2 / squared**2) * 2 * np.pi * radius / np.pi
+        assert ring_to_ring(np.array(apart), radius) == pytest.approx(by_hand, rel=1e-5)
+    step = 0.01
+    assert step * ring_to_ring(np.arange(-5000, 5000, step), radius).sum() == pytest.approx(1.0, abs=1e-4)
+
+
+def test_the_line_glows_on_the_wall_ahead():
+    truth = truth_with("interreflection", 1.0)
+    lit, plain = (renderer_of(t).light(LASER)[..., 1].astype(float) for t in (truth, small_truth()))
+    glow, laser, pose = lit - plain, truth.instrument.laser, truth.poses()[LASER]
+    for ahead in (10.0, 30.0, 60.0):
+        place = np.array([50.0, 0.0, pose[2, 3] + ahead])
+        u, v = truth.stated.camera.project(pose[:3, :3].T @ (place - pose[:3, 3])).uv.round().astype(int)
+        by_hand = 0.4 * 0.4 * laser.power_mm * ring_to_ring(np.array(ahead - 22.0), 50.0)
+        assert glow[v, u] == pytest.approx(by_hand, rel=0.05)
+
+
+def test_what_lamps_throw_back_is_their_light_times_the_reflectance():
+    lamps = lamps_of(small_truth().instrument.light)
+    once = glow_of_lamps(lamps, 50.0, np.array([0.2, 0.4, 0.8]), 7.0)
+    twice = glow_of_lamps(lamps._replace(share=2 * lamps.share), 50.0, np.array([0.2, 0.4, 0.8]), 7.0)
+    np.testing.assert_allclose(once.glow[:, 2], 4 * once.glow[:, 0])
+    np.testing.assert_allclose(twice.glow, 2 * once.glow)
+    lit, plain = (
+        renderer_of(t).light(LED)[150, 290:, 1].astype(float)
+        for t in (truth_with("interreflection", 1.0), small_truth())
+    )
+    assert ((lit - plain) > 0).all()
+    assert 0.05 < (lit - plain).sum() / plain.sum() < 0.4

@@ -85,6 +85,11 @@ def dark_pattern(truth: SceneTruth, relative: float) -> SceneTruth:
     return with_sensor(truth, dark_pattern=relative)
 
 
+def interreflection(truth: SceneTruth, relative: float) -> SceneTruth:
+    """Let the wall light itself, once."""
+    return replace(truth, wall=replace(truth.wall, interreflection=relative))
+
+
 def _on_the_ring(truth: SceneTruth, azimuth_deg: float, width_deg: float) -> tuple[Float, float]:
     """Return where a centred pipe shows the line at an azimuth, and a width around the ring, px."""
     model, azimuth, radius = truth.instrument.camera.model, math.radians(azimuth_deg), mean_radius_mm(truth)

@@ -55,6 +55,8 @@ class Wall:
         Share of the reflectance that is a glossy lobe.
     gloss_lobe : float
         Exponent of that lobe (Blinn-Phong, normalised), an even number up to 254: it is rounded to one.
+    interreflection : float
+        Share that is rendered of the light bounced once inside the bore; 1 is that of a dull wall.
     """
 
     axis: PipeAxis
@@ -64,6 +66,7 @@ class Wall:
     albedo_bgr: Float32
     gloss: float = 0.0
     gloss_lobe: float = 40.0
+    interreflection: float = 0.0
 
 
 @dataclass(frozen=True)
