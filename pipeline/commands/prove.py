@@ -29,7 +29,7 @@ from pipeline.files.shipped import PRIORS, file_or_shipped
 from pipeline.pages import page_template
 from stages.diagnose.drill.cases import find_cases
 from stages.diagnose.drill.figures import Figure, figures
-from stages.diagnose.drill.score import Trial, calibration, confusion
+from stages.diagnose.drill.score import Trial, calibration, confusion, shuffled
 
 
 def write_report(done: Sequence[Worked], folder: Path) -> None:
@@ -112,6 +112,10 @@ def prove(
             "--leave-out", help="diagnose each concealed effect again with it left out of the library"
         ),
     ] = False,
+    shuffle: Annotated[
+        bool,
+        typer.Option("--shuffle", help="score every case by another case's answer: all scores must collapse"),
+    ] = False,
     workers: Annotated[int, typer.Option(min=1, help="cases that are worked on at a time")] = 1,
 ) -> None:
     """Prove the diagnosis on recordings in which an effect is concealed.
@@ -128,6 +132,9 @@ def prove(
         done = _drawn_and_worked(drawing, cases, output, leave_out, workers, console)
     else:
         done = _sealed_and_worked(sealed, truth, output, leave_out, workers, console)
+    if shuffle:
+        _show(_shuffled(done), console)
+        return
     with written_together(output, last="proof.json") as folder:
         write_report(done, folder)
     _show(done, console)
@@ -161,6 +168,12 @@ def _sealed_and_worked(
         require_seal(case, truth)
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(lambda case: _told(worked(case, output, truth, leave_out), console), cases))
+
+
+def _shuffled(done: Sequence[Worked]) -> list[Worked]:
+    """Return all trials, each with the answer to a case that conceals something else; of walls nothing."""
+    trials = shuffled([trial for case in done for trial in case.trials])
+    return [Worked(trials, seconds=None, failures=(), wall=None)]
 
 
 def _told(done: Worked, console: Console) -> Worked:

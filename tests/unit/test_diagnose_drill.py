@@ -16,7 +16,7 @@ from stages.diagnose.drill.answer import (
     read_concealed,
 )
 from stages.diagnose.drill.figures import figures
-from stages.diagnose.drill.score import Rate, Trial, calibration, confusion, heldout_removed, score
+from stages.diagnose.drill.score import Rate, Trial, calibration, confusion, heldout_removed, score, shuffled
 
 TILT = Concealed(name="laser_tilt", values=(0.6, 40.0))
 CONE = Concealed(name="laser_cone", values=(0.1,))
@@ -175,6 +175,20 @@ def test_identifiable_is_what_stands_out_with_its_closest_rival_free():
     assert not Trial("a", (), feasible(CONSISTENT, 0.3)).identifiable
     told = [Trial("a", (TILT,), feasible(named("laser_tilt"), 0.3, left=x)) for x in (0.9, 0.01)]
     assert score(told).named_identifiable.of == 1
+
+
+def test_with_answers_of_other_cases_every_score_collapses():
+    feasibility = (
+        Feasibility(name="laser_tilt", detectable=0.1),
+        Feasibility(name="laser_cone", detectable=0.01),
+    )
+    tilt = Trial("a", (TILT,), named("laser_tilt").model_copy(update={"feasibility": feasibility}))
+    cone = Trial("b", (CONE,), named("laser_cone").model_copy(update={"feasibility": feasibility}))
+    null = Trial("c", (), CONSISTENT)
+    true, swapped = score([tilt, cone, null]), score(shuffled([tilt, cone, null]))
+    assert (true.false_alarms.count, true.named_exactly.share, true.misnamed.count) == (0, 1.0, 0)
+    assert (swapped.false_alarms.count, swapped.named_exactly.share, swapped.misnamed.count) == (1, 0.0, 2)
+    assert swapped.contained.count == 0
 
 
 def test_a_location_counts_when_channel_anchor_and_time_are_all_right():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -182,6 +182,18 @@ def score(trials: Iterable[Trial]) -> Scores:
         heldout_removed=float(np.median(removed)) if removed else float("nan"),
         heldout_count=len(removed),
     )
+
+
+def shuffled(trials: Sequence[Trial]) -> tuple[Trial, ...]:
+    """Return the trials, each with the answer that was given to one which conceals something else.
+
+    What still scores well then does not depend on the answers. Where more than half conceal the same, some of
+    these keep an answer to their like.
+    """
+    order = sorted(range(len(trials)), key=lambda k: sorted(trials[k].truth))
+    apart = max(Counter(t.truth for t in trials).values(), default=0)
+    source = dict(zip(order, order[apart:] + order[:apart], strict=True))
+    return tuple(replace(t, answer=trials[source[k]].answer) for k, t in enumerate(trials))
 
 
 def owned(trial: Trial) -> bool:
