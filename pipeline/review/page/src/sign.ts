@@ -53,6 +53,7 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
 const DEEDS: Record<string, string> = {
   accept: "accepted", reject: "rejected", reopen: "reopened", reclassify: "changed the kind of", redraw: "drew the outline again of",
   merge: "merged", split: "split", add: "added", comment: "commented on", undo: "undid", redo: "redid",
+  describe: "gave the facts of the inspection",
 };
 
 /** An entry of the ledger as a sentence. */

@@ -5,7 +5,8 @@ export const CHOSEN_COLOUR = "#ff4fd8";
 
 export function clock(azimuth: number): string {
   const hours = ((((azimuth * 180) / Math.PI / 30 + 3) % 12) + 12) % 12;
-  const minutes = Math.round(hours * 60) % 720;
+  // Outlines run along half minutes: rounded up, as pipeline/pages/notation.py does, however few decimals there are.
+  const minutes = Math.floor(Math.round(hours * 600) / 10 + 0.5) % 720;
   return `${Math.floor(minutes / 60) || 12}:${String(minutes % 60).padStart(2, "0")}`;
 }
 
