@@ -19,7 +19,7 @@ from pipeline.instrument.camera.mapping import LARGEST_SIDE_PX
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.reproduce import read_run_record
 from pipeline.recording import tables
-from pipeline.recording.tables import read_encoder, read_frame_table
+from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 from pipeline.review import guard, model_stretches, quality
 from pipeline.review.decisions.actions import action_of
 from pipeline.review.model_stretches import read_model
@@ -78,6 +78,7 @@ TOO_LARGE: dict[str, tuple[Callable[[Path], Path], Callable[[Path], object], str
     "camera.yml": (lambda d: hollow(d / "c.yml", 1_000_001), read_camera, "bytes"),
     "frames.csv": (lambda d: hollow(d / "f.csv", 256 * MIB + 1), read_frame_table, "268435457 bytes"),
     "encoder.csv": (lambda d: hollow(d / "e.csv", 256 * MIB + 1), read_encoder, "268435457 bytes"),
+    "imu.csv": (lambda d: hollow(d / "i.csv", 256 * MIB + 1), read_imu, "268435457 bytes"),
     "run.json": (lambda d: hollow(d / "run.json", 256 * MIB + 1).parent, read_run_record, "not the record"),
     "reviewed run.json": (
         lambda d: hollow(d / "run.json", 256 * MIB + 1).parent, lambda d: RunFiles(d).record(), "268435457",
