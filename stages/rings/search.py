@@ -146,29 +146,42 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
     """Find the ring anywhere in the image: radius (A,), NaN where no line stands out, and trial line width.
 
     The closed path of the largest summed matched-filter score is found by dynamic programming in the polar
-    image, for several line widths; scores are capped, so that a glint cannot outvote the ring. Rays are a few
-    sectors apart, which is enough to find the ring by.
+    image, for several line widths. Rays are a few sectors apart, which is enough to find the ring by.
     """
     sector = np.arange(len(sectors.azimuth_rad))
     ray = sector[:: max(1, len(sector) // _RAYS)]
     nearest = np.searchsorted((ray[1:] + ray[:-1]) / 2, sector)
     polar = _polar_image(image, sectors, ray)
+    # Near the centre rays share their pixels: each speaks for the part that is its own.
+    arc_px = 2 * np.pi / len(ray) * (_SMALLEST_RADIUS_PX + np.arange(polar.shape[1]))
+    own = np.minimum(arc_px, 1.0).astype(np.float32)
     best_total, best = -np.inf, (np.full(len(sector), np.nan), _TRIAL_WIDTHS_PX[0])
     for width in _TRIAL_WIDTHS_PX:
         kernel = matched_template(width)[None].astype(np.float32)
         response = np.asarray(cv2.filter2D(polar, cv2.CV_32F, kernel), np.float32)
         score = response / np.maximum(_texture_noise(response, width), noise)
         score[np.isnan(score)] = 0
-        credit = np.clip(score, 0, _CREDIT)
-        path = _closed_path(credit.astype(np.float32), _JUMP)
+        credit = _credit(score) * own
+        path = _closed_path(credit, _JUMP)
         at_path = score[np.arange(len(path)), path]
-        total = float(np.minimum(at_path, 10 * _CREDIT).sum())
+        total = float(credit[np.arange(len(path)), path].sum())
         if total > best_total:
             found = at_path > detection_limit(polar.size)
             radius = np.interp(sector, ray, path + float(_SMALLEST_RADIUS_PX), period=len(sector))
             radius[~found[nearest]] = np.nan
             best_total, best = total, (radius, width)
     return best
+
+
+def _credit(score: Float32) -> Float32:
+    """Return what a score speaks for the line: itself up to a limit, from there on its logarithm.
+
+    Any light of a score at the limit is no noise. Beyond it, brighter is likelier, but slowly: a line ten times
+    as bright as its halo keeps the path over many rays, a glint ten times as bright as the line does not draw
+    it aside over a few.
+    """
+    above = np.maximum(score, _CREDIT)
+    return np.asarray(np.clip(score, 0, _CREDIT) + np.log(above / _CREDIT), np.float32)
 
 
 def _texture_noise(response: Float32, width_px: float) -> Float32:

@@ -23,6 +23,12 @@ _LEAST_SPREAD = 0.02
 # No wall reflects so evenly that a line a fifth fainter could not be the true one.
 _REFLECTANCE_SPREAD = 0.2
 _MOST = 0.5
+# Brightness of a line over that of the brightest from which one image alone does not tell them apart: the wall
+# reflects as unevenly as this around the pipe.
+_RIVAL = 0.5
+# A ring that lost more than this share of its way round from one image to the next may have left the band, or
+# the image's noise may no longer be that of the image before. Searching anew costs time and cannot do harm.
+_LOST = 0.1
 
 
 @dataclass(frozen=True)
@@ -53,9 +59,7 @@ class RingTrace:
 
     def radius_everywhere(self) -> Float:
         """Return the radius (A,) with rejected sectors bridged around the circle."""
-        good = np.flatnonzero(self.validity == RingValidity.VALID)
-        sectors = len(self.validity)
-        return np.interp(np.arange(sectors), good, self.fit.radius_px[good], period=sectors)
+        return _bridged(np.where(self.validity == RingValidity.VALID, self.fit.radius_px, np.nan))
 
 
 def trace_ring(
@@ -63,11 +67,14 @@ def trace_ring(
 ) -> RingTrace | None:
     """Find and fit the laser ring in ``image`` (H, W), grey levels; None when no sample of one is valid.
 
-    With the ring of the image ``before``, a band about it is searched first; when most of the ring is not in
-    there, or without it, the whole image is. ``clip_level``: grey level at which the line clips.
+    With the ring of the image ``before``, a band about it is searched first; without it, or when clearly less
+    of the ring is in there than was before, the whole image is searched too, and the fuller ring counts.
+    ``clip_level``: grey level at which the line clips.
     """
-    trace = None if before is None else follow_ring(image, sectors, before)
-    found = discover_ring(image, sectors, clip_level) if trace is None else trace
+    found = None if before is None else follow_ring(image, sectors, before)
+    if found is None or before is None or found.coverage < before.coverage - _LOST:
+        anew = discover_ring(image, sectors, clip_level)
+        found = max((t for t in (found, anew) if t is not None), key=lambda t: t.coverage, default=None)
     return found if found is not None and found.coverage > 0 else None
 
 
@@ -101,16 +108,38 @@ def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrac
     if not found.any():
         return None
     band = BAND_WIDTHS * width
-    peaks = search_band(image, sectors, radius - band, radius + band, width, response.dark_noise)
-    choice = choose_line(peaks, radius, width)
-    fit = fit_line(image, sectors, choice.radius_px, width, response)
+    choice, fit = _fitted_about(radius, band, image, sectors, width, response)
     for _ in range(2):
         if not np.isfinite(fit.width_px).any():
             return None
         width = float(np.nanmedian(fit.width_px))
         response = noise_response(image, sectors, fit, response)
-        fit = fit_line(image, sectors, choice.radius_px, width, response)
+        # Near the image's edge a narrow line is seen where the wider template did not fit.
+        radius = _bridged(np.where(found, radius, fit.radius_px))
+        choice, fit = _fitted_about(radius, band, image, sectors, width, response)
     return _judged(fit, choice, sectors, width, response)
+
+
+def _fitted_about(
+    radius_px: Float, band: float, image: Image, sectors: Sectors, width_px: float, response: Response
+) -> tuple[Choice, ProfileFit]:
+    """Search a band, px, about a ring (A,) of this image with a line of this width, and fit the likeliest.
+
+    The ring about which is searched was found in the same image and is no second witness: where another line
+    is nearly as bright, either may be the ring.
+    """
+    peaks = search_band(image, sectors, radius_px - band, radius_px + band, width_px, response.dark_noise)
+    choice = choose_line(peaks, radius_px, width_px)
+    rivalled = peaks.score[:, 1] > _RIVAL * peaks.score[:, 0]
+    choice = choice._replace(probability=np.where(rivalled, 0.5, choice.probability))
+    return choice, fit_line(image, sectors, choice.radius_px, width_px, response)
+
+
+def _bridged(radius_px: Float) -> Float:
+    """Return radii (A,) with unknown sectors bridged around the circle."""
+    known = np.flatnonzero(np.isfinite(radius_px))
+    sectors = len(radius_px)
+    return np.interp(np.arange(sectors), known, radius_px[known], period=sectors)
 
 
 def _limit(sectors: Sectors, positions: float) -> float:

@@ -121,8 +121,8 @@ def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
         repaint(folder, OWN[kind], seed)
 
 
-def repaint(folder: Path, paint: Callable[..., Image], seed: int) -> None:
-    """Put every frame of a recording through ``paint``."""
+def repaint(folder: Path, paint: Callable[..., Image], seed: int, crf: int = 16) -> None:
+    """Put every frame of a recording through ``paint``, and store them at a constant rate factor."""
     random, video = np.random.default_rng(seed), folder / "frames.mkv"
     rows = (folder / "frames.csv").read_text("utf-8").splitlines()[1:]
     laser = [not row.endswith("led") for row in rows]
@@ -131,7 +131,7 @@ def repaint(folder: Path, paint: Callable[..., Image], seed: int) -> None:
         first = old.streams.video[0]
         stream = new.add_stream("libx264", rate=first.average_rate)
         stream.width, stream.height, stream.pix_fmt = first.width, first.height, "yuv420p"
-        stream.options = {"crf": "16", "preset": "veryfast"}
+        stream.options = {"crf": str(crf), "preset": "veryfast"}
         for k, frame in enumerate(old.decode(video=0)):
             image = paint(frame.to_ndarray(format="bgr24").astype(np.float32), laser[k], k, random)
             made = av.VideoFrame.from_ndarray(np.clip(image + 0.5, 0, 255).astype(np.uint8), format="bgr24")
