@@ -107,6 +107,8 @@ class Defect:
         Extreme deviation from the pipe's own smooth shape, positive into the wall, and its 1 σ.
     wall_loss_percent : float
         Depth over wall thickness for metal loss; NaN where it has no meaning or the thickness is unknown.
+    probability : float
+        That something is there: from how many rings show it, against how many false ones such footage makes.
     confidence : float
         Probability that the defect is there and of this kind.
     frames : (N,) int
@@ -134,6 +136,7 @@ class Defect:
     depth_mm: float
     depth_sigma_mm: float
     wall_loss_percent: float
+    probability: float
     confidence: float
     frames: Int
     outline: Float
@@ -152,12 +155,11 @@ class Defects:
     items : tuple of Defect
         Each shown by two rings, or by one and the photo.
     false_alarm_rate : float
-        Expected number of false ones among them: by the wall's noise and roughness, and by two of those that
-        single rings show meeting in one place.
+        Expected number of false ones among them: by the wall's noise, and what their probabilities leave.
     smallest_depth_mm : float
         Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
     unconfirmed : tuple of Defect
-        What one ring alone shows: to be looked at, not to be counted.
+        What one ring alone shows, or is rather false than real: to be looked at, not to be counted.
     """
 
     items: tuple[Defect, ...]

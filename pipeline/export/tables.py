@@ -18,9 +18,8 @@ from pipeline.pages import notation
 _DEGREES = {"major_axis_rad": "major_axis_deg"}
 _TABLE = (
     "id", "kind", "distance_from_mm", "distance_to_mm", "clock_from", "clock_to", "peak_distance_mm",
-    "peak_clock", "length_mm", "width_mm",
-    "depth_mm", "depth_sigma_mm", "wall_loss_percent", "confidence", "frames", "pof_class", "pacp_suggestion",
-    "en13508_suggestion", "statement",
+    "peak_clock", "length_mm", "width_mm", "depth_mm", "depth_sigma_mm", "wall_loss_percent", "probability",
+    "confidence", "frames", "pof_class", "pacp_suggestion", "en13508_suggestion", "statement",
 )  # fmt: skip
 
 

@@ -5,7 +5,8 @@
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
 4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
-5. What neither a second ring nor the photo confirms is set apart (`corroborate`).
+5. What neither a second ring nor the photo confirms, or is rather false than real in such footage, is set
+apart (`corroborate`, `clutter`, `credibility`).
 6. Kind from named features as a probability, with codes and words (`classify`, `describe`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
@@ -14,20 +15,22 @@ A long wall is gone through in stretches with overlap; what is found does not de
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import ndtri
 
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
-from pipeline.artefacts.measured import Wall, WallTexture
+from pipeline.artefacts.measured import RingSamples, Wall, WallTexture
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from stages.defects.clean import clean_wall
-from stages.defects.corroborate import chance_meetings, is_corroborated
-from stages.defects.depth import measure_depth
+from stages.defects.clutter import NO_CLUTTER, Clutter, clutter_of
+from stages.defects.corroborate import Evidence, evidence_for
+from stages.defects.credibility import COUNTED, Credibility, credibility_of
+from stages.defects.depth import allowed_by_neighbours, measure_depth
 from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
@@ -40,12 +43,20 @@ from stages.defects.surface import MeasuredWall, Surface
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
 _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
+# Unconfirmed ones as few as these are looked at at once; a reader must know from where on one finding in four
+# is expected to be false.
+_FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
 
 
 def find_defects(
-    recording: Recording, wall: Wall, texture: WallTexture, parameters: DefectParameters, context: Context
+    recording: Recording,
+    wall: Wall,
+    texture: WallTexture,
+    parameters: DefectParameters,
+    context: Context,
+    clutter: Clutter = NO_CLUTTER,
 ) -> Defects:
-    """Find, outline, measure and name the defects of a wall.
+    """Find, outline, measure and name the defects of a wall whose rings held so much ``clutter``.
 
     Raises
     ------
@@ -62,18 +73,12 @@ def find_defects(
     scene = Scene(texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
-    found = tuple(_described(measured, regions, scene, parameters, context))
-    confirmed, unconfirmed = ([d for d, sure in found if sure is wanted] for wanted in (True, False))
+    found = tuple(_measured(measured, regions, scene, parameters, context))
+    credibility = credibility_of([f.evidence for f in found if not f.all_round], clutter, wall.cloud.frame)
+    confirmed, unconfirmed = _judged(found, credibility, parameters.min_depth_mm)
     items, alone = _numbered(confirmed, 1), _numbered(unconfirmed, len(confirmed) + 1)
-    context.report("defects", len(items), "")
-    context.report("unconfirmed: neither a second ring nor the photo shows them", len(alone), "detections")
-    context.report(
-        "rejected: shallower than the smallest depth or between rings",
-        len(regions) - len(found),
-        "detections",
-    )
-    by_chance = chance_meetings(alone, relief.extent_mm, measured.spacing_mm)
-    expected = parameters.false_alarms + by_chance
+    expected = parameters.false_alarms + sum(1 - d.probability for d in items)
+    _report(items, alone, len(regions) - len(found), expected, context)
     return Defects(items, expected, _smallest_depth(seeds, parameters), alone)
 
 
@@ -81,14 +86,23 @@ def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
     return tuple(replace(defect, id=n) for n, defect in enumerate(found, first))
 
 
-def _described(
+@dataclass(frozen=True)
+class _Found:
+    """A region that is deep enough to be reported, described as if it were surely there."""
+
+    defect: Defect
+    evidence: Evidence
+    all_round: bool
+
+
+def _measured(
     wall: MeasuredWall,
     regions: tuple[Region, ...],
     scene: Scene,
     parameters: DefectParameters,
     context: Context,
-) -> Iterator[tuple[Defect, bool]]:
-    """Yield the regions that were measured and are as deep as is worth reporting, and which are confirmed."""
+) -> Iterator[_Found]:
+    """Yield the regions that were measured and are as deep as is worth reporting."""
     clean = clean_wall(wall, regions)
     for done, region in enumerate(regions, 1):
         # A region that the sure points do not show is measured once more with all points.
@@ -97,11 +111,49 @@ def _described(
             if not _is_measured(surface, here):
                 continue
             depth = measure_depth(here, surface, clean, parameters.draws, context.random)
+            depth = allowed_by_neighbours(depth, here, surface)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
-                confirmed = is_corroborated(here, depth, surface, scene.texture)
-                yield describe(here, depth, surface, scene), confirmed
+                evidence = evidence_for(here, depth, surface, scene.texture)
+                yield _Found(describe(here, depth, surface, scene), evidence, here.all_round)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
+
+
+def _judged(
+    found: Sequence[_Found], credibility: Credibility, min_depth_mm: float
+) -> tuple[list[Defect], list[Defect]]:
+    """Return what is confirmed, and what is not: shown by one ring alone, or rather false than real."""
+    confirmed: list[Defect] = []
+    unconfirmed: list[Defect] = []
+    for f in found:
+        real = 1.0 if f.all_round else credibility.probability(f.evidence, f.defect, min_depth_mm)
+        counts = f.all_round or (f.evidence.corroborated and real >= COUNTED)
+        defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
+        (confirmed if counts else unconfirmed).append(defect)
+    return confirmed, unconfirmed
+
+
+def _report(
+    items: Sequence[Defect], alone: Sequence[Defect], rejected: int, expected: float, context: Context
+) -> None:
+    context.report("defects", len(items), "")
+    context.report("false findings expected among the defects", expected, "")
+    context.report(
+        "unconfirmed: one ring alone shows them, or rather false than real", len(alone), "detections"
+    )
+    context.report("rejected: shallower than the smallest depth or between rings", rejected, "detections")
+    if len(alone) > max(_FEW_UNCONFIRMED, len(items)):
+        context.warn(
+            f"{len(alone)} places show something in one ring alone or are rather false than real, beside "
+            "{len(items)} defects: glints, splashes or compression are taken for the line. What to do: look "
+            "at the unconfirmed ones in the review; record again with less exposure of the laser, a clean "
+            "window or less compression"
+        )
+    if expected > _MANY_FALSE * max(len(items), 1) and len(items) > 1:
+        context.warn(
+            f"of {len(items)} defects {expected:.1f} are expected to be false. What to do: accept or reject "
+            "each in the review by its picture before any is counted"
+        )
 
 
 def _is_measured(surface: Surface, region: Region) -> bool:
@@ -132,6 +184,19 @@ def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float
     return max(found, parameters.min_depth_mm + chance * detection.small_sigma_mm)
 
 
+def _defects_of_run(
+    recording: Recording,
+    rings: RingSamples,
+    wall: Wall,
+    texture: WallTexture,
+    parameters: DefectParameters,
+    context: Context,
+) -> Defects:
+    """Find the defects of a run; its rings tell how much in them was not the wall."""
+    around = 2 * np.pi * float(np.nanmedian(wall.radius_map.radius_mm))
+    return find_defects(recording, wall, texture, parameters, context, clutter_of(rings, around))
+
+
 DEFECTS = Stage(
-    "defects", "5", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
+    "defects", "6", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

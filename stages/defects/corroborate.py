@@ -7,11 +7,10 @@ taken under another light.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import WallTexture
 from stages.defects.depth import Depth
 from stages.defects.relief import Relief
@@ -28,10 +27,34 @@ _LEAST_SAMPLES = 3
 _PLACES = 40
 
 
-def is_corroborated(region: Region, depth: Depth, surface: Surface, texture: WallTexture) -> bool:
-    """Whether two rings, or one and the photo, show the defect."""
-    rings = rings_behind(region, depth.depth_mm, surface)
-    return rings >= _LEAST_RINGS or photo_stands_out(texture, surface.relief, region)
+@dataclass(frozen=True)
+class Evidence:
+    """How many rings show a finding, whether the photo does, and its depth in σ of the wall."""
+
+    rings: int
+    photo: bool
+    above_noise: float
+
+    @property
+    def corroborated(self) -> bool:
+        """Whether two rings, or one and the photo, show it."""
+        return self.rings >= _LEAST_RINGS or (self.photo and self.rings > 0)
+
+
+def evidence_for(region: Region, depth: Depth, surface: Surface, texture: WallTexture) -> Evidence:
+    """Return what rings and photo say of a finding.
+
+    The photo is laid on the wall as it was measured: where the depth itself shifts the picture by more than
+    the finding's size, the picture differs there because of the depth and is no second witness.
+    """
+    relief = surface.relief
+    size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
+    shifted = abs(depth.depth_mm) > size
+    return Evidence(
+        rings_behind(region, depth.depth_mm, surface),
+        not shifted and photo_stands_out(texture, relief, region),
+        abs(depth.depth_mm) / relief.typical.sigma_mm,
+    )
 
 
 def rings_behind(region: Region, depth_mm: float, surface: Surface) -> int:
@@ -73,15 +96,3 @@ def darkness(texture: WallTexture, relief: Relief, region: Region) -> float:
     if not (inside & seen).any() or not (~inside & seen).any():
         return float("nan")
     return float(1 - grey[inside & seen].mean() / max(1.0, float(grey[~inside & seen].mean())))
-
-
-def chance_meetings(unconfirmed: Sequence[Defect], wall_mm: tuple[float, float], spacing_mm: float) -> float:
-    """Return how many false findings to expect of what single rings show: two of them in one place by chance.
-
-    Places are uniform and independent over a wall of length and circumference ``wall_mm``; two meet when
-    their rings are neighbours (``spacing_mm`` apart), their widths overlap and they are of one sign.
-    """
-    width = sum(d.width_mm for d in unconfirmed)
-    neighbours, one_sign = 2 * spacing_mm / wall_mm[0], 0.5
-    pairs_overlapping = max(len(unconfirmed) - 1, 0) * width / wall_mm[1]
-    return neighbours * one_sign * pairs_overlapping

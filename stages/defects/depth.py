@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from pipeline.arrays import Float
 from stages.defects.bell import fit_bell
 from stages.defects.clean import CleanWall
 from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
-from stages.defects.surface import Surface
+from stages.defects.surface import Surface, cells_of
 
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0
@@ -20,6 +21,9 @@ _BELL_MISFIT = 0.12
 # A bell whose height the points leave open by more than this share of it tells nothing: what the rings
 # themselves show is the depth then, and its σ that of a peak between them.
 _BELL_UNKNOWN = 0.5
+# Rings beside each other are no further apart than this many of their distances; a ring's departure is that
+# of the fifth of its samples that depart most, as for what confirms a finding.
+_BESIDE, _TOP_QUANTILE, _LEAST_OF_RING = 1.6, 0.8, 3
 _SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 
 
@@ -63,6 +67,39 @@ def measure_depth(
         depth, scatter = _between_rings(relief, region, surface.points, depth, scatter)
     sigma = float(np.hypot(scatter, _shape_sigma(relief, depth)))
     return Depth(region.sign * depth, sigma, bias, (int(peak[0]), int(peak[1])))
+
+
+def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:
+    """Return the depth, no deeper than the rings beside the deepest one allow, and then as unsure as that.
+
+    A wall seen along a line of sight falls off from ring to ring by no more than their distance (45°, the
+    mean flank of a hemisphere): what one ring shows beyond that is no part of the wall that the next one
+    shows.
+    """
+    top, at = _tops_of_rings(depth, region, surface)
+    if region.all_round or not len(top):
+        return depth
+    spacing = surface.points.spacing_mm
+    beside = (np.abs(at - at[top.argmax()]) < _BESIDE * spacing) & (np.arange(len(top)) != top.argmax())
+    most = max(float(top[beside].max(initial=0.0)), 0.0) + spacing
+    if abs(depth.depth_mm) <= most:
+        return depth
+    sigma = float(np.hypot(depth.sigma_mm, most / 2))
+    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * most, sigma_mm=sigma)
+
+
+def _tops_of_rings(depth: Depth, region: Region, surface: Surface) -> tuple[Float, Float]:
+    """Return how far every ring about a region departs to the finding's side, and where along the pipe."""
+    relief, points = surface.relief, surface.near
+    margin = int(np.ceil(2 * surface.points.spacing_mm / relief.cell_mm[0]))
+    columns = np.broadcast_to(region.mask.any(0), (len(region.mask) + 2 * margin, region.mask.shape[1]))
+    wide = Region(region.row - margin, region.column, columns, region.sign)
+    row, column, inside = cells_of(points, relief, wide)
+    deviation = np.sign(depth.depth_mm) * (points.radius_mm - relief.shape_at(row, column))
+    rings = [inside & (points.frame == k) for k in np.unique(points.frame[inside])]
+    rings = [r for r in rings if r.sum() >= _LEAST_OF_RING]
+    top = np.array([np.quantile(deviation[r], _TOP_QUANTILE) for r in rings])
+    return top, np.array([float(np.mean(points.distance_mm[r])) for r in rings])
 
 
 def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:

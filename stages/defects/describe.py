@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.special import ndtr
 
 from pipeline.arrays import Byte, Float, Int
 from pipeline.artefacts.findings import (
@@ -40,12 +39,11 @@ class Scene:
 
 
 def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
-    """Return the defect of a region whose depth was measured; it has no number yet."""
+    """Return the defect of a region as if it were surely there; it has no number yet."""
     relief = surface.relief
     features = features_of(relief, region, depth)
     likely = probabilities(features, region)
     kind, share = next(iter(likely.items()))
-    real = float(ndtr((abs(depth.depth_mm) - scene.min_depth_mm / 2) / depth.sigma_mm))
     clock_from, clock_to = _clock(relief, region)
     peak_distance, peak_clock = _peak(relief, region, depth)
     first = float(relief.distance_mm[region.row] - relief.cell_mm[0] / 2)
@@ -64,7 +62,8 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
         depth_mm=depth.depth_mm,
         depth_sigma_mm=depth.sigma_mm,
         wall_loss_percent=100 * depth.depth_mm / loss if loss else float("nan"),
-        confidence=share * real,
+        probability=1.0,
+        confidence=share,
         frames=_frames(surface.near, relief, region),
         outline=_outline(relief, region),
         pof_class=(

@@ -173,12 +173,12 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
     return best
 
 
-def _credit(score: Float32) -> Float32:
+def _credit(score: Float) -> Float32:
     """Return what a score speaks for the line: itself up to a limit, from there on its logarithm.
 
-    Any light of a score at the limit is no noise. Beyond it, brighter is likelier, but slowly: a line ten times
-    as bright as its halo keeps the path over many rays, a glint ten times as bright as the line does not draw
-    it aside over a few.
+    Any light of a score at the limit is no noise. Beyond it, brighter is likelier, but slowly: a line ten
+    times as bright as its halo keeps the path over many rays, a glint ten times as bright as the line does
+    not draw it aside over a few.
     """
     above = np.maximum(score, _CREDIT)
     return np.asarray(np.clip(score, 0, _CREDIT) + np.log(above / _CREDIT), np.float32)

@@ -23,8 +23,8 @@ _LEAST_SPREAD = 0.02
 # No wall reflects so evenly that a line a fifth fainter could not be the true one.
 _REFLECTANCE_SPREAD = 0.2
 _MOST = 0.5
-# Brightness of a line over that of the brightest from which one image alone does not tell them apart: the wall
-# reflects as unevenly as this around the pipe.
+# Brightness of a line over that of the brightest from which one image alone does not tell them apart: the
+# wall reflects as unevenly as this around the pipe.
 _RIVAL = 0.5
 # A ring that lost more than this share of its way round from one image to the next may have left the band, or
 # the image's noise may no longer be that of the image before. Searching anew costs time and cannot do harm.

@@ -221,7 +221,7 @@ CONFIG = "rings: {azimuths: 720}\nmotion:\n  cell_px: 24\n"
 FINDING = (
     '[{"id": 1, "kind": "pit", "outline": [[0, 0], [1, 0], [1, 1]], "distance_from_mm": 0, '
     '"distance_to_mm": 1, "clock_from": 1, "clock_to": 2, "length_mm": 1, "width_mm": 1, "depth_mm": 1, '
-    '"depth_sigma_mm": 0.1, "wall_loss_percent": null, "confidence": 0.9, "frames": [1]}]'
+    '"depth_sigma_mm": 0.1, "wall_loss_percent": null, "probability": 1.0, "confidence": 0.9, "frames": [1]}]'
 )
 
 

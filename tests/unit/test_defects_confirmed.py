@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
-from stages.defects.corroborate import chance_meetings
+from stages.defects.clutter import Clutter, clutter_of
+from stages.defects.corroborate import Evidence
+from stages.defects.credibility import credibility_of
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
@@ -49,18 +52,43 @@ def test_rings_that_are_not_sure_of_themselves_do_not_speak_for_a_finding():
     assert (len(told.items), len(told.unconfirmed)) == (0, 1)
 
 
-def test_chance_meetings_are_those_of_places_drawn_at_random():
-    random = np.random.default_rng(1)
-    single = found(1).unconfirmed[0]
-    count, width, rings, around, runs = 40, 4.0, 100, 300.0, 400
-    drawn = [replace(single, width_mm=width)] * count
-    met = 0
-    for _ in range(runs):
-        ring, place = random.integers(0, rings, count), random.uniform(0, around, count)
-        sign = random.integers(0, 2, count)
-        near = np.abs(ring[:, None] - ring) == 1
-        apart = np.abs(place[:, None] - place)
-        near &= (np.minimum(apart, around - apart) < width) & (sign[:, None] == sign)
-        met += int(np.triu(near).sum())
-    assert chance_meetings(drawn, (float(rings), around), 1.0) == pytest.approx(met / runs, rel=0.15)
-    assert chance_meetings(drawn[:1], (100.0, 300.0), 1.0) == 0.0
+def rings_with(validity):
+    """Return rings of which only the validity (F, A) matters."""
+    radius = np.full(validity.shape, 100.0, np.float32)
+    azimuth = np.linspace(-np.pi, np.pi, validity.shape[1], endpoint=False)
+    frame = np.arange(len(validity))
+    return RingSamples(frame, azimuth, (0.0, 0.0), radius, radius, radius, radius, validity)
+
+
+def test_clutter_meets_in_neighbouring_rings_as_often_as_what_is_drawn_at_random():
+    random, width = np.random.default_rng(1), 9
+    drawn = random.random((400, 720)) < 0.01
+    odd = np.zeros_like(drawn)
+    for k in range(width):
+        odd |= np.roll(drawn, k, 1)
+    validity = np.where(odd, RingValidity.GLINT, RingValidity.VALID).astype(np.uint8)
+    clutter = clutter_of(rings_with(validity), 720.0)
+    two = odd[1:] & odd[:-1]
+    assert clutter.meetings(2) == pytest.approx((two & ~np.roll(two, 1, 1)).sum(), rel=0.25)
+    narrow = np.where(drawn, RingValidity.GLINT, RingValidity.VALID).astype(np.uint8)
+    assert clutter_of(rings_with(narrow), 720.0).meetings(2) == 0.0
+
+
+def evidence(rings, above_noise=8.0):
+    return Evidence(rings, False, above_noise)
+
+
+def test_two_rings_in_much_clutter_are_rather_false_and_many_rings_stay_sure():
+    told = found(2).items[0]
+    several = [evidence(2)] * 4 + [evidence(8)] * 4
+    frames = np.arange(50)
+    quiet = credibility_of(several, Clutter(), frames)
+    hard = credibility_of(several, Clutter(300.0, 0.1), frames)
+    assert quiet.probability(evidence(2), told, 0.2) > 0.6 > 0.2 > hard.probability(evidence(2), told, 0.2)
+    assert hard.probability(evidence(8), told, 0.2) > 0.95
+
+
+def test_one_ring_is_not_deeper_than_its_neighbours_allow():
+    alone = found(1, 9.0).unconfirmed[0]
+    assert abs(alone.depth_mm) < 2.0
+    assert found(3, 0.9).items[0].depth_mm == pytest.approx(0.9, abs=0.1)

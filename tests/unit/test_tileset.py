@@ -39,7 +39,7 @@ def pit_defect() -> Defect:
     outline = np.stack([at + width * np.cos(turn), around + width / RADIUS * np.sin(turn)], -1)
     return Defect(
         7, "corrosion", at - width, at + width, 4.5, 5.5, at, 5.0, 2 * width, 2 * width, depth, 0.02,
-        float("nan"), 0.9, np.arange(3), outline, "", "", "", "drawn",
+        float("nan"), 1.0, 0.9, np.arange(3), outline, "", "", "", "drawn",
     )  # fmt: skip
 
 

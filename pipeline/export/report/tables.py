@@ -106,12 +106,12 @@ def _found(summary: RunSummary) -> Card:
     lines = [
         f"nine of ten defects of 3 mm × 3 mm are found if they are {defects.smallest_depth_mm:.2f} mm deep",
         f"{defects.false_alarm_rate:.2g} false findings are expected in such a recording, from the wall's "
-        "roughness and from two rings that err in the same place",
+        "texture and from glints that two rings show in one place",
     ]
     if defects.unconfirmed:
         lines.append(
-            f"{len(defects.unconfirmed)} more places are seen in one ring alone and not in the photo: they "
-            "are listed as unconfirmed and not counted"
+            f"{len(defects.unconfirmed)} more places are seen in one ring alone or are rather false than "
+            "real: they are listed as unconfirmed and not counted"
         )
     if not defects.items:
         return Card("What was found", "no defect", tuple(lines))
