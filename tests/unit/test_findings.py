@@ -8,7 +8,8 @@ import pytest
 from pipeline.artefacts.findings import Defect, Defects
 
 PIT = Defect(
-    id=1, kind="pit", distance_from_mm=10.0, distance_to_mm=14.0, clock_from=3.0, clock_to=3.2, length_mm=4.0,
+    id=1, kind="pit", distance_from_mm=10.0, distance_to_mm=14.0, clock_from=3.0, clock_to=3.2,
+    peak_distance_mm=12.0, peak_clock=3.1, length_mm=4.0,
     width_mm=4.0, depth_mm=0.8, depth_sigma_mm=0.05, wall_loss_percent=float("nan"), probability=1.0,
     confidence=0.9, frames=np.array([1]), outline=np.zeros((3, 2)), pof_class="", pacp_suggestion="",
     en13508_suggestion="", statement="",
