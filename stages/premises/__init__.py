@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.errors import UnusableError
@@ -54,6 +54,13 @@ class PremisesParameters(Parameters):
         description="of each light every nth frame is withheld from all measurement, so that boresight "
         "twin can compare it with what the run predicts; 0: none",
     )
+
+    @field_validator("withhold")
+    @classmethod
+    def _leave_some(cls, every: int) -> int:
+        if every == 1:
+            raise ValueError("1 would withhold every frame; give 0 for none, or 2 or more")
+        return every
 
 
 def check_premises(

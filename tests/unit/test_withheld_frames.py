@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.recording.base import FrameTable, Illumination, PipeFacts, Recording
 from pipeline.recording.checked_frames import WITHHELD, CheckedFrames
-from stages.premises import withheld_frames
+from stages.premises import PremisesParameters, withheld_frames
 
 
 def _recording(table):
@@ -22,6 +22,11 @@ def test_every_tenth_of_each_light_is_withheld_and_its_neighbours_are_not():
 @pytest.mark.parametrize("label", [["both"] * 30, ["laser"] * 30])
 def test_one_light_alone(label):
     assert withheld_frames(np.array(label), 10).sum() == 3
+
+
+def test_withholding_every_frame_is_refused():
+    with pytest.raises(ValueError, match="1 would withhold every frame"):
+        PremisesParameters(withhold=1)
 
 
 def test_nothing_is_withheld_unless_asked():

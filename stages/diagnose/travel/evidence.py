@@ -136,7 +136,7 @@ def travel_evidence(
     """
     first = int(np.searchsorted(recording.frames.frame, sight.frame[0])) if len(sight.frame) else 0
     span = slice(first, first + len(T_pc))
-    lit = recording.frames.illumination[span] != "laser"
+    lit = np.isin(recording.frames.illumination[span], ("led", "both"))
     lines = find_lines(recording.frames.time_s[span], T_pc[:, :2, 3], lit, shown)
     missing = _shortcomings(source, recording, sight)
     encoder = recording.encoder
