@@ -35,6 +35,10 @@ def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
         page.until(
             f"document.querySelector('.mark.finding.chosen:not([hidden])')?.dataset.finding === '{name}'"
         )
+        hidden = page.js("""(() => { const { camera, marker, marks } = boresight.model;
+          const { z } = camera.position;
+          return marks.ends.some((e) => (e.position.z - z) * (e.position.z - marker.position.z) < 0); })()""")
+        assert not hidden, "no end cap stands between the eye and what it looks at"
     page.page.click("text=Home")
     page.until("document.querySelectorAll('.mark.hour:not([hidden])').length > 0")
     assert any(text.endswith(" mm") for text in marks(page, ":not(.hour, .finding, .end)"))

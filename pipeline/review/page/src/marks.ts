@@ -13,6 +13,8 @@ const MM = 1e-3;
 // Findings and distances are marked within so many radii of the eye; all of a long pipe would be a crowd.
 const NEAR_RADII = 14, RINGS_AHEAD_RADII = 7, CLOCK_RADII = 1.4;
 const STEP_RAD = 0.06;
+// The eye goes so far before the start of the wall, and no nearer to its end.
+export const END_RADII = 0.3;
 const [WITHIN, AROUND] = [0.985, 1.015]; // radii of marks, seen from inside and from outside
 const BAR_PX: Point = [50, 150];
 
@@ -32,7 +34,9 @@ export class Marks {
 
   constructor(private readonly session: Session, private readonly pipe: Pipe) {
     const { run } = session;
-    this.ends = run.distance_mm.map((mm) => this.cap(mm));
+    const [from, to] = run.distance_mm;
+    // The first lies behind the eye where it stands farthest back, or it would hide the wall.
+    this.ends = [this.cap(from - 1.1 * END_RADII * run.radius_mm), this.cap(to)];
     this.group.add(this.findings, this.rings, ...this.ends);
     this.layer.append(this.bar);
   }

@@ -4,7 +4,7 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { CoarseWall } from "./coarse";
 import { Pace, Pinch, drawsPlainly, fromModel, toModel } from "./graphics";
 import { layerChoice, legend } from "./legend";
-import { Marks } from "./marks";
+import { END_RADII, Marks } from "./marks";
 import { Pipe } from "./pipe";
 import type { Session } from "./session";
 import { Stretches } from "./stretches";
@@ -16,8 +16,8 @@ const MOST_PIXELS = 1280 * 720;
 
 // From outside, no more of a long pipe is shown than this many radii: it would be a thread.
 const OUTSIDE_RADII = 16;
-// The eye stands so far before the spot, in radii, and no nearer to the end of the wall.
-const BEFORE_RADII = 1.1, END_RADII = 0.3;
+// The eye stands so far before the spot, in radii.
+const BEFORE_RADII = 1.1;
 const [FOV_INSIDE, FOV_NEAR, FOV_OUTSIDE] = [80, 52, 30];
 const MARGIN = 1.12;
 // Where the raking light stands behind the eye, in radii: it meets the wall beside the spot at about 12°, so that a slope of
@@ -229,7 +229,7 @@ export class ModelView {
   private fly(mm: number): void {
     const [from, to] = this.session.run.distance_mm;
     const { radius_mm: radius } = this.session.run;
-    this.flown = Math.max(Math.min(this.flown + mm, to - END_RADII * radius), from - BEFORE_RADII * radius);
+    this.flown = Math.max(Math.min(this.flown + mm, to - END_RADII * radius), from - END_RADII * radius);
     if (mm) this.lens(FOV_INSIDE);
     const { origin, x, y, tangent } = this.pipe.at(this.flown);
     const up = toModel(y).negate();
