@@ -147,7 +147,7 @@ def _texture_rows(run: FieldRun, known: Int, asked: Asked, size: int) -> Landmar
 def _more_biases(run: FieldRun, points: ImagePoints) -> Float:
     """Return (M, 2, 2) what matching may get wrong all round, quadratic and cubic in the polar angle.
 
-    The adjustment allows for a constant and a linear part; effects on the lens are told by the rest.
+    The adjustment allows for errors at knots, linear between; effects on the lens are told by the rest.
     """
     t = (points.theta - _MIDDLE_RAD) / _SPAN_RAD
     curve = np.stack([1.5 * t**2 - 0.5, 2.5 * t**3 - 1.5 * t], -1) * run.parameters.match_bias_px
