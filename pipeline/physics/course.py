@@ -44,7 +44,7 @@ COURSES: Mapping[CourseKind, tuple[Quantity, ...]] = MappingProxyType({
     CourseKind.SPEED: (Quantity("speed_mm_s", "mm/s", 20.0, 0.1, 1e4, "speed at which it has its size"),),
     CourseKind.REVERSAL: (),
     CourseKind.DISTANCE: (
-        Quantity("distance_mm", "mm", 100.0, 0.1, 1e6, "way after which it has its size"),
+        Quantity("distance_mm", "mm", 100.0, 0.1, 1e6, "distance in P at which it has its size"),
     ),
 })  # fmt: skip
 
@@ -89,7 +89,7 @@ class Course:
         time_s : (...,)
             Since the first frame.
         distance_mm, speed_mm_s : (...,)
-            Of the camera along the pipe, since the first frame; backward negative.
+            Of the camera along the pipe, distance in P; backward speed negative.
         """
         t, at = np.asarray(time_s, np.float64), (*self.values, 1.0)[0]
         match self.kind:

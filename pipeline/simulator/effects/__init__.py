@@ -70,10 +70,9 @@ class Coursed:
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
         """See `pipeline.simulator.instrument.Change`."""
-        motion, start = self.scene.motion.distance_mm, float(self.scene.frames.time_s[0])
-        around = motion.at(np.array([start, time_s - _STEP_S, time_s, time_s + _STEP_S]))
-        speed = (around[3] - around[1]) / (2 * _STEP_S)
-        part = self.switch.course.factor(time_s - start, around[2] - around[0], speed)
+        start = float(self.scene.frames.time_s[0])
+        before, here, after = self.scene.motion.distance_mm.at(time_s + _STEP_S * np.array([-1.0, 0.0, 1.0]))
+        part = self.switch.course.factor(time_s - start, here, (after - before) / (2 * _STEP_S))
         size, *others = self.switch.quantities.items()
         scene = replace(self.scene, instrument=instrument)
         sizes = {size[0]: float(part) * size[1], **dict(others)}

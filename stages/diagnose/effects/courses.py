@@ -49,7 +49,7 @@ _WORDS: Mapping[CourseKind, str] = {
     CourseKind.SINUSOID: "the amplitude of a swing at {frequency_hz:.2f} Hz",
     CourseKind.SPEED: "at a speed of {speed_mm_s:.0f} mm/s, and in proportion to the speed",
     CourseKind.REVERSAL: "while the probe travels forward, and the opposite while it travels backward",
-    CourseKind.DISTANCE: "after {distance_mm:.0f} mm, in proportion to the way travelled",
+    CourseKind.DISTANCE: "at a distance of {distance_mm:.0f} mm, and in proportion to the distance",
 }
 _FORMULAS: Mapping[CourseKind, str] = {
     CourseKind.STEP: "0 before time_s, 1 from then on", CourseKind.RAMP: "t / time_s",
