@@ -151,9 +151,10 @@ def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
         return untestable("ambient_light", "No frame shows the line against the dark.")
     share = profiles.background[used] / height[used]
     worst = float(np.percentile(share, 90))
-    z = worst / STRAY_FLOOR
+    sigma = float(np.hypot(STRAY_FLOOR, profiles.background_sigma / np.median(height[used])))
+    z = worst / sigma
     return finding(
-        "ambient_light", z, float(2 * norm.sf(abs(z))), (Size("relative", "", worst, STRAY_FLOOR),),
+        "ambient_light", z, float(2 * norm.sf(abs(z))), (Size("relative", "", worst, sigma),),
         f"Beside the line lies light of {100 * worst:.2f} % of its height where there is most.",
     )  # fmt: skip
 

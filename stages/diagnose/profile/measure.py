@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numba
 import numpy as np
+from scipy.stats import norm
 
 from pipeline.arrays import Float, Float32, Image, Int
 from pipeline.artefacts.measured import RingSamples
@@ -124,7 +125,10 @@ class LineProfiles:
     highest : (F, S)
         Largest grey level on the line.
     background : (F,)
-        Mean grey level, above black, 40 to 60 px away from the line; NaN where the wall is lit.
+        Mean grey level, above that of the darkest place, 40 to 60 px away from the line; NaN where the
+        wall is lit.
+    background_sigma : float
+        By how much noise and compression may put the level of the darkest place too low, grey levels.
     gain : (2, 2, N) float64
         For two halves of the frames in turns: sums of residual × model and of model² in every pixel.
     """
@@ -140,6 +144,7 @@ class LineProfiles:
     clipped: Float
     highest: Float
     background: Float
+    background_sigma: float
     gain: Float
 
 
@@ -153,30 +158,29 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
     count, bins = len(rows), round(2 * REACH_PX / STEP_PX)
     light = np.zeros((count, SECTORS, bins), np.float32)
     height, share = np.zeros_like(light), np.zeros((count, SECTORS, 3))
-    background = np.zeros(count)
+    beside, tiles = np.full(count, np.nan), []
     gain = np.zeros((2, 2, recording.source.image_size[0] * recording.source.image_size[1]))
     trusted = _TRUSTED * _clip_level(recording, rings, rows, sectors)
     step = rings.azimuth_rad[1] - rings.azimuth_rad[0]
-    dark = np.nan
     for k, (_, image) in enumerate(recording.read(rings.frame[rows], "grey")):
         if image is None:
             continue
-        dark = _dark_level(image) if np.isnan(dark) else dark
+        tiles.append(_tile_means(image))
         line, width = _line(rings, rows[k])
         slope = (np.roll(line, -_SLOPE_SECTORS) - np.roll(line, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
-        beside = _far_level(image, sectors, line)
-        background[k] = beside - dark
+        beside[k] = _far_level(image, sectors, line)
         stack_frame(
             image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad, line, slope,
-            width, rings.valid[rows[k]], beside, trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
+            width, rings.valid[rows[k]], beside[k], trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
             light[k], height[k], share[k], gain[k // _TURNS % 2],
         )  # fmt: skip
+    dark, dark_sigma = _dark_level(tiles)
     offset: Float = -REACH_PX + STEP_PX * (np.arange(bins, dtype=np.float64) + 0.5)
     middle: Float = -np.pi - step / 2 + 2 * np.pi / SECTORS * (np.arange(SECTORS, dtype=np.float64) + 0.5)
     return LineProfiles(
         rings.frame[rows], rows, _times(recording, rings.frame[rows]), middle, offset,
         light, height, share[..., 0], share[..., 1] / np.maximum(share[..., 0], 1), share[..., 2],
-        background, gain,
+        beside - dark, dark_sigma, gain,
     )  # fmt: skip
 
 
@@ -189,11 +193,25 @@ def _line(rings: RingSamples, row: int) -> tuple[Float, Float]:
     return radius, np.clip(width, 0.5 * np.median(width), 2 * np.median(width))
 
 
-def _dark_level(image: Image) -> float:
-    """Return the grey level of the darkest place: tiles are averaged first, so that noise does not decide."""
+def _tile_means(image: Image) -> Float32:
     size = (image.shape[1] // _TILE_PX, image.shape[0] // _TILE_PX)
-    tiles = cv2.resize(image.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    return float(np.percentile(tiles, _DARK_PERCENT))
+    return np.asarray(cv2.resize(image.astype(np.float32), size, interpolation=cv2.INTER_AREA))
+
+
+def _dark_level(tiles: list[Float32]) -> tuple[float, float]:
+    """Return the grey level of the darkest place, from the means of tiles (h, w) of every frame, and its 1 σ.
+
+    The darkest of many tiles is dark by chance too: by two of their 1 σ at the percentile that is taken.
+    That σ is how the darkest tiles change from frame to frame. It is not divided by the number of frames,
+    because compression repeats the noise of one frame in those that follow.
+    """
+    if not tiles:
+        return np.nan, np.nan
+    stack = np.stack(tiles)
+    mean = stack.mean(0)
+    dark = float(np.percentile(mean, _DARK_PERCENT))
+    darkest = stack[:, mean <= np.median(mean)]
+    return dark, float(-norm.ppf(_DARK_PERCENT / 100) * np.median(darkest.std(0)))
 
 
 def _far_level(image: Image, sectors: Sectors, line: Float) -> float:
