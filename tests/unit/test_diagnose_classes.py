@@ -40,8 +40,8 @@ def test_what_to_record_next_names_each_recording_once():
 
 
 def test_what_looks_alike_and_has_no_model_is_not_excluded():
-    seen = cast(Any, SimpleNamespace(best=SimpleNamespace(named=True, names=("dome_axial",))))
+    seen = cast(Any, SimpleNamespace(best=SimpleNamespace(named=True, laws=("dome_axial",))))
     assert _untested(seen, ("focal_scale", "laser_tilt")) == ("focal_scale",)
     assert _untested(seen, ()) == ()
-    unnamed = cast(Any, SimpleNamespace(best=SimpleNamespace(named=False, names=("generic_rows",))))
+    unnamed = cast(Any, SimpleNamespace(best=SimpleNamespace(named=False, laws=("generic_rows",))))
     assert _untested(unnamed, ("focal_scale",)) == ()
