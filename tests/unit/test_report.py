@@ -121,6 +121,7 @@ def test_no_text_becomes_markup(summary, tmp_path):
 def test_shows_the_pit_with_pictures_clock_and_wall_loss(summary):
     (finding,) = page_of(summary).findings
     assert finding.kind == "pit"
+    assert finding.probability == "above 90 %"
     assert re.match(r"11:\d\d–12:\d\d$", finding.clock)
     assert re.match(r"[56]\d\.\d mm \(\d\d\.\d–\d\d\.\d mm\)$", finding.distance), "peak and extent"
     assert re.match(r"\d\.\d+ ± \d\.\d+ mm deep$", finding.depth)
@@ -129,6 +130,14 @@ def test_shows_the_pit_with_pictures_clock_and_wall_loss(summary):
     assert 22 <= float(loss[1]) <= 29
     assert finding.photo.startswith("data:image/jpeg;base64,")
     assert finding.deviation.startswith("data:image/jpeg;base64,")
+
+
+def test_a_probability_is_stated_no_finer_than_it_was_shown(summary):
+    (pit,) = summary.defects.items
+    for stated, told in ((0.99, "above 90 %"), (0.64, "about 64 %")):
+        defects = replace(summary.defects, items=(replace(pit, probability=stated),))
+        (finding,) = page_of(replace(summary, defects=defects)).findings
+        assert finding.probability == told
 
 
 def test_mark_lies_in_the_middle_of_the_flat_view(summary):

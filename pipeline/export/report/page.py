@@ -178,7 +178,7 @@ class Finding:
     width: str
     depth: str
     wall_loss: str
-    confidence: str
+    probability: str
     codes: tuple[str, ...]
     frames: tuple[str, ...]
     statement: str

@@ -32,7 +32,7 @@ export function unconfirmed(session: Session): HTMLElement | string {
   });
   const root = element("details", { class: "unconfirmed" },
     element("summary", {}, items.length === 1 ? "1 unconfirmed place" : `${items.length} unconfirmed places`),
-    element("p", { class: "quiet" }, "One ring alone shows each of these; no second ring and nothing in the photo confirms it. They are not counted. If one is a defect, draw it with Add defect."),
+    element("p", { class: "quiet" }, "One ring alone shows each of these and nothing in the photo confirms it, or recordings like this one hold more false findings of this kind than real ones. They are not counted. If one is a defect, draw it with Add defect."),
     element("ul", {}, ...rows));
   root.addEventListener("toggle", () => { if (root.open && !photo.layer) void photo.load("photo").then(() => draws.forEach((draw) => draw())).catch((e: Error) => session.say(e.message)); });
   return root;
