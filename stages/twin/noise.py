@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 from scipy.stats import chi2
 
 from pipeline.arrays import Bool, Float, Float32
-from stages.twin.photometry import Figure
+from stages.twin.lamp_light import Figure
 
 _WINDOW_PX = 12
 """Side of a window: the variance of 144 pixels is known to some 12 %, also where neighbours are alike."""

@@ -12,8 +12,9 @@ from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
+from stages.twin.lamp_light import LampLight, LampSamples
+from stages.twin.line_light import LineLight, LineSamples
 from stages.twin.noise import CameraNoise, QuietWindows, black_and_white, photon_transfer, windows_of
-from stages.twin.photometry import LampLight, LampSamples, LineLight, LineSamples
 from stages.twin.scene import LitSight, Scene
 
 _LEAST_LEVEL = 4.0

@@ -12,10 +12,10 @@ from pipeline.geometry.axis import straight_axis
 from pipeline.recording.base import Illumination
 from stages.texture.surface import WallSurface
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
+from stages.twin.lamp_light import Figure
 from stages.twin.locate import full_size, places_in_image
 from stages.twin.name import dirt
 from stages.twin.noise import photon_transfer, windows_of
-from stages.twin.photometry import Figure
 from stages.twin.render import Region, TwinFrame
 from stages.twin.sight import wall_seen
 
