@@ -19,7 +19,6 @@ from pipeline.commands.prove_cases import (
     Worked,
     draw_case,
     require_seal,
-    sweep,
     worked,
 )
 from pipeline.errors import InputError
@@ -122,11 +121,10 @@ def prove(
 
     Without --sealed, probes are drawn, effects concealed, and recordings rendered and sealed. Each is
     diagnosed by a process that is given the recordings only; then the seal is checked, the truth opened and
-    scored. What is there already is kept: an interrupted proof goes on where it stopped.
+    scored. What is there already is kept: an interrupted proof goes on where it stopped, also within a case.
     """
     console = Console(stderr=True)
     require_writable(output)
-    sweep(output)
     if sealed is None:
         drawing = Drawing(file_or_shipped(prior, PRIORS), seed, output / "recordings", output / "truth")
         done = _drawn_and_worked(drawing, cases, output, leave_out, workers, console)

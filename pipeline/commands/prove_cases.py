@@ -24,7 +24,6 @@ from stages.diagnose.drill.cases import (
     diagnose_apart,
     trial_of,
 )
-from stages.diagnose.drill.cases import sweep as sweep_answers
 from stages.diagnose.drill.score import Trial
 
 ANSWERS, ANSWERS_WITHOUT = "answers", "answers-without"
@@ -55,7 +54,7 @@ class Worked:
     trials : tuple of Trial
         With the whole library and, where asked for, without the concealed effect.
     seconds : float or None
-        That the diagnosis with the whole library took.
+        That the diagnosis with the whole library took; None where it was stopped on the way.
     failures : tuple of str
         Diagnoses that ended without an answer; they are scored as having identified nothing.
     wall : WallErrors or None
@@ -121,12 +120,6 @@ def require_seal(case: Case, truth: Path) -> None:
             )  # fmt: skip
 
 
-def sweep(output: Path) -> None:
-    """Remove what a killed proof left of diagnoses that were under way."""
-    for folder in (ANSWERS, ANSWERS_WITHOUT):
-        sweep_answers(output / folder)
-
-
 def worked(case: Case, output: Path, truth: Path, leave_out: bool) -> Worked:
     """Diagnose a case, check its seal, open its truth; where asked, diagnose it without what it conceals."""
     answer, failures = output / ANSWERS / case.name, []
@@ -151,8 +144,7 @@ def _answered(case: Case, answer: Path, without: tuple[str, ...]) -> list[str]:
     try:
         diagnose_apart(case, answer, without)
     except DiagnosisFailedError as error:
-        if error.code < 0:
-            # It was killed: nothing that the diagnosis could do better.
+        if error.was_stopped:
             raise InputError(answer, str(error), hint=_GO_ON) from error
         return [str(error)]
     return []

@@ -112,6 +112,36 @@ def test_a_diagnosis_that_was_killed_is_no_failure_of_the_diagnosis(
     assert not (drill / "out" / "proof.json").exists()
 
 
+# Stands for a diagnosis that is killed after its first stage, and ends once it finds that stage's result.
+_KILLED_ONCE = """
+import os, pathlib, sys
+answer = pathlib.Path(sys.argv[1])
+stage = answer / "stage"
+if not stage.exists():
+    stage.mkdir(parents=True)
+    os.kill(os.getpid(), {signal})
+(answer / "diagnosis.json").write_text('{{"verdict": "consistent", "effects": []}}')
+"""
+
+
+@pytest.mark.parametrize("ended_by", [signal.SIGKILL, signal.SIGINT])
+def test_a_stopped_diagnosis_goes_on_from_the_stages_it_completed(
+    drill: Path, monkeypatch: pytest.MonkeyPatch, ended_by: signal.Signals
+) -> None:
+    script = _KILLED_ONCE.format(signal=int(ended_by))
+    monkeypatch.setattr(
+        "stages.diagnose.drill.cases._command",
+        lambda case, output, without: [sys.executable, "-c", script, str(output)],
+    )
+    assert isinstance(CliRunner().invoke(app, proof(drill)).exception, InputError)
+    done = CliRunner().invoke(app, proof(drill))
+    assert done.exit_code == 0, done.output
+    written = json.loads((drill / "out" / "proof.json").read_text())
+    assert written["unanswered"] == []
+    assert written["seconds"] is None, "the time of a diagnosis that was stopped is not known"
+    assert sorted(p.name for p in (drill / "out" / "answers").iterdir()) == ["a", "b"]
+
+
 def test_wall_errors_kept_half_are_worked_out_again(tmp_path: Path) -> None:
     case = Case("a", None, None)
     (tmp_path / "wall_errors.json").write_text('{"stated_mm": 1')

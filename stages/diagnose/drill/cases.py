@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import pipeline
 from pipeline.errors import BoresightError, InputError
-from pipeline.files.disk import disk_errors_named, sync_tree
+from pipeline.files.disk import disk_errors_named, remove, sync_tree
 from pipeline.system.stopping import end_with_parent
 from stages.diagnose.drill.answer import Answer, Concealed, read_answer, read_concealed
 from stages.diagnose.drill.score import Trial
@@ -30,6 +30,11 @@ class DiagnosisFailedError(BoresightError):
     def __init__(self, problem: str, code: int) -> None:
         super().__init__(problem)
         self.code = code
+
+    @property
+    def was_stopped(self) -> bool:
+        """Whether a signal ended it, so that the same command goes on with it."""
+        return self.code < 0 or self.code == 128 + signal.SIGINT
 
 
 @dataclass(frozen=True)
@@ -64,7 +69,8 @@ def find_cases(folder: Path) -> tuple[Case, ...]:
 def diagnose_apart(case: Case, output: Path, without: tuple[str, ...] = ()) -> None:
     """Diagnose a case in a process of its own that is told the recordings and nothing else.
 
-    It is given them in a folder beside which there is no truth. An answer that is there already is kept.
+    It is given them in a folder beside which there is no truth. An answer that is there already is kept; a
+    diagnosis that was stopped goes on from the results of its completed stages.
 
     Raises
     ------
@@ -73,38 +79,41 @@ def diagnose_apart(case: Case, output: Path, without: tuple[str, ...] = ()) -> N
     InputError
         When the disk is full or cannot be written.
     """
-    if (output / ANSWER).is_file():
-        return
     with disk_errors_named(output.parent):
-        output.parent.mkdir(parents=True, exist_ok=True)
-        _diagnose_into(case, output, without)
+        if not (output / ANSWER).is_file():
+            _diagnose_into(case, output, without)
+        remove(_apart(output))
+
+
+def _apart(output: Path) -> Path:
+    """Return the folder in which the diagnosis with this output is at work."""
+    return output.with_name(_APART + output.name)
 
 
 def _diagnose_into(case: Case, output: Path, without: tuple[str, ...]) -> None:
+    elsewhere = _apart(output)
+    recordings, answer = elsewhere / "recordings", elsewhere / "answer"
+    remove(recordings)
+    recordings.mkdir(parents=True)
     environment = os.environ | {"PYTHONPATH": str(Path(pipeline.__file__).resolve().parents[1])}
-    with tempfile.TemporaryDirectory(dir=output.parent, prefix=_APART) as elsewhere:
-        alone, answer = _alone(case, Path(elsewhere)), Path(elsewhere) / "answer"
-        start = time.monotonic()
-        done = subprocess.run(
-            _command(alone, answer.resolve(), without),
-            cwd=elsewhere, env=environment, capture_output=True, text=True, check=False,
-            preexec_fn=end_with_parent,
-        )  # fmt: skip
-        if done.returncode:
-            last = "\n".join(done.stderr.strip().splitlines()[-6:])
-            raise DiagnosisFailedError(
-                f"{case.name}: the diagnosis ended with {done.returncode}\n{last}", done.returncode
-            )
+    in_one_go, start = not answer.exists(), time.monotonic()
+    done = subprocess.run(
+        _command(_alone(case, recordings), answer.resolve(), without),
+        cwd=elsewhere, env=environment, capture_output=True, text=True, check=False,
+        preexec_fn=end_with_parent,
+    )  # fmt: skip
+    if done.returncode:
+        last = "\n".join(done.stderr.strip().splitlines()[-6:])
+        problem = f"{case.name}: the diagnosis ended with {done.returncode}\n{last}"
+        failure = DiagnosisFailedError(problem, done.returncode)
+        if not failure.was_stopped:
+            remove(elsewhere)
+        raise failure
+    if in_one_go:
         (answer / TIMING).write_text(json.dumps({"seconds": round(time.monotonic() - start, 1)}), "utf-8")
-        sync_tree(answer)
-        shutil.rmtree(output, ignore_errors=True)
-        answer.rename(output)
-
-
-def sweep(answers: Path) -> None:
-    """Remove what diagnoses left in a folder of answers that were killed."""
-    for left in answers.glob(f"{_APART}*"):
-        shutil.rmtree(left, ignore_errors=True)
+    sync_tree(answer)
+    remove(output)
+    answer.rename(output)
 
 
 def _alone(case: Case, folder: Path) -> Case:
