@@ -5,11 +5,21 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall
+from pipeline.artefacts.findings import clock_of_azimuth
+from pipeline.artefacts.measured import (
+    FixedPlace,
+    FixedToProbe,
+    RingPoints,
+    RingSamples,
+    Trajectory,
+    Wall,
+)
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.pages import notation
 from stages.accumulate.calibration import CalibrationSpread, calibration_spread
+from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import map_grid
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
 from stages.accumulate.survey import RingsOnWall, survey_of
@@ -20,6 +30,8 @@ __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 _REPORTED_ROWS = 2000
 # A branch, step or collapse may take half of the radius somewhere, not from most of a pipe. Not measured.
 _IMPOSSIBLE, _MOST_IMPOSSIBLE = 0.5, 0.5
+# Places fixed to the image that are warned of one by one; the largest first.
+_TOLD_PLACES = 4
 
 
 class AccumulateParameters(Parameters):
@@ -61,16 +73,50 @@ def accumulate_wall(
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
     spread = calibration_spread(found, rings, trajectory, survey)
-    wall = empty_wall(grid, survey, trajectory.axis, context.scratch)
+    fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
+    wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
     smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
-        radius_map = map_of(stretch, on_wall, survey, grid, spread, smoothing_mm, gap_mm)
+        systematic = spread.on(grid.rows(stretch.from_row, stretch.to_row))
+        if fixed is not None:
+            systematic = np.hypot(systematic, fixed.departure_mm[stretch.from_row : stretch.to_row])
+        radius_map = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm)
         fill(wall, stretch, radius_map, on_wall, survey)
         context.progress(done, len(stretches))
     _refuse_impossible_radii(wall, trajectory)
     _report(context, wall, spread)
+    _warn_of_fixed(fixed, context)
     return wall
+
+
+def _warn_of_fixed(fixed: FixedToProbe | None, context: Context) -> None:
+    """Warn of what stays at one place of the image while the wall goes by."""
+    places = () if fixed is None else fixed.places
+    context.report("places where the line departs in the image, not on the wall", len(places), "")
+    for place in sorted(places, key=lambda p: -abs(p.departure_mm))[:_TOLD_PLACES]:
+        context.warn(_fixed_in_words(place))
+
+
+def _fixed_in_words(place: FixedPlace) -> str:
+    seen = (
+        f"at {notation.clock(float(clock_of_azimuth(place.azimuth_rad)))} in the picture, over "
+        f"{np.degrees(place.width_rad):.0f}°, the line departs by {abs(place.departure_mm):.2f} mm "
+        f"{'outward' if place.departure_mm > 0 else 'inward'} while {place.length_mm:.0f} mm of wall go by "
+        f"(frames {place.frame_from} to {place.frame_to})"
+    )
+    if place.on_probe:
+        return (
+            f"something on the window or fixed to the probe: {seen}, and it does not follow the wall when "
+            "the probe rolls. Its departure is added to σ there, and findings there are not counted. What to "
+            "do: clean the window, look for scratches and reflections, record again"
+        )
+    return (
+        f"something on the window or fixed to the probe, or a groove or ridge along the pipe: {seen}. They "
+        "cannot be told apart, since the probe does not roll enough. The departure is added to σ there, and "
+        "findings there are not counted. What to do: clean the window and record once more with the probe "
+        "rolled by 30° or more"
+    )
 
 
 def _refuse_impossible_radii(wall: Wall, trajectory: Trajectory) -> None:
@@ -105,7 +151,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "2",
+    "3",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

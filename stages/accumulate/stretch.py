@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
-from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
+from pipeline.artefacts.measured import FixedToProbe, PointCloud, RadiusMap, Wall
 from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
-from stages.accumulate.calibration import CalibrationSpread
 from stages.accumulate.grid import MapGrid, gridded, rings_on_columns
 from stages.accumulate.survey import RingsOnWall, RingSurvey, WallSamples, centred, some_at_a_time
 
@@ -63,21 +62,23 @@ def map_of(
     rings: RingsOnWall,
     survey: RingSurvey,
     grid: MapGrid,
-    spread: CalibrationSpread,
+    systematic_mm: Float,
     smoothing_mm: float,
     gap_mm: float,
 ) -> RadiusMap:
-    """Return the radius map of the rows that a stretch works out."""
+    """Return the radius map of the rows that a stretch works out, of which ``systematic_mm`` is a 1 σ."""
     part = grid.rows(stretch.from_row, stretch.to_row)
     samples = (s for _, s in _centred_samples(rings, survey, stretch.near))
     columns = rings_on_columns(samples, len(stretch.near), part)
     radius, random, count, misalignment = gridded(columns, part, smoothing_mm, gap_mm)
-    total = np.hypot(random, spread.on(part)).astype(np.float32)
+    total = np.hypot(random, systematic_mm).astype(np.float32)
     total[~np.isfinite(radius)] = np.nan
     return RadiusMap(part.distance_mm, part.azimuth_rad, radius, total, random, count, misalignment)
 
 
-def empty_wall(grid: MapGrid, survey: RingSurvey, axis: PipeAxis, scratch: Scratch) -> Wall:
+def empty_wall(
+    grid: MapGrid, survey: RingSurvey, axis: PipeAxis, fixed: FixedToProbe | None, scratch: Scratch
+) -> Wall:
     """Return an empty wall of full size on scratch storage."""
     shape, points = (len(grid.distance_mm), len(grid.azimuth_rad)), int(survey.count.sum())
     single = np.float32
@@ -88,7 +89,7 @@ def empty_wall(grid: MapGrid, survey: RingSurvey, axis: PipeAxis, scratch: Scrat
     own_sigma, own_radius, distance, azimuth = (scratch.zeros((points,), single) for _ in range(4))
     frame = scratch.zeros((points,), np.int64)
     cloud = PointCloud(xyz, normal, own_sigma, own_radius, distance, azimuth, frame)
-    return Wall(cloud, radius_map, axis)
+    return Wall(cloud, radius_map, axis, fixed)
 
 
 def fill(wall: Wall, stretch: Stretch, radius_map: RadiusMap, rings: RingsOnWall, survey: RingSurvey) -> None:

@@ -25,6 +25,8 @@ _RINGS = 31
 _SMOOTH_RINGS = 7
 # Rings worked out at a time, for memory's sake.
 _AT_ONCE = 512
+# Sectors of the image in which a ring's departure from its smooth shape is kept: a degree each.
+_SECTORS = 360
 
 
 @dataclass(frozen=True)
@@ -118,8 +120,11 @@ def smoothed_shift(shift: Float) -> Float:
     return np.asarray(uniform_filter1d(middle, _SMOOTH_RINGS, axis=0, mode="nearest"))
 
 
-def first_harmonic(samples: WallSamples) -> Float:
-    """Return the first harmonic (F, 2), mm, of every ring's sound wall; 0 where it is not determined.
+def smooth_shape(samples: WallSamples) -> tuple[Float, Float]:
+    """Return the first harmonic (F, 2), mm, of every ring's sound wall, and what departs from its shape.
+
+    The harmonic is 0 where it is not determined. The departure (F, A), mm, is that of each sample from mean,
+    first and second harmonic; NaN where it is unknown.
 
     The radius is counted from the pipe's own axis, so a first harmonic of a whole ring is no shape but a pose
     error. It is found with Geman-McClure weights beside mean and ovality, so that a dent or a deposit does
@@ -142,7 +147,19 @@ def first_harmonic(samples: WallSamples) -> Float:
         scale = np.full(len(psi), np.inf)
         scale[usable] = _REDESCENT * np.maximum(spread, 1e-6)
         weight = samples.valid / (1 + (error / scale[:, None]) ** 2) ** 2
-    return np.where(usable[:, None], shape[:, :2], 0.0)
+    error = radius - np.einsum("fai,fi->fa", design, shape)
+    known = samples.valid & usable[:, None]
+    return np.where(usable[:, None], shape[:, :2], 0.0), np.where(known, error, np.nan)
+
+
+def _in_sectors(values: Float) -> Float:
+    """Return the means (F, K) of the known values (F, A) in each sector of the image; NaN without any."""
+    azimuths = values.shape[1]
+    starts = np.unique(np.arange(_SECTORS) * azimuths // _SECTORS)
+    known = np.isfinite(values)
+    count = np.add.reduceat(known, starts, axis=1, dtype=np.int64)
+    total = np.add.reduceat(np.where(known, values, 0.0), starts, axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 @dataclass(frozen=True)
@@ -159,6 +176,10 @@ class RingSurvey:
         Share of the circle that it shows.
     count : (F,) int
         Its valid samples.
+    roll_rad : (F,)
+        Azimuth in P less azimuth in the image.
+    departure_mm : (F, K)
+        Departure from its mean, first and second harmonic in sectors of the image; NaN where unknown.
     """
 
     shift_mm: Float
@@ -167,6 +188,8 @@ class RingSurvey:
     farthest_mm: Float
     seen: Float
     count: Int
+    roll_rad: Float
+    departure_mm: Float
 
     def near(self, first_mm: float, last_mm: float) -> Int:
         """Return the rings (n,), in the order of frames, that reach between two distances."""
@@ -177,10 +200,13 @@ class RingSurvey:
 def survey_of(rings: RingsOnWall) -> RingSurvey:
     """Look at all rings, some at a time."""
     every, azimuths = np.arange(len(rings.rings.frame)), len(rings.rings.azimuth_rad)
-    parts = [_of(rings.samples(rows)) for rows in some_at_a_time(every)]
-    harmonic, nearest, middle, farthest, count = (np.concatenate(p) for p in zip(*parts, strict=True))
+    image_rad = rings.rings.azimuth_rad
+    parts = [_of(rings.samples(rows), image_rad) for rows in some_at_a_time(every)]
+    harmonic, nearest, middle, farthest, count, *image = (np.concatenate(p) for p in zip(*parts, strict=True))
     share = count / azimuths
-    return RingSurvey(smoothed_shift(harmonic), nearest, middle, farthest, share, count.astype(np.int64))
+    return RingSurvey(
+        smoothed_shift(harmonic), nearest, middle, farthest, share, count.astype(np.int64), *image
+    )
 
 
 def some_at_a_time(rows: Int) -> Iterator[Int]:
@@ -189,11 +215,14 @@ def some_at_a_time(rows: Int) -> Iterator[Int]:
         yield rows[start : start + _AT_ONCE]
 
 
-def _of(samples: WallSamples) -> tuple[Float, ...]:
+def _of(samples: WallSamples, image_rad: Float) -> tuple[Float, ...]:
+    harmonic, departure = smooth_shape(samples)
+    turn = np.exp(1j * (np.where(samples.valid, samples.azimuth_rad, 0.0) - image_rad))
+    roll = np.angle(np.where(samples.valid, turn, 0.0).sum(1))
     s, any_seen = np.where(samples.valid, samples.distance_mm, np.nan), np.asarray(samples.valid.any(1))
     return (
-        first_harmonic(samples), *(_over(f, s, any_seen) for f in (np.nanmin, np.nanmedian, np.nanmax)),
-        samples.valid.sum(1).astype(float),
+        harmonic, *(_over(f, s, any_seen) for f in (np.nanmin, np.nanmedian, np.nanmax)),
+        samples.valid.sum(1).astype(float), roll, _in_sectors(departure),
     )  # fmt: skip
 
 

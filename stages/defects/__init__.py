@@ -5,8 +5,8 @@
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
 4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
-5. What neither a second ring nor the photo confirms, or is rather false than real in such footage, is set
-apart (`corroborate`, `clutter`, `credibility`).
+5. What neither a second ring nor the photo confirms, stays at one place of the image, or is rather false than
+real in such footage, is set apart with the reason (`corroborate`, `clutter`, `credibility`).
 6. Kind from named features as a probability, with codes and words (`classify`, `describe`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
@@ -20,9 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
+from pipeline.arrays import Float
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
-from pipeline.artefacts.measured import RingSamples, Wall, WallTexture
+from pipeline.artefacts.measured import FixedToProbe, RingSamples, Wall, WallTexture
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
@@ -46,6 +47,8 @@ _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
 # Unconfirmed ones as few as these are looked at at once; a reader must know from where on one finding in four
 # is expected to be false.
 _FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
+# Of what stays at one place of the image nothing says that it is rather on the wall than on the probe.
+_ON_PROBE_OR_WALL = 0.5
 
 
 def find_defects(
@@ -73,8 +76,9 @@ def find_defects(
     scene = Scene(texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
-    found = tuple(_measured(measured, regions, scene, parameters, context))
-    credibility = credibility_of([f.evidence for f in found if not f.all_round], clutter, wall.cloud.frame)
+    found = tuple(_measured(measured, regions, scene, wall.fixed, parameters, context))
+    on_wall = [f.evidence for f in found if not (f.all_round or f.evidence.fixed)]
+    credibility = credibility_of(on_wall, clutter, wall.cloud.frame)
     confirmed, unconfirmed = _judged(found, credibility, parameters.min_depth_mm)
     items, alone = _numbered(confirmed, 1), _numbered(unconfirmed, len(confirmed) + 1)
     expected = parameters.false_alarms + sum(1 - d.probability for d in items)
@@ -99,6 +103,7 @@ def _measured(
     wall: MeasuredWall,
     regions: tuple[Region, ...],
     scene: Scene,
+    fixed: FixedToProbe | None,
     parameters: DefectParameters,
     context: Context,
 ) -> Iterator[_Found]:
@@ -113,23 +118,36 @@ def _measured(
             depth = measure_depth(here, surface, clean, parameters.draws, context.random)
             depth = allowed_by_neighbours(depth, here, surface)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
-                evidence = evidence_for(here, depth, surface, scene.texture)
+                evidence = evidence_for(here, depth, surface, scene.texture, _fixed_in(region, fixed))
                 yield _Found(describe(here, depth, surface, scene), evidence, here.all_round)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
 
 
+def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
+    """Return by how much the line departs in a region (H, W) at one place of the image, mm."""
+    if fixed is None:
+        return np.zeros(region.mask.shape)
+    rows = fixed.departure_mm[region.row : region.row + len(region.mask)].astype(float)
+    return region.counted_from(region.row).cut(rows)
+
+
 def _judged(
     found: Sequence[_Found], credibility: Credibility, min_depth_mm: float
 ) -> tuple[list[Defect], list[Defect]]:
-    """Return what is confirmed, and what is not: shown by one ring alone, or rather false than real."""
+    """Return what is confirmed, and what is not, with the reason."""
     confirmed: list[Defect] = []
     unconfirmed: list[Defect] = []
     for f in found:
         real = 1.0 if f.all_round else credibility.probability(f.evidence, f.defect, min_depth_mm)
+        real *= _ON_PROBE_OR_WALL if f.evidence.fixed else 1.0
         counts = f.all_round or (f.evidence.corroborated and real >= COUNTED)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
-        (confirmed if counts else unconfirmed).append(defect)
+        if counts:
+            confirmed.append(defect)
+        else:
+            words = f"{defect.statement} Not confirmed. {f.evidence.doubt}."
+            unconfirmed.append(replace(defect, statement=words))
     return confirmed, unconfirmed
 
 
@@ -198,5 +216,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "6", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "7", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

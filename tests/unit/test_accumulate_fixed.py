@@ -1,0 +1,92 @@
+"""What stays at one place of the image is told from the wall, by its length and by the probe's roll."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.arrays import Float
+from pipeline.artefacts.measured import Trajectory, Wall
+from pipeline.geometry.axis import straight_axis
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from stages.accumulate import AccumulateParameters, accumulate_wall
+from stages.triangulate import TriangulateParameters, triangulate_rings
+from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
+from tests.quiet import quiet_context
+
+RINGS, STEP_MM, ROLL = 60, 2.0, 0.25
+WHERE, WIDTH = 0.8, 0.06  # azimuth and 1 σ, rad, of everything that departs
+DROPLET_PX = 1.5
+
+
+def motion(roll_rad: float) -> Trajectory:
+    k = np.arange(RINGS)
+    turn = np.stack([0.01 * np.sin(0.2 * k), 0.01 * np.cos(0.15 * k), roll_rad * k / RINGS], -1)
+    origin = np.stack([0.8 * np.sin(0.1 * k), 0.5 * np.cos(0.1 * k), STEP_MM * k], -1)
+    axis = straight_axis(-50.0, STEP_MM * RINGS + 100)
+    T_pc = from_parts(rotation_from_vector(turn), origin)
+    return Trajectory(k, k / 30, T_pc, np.zeros((RINGS, 6, 6)), axis, RADIUS, 1.0, 0.0, 0.0, ())
+
+
+def bump(azimuth: Float) -> Float:
+    turn = (azimuth - WHERE + np.pi) % (2 * np.pi) - np.pi
+    return np.asarray(np.exp(-0.5 * (turn / WIDTH) ** 2))
+
+
+def seam(s: Float, psi: Float) -> Float:
+    return RADIUS - 0.6 * bump(psi)
+
+
+def gouge(s: Float, psi: Float) -> Float:
+    return RADIUS + 0.6 * bump(psi) * (np.abs(s - BASELINE - 60) < 15)
+
+
+def measured(roll_rad: float, wall=round_wall, droplet_px: float = 0.0, from_ring: int = 0) -> Wall:
+    run, probe = motion(roll_rad), replace(small_probe(), covariance=np.zeros((20, 20)))
+    rings = rings_on_wall(probe, run.T_pc, run.frame, np.random.default_rng(0), wall, 0.05, 360)
+    radius = rings.radius_px.copy()
+    radius[from_ring:] += (droplet_px * bump(rings.azimuth_rad)).astype(np.float32)
+    rings = replace(rings, radius_px=radius)
+    points = triangulate_rings(rings, probe, TriangulateParameters(), quiet_context())
+    chosen = AccumulateParameters(azimuth_samples=360)
+    return accumulate_wall(probe, rings, points, run, chosen, quiet_context())
+
+
+@pytest.mark.parametrize("from_ring", [0, RINGS // 3])
+def test_a_droplet_does_not_follow_the_wall(from_ring: int) -> None:
+    fixed = measured(ROLL, droplet_px=DROPLET_PX, from_ring=from_ring).fixed
+    assert fixed is not None
+    (place,) = fixed.places
+    assert place.on_probe
+    assert place.azimuth_rad == pytest.approx(WHERE, abs=0.03)
+    assert place.frame_from == pytest.approx(from_ring, abs=6)
+
+
+def test_without_roll_droplet_and_seam_cannot_be_told_apart() -> None:
+    for wall, droplet_px in ((round_wall, DROPLET_PX), (seam, 0.0)):
+        fixed = measured(0.0, wall, droplet_px).fixed
+        assert fixed is not None
+        assert [place.on_probe for place in fixed.places] == [False]
+
+
+@pytest.mark.parametrize("wall", [round_wall, gouge])
+def test_what_is_short_or_nothing_belongs_to_the_wall(wall) -> None:
+    assert measured(0.0, wall).fixed is None
+
+
+def test_a_seam_that_the_roll_shows_to_be_on_the_wall_is_left_alone() -> None:
+    assert measured(ROLL, seam).fixed is None
+
+
+def test_sigma_holds_what_a_droplet_does_to_the_wall() -> None:
+    got = measured(ROLL, droplet_px=DROPLET_PX)
+    error = np.abs(got.radius_map.radius_mm - RADIUS)
+    off = error > 0.25
+    assert off.sum() > 200
+    assert np.mean(error[off] < 1.96 * got.radius_map.sigma_mm[off]) > 0.9
+    assert got.fixed is not None
+    beside = got.fixed.departure_mm == 0
+    clean = np.median(measured(ROLL).radius_map.sigma_mm)
+    assert np.median(got.radius_map.sigma_mm[beside]) < 1.3 * clean
