@@ -27,9 +27,10 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     (
         "steps built on others",
-        ("stages.motion", "stages.calibrate", "stages.preview", "stages.compare", "stages.twin"),
+        ("stages.motion", "stages.calibrate", "stages.preview", "stages.compare"),
     ),
     ("diagnosis", ("stages.diagnose",)),
+    ("recorded against re-rendered", ("stages.twin",)),
     ("order of the steps", ("stages.catalogue",)),
     ("files for people", ("pipeline.export",)),
     ("review", ("pipeline.review",)),

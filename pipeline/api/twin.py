@@ -6,15 +6,16 @@ import base64
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 
-from pipeline.api.job import Job, open_job, result_of, run_job
+from pipeline.api.diagnosis.tried import DiagnosisTried, try_diagnosis
+from pipeline.api.job import Job, open_job, result_of, run_job, value_source
 from pipeline.arrays import Byte
-from pipeline.artefacts.twin import Mismatch, NamedFigure, Twin, TwinView
+from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, Twin, TwinView
 from pipeline.errors import InputError
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.configuration import resolve
@@ -65,32 +66,38 @@ def twin(
     Cancelled
         When the user stopped it with Ctrl-C; the same call goes on where it was.
     """
-    job = twin_job(Path(run), Path(output), None if diagnosis is None else Path(diagnosis), settings)
-    run_job(job, Selection(), display or SilentDisplay())
+    shown = display or SilentDisplay()
+    job = twin_job(Path(run), Path(output), None if diagnosis is None else Path(diagnosis), settings, shown)
+    run_job(job, Selection(), shown)
     return result_of(job, Twin)
 
 
-def twin_job(run: Path, output: Path, diagnosis: Path | None, settings: Sequence[str]) -> Job:
-    """Open the inputs of a twin without starting it; raises as `twin`."""
+def twin_job(
+    run: Path, output: Path, diagnosis: Path | None, settings: Sequence[str], display: Display
+) -> Job:
+    """Open the inputs of a twin without starting it; raises as `twin`.
+
+    With a diagnosis, its gauge run is first held against it, which takes half a minute.
+    """
     record = read_run_record(run)
-    probe = record.probe
+    probe, tried = record.probe, DiagnosisTried()
     if diagnosis is not None:
         probe = diagnosis / "probe.yaml"
         if not probe.is_file():
             raise InputError(diagnosis, "holds no probe.yaml", expected="the folder of boresight diagnose")
+        tried = try_diagnosis(diagnosis, output / "gauge", display)
     earlier = {s.name: record.configuration[s.name] for s in _MEASURED if s.name in record.configuration}
     stages = (*_MEASURED, TWIN)
     configuration = resolve(stages, None, settings, earlier, run / "run.json")
     job = open_job(record.recording, output, probe, stages, EXPORTERS, configuration, "twin")
     if diagnosis is None:
         check_inputs_unchanged(record, {s.kind.__name__.lower(): s.key for s in job.sources})
-    return Job(
-        job.command, job.sources, job.stages, job.exporters, job.configuration, job.folder, job.about, (run,)
-    )
+    return replace(job, sources=(*job.sources, value_source(tried)), lent=(run,))
 
 
-def twin_document(found: Twin) -> dict[str, Any]:
+def twin_document(found: Twin, tried: DiagnosisTried) -> dict[str, Any]:
     """Return a twin as plain data; what is not known is None."""
+    gauge = None if tried.gauge is None else _gauge(tried.gauge)
     return {
         "format": 1,
         "frames": [int(f) for f in found.frame],
@@ -105,12 +112,19 @@ def twin_document(found: Twin) -> dict[str, Any]:
             }
             for r in found.regions
         },
-        "found": [_mismatch(m) for m in found.found],
+        "found": [_mismatch(m) for m in (*tried.found, *found.found)],
+        "withdrawn": [_mismatch(m) for m in tried.withdrawn],
+        "gauge": gauge,
         "psnr_db": _known(found.psnr_db),
         "psnr_noise_free_db": _known(found.psnr_noise_free_db),
         "seen": found.seen,
-        "cannot_tell": list(found.cannot_tell),
+        "cannot_tell": [*tried.cannot_tell, *found.cannot_tell],
     }
+
+
+def _gauge(gauge: GaugeTwin) -> dict[str, Any]:
+    plain = {k: _known(v) if isinstance(v, float) else v for k, v in vars(gauge).items() if k != "frame"}
+    return {"frames": [int(f) for f in gauge.frame], **plain}
 
 
 def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
@@ -128,9 +142,9 @@ def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def write_twin(found: Twin, made_by: MadeBy, folder: Path) -> None:
+def write_twin(found: Twin, tried: DiagnosisTried, made_by: MadeBy, folder: Path) -> None:
     """Write twin.json and twin.html."""
-    document = twin_document(found) | {"made_by": made_by.document()}
+    document = twin_document(found, tried) | {"made_by": made_by.document()}
     (folder / "twin.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
     views = [_shown(v) for v in found.views]
     page = page_template("twin").render(d=document, views=views)

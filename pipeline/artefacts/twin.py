@@ -126,3 +126,42 @@ class Twin:
     seen: float
     cannot_tell: tuple[str, ...]
     views: tuple[TwinView, ...]
+
+
+@dataclass(frozen=True)
+class GaugeTwin:
+    """The line of a gauge run, whose bore is known, beside the same line re-rendered with two instruments.
+
+    Attributes
+    ----------
+    frame : (F,) int
+        The compared laser frames.
+    effects : tuple of str
+        What was switched on beyond the stated instrument, as `boresight simulate` takes it.
+    pixels : int
+    chi2_stated, chi2_diagnosed, chi2_measured : float
+        Per pixel: with the stated instrument, with the effects, and with the line where it was measured,
+        which is the least that any instrument can reach: 1 by the choice of the variance, less where pixels
+        clip.
+    rms_px_stated, rms_px_diagnosed : float
+        R.m.s. of how far the line lies from where it is predicted.
+    told_px : float
+        Displacement of the line that raises χ² by a tenth: less than about that cannot be told.
+    sigmas : float
+        By how many σ, taken from frame to frame, χ² falls when the effects are switched on.
+    kept : tuple of bool
+        Of each effect, whether frames fit better with it than with the others alone; the others are
+        withdrawn.
+    """
+
+    frame: Int
+    effects: tuple[str, ...]
+    pixels: int
+    chi2_stated: float
+    chi2_diagnosed: float
+    chi2_measured: float
+    rms_px_stated: float
+    rms_px_diagnosed: float
+    told_px: float
+    sigmas: float
+    kept: tuple[bool, ...]

@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from pipeline.api.diagnosis.tried import DiagnosisTried
 from pipeline.api.job import result_of
 from pipeline.api.twin import twin_job
 from pipeline.artefacts.twin import Twin
 from pipeline.commands.working import Assignments, worked
+from pipeline.machine.display import ProgressDisplay
 
 
 def twin(
@@ -28,9 +30,21 @@ def twin(
     Writes twin.json and twin.html. Frames tell most when the run was told to withhold them from measurement.
     """
     console = Console(stderr=True)
-    job = twin_job(run, output, diagnosis, assignments or ())
+    with ProgressDisplay(console) as display:
+        job = twin_job(run, output, diagnosis, assignments or (), display)
     worked(job, console)
+    _show_gauge(job.source(DiagnosisTried))
     _show(result_of(job, Twin), output)
+
+
+def _show_gauge(tried: DiagnosisTried) -> None:
+    if tried.gauge is not None:
+        stated, diagnosed = tried.gauge.chi2_stated, tried.gauge.chi2_diagnosed
+        typer.echo(
+            f"line of the gauge run: χ² per pixel {stated:.2f} as stated, {diagnosed:.2f} as diagnosed"
+        )
+    for mismatch in (*tried.found, *tried.withdrawn):
+        typer.echo(mismatch.statement)
 
 
 def _show(found: Twin, output: Path) -> None:

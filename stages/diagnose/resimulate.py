@@ -12,26 +12,14 @@ from threadpoolctl import threadpool_limits
 
 from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
-from pipeline.geometry.axis import straight_axis
 from pipeline.physics.catalogue import EFFECTS, effect
 from pipeline.physics.course import Course
 from pipeline.recording.base import Recording
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.exact import room_mm
-from pipeline.simulator.instrument import (
-    LedRing,
-    LineProfile,
-    TrueCamera,
-    TrueInstrument,
-    TrueLaser,
-    TrueSensor,
-)
-from pipeline.simulator.motion import Odometer, motion_through
-from pipeline.simulator.scene import Rendering
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.grid import Wall, WallGrid
-from stages.calibrate.gauge.geometry import gauge_of
+from stages.calibrate.gauge.scene import gauge_scene
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.gauge.fit import Fit, fit
@@ -39,7 +27,7 @@ from stages.diagnose.gauge.run import GaugeRun, Term
 
 _HELD_OUT = 12
 _RELAXED, _UNHEARD = 1e-4, 1e-8
-_NEAR, _BEYOND_MM, _STEP_MM, _COLUMNS = 2, 300.0, 0.1, 16
+_NEAR = 2
 _STEP_PX, _WAVES = 0.5, 8
 
 
@@ -140,32 +128,7 @@ def _switch(term: Term) -> Switch:
 
 def scene_of(recording: Recording, found: Fit) -> SceneTruth:
     """Return the scene of a gauge run: its bores, the poses and the instrument of a fit, no effect."""
-    state, probe = found.state, found.state.probe
-    wall = _wall(recording, state.T_pc)
-    motion = motion_through(state.T_pc, recording.frames.time_s, wall.axis)
-    laser = TrueLaser(probe.laser, profile=LineProfile(probe.laser.line_sigma_mm))
-    instrument = TrueInstrument(TrueCamera(probe.camera), laser, LedRing(), TrueSensor(), probe.shutter)
-    return SceneTruth(
-        name=recording.name, kind=recording.kind, seed=0, stated=state.stated, instrument=instrument,
-        wall=wall, facts=recording.pipe, motion=motion,
-        odometer=Odometer(), frames=recording.frames, frame_rate=recording.frame_rate,
-        rendering=Rendering.model_validate({}),
-    )  # fmt: skip
-
-
-def _wall(recording: Recording, T_pc: Float) -> Wall:
-    z = T_pc[:, 2, 3]
-    ends = float(z.min()) - _BEYOND_MM, float(z.max()) + _BEYOND_MM
-    rows = round((ends[1] - ends[0]) / _STEP_MM) + 1
-    grid = WallGrid(ends[0], _STEP_MM, rows, _COLUMNS)
-    fiducials = recording.pipe.fiducials
-    assert fiducials is not None
-    gauge = gauge_of(recording.pipe, fiducials)
-    radius = gauge.radius_mm[gauge.section(grid.distance_mm)]
-    shape = np.repeat(radius[:, None], _COLUMNS, axis=1).astype(np.float32)
-    plain = WallGrid(ends[0], ends[1] - ends[0], 2, _COLUMNS)
-    albedo = np.full((2, _COLUMNS, 3), 0.5, np.float32)
-    return Wall(straight_axis(*ends), grid, shape, plain, albedo)
+    return gauge_scene(recording, found.state.stated, found.state.probe, found.state.T_pc)
 
 
 def _off_px(scene: SceneTruth, frame: Int, uv: Float, outward: Float) -> Float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -25,7 +25,7 @@ class Value(BaseModel):
 
 
 class NamedEffect(BaseModel):
-    """One effect that a diagnosis names."""
+    """One effect that a diagnosis names; ``course`` is None for one that is constant."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -33,6 +33,7 @@ class NamedEffect(BaseModel):
     probability: float = Field(ge=0, le=1)
     parameters: dict[str, Value] = {}
     statement: str = ""
+    course: dict[str, Any] | None = None
 
 
 class Location(BaseModel):

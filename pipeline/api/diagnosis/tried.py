@@ -1,0 +1,124 @@
+"""A diagnosis tried on its own gauge run: a name is kept only if the re-rendered line then fits better."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.api.diagnosis.inputs import open_inputs
+from pipeline.api.diagnosis.switches import Switches, moves_line, switches_of
+from pipeline.api.job import Job, result_of, run_job
+from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure
+from pipeline.errors import InputError
+from pipeline.files.json_file import read_json
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import Display
+from pipeline.machine.plan import Selection
+from pipeline.physics.catalogue import effect
+from stages.diagnose.channels import FIDUCIALS
+from stages.diagnose.drill.answer import NamedEffect
+from stages.diagnose.drill.cases import ANSWER
+from stages.premises import PREMISES
+from stages.rings import RINGS
+from stages.twin.gauge_line import GAUGE_LINE
+
+_STAGES = (*(s.for_role("gauge") for s in (PREMISES, RINGS, FIDUCIALS)), GAUGE_LINE)
+
+
+@dataclass(frozen=True)
+class DiagnosisTried:
+    """What pictures of the gauge run say of a diagnosis; empty without one.
+
+    Attributes
+    ----------
+    gauge : GaugeTwin or None
+        None without a gauge run, or where nothing was named that moves the line.
+    found, withdrawn : tuple of Mismatch
+        Effects with which the pictures fit better, and those with which they do not.
+    cannot_tell : tuple of str
+    """
+
+    gauge: GaugeTwin | None = None
+    found: tuple[Mismatch, ...] = ()
+    withdrawn: tuple[Mismatch, ...] = ()
+    cannot_tell: tuple[str, ...] = ()
+
+
+def try_diagnosis(diagnosis: Path, folder: Path, display: Display) -> DiagnosisTried:
+    """Re-render the line of a diagnosis' gauge run with the stated probe and with what was found.
+
+    Parameters
+    ----------
+    diagnosis : Path
+        Folder of `boresight diagnose`; what it measured of the gauge run is not measured again.
+    folder : Path
+        Gets the results of the stages.
+
+    Raises
+    ------
+    InputError
+        When the folder is not one of a diagnosis, or its gauge run or probe cannot be used.
+    """
+    said, gauge, probe = switches_of(diagnosis / ANSWER), *_inputs(diagnosis / "run.json")
+    still = tuple(
+        f"The gauge's pictures cannot tell {s.name.replace('_', ' ')}: it does not move the line in them."
+        for s in said.found
+        if not moves_line(s.name)
+    )
+    if gauge is None:
+        sentence = (
+            "The diagnosis had no gauge run. In an inspection wall and poses are measured with the very "
+            "instrument that is in doubt, so that its error cannot be told from the wall's shape: record one."
+        )
+        return DiagnosisTried(cannot_tell=(*said.unsaid, *still, sentence))
+    if not said.of_line:
+        return DiagnosisTried(cannot_tell=(*said.unsaid, *still))
+    inputs = open_inputs(None, gauge, probe)
+    effects = json.dumps([s.text for s in said.of_line])
+    configuration = resolve(_STAGES, None, [f"gauge_line.effects={effects}"])
+    job = Job("twin", inputs.sources(), _STAGES, (), configuration, folder, inputs.record(), (diagnosis,))
+    run_job(job, Selection(), display)
+    return _judged(said, result_of(job, GaugeTwin), still)
+
+
+def _judged(said: Switches, found: GaugeTwin, still: tuple[str, ...]) -> DiagnosisTried:
+    named = [e for s, e in zip(said.found, said.effects, strict=True) if moves_line(s.name)]
+    each = [_mismatch(e, kept, found) for e, kept in zip(named, found.kept, strict=True)]
+    power = (
+        f"A line displaced by less than about {found.told_px:.2f} px raises χ² in the gauge's pictures by "
+        "less than a tenth: instruments that differ by less cannot be told apart."
+    )
+    kept, withdrawn = (
+        tuple(m for m, k in zip(each, found.kept, strict=True) if k == want) for want in (True, False)
+    )
+    return DiagnosisTried(found, kept, withdrawn, (*said.unsaid, *still, power))
+
+
+def _mismatch(named: NamedEffect, kept: bool, found: GaugeTwin) -> Mismatch:
+    """Return an effect as a mismatch of the line in the gauge run's pictures."""
+    words = named.name.replace("_", " ")
+    verdict = "fit better with it" if kept else "do not fit better with it, so that the name is withdrawn"
+    sizes = {q.name: q.unit for q in effect(named.name).quantities}
+    figures = tuple(
+        NamedFigure(name, value.value, value.sd, sizes.get(name, ""))
+        for name, value in named.parameters.items()
+    )
+    return Mismatch(
+        named.name, "line", str(effect(named.name).fixed_to), (), figures, named.probability,
+        found.chi2_stated, found.chi2_diagnosed,
+        f"{words.capitalize()}, named by the diagnosis: pictures of the gauge run {verdict}.",
+    )  # fmt: skip
+
+
+def _inputs(record: Path) -> tuple[Path | None, Path]:
+    """Return gauge run and stated probe of a diagnosis' record."""
+    try:
+        tree: dict[str, Any] = read_json(record)
+        gauge = tree.get("gauge")
+        return None if gauge is None else Path(gauge["path"]), Path(tree["probe"]["path"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            record, "is not the record of a diagnosis", expected="run.json of boresight diagnose"
+        ) from error

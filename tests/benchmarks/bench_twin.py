@@ -1,0 +1,141 @@
+"""What the twin can tell, by figures.
+
+``python -m tests.benchmarks.bench_twin swaps OUT``: every gauge run of the shared recordings, its line
+re-rendered as stated, with its own answer, with the true effects, and with the answers of other probes. A
+right answer must fit better than any other. The truth is opened for scoring alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.api.diagnosis.switches import Switches, moves_line, switches_of
+from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
+from pipeline.artefacts.measured import RingSamples
+from pipeline.instrument.probe_file import read_with_source
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.plan import Selection
+from pipeline.machine.stage import of_role
+from pipeline.physics.catalogue import effect
+from pipeline.physics.course import Course, CourseKind
+from pipeline.recording import open_recording
+from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.simulator.effects.switch import Switch
+from stages.diagnose.channels import FIDUCIALS, GaugeMeasured
+from stages.premises import PREMISES
+from stages.rings import RINGS
+from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, gauge_line_of, sigmas
+from tests.shared_data import PROJECT_ROOT
+
+_OPEN = ("open-1", "open-2")
+_BLIND = tuple(f"a{k:02d}" for k in range(1, 13))
+_KNOCK = "mount_knock"
+_FRAMES = 24
+_WRONG = 3
+_STAGES = tuple(s.for_role("gauge") for s in (PREMISES, RINGS, FIDUCIALS))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A gauge run, what its committed diagnosis says, and what is true."""
+
+    name: str
+    gauge: Path
+    answer: tuple[Switch, ...]
+    truth: tuple[Switch, ...]
+
+
+def cases(answers: Path) -> list[Case]:
+    """Return the shared gauge runs; open ones have the true effects as their answer, to save a diagnosis."""
+    root = PROJECT_ROOT.parent / "shared" / "recordings"
+    found = []
+    for name in _OPEN:
+        truth = _true(json.loads((root / f"{name}-gauge" / "truth.json").read_text("utf-8"))["effects"])
+        found.append(Case(name, root / f"{name}-gauge", truth, truth))
+    for name in _BLIND:
+        said: Switches = switches_of(answers / name / "diagnosis.json")
+        truth = json.loads((root / "blind-a" / "truth" / f"{name}.json").read_text("utf-8"))["effects"]
+        found.append(Case(name, root / "blind-a" / f"{name}-gauge", said.of_line, _true(truth)))
+    return found
+
+
+def _true(effects: list[list[Any]]) -> tuple[Switch, ...]:
+    """Return the true effects that move the line, in the catalogue's units."""
+    return tuple(_true_switch(name, values) for name, values in effects if name == _KNOCK or moves_line(name))
+
+
+def _true_switch(name: str, values: Any) -> Switch:
+    v = [float(x) for x in (values if isinstance(values, list) else [values])]
+    if name == _KNOCK:
+        return Switch("laser_tilt", (v[1], v[2]), Course(CourseKind.STEP, (v[0],)))
+    if name == "sheet_waviness":
+        return Switch(name, (1e3 * math.radians(v[1]), v[0], v[2]))
+    if name == "principal_point":
+        return Switch(name, (math.hypot(*v), math.degrees(math.atan2(v[1], v[0]))))
+    return Switch(name, tuple(v[: len(effect(name).quantities)]))
+
+
+def gauge_line(case: Case, folder: Path) -> GaugeLine:
+    """Return the line of a case's gauge run; rings and fiducials are kept in a folder."""
+    recording = open_recording(case.gauge)
+    assert recording.probe_file is not None
+    probe, _ = read_with_source(recording.probe_file)
+    sources = (recording_source(recording, "gauge"), probe_source(probe))
+    job = Job("twin", sources, _STAGES, (), resolve(_STAGES, None, ()), folder / case.name)
+    run_job(job, Selection(), SilentDisplay())
+    frames, rings, measured = (
+        result_of(job, of_role(kind, "gauge")) for kind in (CheckedFrames, RingSamples, GaugeMeasured)
+    )
+    assert measured.run is not None, measured.problem
+    parameters = GaugeLineParameters.model_validate({"frames": _FRAMES})
+    return gauge_line_of(frames.applied_to(recording), rings, measured.run, parameters)
+
+
+def swaps(folder: Path, answers: Path) -> None:
+    """Print χ² per pixel of each gauge's line under each instrument, and how many wrong ones fit worse."""
+    every = cases(answers)
+    different = [c for c in every if c.answer]
+    worse = better_than_stated = pairs = named = 0
+    for k, case in enumerate(every):
+        start = time.process_time()
+        line = gauge_line(case, folder)
+        nowhere = np.zeros(len(line.blocks.of_frame))
+        least = float(line.chi2(nowhere).mean())
+        stated = line.chi2(line.displacement_px(()))
+        own = line.chi2(line.displacement_px(case.answer)) if case.answer else stated
+        true = line.chi2(line.displacement_px(case.truth)) if case.truth else stated
+        print(
+            f"{case.name}: measured {least:.3f}, stated {stated.mean():.3f}, own answer {own.mean():.3f} "
+            f"({' '.join(s.text for s in case.answer) or 'nothing'}), true effects {true.mean():.3f}",
+            flush=True,
+        )
+        if case.answer:
+            named += 1
+            better_than_stated += sigmas(stated, own) > 0
+        others = [o for o in different[k % len(different) :] + different if o.name != case.name][:_WRONG]
+        for other in others:
+            wrong = line.chi2(line.displacement_px(other.answer))
+            told = sigmas(wrong, own)
+            pairs, worse = pairs + 1, worse + (told > 0)
+            print(f"  with the answer of {other.name}: {wrong.mean():.3f}, worse by {told:.1f} σ", flush=True)
+        print(f"  {time.process_time() - start:.0f} s of processor time", flush=True)
+    print(f"answers that move the line fit better than the stated probe: {better_than_stated} of {named}")
+    print(f"swapped answers fit worse than a probe's own: {worse} of {pairs}")
+
+
+if __name__ == "__main__":
+    words = argparse.ArgumentParser(description=__doc__)
+    words.add_argument("what", choices=["swaps"])
+    words.add_argument("folder", type=Path)
+    words.add_argument("--answers", type=Path, default=Path("data/blind-a"), help="folder of diagnoses")
+    given = words.parse_args()
+    swaps(given.folder, given.answers)
