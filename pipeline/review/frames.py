@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import BoresightError, InputError
@@ -78,7 +78,7 @@ class FrameFinder:
         spot_c = transform(inverse(self.trajectory.T_pc[near]), spot_p)
         polar = np.arctan2(np.hypot(spot_c[:, 0], spot_c[:, 1]), spot_c[:, 2])
         lit_by = self._illumination(near)
-        ahead = np.where(np.isin(lit_by, ["laser", "both"]), np.abs(self._off_sheet(spot_c)), np.inf)
+        ahead = np.where(np.isin(lit_by, ["laser", "both"]), np.abs(self.off_sheet(spot_c)), np.inf)
         lit = np.where(np.isin(lit_by, ["led", "both"]), np.abs(polar - _BEST_POLAR_RAD), np.inf)
         best = {int(np.argmin(way)): None for way in (ahead, lit) if np.isfinite(way).any()}
         found = tuple(s for k in best if (s := self._sight(near[k], spot_c[k], lit_by[k])) is not None)
@@ -107,8 +107,8 @@ class FrameFinder:
             raise UnseenError("no wall is seen there")
         return float(distance[outside[0]]), float(azimuth[outside[0]])
 
-    def picture(self, frame: int) -> bytes:
-        """Return a frame as JPEG.
+    def image(self, frame: int) -> Image:
+        """Return a frame (H, W, 3) BGR.
 
         Raises
         ------
@@ -124,12 +124,16 @@ class FrameFinder:
             raise UnseenError(str(error)) from error
         if image is None:
             raise UnseenError(f"frame {frame} cannot be decoded")
-        encoded, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        return image
+
+    def picture(self, frame: int) -> bytes:
+        """Return a frame as JPEG; raises as `image`."""
+        encoded, jpeg = cv2.imencode(".jpg", self.image(frame), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
         if not encoded:
             raise UnseenError(f"frame {frame} cannot be encoded")
         return jpeg.tobytes()
 
-    def _off_sheet(self, spot_c: Float) -> Float:
+    def off_sheet(self, spot_c: Float) -> Float:
         """Return how far (N,) the spot lies off the laser's sheet along the optical axis, mm."""
         rho = np.hypot(spot_c[:, 0], spot_c[:, 1])
         azimuth = np.arctan2(spot_c[:, 1], spot_c[:, 0])

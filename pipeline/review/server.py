@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ from starlette.staticfiles import StaticFiles
 
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import BoresightError, InputError
-from pipeline.review import documents
+from pipeline.review import documents, same_view
 from pipeline.review.decisions.actions import Point, action_of
 from pipeline.review.decisions.ledger import StaleError
 from pipeline.review.flat_tiles import FlatPicture, picture_of
@@ -111,6 +112,8 @@ class ReviewApp:
             Route("/api/quality", self._answering(self._quality)),
             Route("/api/sights", self._answering(self._sights)),
             Route("/api/frames/{frame:int}/spot", self._answering(self._spot)),
+            Route("/api/frames/{frame:int}/stand", self._answering(self._stand)),
+            Route("/api/frames/{frame:int}/seen.png", self._answering(self._seen)),
             Route("/api/frames/{frame:int}.jpg", self._answering(self._frame)),
             Route("/api/tiles/{layer:str}", self._answering(self._layer)),
             Route(
@@ -190,6 +193,19 @@ class ReviewApp:
         uv = _number(request, "u"), _number(request, "v")
         found = finder_of(self.review.files).spot(request.path_params["frame"], uv)
         return JSONResponse({"point": found})
+
+    def _stand(self, request: Request, _: bytes) -> Response:
+        return JSONResponse(documents.cleaned(vars(self._stand_of(request))))
+
+    def _seen(self, request: Request, _: bytes) -> Response:
+        fov, width, height = (_number(request, name) for name in ("fov", "width", "height"))
+        finder = finder_of(self.review.files)
+        png = same_view.seen_png(finder, self._stand_of(request), math.radians(fov), int(width), int(height))
+        return Response(png, media_type="image/png")
+
+    def _stand_of(self, request: Request) -> same_view.Stand:
+        at = _number(request, "distance"), _number(request, "azimuth")
+        return same_view.stand_in(self.review.files, request.path_params["frame"], *at)
 
     def _frame(self, request: Request, _: bytes) -> Response:
         jpeg = finder_of(self.review.files).picture(request.path_params["frame"])

@@ -41,6 +41,8 @@ def cut_plan(plan: Sequence[TileViews], views_at_once: int) -> list[TextureStret
 class LightChain:
     """The lights of stretches, each as bright as the one before it in the views that both want.
 
+    The first is as bright as recorded where the median view sees the laser ring, at ``ring_polar_rad``.
+
     Attributes
     ----------
     gain : (V,)
@@ -49,8 +51,8 @@ class LightChain:
         Views of all stretches so far.
     """
 
-    def __init__(self, views: int, probe: Probe) -> None:
-        self._probe = probe
+    def __init__(self, views: int, probe: Probe, ring_polar_rad: float) -> None:
+        self._probe, self._ring_polar_rad = probe, ring_polar_rad
         self._before: Light | None = None
         self._residuals: list[float] = []
         self.gain: Float = np.full(views, np.nan)
@@ -62,7 +64,9 @@ class LightChain:
         gain = np.full(len(self.gain), np.nan)
         gain[wanted] = found.gain
         light = replace(found, gain=gain)
-        if self._before is not None:
+        if self._before is None:
+            light = _one_at(light, self._ring_polar_rad)
+        else:
             light = replace(light, gain=gain * _ratio(self._before, light))
         self._before = light
         self._residuals.append(light.residual)
@@ -74,6 +78,19 @@ class LightChain:
     def residual(self) -> float:
         """Robust 1 σ of relative brightness after the fit, median over the stretches."""
         return float(np.median(self._residuals))
+
+
+def _one_at(light: Light, polar_rad: float) -> Light:
+    """Return the light with a brightness of 1 at a polar angle in the median view.
+
+    Wall, light and exposures are known up to common factors, which are chosen so that the wall's photo is as
+    bright as recorded.
+    """
+    if not np.isfinite(light.gain).any():
+        return light
+    level = float(_course(light.field, np.array([polar_rad]))[0])
+    field = replace(light.field, log_correction=light.field.log_correction - level)
+    return replace(light, field=field, gain=light.gain / np.nanmedian(light.gain))
 
 
 def _ratio(before: Light, light: Light) -> float:

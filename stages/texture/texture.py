@@ -71,8 +71,9 @@ def photograph_wall(
     stretches = cut_plan(plan, parameters.views_at_once)
     images = _Images(recording, views, sum(len(s.wanted) for s in stretches), context)
 
+    ring = float(np.arctan2(surface.mean_radius_mm, probe.laser.baseline_mm))
     sampler = LightSampler(surface, probe, views, reach, parameters.laser_band_mm)
-    picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe)
+    picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe, ring)
     for stretch in stretches:
         for view, image in images.read(stretch.wanted):
             sampler.add(view, image)

@@ -33,7 +33,7 @@ FLY = """new Promise((done) => { const m = boresight.model, times = [];
   requestAnimationFrame(step); })"""
 DRAW = """(() => { const m = boresight.model, gl = m.renderer.getContext(), pixel = new Uint8Array(4);
   const start = performance.now();
-  for (let k = 0; k < 20; k++) { m.camera.position.z -= 0.0007; m.renderer.render(m.scene, m.camera);
+  for (let k = 0; k < 20; k++) { m.eye.camera.position.z -= 0.0007; m.renderer.render(m.scene, m.eye.camera);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel); }
   return (performance.now() - start) / 20; })()"""
 SIZED = """(() => { const r = boresight.model.renderer;

@@ -63,7 +63,7 @@ def drawn_light(first: int, last: int, level: float) -> LightSamples:
 
 
 def test_light_goes_on_as_bright_as_it_was() -> None:
-    chain = LightChain(80, small_probe())
+    chain = LightChain(80, small_probe(), 1.0)
     first = chain.add(drawn_light(0, 45, 0.0), np.arange(45), 1.0)
     second = chain.add(drawn_light(35, 80, 0.0), np.arange(35, 80), 1.0)
 

@@ -42,7 +42,7 @@ def test_every_tool_gives_its_sigma(page: Tab, tool: str, places: list[Any], nam
 def test_the_model_can_be_measured_on(page: Tab) -> None:
     page.page.click('.tools button:text-is("Point")')
     page.page.click("text=Home")
-    page.js("boresight.model.flown = 20, boresight.model.fly(0)")
+    page.js("boresight.model.eye.flown = 20, boresight.model.fly(0)")
     box = page.page.locator(".model canvas").bounding_box()
     page.page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 0.5 * box["height"])
     page.until("document.querySelector('#view-flat .status').textContent.includes('±')")

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from tests.review_browser import Tab
+from tests.same_view import side_by_side
 
 _SPOT_ON_SCREEN = """(([s, a]) => {
   const m = boresight.model;
   boresight.session.moveTo([s, a]);
-  m.camera.updateMatrixWorld();
-  const p = m.marker.position.clone().project(m.camera);
+  m.eye.camera.updateMatrixWorld();
+  const p = m.spot.marker.position.clone().project(m.eye.camera);
   return [p.x, p.y, p.z]; })"""
 
 
@@ -35,7 +36,7 @@ def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
         page.until(
             f"document.querySelector('.mark.finding.chosen:not([hidden])')?.dataset.finding === '{name}'"
         )
-        hidden = page.js("""(() => { const { camera, marker, marks } = boresight.model;
+        hidden = page.js("""(() => { const { eye: { camera }, spot: { marker }, marks } = boresight.model;
           const { z } = camera.position;
           return marks.ends.some((e) => (e.position.z - z) * (e.position.z - marker.position.z) < 0); })()""")
         assert not hidden, "no end cap stands between the eye and what it looks at"
@@ -45,7 +46,7 @@ def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
     page.js("boresight.model.fly(1e4)")
     page.until("document.querySelector('.mark.end:not([hidden])')")
     last = page.js("boresight.session.run.distance_mm[1]")
-    assert page.js("boresight.model.flown") < last, "the eye stays within the wall"
+    assert page.js("boresight.model.eye.flown") < last, "the eye stays within the wall"
     (said,) = marks(page, ".end")
     assert float(said.removeprefix("end of the measured wall, ").split()[0]) == pytest.approx(last, abs=0.6)
     page.js("boresight.session.select('1')")
@@ -55,17 +56,17 @@ def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
     px = page.page.locator(".scale-bar i").bounding_box()["width"]
     mm = float(page.page.locator(".scale-bar span").inner_text().split()[0])
     eye, high = page.js(
-        "(({camera, marker, canvas}) => [camera.position.distanceTo(marker.position), canvas.clientHeight])"
-        "(boresight.model)"
+        "(({eye: {camera}, spot: {marker}, canvas}) =>"
+        " [camera.position.distanceTo(marker.position), canvas.clientHeight])(boresight.model)"
     )
-    fov = np.radians(page.js("boresight.model.camera.fov"))
+    fov = np.radians(page.js("boresight.model.eye.camera.fov"))
     assert px / mm == pytest.approx(high / 2 / np.tan(fov / 2) / (1000 * eye), rel=0.05)
 
 
 def test_from_outside_the_pipe_fills_the_pane(page: Tab) -> None:
     page.page.click("text=Outside")
     corners = page.js("""(() => {
-      const { pipe, camera } = boresight.model, { distance_mm, radius_mm } = boresight.session.run;
+      const { pipe, eye: { camera } } = boresight.model, { distance_mm, radius_mm } = boresight.session.run;
       camera.updateMatrixWorld();
       const turn = [...Array(24).keys()];
       return distance_mm.flatMap((s) => turn.map((k) => {
@@ -105,20 +106,39 @@ def test_the_photo_is_shown_as_it_was_recorded(page: Tab) -> None:
       const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
       const [maps, seen] = [m.parts.map((p) => p.mesh.material.map), []];
       for (const part of m.parts) { part.mesh.material.map = null; part.mesh.material.needsUpdate = true; }
-      m.marks.group.visible = m.marker.visible = false;
-      m.shine(); m.renderer.render(m.scene, m.camera);
+      m.marks.group.visible = m.spot.marker.visible = false;
+      m.shine(); m.renderer.render(m.scene, m.eye.camera);
       const px = new Uint8Array(4 * w * h);
       gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, px);
       for (let y = Math.round(h * .43); y < h * .57; y += 2)
         for (let x = Math.round(w * .43); x < w * .57; x += 2) seen.push(px[4 * (y * w + x)]);
       m.parts.forEach((p, k) => { p.mesh.material.map = maps[k]; p.mesh.material.needsUpdate = true; });
-      m.marks.group.visible = m.marker.visible = true;
+      m.marks.group.visible = m.spot.marker.visible = true;
       seen.sort((a, b) => a - b);
       return (seen[Math.floor(.98 * seen.length)] - seen[Math.floor(.02 * seen.length)]) / 255; })()"""
     assert page.js(contrast) < 0.02
     page.page.check("#raking")
     assert page.js(contrast) > 0.25, "a dent of 1.6 mm reads by light and shadow"
     page.page.uncheck("#raking")
+
+
+def test_a_recorded_frame_and_the_model_look_the_same_from_the_same_place(page: Tab) -> None:
+    first, last = page.js("boresight.session.run.distance_mm")
+    spot = [(first + last) / 2, 0.3]
+    sights = page.js(f"boresight.session.source.sights(...{spot})")
+    lit = next(s["frame"] for s in sights if s["illumination"] == "led")
+    alike = side_by_side(page, lit, *spot)
+    assert alike.compared > 0.8
+    assert alike.psnr_db > 35, "at least 30 are asked for"
+    assert alike.brighter == pytest.approx(1, abs=0.02)
+    evenly = side_by_side(page, lit, *spot, is_evenly_lit=True)
+    assert evenly.psnr_db < 30, "the control: without the frame's light it is not the same"
+    page.page.check("#alike")
+    page.until("boresight.session.stand !== null && document.querySelector('.shots img').naturalWidth > 0")
+    page.page.focus(".model canvas")
+    page.keys("w")
+    assert page.js("boresight.session.stand") is None, "who flies on looks freely again"
+    assert not page.page.is_checked("#alike")
 
 
 def test_colours_hold_every_value_and_can_be_fixed(page: Tab) -> None:

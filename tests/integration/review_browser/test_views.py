@@ -38,13 +38,13 @@ def told(page: Tab, place: str, old: str) -> str:
 def test_a_click_on_the_wall_moves_all_views(page: Tab) -> None:
     page.show_wall(60, -1.5, 0.25)
     frame, section = (page.page.locator(f"{v} .told").inner_text() for v in ("#view-frame", "#view-section"))
-    marker = page.js("boresight.model.marker.position.toArray()")
+    marker = page.js("boresight.model.spot.marker.position.toArray()")
     page.click_wall(SPOT)
     distance, azimuth = cursor(page)
     assert (distance, azimuth) == pytest.approx(SPOT, abs=0.4)
     assert "Frame" in told(page, "#view-frame", frame)
     assert "Radius at" in told(page, "#view-section", section)
-    assert page.js("boresight.model.marker.position.toArray()") != marker
+    assert page.js("boresight.model.spot.marker.position.toArray()") != marker
     assert page.status().startswith(f"Spot at {distance:.1f} mm, 12:")
 
 
@@ -52,10 +52,10 @@ def test_a_click_on_the_model_moves_to_what_was_clicked(page: Tab) -> None:
     page.js("boresight.session.moveTo([70, -2.4])")
     x, y = page.js("""(() => {
         const m = boresight.model, box = m.canvas.getBoundingClientRect();
-        m.camera.updateMatrixWorld(); const p = m.marker.position.clone().project(m.camera);
+        m.eye.camera.updateMatrixWorld(); const p = m.spot.marker.position.clone().project(m.eye.camera);
         return [(p.x + 1) / 2 * box.width, (1 - p.y) / 2 * box.height]; })()""")
     page.js("boresight.session.moveTo([30, 1.0])")
-    page.js("boresight.model.turnTo(70, -2.4)")
+    page.js("(boresight.model.eye.turnTo(70, -2.4), boresight.model.draw())")
     page.page.locator(".model canvas").click(position={"x": x, "y": y})
     distance, azimuth = cursor(page)
     assert abs(distance - 70) < 1.5
@@ -134,9 +134,11 @@ def test_the_model_is_cut_open_from_outside_only(page: Tab) -> None:
 
 def test_the_keyboard_flies_inside(page: Tab) -> None:
     page.keys("g")
-    before = page.js("[boresight.model.flown, boresight.model.look.yaw, boresight.model.frameTimes.length]")
+    before = page.js(
+        "[boresight.model.eye.flown, boresight.model.eye.look.yaw, boresight.model.frameTimes.length]"
+    )
     page.keys("w", "w", "Shift+W", "s", "d")
-    flown, yaw = page.js("[boresight.model.flown, boresight.model.look.yaw]")
+    flown, yaw = page.js("[boresight.model.eye.flown, boresight.model.eye.look.yaw]")
     assert flown - before[0] == pytest.approx(6 + 6 + 30 - 6)
     assert yaw < before[1]
     assert page.standing(), "D beside the model looks around; it adds no defect"

@@ -1,19 +1,17 @@
 /** The unrolled wall: distance to the right, clock downward from 6 over 12 to 6, tiles loaded as they are seen. */
+import { FlatMarks, type Plane } from "./flat_marks";
 import { Pinch } from "./graphics";
 import type { Session } from "./session";
 import { TileLayer, type Ground } from "./tiles";
-import type { Finding, Point } from "./types";
-import { CHOSEN_COLOUR, TURN, clock, element } from "./words";
+import type { Point } from "./types";
+import { TURN, element } from "./words";
 
 const TOP = -1.5 * Math.PI; // 6 o'clock
-// Outlines lie on pictures of any colour, in light and dark alike: bright on a black casing.
-const [CASING, OUTLINE, CHOSEN] = ["#000000", "#ffffff", CHOSEN_COLOUR];
 const GRAB_PX = 12;
-const MARKS: Record<string, string> = { open: "?", accepted: "✓", rejected: "✕" };
 
 interface View { distance: number; azimuth: number; mmPerPx: number }
 
-export class FlatView {
+export class FlatView implements Plane {
   readonly root: HTMLElement;
   private readonly canvas = element("canvas", {
     tabindex: "0", role: "img",
@@ -43,15 +41,14 @@ export class FlatView {
     this.load();
   }
 
+  get mmPerPx(): number { return this.view.mmPerPx; }
   private get perRad(): number { return this.session.run.radius_mm / this.view.mmPerPx; }
-  private get size(): [number, number] { return [this.canvas.clientWidth, this.canvas.clientHeight]; }
+  get size(): [number, number] { return [this.canvas.clientWidth, this.canvas.clientHeight]; }
 
-  private get textPx(): number { return 0.9 * parseFloat(getComputedStyle(this.root).fontSize); }
+  x(distance: number): number { return this.size[0] / 2 + (distance - this.view.distance) / this.view.mmPerPx; }
+  y(azimuth: number): number { return this.size[1] / 2 + (azimuth - this.view.azimuth) * this.perRad; }
 
-  private x(distance: number): number { return this.size[0] / 2 + (distance - this.view.distance) / this.view.mmPerPx; }
-  private y(azimuth: number): number { return this.size[1] / 2 + (azimuth - this.view.azimuth) * this.perRad; }
-
-  private point(x: number, y: number): Point {
+  point(x: number, y: number): Point {
     return [
       this.view.distance + (x - this.size[0] / 2) * this.view.mmPerPx,
       this.view.azimuth + (y - this.size[1] / 2) / this.perRad,
@@ -116,102 +113,7 @@ export class FlatView {
     context.fillStyle = style.getPropertyValue("--ground");
     context.fillRect(0, 0, width, height);
     this.picture.paint(context, this.ground);
-    this.paintGrid(context, style);
-    for (const turn of [-TURN, 0, TURN]) this.paintFindings(context, turn);
-    this.paintCursor(context);
-    this.paintShape(context);
-  }
-
-  private paintGrid(context: CanvasRenderingContext2D, style: CSSStyleDeclaration): void {
-    const [width, height] = this.size;
-    context.font = `${this.textPx}px system-ui, sans-serif`;
-    context.textBaseline = "middle";
-    for (let hour = -12; hour < 24; hour += 3) {
-      const azimuth = TOP + (hour * Math.PI) / 6;
-      this.label(context, style, clock(azimuth).replace(":00", " h"), 4, this.y(azimuth), "left");
-    }
-    const step = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000].find((s) => s / this.view.mmPerPx > 7 * this.textPx) ?? 20000;
-    for (let s = Math.ceil(this.point(0, 0)[0] / step) * step; s < this.point(width, 0)[0]; s += step) {
-      this.label(context, style, `${s} mm`, this.x(s), height - this.textPx, "center");
-    }
-  }
-
-  private label(context: CanvasRenderingContext2D, style: CSSStyleDeclaration, text: string, x: number, y: number, align: CanvasTextAlign): void {
-    context.textAlign = align;
-    context.lineWidth = 3;
-    context.strokeStyle = style.getPropertyValue("--halo");
-    context.fillStyle = style.getPropertyValue("--ink");
-    context.strokeText(text, x, y);
-    context.fillText(text, x, y);
-  }
-
-  private paintFindings(context: CanvasRenderingContext2D, turn: number): void {
-    const [left, right] = [this.point(0, 0)[0], this.point(this.size[0], 0)[0]];
-    for (const finding of this.session.standing) {
-      if (finding.size.distance_to_mm < left || finding.size.distance_from_mm > right) continue;
-      const chosen = finding.id === this.session.selected;
-      context.setLineDash(finding.status === "rejected" ? [4, 4] : []);
-      this.trace(context, finding.outline.map(([s, a]) => [s, a + turn] as Point), true);
-      this.cased(context, chosen ? CHOSEN : OUTLINE, chosen ? 2.6 : 1.8);
-      context.setLineDash([]);
-      this.name(context, finding, turn, chosen);
-    }
-  }
-
-  /** Number and decision at the outline's upper right corner. */
-  private name(context: CanvasRenderingContext2D, finding: Finding, turn: number, chosen: boolean): void {
-    const x = this.x(Math.max(...finding.outline.map((p) => p[0]))) + 4;
-    const y = this.y(Math.min(...finding.outline.map((p) => p[1])) + turn);
-    context.font = `bold ${this.textPx}px system-ui, sans-serif`;
-    context.textAlign = "left";
-    context.lineWidth = 4;
-    context.strokeStyle = CASING;
-    context.fillStyle = chosen ? CHOSEN : OUTLINE;
-    const text = `${finding.label.split(" ")[0]} ${MARKS[finding.status] ?? ""}`;
-    context.strokeText(text, x, y);
-    context.fillText(text, x, y);
-  }
-
-  private cased(context: CanvasRenderingContext2D, colour: string, width: number): void {
-    context.lineWidth = width + 2.4;
-    context.strokeStyle = CASING;
-    context.stroke();
-    context.lineWidth = width;
-    context.strokeStyle = colour;
-    context.stroke();
-  }
-
-  private paintCursor(context: CanvasRenderingContext2D): void {
-    const [s, a] = this.session.cursor;
-    const x = Math.round(this.x(s)) + 0.5;
-    context.beginPath();
-    context.moveTo(x, 0);
-    context.lineTo(x, this.size[1]);
-    for (const turn of [-TURN, 0, TURN]) {
-      const y = Math.round(this.y(a + turn)) + 0.5;
-      context.moveTo(x - 14, y);
-      context.lineTo(x + 14, y);
-    }
-    this.cased(context, CHOSEN, 1);
-  }
-
-  private paintShape(context: CanvasRenderingContext2D): void {
-    const { drawn: points, tool } = this.session;
-    if (!points.length) return;
-    this.trace(context, points, !["distance", "point", "diameter"].includes(tool));
-    this.cased(context, CHOSEN, 2);
-    for (const [s, a] of points) {
-      context.fillStyle = CASING;
-      context.fillRect(this.x(s) - 4, this.y(a) - 4, 8, 8);
-      context.fillStyle = CHOSEN;
-      context.fillRect(this.x(s) - 3, this.y(a) - 3, 6, 6);
-    }
-  }
-
-  private trace(context: CanvasRenderingContext2D, points: Point[], closed: boolean): void {
-    context.beginPath();
-    points.forEach(([s, a], k) => (k ? context.lineTo(this.x(s), this.y(a)) : context.moveTo(this.x(s), this.y(a))));
-    if (closed) context.closePath();
+    new FlatMarks(context, this.session, this, style).paint();
   }
 
   private press(event: PointerEvent): void {

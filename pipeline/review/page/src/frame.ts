@@ -1,6 +1,7 @@
 /** The recorded frames that show the spot, lit and laser beside each other, with the spot and the laser's ring marked. */
+import { FOV_STAND } from "./eye";
 import type { Session } from "./session";
-import type { Sight } from "./types";
+import type { Point, Sight } from "./types";
 import { drawn, element } from "./words";
 
 const DELAY_MS = 150;
@@ -13,24 +14,31 @@ export class FrameView {
   private readonly close = element("input", { type: "checkbox", id: "close-up", checked: true });
   private readonly light = element("input", { type: "range", min: "1", max: "8", step: "0.5", value: "1", id: "brighten" });
   private readonly row = element("div", { class: "shots" });
+  private readonly alike = element("input", { type: "checkbox", id: "alike" });
   private shots: Shot[] = [];
 
-  constructor(private readonly session: Session) {
+  /** `sizeOfModel` gives the pixels of the model's picture, which a frame seen alike has too. */
+  constructor(private readonly session: Session, private readonly sizeOfModel: () => Point) {
     this.root.append(this.row, this.told);
     this.close.addEventListener("change", () => this.zoom());
     this.light.addEventListener("input", () => this.brighten());
     new ResizeObserver(() => this.zoom()).observe(this.root);
+    this.alike.addEventListener("change", () => { if (!this.alike.checked) session.standAs(null); void this.load(); });
     session.on(["cursor"], () => this.later());
+    session.on(["stand"], () => { if (!session.stand && this.alike.checked) { this.alike.checked = false; void this.load(); } });
     this.later();
   }
 
   /** What stands beside the pane's title. */
   bar(): HTMLElement {
-    return element("div", { class: "bar" }, element("label", { for: "close-up" }, this.close, " close-up"),
+    return element("div", { class: "bar" },
+      !this.session.source.readOnly && element("label", { for: "alike", title: "the model from where the frame was taken, in its light; the frame through the model's lens" },
+        this.alike, " same view as model"),
+      element("label", { for: "close-up" }, this.close, " close-up"),
       element("label", { for: "brighten" }, "brighter ", this.light));
   }
 
-  private zoom(): void { for (const shot of this.shots) shot.zoom(this.close.checked); }
+  private zoom(): void { for (const shot of this.shots) shot.zoom(this.close.checked && !this.alike.checked); }
   private brighten(): void { for (const shot of this.shots) shot.image.style.filter = `brightness(${this.light.value})`; }
 
   private later(): void {
@@ -41,12 +49,29 @@ export class FrameView {
   private async load(): Promise<void> {
     const [distance, azimuth] = this.session.cursor;
     try {
-      this.show(await this.session.source.sights(distance, azimuth));
+      const sights = await this.session.source.sights(distance, azimuth);
+      const lit = this.alike.checked && sights.find((s) => s.illumination !== "laser");
+      if (lit) await this.compare(lit, [distance, azimuth]);
+      else this.show(sights);
     } catch (error) {
       this.shots = [];
       this.row.replaceChildren();
       this.told.textContent = error instanceof Error ? error.message : String(error);
     }
+  }
+
+  /** Show a frame and the model from the same place, through the same lens, in the same light. */
+  private async compare(sight: Sight, at: Point): Promise<void> {
+    this.session.standAs(await this.session.source.stand(sight.frame, at));
+    if (!this.session.stand) return;
+    const [width, height] = this.sizeOfModel();
+    this.shots.length = 0;
+    const shot = new Shot(() => undefined);
+    shot.put({ ...sight, spot_px: [width / 2, height / 2], ring_px: [] }, this.session.source.seenFrom(sight.frame, at, FOV_STAND, width, height), () => undefined);
+    this.shots.push(shot);
+    this.row.replaceChildren(shot.root);
+    this.brighten();
+    this.told.textContent = `Frame ${sight.frame} (${lightOf(sight)}) at ${sight.time_s.toFixed(2)} s, seen as the model is: same place, lens and light.`;
   }
 
   private show(sights: Sight[]): void {

@@ -3,8 +3,8 @@ import * as THREE from "three";
 import type { Vector } from "./pipe";
 
 const MM = 1e-3;
-// 30 pictures a second while moving; a longer gap is a rest, after which the picture is drawn sharply.
-const [WANTED_STEP_MS, LONGEST_STEP_MS, REST_MS, LEAST_SHARPNESS] = [34, 250, 300, 0.4];
+// 60 pictures a second while moving; a longer gap is a rest, after which the picture is drawn sharply.
+const [WANTED_STEP_MS, LONGEST_STEP_MS, REST_MS, LEAST_SHARPNESS] = [17, 250, 300, 0.4];
 
 /** Draws less sharply while the view moves, where it would stutter otherwise, and sharply again when it rests. */
 export class Pace {
@@ -12,18 +12,20 @@ export class Pace {
   private drawnAt = 0;
   private resting = 0;
 
-  constructor(private readonly sharpen: (sharpness: number) => void, private readonly draw: () => void) {}
+  /** `sharpen` takes the share of the pixels each way and whether the view moves. */
+  constructor(private readonly sharpen: (sharpness: number, isMoving: boolean) => void, private readonly draw: () => void) {}
 
   /** A picture is about to be drawn. */
   step(now: number): void {
     const took = now - this.drawnAt;
     const isMoving = took < LONGEST_STEP_MS && this.drawnAt > 0;
     this.drawnAt = now;
-    if (isMoving && took > WANTED_STEP_MS) this.sharpness = Math.max(LEAST_SHARPNESS, this.sharpness * 0.85);
-    if (isMoving && took < WANTED_STEP_MS / 2) this.sharpness = Math.min(1, this.sharpness * 1.05);
-    if (isMoving) this.sharpen(this.sharpness);
+    if (isMoving && took > 1.5 * WANTED_STEP_MS) this.sharpness = Math.max(LEAST_SHARPNESS, this.sharpness * 0.85);
+    if (isMoving && took < 1.1 * WANTED_STEP_MS) this.sharpness = Math.min(1, this.sharpness * 1.02);
     window.clearTimeout(this.resting);
-    if (isMoving && this.sharpness < 1) this.resting = window.setTimeout(() => { this.sharpen(1); this.drawnAt = 0; this.draw(); }, REST_MS);
+    if (!isMoving) return;
+    this.sharpen(this.sharpness, true);
+    this.resting = window.setTimeout(() => { this.sharpen(1, false); this.drawnAt = 0; this.draw(); }, REST_MS);
   }
 }
 

@@ -24,7 +24,7 @@ async function start(): Promise<void> {
   document.title = `${run.name} · boresight review`;
   const tools = new ToolBar(session);
   const flat = new FlatView(session), model = new ModelView(session);
-  const findings = new FindingsPanel(session), frame = new FrameView(session), section = new SectionView(session);
+  const findings = new FindingsPanel(session), frame = new FrameView(session, () => model.size), section = new SectionView(session);
   const inspect = element("main", { class: "inspect", id: "inspect" },
     pane("Model", "view-model", model.bar(), model.root),
     pane("Unrolled wall", "view-flat", tools.bar(), tools.root, flat.root, tools.status),

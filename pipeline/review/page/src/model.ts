@@ -2,24 +2,20 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { CoarseWall } from "./coarse";
-import { Pace, Pinch, drawsPlainly, fromModel, toModel } from "./graphics";
+import { Eye } from "./eye";
+import { Pace, drawsPlainly, fromModel, toModel } from "./graphics";
+import { hold } from "./hands";
+import { Lamp } from "./lamp";
 import { layerChoice, legend } from "./legend";
-import { END_RADII, Marks } from "./marks";
+import { Marks } from "./marks";
 import { Pipe } from "./pipe";
 import type { Session } from "./session";
-import { Stretches } from "./stretches";
-import { CHOSEN_COLOUR, element } from "./words";
+import { Spot } from "./spot";
+import { Stretches, type Light } from "./stretches";
+import { element } from "./words";
 
 const MM = 1e-3;
-const FLIGHT_MM = 6;
 const MOST_PIXELS = 1280 * 720;
-
-// From outside, no more of a long pipe is shown than this many radii: it would be a thread.
-const OUTSIDE_RADII = 16;
-// The eye stands so far before the spot, in radii.
-const BEFORE_RADII = 1.1;
-const [FOV_INSIDE, FOV_NEAR, FOV_OUTSIDE] = [80, 52, 30];
-const MARGIN = 1.12;
 // Where the raking light stands behind the eye, in radii: it meets the wall beside the spot at about 12°, so that a slope of
 // 0.1 changes its brightness by a third. Strengths make a flat wall there as bright as recorded.
 const RAKING_RADII = 3.5;
@@ -29,9 +25,7 @@ export class ModelView {
   private readonly isPlain = drawsPlainly(); // first: it says how colours are to be understood
   readonly root = element("div", { class: "model" });
   readonly frameTimes: number[] = [];
-  private readonly canvas = element("canvas", {
-    tabindex: "0", role: "img", "aria-label": "Model of the pipe. Inside: W and S fly along it, A and D turn the view.",
-  });
+  private readonly canvas = element("canvas", { tabindex: "0", role: "img", "aria-label": "Model of the pipe. Inside: W and S fly along it, A and D turn the view." });
   private readonly told = element("p", { class: "veil" }, "Loading the model…");
   private readonly gain = element("input", { type: "range", min: "1", max: "20", value: "1", id: "gain" });
   private readonly gained = element("output", { for: "gain" }, "1×");
@@ -40,35 +34,29 @@ export class ModelView {
   private readonly without = element("button", { "aria-pressed": "false", click: () => this.enter(false) }, "Outside");
   private readonly hint = element("p", { class: "hint view-hint" });
   private readonly raking = element("input", { type: "checkbox", id: "raking" });
-  private isInside = true;
-  private readonly pace = new Pace((sharpness) => this.sharpen(sharpness), () => this.draw());
+  private readonly pace = new Pace((sharpness, isMoving) => this.sharpen(sharpness, isMoving), () => this.draw());
   private readonly pipe: Pipe;
   private readonly scene = new THREE.Scene();
-  private readonly camera = new THREE.PerspectiveCamera(80, 1, 1e-3, 1000);
-  private readonly lamp = new THREE.PointLight(0xffffff, RAKING, 0, 0);
-  private readonly pinch = new Pinch();
+  private readonly eye: Eye;
+  private readonly rake = new THREE.PointLight(0xffffff, RAKING, 0, 0);
   private readonly marks: Marks;
   private isStaying = false;
-  private readonly marker = new THREE.Mesh(
-    new THREE.TorusGeometry(1, 0.14, 8, 32), new THREE.MeshBasicMaterial({ color: CHOSEN_COLOUR, depthTest: false, transparent: true }));
-  private readonly line = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: CHOSEN_COLOUR, depthTest: false, transparent: true }));
-  private readonly corners = new THREE.Points(
-    new THREE.BufferGeometry(), new THREE.PointsMaterial({ color: CHOSEN_COLOUR, size: 9, sizeAttenuation: false, depthTest: false, transparent: true }));
+  private readonly spot: Spot;
+  private readonly lamp: Lamp;
   private readonly plane = new THREE.Plane(new THREE.Vector3(1, 0, 0), 0);
   private renderer: THREE.WebGLRenderer | null = null;
   private controls: OrbitControls | null = null;
   private readonly fine: Stretches;
   private readonly coarse: CoarseWall;
-  private flown: number;
-  private look = { yaw: 0, pitch: 0 };
   private asked = false;
   private seen = NaN; // where the eye was when stretches were last asked for
-  private pressed: { x: number; y: number } | null = null;
 
   constructor(private readonly session: Session) {
     this.pipe = new Pipe(session.run.axis);
-    this.flown = session.run.distance_mm[0];
-    this.fine = new Stretches(session, this.pipe, this.isPlain, () => this.grown());
+    this.eye = new Eye(session, this.pipe);
+    this.spot = new Spot(session, this.pipe);
+    this.lamp = new Lamp(this.isPlain);
+    this.fine = new Stretches(session, this.pipe, this.lamp, this.isPlain, () => this.grown());
     this.coarse = new CoarseWall(session, this.pipe, this.isPlain, () => this.draw());
     this.marks = new Marks(session, this.pipe);
     const button = (name: string, title: string, click: () => void) => element("button", { title, click }, name);
@@ -76,12 +64,12 @@ export class ModelView {
       element("div", { class: "over corner" }, button("Fit", "turn to the spot or the chosen finding", () => this.follow()),
         button("Home", "back to the start of the pipe", () => this.home()), button("Maximise", "the model alone, and back", () => this.maximise())),
       this.manner(), element("div", { class: "over foot" }, legend(session), this.hint)));
-    this.marker.renderOrder = 1; // drawn after the wall, or the wall would cover it
     this.explain();
     session.on(["layer", "limits"], () => this.dress());
-    session.on(["state", "selection"], () => { this.marks.around(this.eye, this.isInside, true); this.draw(); });
+    session.on(["state", "selection"], () => { this.marks.around(this.eye.distance, this.eye.isInside, true); this.draw(); });
     session.on(["cursor"], () => this.follow());
-    session.on(["shape"], () => this.trace());
+    session.on(["stand"], () => this.standAs());
+    session.on(["shape"], () => { this.spot.trace(); this.draw(); });
     void this.start();
   }
 
@@ -96,28 +84,50 @@ export class ModelView {
   private manner(): HTMLElement {
     this.gain.addEventListener("input", () => { this.gained.textContent = `${this.gain.value}×`; this.exaggerate(); });
     this.cut.addEventListener("change", () => this.draw());
-    this.raking.addEventListener("change", () => { this.fine.dress(this.isLit); this.draw(); });
+    this.raking.addEventListener("change", () => { this.fine.dress(this.light); this.draw(); });
     return element("div", { class: "over manner" },
       element("label", { for: "raking", title: "light along the wall: dents and pits throw shadows" }, this.raking, " raking light"),
       element("label", { for: "cut", title: "take away the half toward the viewer" }, this.cut, " cut open"),
       element("label", { for: "gain", title: "exaggerate how far the wall leaves the round pipe" }, "relief ", this.gain, " ", this.gained));
   }
 
-  private get isLit(): boolean { return this.raking.checked || !this.isInside; }
+  private get light(): Light {
+    if (this.session.stand) return "frame";
+    return this.raking.checked || !this.eye.isInside ? "raking" : "even";
+  }
 
   private enter(inside: boolean): void {
-    this.isInside = inside;
-    this.fine.dress(this.isLit);
+    this.leave();
+    this.eye.isInside = inside;
+    this.fine.dress(this.light);
     this.stand();
     this.explain();
   }
 
   private home(): void {
-    this.flown = this.session.run.distance_mm[0];
-    if (this.isInside) this.lens(FOV_INSIDE);
-    this.look = { yaw: 0, pitch: 0 };
+    this.leave();
+    this.eye.home();
     this.stand();
   }
+
+  /** Pixels of the picture, as the page counts them. */
+  get size(): [number, number] { return [this.canvas.clientWidth, this.canvas.clientHeight]; }
+
+  /** Stand as the camera of the frame that the session names, in its light; or in even light where it names none. */
+  private standAs(): void {
+    const { stand } = this.session;
+    if (stand) {
+      this.lamp.take(stand);
+      this.eye.standAs(stand);
+      if (this.controls) this.controls.enabled = false;
+      this.explain();
+    }
+    this.fine.dress(this.light);
+    this.draw();
+  }
+
+  /** No longer stand as a frame's camera: the view was moved by hand. */
+  private leave(): void { this.session.standAs(null); }
 
   private maximise(): void {
     const wide = document.querySelector("#inspect")?.classList.toggle("wide");
@@ -126,11 +136,11 @@ export class ModelView {
   }
 
   private explain(): void {
-    this.within.setAttribute("aria-pressed", String(this.isInside));
-    this.without.setAttribute("aria-pressed", String(!this.isInside));
-    this.cut.disabled = this.isInside;
-    this.raking.disabled = !this.isInside;
-    this.canvas.title = this.hint.textContent = this.isInside ? "Wheel or W S flies, drag or A D looks around, a click moves the spot (ring)."
+    this.within.setAttribute("aria-pressed", String(this.eye.isInside));
+    this.without.setAttribute("aria-pressed", String(!this.eye.isInside));
+    this.cut.disabled = this.eye.isInside;
+    this.raking.disabled = !this.eye.isInside;
+    this.canvas.title = this.hint.textContent = this.eye.isInside ? "Wheel or W S flies, drag or A D looks around, a click moves the spot (ring)."
       : "Drag turns, wheel zooms, right drag shifts, a click moves the spot (ring).";
   }
 
@@ -144,22 +154,20 @@ export class ModelView {
     }
     this.renderer.localClippingEnabled = true;
     this.scene.background = new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue("--ground").trim());
-    this.scene.add(new THREE.AmbientLight(0xffffff, AMBIENT), this.lamp, this.marks.group, this.marker, this.line, this.corners);
-    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.scene.add(new THREE.AmbientLight(0xffffff, AMBIENT), this.rake, this.marks.group, this.spot.group);
+    this.controls = new OrbitControls(this.eye.camera, this.canvas);
     this.controls.addEventListener("change", () => this.draw());
-    this.canvas.addEventListener("pointerdown", (e) => { this.pinch.down(e); this.pressed = { x: e.clientX, y: e.clientY }; });
-    this.canvas.addEventListener("pointermove", (e) => this.turn(e));
-    this.canvas.addEventListener("pointerup", (e) => { this.pinch.up(e); this.pick(e); });
-    this.canvas.addEventListener("pointercancel", (e) => { this.pinch.up(e); this.pressed = null; });
-    this.canvas.addEventListener("wheel", (e) => { if (this.isInside) { e.preventDefault(); this.fly(-e.deltaY / 20); } }, { passive: false });
-    this.canvas.addEventListener("keydown", (e) => this.key(e));
+    hold(this.canvas, {
+      isInside: () => this.eye.isInside, enter: () => this.enter(true), fly: (mm) => this.fly(mm),
+      glance: (yaw, pitch) => this.glance(yaw, pitch), pick: (x, y) => this.pick(x, y),
+    });
     new ResizeObserver(() => this.resize()).observe(this.root);
     this.scene.add(this.fine.group, this.coarse.group);
     this.stand();
     try {
       await this.fine.start();
       if (!this.fine.isAll) void this.coarse.dress().catch((e: Error) => this.session.say(e.message));
-      await this.fine.around(this.eye);
+      await this.fine.around(this.eye.distance);
     } catch (error) {
       this.told.textContent = error instanceof Error ? error.message : String(error);
     }
@@ -167,9 +175,6 @@ export class ModelView {
 
   get parts() { return this.fine.parts; }
   get isReady(): boolean { return this.fine.isReady; }
-
-  /** The distance next to which detail is wanted. */
-  private get eye(): number { return this.isInside ? this.flown : this.session.cursor[0]; }
 
   /** A stretch has come or gone. */
   private grown(): void {
@@ -188,128 +193,39 @@ export class ModelView {
 
   private stand(): void {
     if (!this.controls) return;
-    this.controls.enabled = !this.isInside;
-    const { radius_mm: radius, distance_mm: [from, to] } = this.session.run;
-    if (this.isInside) {
-      this.lens(FOV_INSIDE);
-      this.fly(0);
-      return;
+    this.controls.enabled = !this.eye.isInside;
+    const centre = this.eye.stand();
+    if (centre) {
+      this.controls.target.copy(centre);
+      this.controls.update();
     }
-    const length = Math.min(to - from, OUTSIDE_RADII * radius);
-    const middle = Math.min(Math.max(this.session.cursor[0], from + length / 2), to - length / 2);
-    const centre = toModel(this.pipe.at(middle).origin).multiplyScalar(MM);
-    this.lens(FOV_OUTSIDE);
-    this.camera.up.set(0, 1, 0);
-    const direction = new THREE.Vector3(0.85, 0.4, 0.35).normalize();
-    this.camera.position.copy(centre).addScaledVector(direction, this.farOff(direction, centre, middle, length));
-    this.controls.target.copy(centre);
-    this.controls.update();
     this.draw();
   }
 
-  /** How far off, in a direction, the eye must stand so that a stretch of pipe just fills the picture. */
-  private farOff(direction: THREE.Vector3, centre: THREE.Vector3, middle: number, length: number): number {
-    const right = new THREE.Vector3(0, 1, 0).cross(direction).normalize(), up = direction.clone().cross(right);
-    const high = Math.tan((this.camera.fov * Math.PI) / 360), wide = high * this.camera.aspect;
-    let far = 0;
-    for (const s of [middle - length / 2, middle + length / 2]) {
-      for (let a = 0; a < 6.28; a += 0.4) {
-        const at = toModel(this.pipe.point(s, a, this.session.run.radius_mm)).multiplyScalar(MM).sub(centre);
-        far = Math.max(far, at.dot(direction) + MARGIN * Math.max(Math.abs(at.dot(right)) / wide, Math.abs(at.dot(up)) / high));
-      }
-    }
-    return far;
-  }
-
-  private lens(fov: number): void {
-    this.camera.fov = fov;
-    this.camera.updateProjectionMatrix();
-  }
-
   private fly(mm: number): void {
-    const [from, to] = this.session.run.distance_mm;
-    const { radius_mm: radius } = this.session.run;
-    this.flown = Math.max(Math.min(this.flown + mm, to - END_RADII * radius), from - END_RADII * radius);
-    if (mm) this.lens(FOV_INSIDE);
-    const { origin, x, y, tangent } = this.pipe.at(this.flown);
-    const up = toModel(y).negate();
-    const forward = toModel(tangent).applyAxisAngle(up, this.look.yaw).applyAxisAngle(toModel(x), this.look.pitch);
-    this.camera.up.copy(up);
-    this.camera.position.copy(toModel(origin).multiplyScalar(MM));
-    this.camera.lookAt(this.camera.position.clone().add(forward));
+    this.leave();
+    this.eye.fly(mm);
+    this.draw();
+  }
+
+  private glance(yaw: number, pitch: number): void {
+    this.leave();
+    this.eye.glance(yaw, pitch);
     this.draw();
   }
 
   private follow(): void {
     const [distance, azimuth] = this.session.cursor;
-    if (this.isInside && this.controls && !this.isStaying) this.turnTo(distance, azimuth);
-    else if (!this.isInside && !this.fine.isAll) this.stand();
-    const at = this.pipe.point(distance, azimuth, this.session.run.radius_mm * 0.995);
-    this.marker.position.copy(toModel(at).multiplyScalar(MM));
-    this.marker.lookAt(toModel(this.pipe.at(distance).origin).multiplyScalar(MM));
-    this.marker.scale.setScalar(this.session.run.radius_mm * 0.06 * MM);
+    if (this.eye.isInside && this.controls && !this.isStaying && !this.session.stand) this.eye.turnTo(distance, azimuth);
+    else if (!this.eye.isInside && !this.fine.isAll) this.stand();
+    this.spot.follow();
     this.draw();
   }
 
-  /** Stand before a place of the wall, on the axis, and look at it, whatever its clock. */
-  private turnTo(distance: number, azimuth: number): void {
-    const { radius_mm: radius } = this.session.run;
-    this.flown = distance - radius * BEFORE_RADII;
-    this.lens(FOV_NEAR);
-    this.fly(0); // at the start and the end of the wall the eye stays within it
-    const [x, up, ahead] = [radius * Math.cos(azimuth), -radius * Math.sin(azimuth), distance - this.flown];
-    this.look = { yaw: -Math.asin(x / Math.hypot(x, up, ahead)), pitch: Math.atan2(up, ahead) };
-    this.fly(0);
-  }
-
-  /** What is being drawn or measured, on the wall. */
-  private trace(): void {
-    const { drawn, run } = this.session;
-    const at = drawn.map(([s, a]) => toModel(this.pipe.point(s, a, run.radius_mm * 0.99)).multiplyScalar(MM));
-    for (const shape of [this.line, this.corners]) {
-      shape.geometry.dispose();
-      shape.geometry = new THREE.BufferGeometry().setFromPoints(at);
-      shape.renderOrder = 1;
-      shape.frustumCulled = false;
-    }
-    this.draw();
-  }
-
-  private key(event: KeyboardEvent): void {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const step = event.shiftKey ? 5 * FLIGHT_MM : FLIGHT_MM;
-    const keys: Record<string, () => void> = {
-      w: () => this.fly(step), s: () => this.fly(-step), ArrowUp: () => this.fly(step), ArrowDown: () => this.fly(-step),
-      a: () => this.glance(0.08, 0), d: () => this.glance(-0.08, 0), ArrowLeft: () => this.glance(0.08, 0), ArrowRight: () => this.glance(-0.08, 0),
-    };
-    const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!act) return;
-    if (!this.isInside) this.enter(true);
-    act();
-    event.preventDefault();
-  }
-
-  private glance(yaw: number, pitch: number): void {
-    this.look = { yaw: this.look.yaw + yaw, pitch: Math.max(-1.3, Math.min(1.3, this.look.pitch + pitch)) };
-    this.fly(0);
-  }
-
-  private turn(event: PointerEvent): void {
-    if (!this.isInside) return;
-    const { spread, dx, dy } = this.pinch.move(event);
-    if (spread) this.fly(spread * 0.4);
-    else if (event.buttons === 1) this.glance(dx * 0.004, dy * 0.004);
-  }
-
-  private pick(event: PointerEvent): void {
-    const from = this.pressed;
-    this.pressed = null;
-    if (!from || Math.hypot(event.clientX - from.x, event.clientY - from.y) > 4) return;
-    const box = this.canvas.getBoundingClientRect();
-    const at = new THREE.Vector2(
-      ((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+  /** Take the place of the wall under a point of the picture, both from -1 to 1. */
+  private pick(x: number, y: number): void {
     const caster = new THREE.Raycaster();
-    caster.setFromCamera(at, this.camera);
+    caster.setFromCamera(new THREE.Vector2(x, y), this.eye.camera);
     const hit = caster.intersectObjects([...this.fine.meshes, ...this.coarse.group.children.filter((c) => c.visible)], false)
       .find((h) => !this.isCut || this.plane.distanceToPoint(h.point) >= 0);
     if (!hit) return;
@@ -323,9 +239,10 @@ export class ModelView {
     this.isStaying = false;
   }
 
-  private get isCut(): boolean { return this.cut.checked && !this.isInside; }
+  private get isCut(): boolean { return this.cut.checked && !this.eye.isInside; }
 
-  private sharpen(share: number): void {
+  private sharpen(share: number, isMoving: boolean): void {
+    this.fine.thin(isMoving);
     const ratio = this.pixelRatio * share;
     if (Math.abs(this.renderer!.getPixelRatio() - ratio) > 0.02 * ratio) this.renderer!.setPixelRatio(ratio);
   }
@@ -341,17 +258,17 @@ export class ModelView {
     if (!this.renderer || !width || !height) return;
     this.renderer.setPixelRatio(this.pixelRatio);
     this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.eye.shape(width / height);
     this.draw();
   }
 
   private draw(): void {
-    if (this.eye !== this.seen) {
-      this.seen = this.eye;
-      this.coarse.around(this.eye);
-      void this.fine.around(this.eye).catch((e: Error) => this.session.say(e.message));
-      this.marks.around(this.eye, this.isInside);
+    const { camera, distance } = this.eye;
+    if (distance !== this.seen) {
+      this.seen = distance;
+      this.coarse.around(distance);
+      void this.fine.around(distance).catch((e: Error) => this.session.say(e.message));
+      this.marks.around(distance, this.eye.isInside);
     }
     if (this.asked || !this.renderer) return;
     this.asked = true;
@@ -361,23 +278,22 @@ export class ModelView {
       this.frameTimes.push(now);
       if (this.frameTimes.length > 120) this.frameTimes.shift();
       this.shine();
-      const across = new THREE.Vector3(this.camera.position.x, this.camera.position.y, 0);
+      const across = new THREE.Vector3(camera.position.x, camera.position.y, 0);
       if (across.lengthSq() < 1e-12) across.set(1, 0, 0);
       this.plane.normal.copy(across.normalize().negate());
       const planes = this.isCut ? [this.plane] : [];
       this.fine.clip(planes);
-      this.renderer!.render(this.scene, this.camera);
-      const { clientWidth: width, clientHeight: height } = this.canvas;
-      this.marks.follow(this.camera, width, height, this.session.cursor);
+      this.renderer!.render(this.scene, camera);
+      this.marks.follow(camera, ...this.size, this.session.cursor);
     });
   }
 
   /** Light along the wall from behind the eye, or over the shoulder of who looks from outside. */
   private shine(): void {
-    this.lamp.intensity = this.isInside ? RAKING : SHINING;
-    if (!this.isInside) { this.lamp.position.copy(this.camera.position).add(this.camera.up.clone().multiplyScalar(this.camera.position.length() / 2)); return; }
-    const behind = this.flown - RAKING_RADII * this.session.run.radius_mm;
-    const { origin, tangent } = this.pipe.at(this.flown);
-    this.lamp.position.copy(toModel(origin).addScaledVector(toModel(tangent), behind - this.flown).multiplyScalar(MM));
+    const { camera, isInside, flown } = this.eye;
+    this.rake.intensity = isInside ? RAKING : SHINING;
+    if (!isInside) { this.rake.position.copy(camera.position).add(camera.up.clone().multiplyScalar(camera.position.length() / 2)); return; }
+    const { origin, tangent } = this.pipe.at(flown);
+    this.rake.position.copy(toModel(origin).addScaledVector(toModel(tangent), -RAKING_RADII * this.session.run.radius_mm).multiplyScalar(MM));
   }
 }

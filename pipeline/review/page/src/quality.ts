@@ -15,7 +15,7 @@ export function qualityPage(session: Session): HTMLElement {
   }).catch((error: Error) => measured.replaceChildren(element("p", { class: "unsigned" }, error.message)));
   const stages = run.numbers.filter((s) => s.numbers.length).map((s) =>
     element("section", {}, element("h3", {}, s.stage), element("table", {}, ...rows(s.numbers))));
-  const root = element("div", { class: "page" },
+  const root = element("main", { class: "page" },
     element("section", {}, element("h2", {}, "The run in figures"), element("table", { class: "wide" }, ...rows(run.metrics))),
     measured,
     element("section", {}, element("h2", {}, "Instrument diagnosis"), element("p", {}, run.diagnosis

@@ -1,12 +1,12 @@
 /** What the page shows now, and who wants to know when it changes. */
 import { LostError, RefusedError, type Source } from "./source";
-import type { Finding, Overlay, Point, ReviewState, Run, SavedReading, Seal, Tool } from "./types";
+import type { Finding, Overlay, Point, ReviewState, Run, SavedReading, Seal, Stand, Tool } from "./types";
 import { azimuthOf, wrapped } from "./words";
 
 // Least that the end colours of a layer mean: about the depth from which findings are told.
 const [LEAST_RANGE_MM, LEAST_SIGMA_MM] = [0.25, 0.05];
 
-export type Topic = "limits" | "readings" | "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "named" | "recomputed";
+export type Topic = "limits" | "readings" | "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "named" | "recomputed" | "stand";
 
 export class Session {
   selected: string | null = null;
@@ -16,6 +16,8 @@ export class Session {
   tool: Tool = "none";
   drawn: Point[] = [];
   message = "";
+  /** The recorded frame as whose camera the model is seen; null where it is seen freely. */
+  stand: Stand | null = null;
   private isGiven = false; // whether what is drawn is the finding's own outline, untouched
   /** Null while the server still reads what a signature binds. */
   seal: Seal | null = null;
@@ -56,6 +58,12 @@ export class Session {
     const [from, to] = this.run.distance_mm;
     this.cursor = [Math.min(Math.max(distance, from), to), wrapped(azimuth)];
     this.tell("cursor");
+  }
+
+  standAs(stand: Stand | null): void {
+    if (stand === this.stand) return;
+    this.stand = stand;
+    this.tell("stand");
   }
 
   show(layer: string): void { this.layer = layer; this.tell("layer"); }

@@ -9,7 +9,7 @@ const PAPERS: [string, string][] = [
 ];
 
 export function signPage(session: Session): HTMLElement {
-  const root = element("div", { class: "page" });
+  const root = element("main", { class: "page" });
   const form = session.source.readOnly ? null : signature(session);
   const assumed = session.source.readOnly ? null : element("div", {}, inspection(session), assumptions(session));
   const paint = () => root.replaceChildren(...parts(session, form, assumed));

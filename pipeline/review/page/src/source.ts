@@ -1,5 +1,5 @@
 /** Where the page gets its data: the local server, or the files of a read-only export. */
-import type { Comparison, Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Stretch, Tool } from "./types";
+import type { Comparison, Layer, Point, Profile, Quality, Reading, ReviewState, Run, Seal, Section, Sight, Stand, Stretch, Tool } from "./types";
 
 /** The server cannot be reached. */
 export class LostError extends Error {}
@@ -23,6 +23,9 @@ export interface Source {
   /** Where a tile is; between limits (mm) where they are given and the server can be asked. */
   tile(layer: string, level: number, column: number, row: number, limits?: Point | null): string;
   frame(frame: number): string;
+  /** Where a frame's camera stood, turned to a place of the wall, and the frame as it is seen from there. */
+  stand(frame: number, at: Point): Promise<Stand>;
+  seenFrom(frame: number, at: Point, fov: number, width: number, height: number): string;
   spot(frame: number, u: number, v: number): Promise<Point>;
   stretches(): Promise<Stretch[]>;
   stretch(number: number): Promise<ArrayBuffer>;
@@ -71,6 +74,9 @@ export class Server implements Source {
   tile = (layer: string, level: number, column: number, row: number, limits?: Point | null) =>
     `/api/tiles/${layer}/${level}/${column}/${row}.png${limits ? `?low=${limits[0]}&high=${limits[1]}` : ""}`;
   frame = (frame: number) => `/api/frames/${frame}.jpg`;
+  stand = (frame: number, [distance, azimuth]: Point) => get<Stand>(`/api/frames/${frame}/stand?distance=${distance}&azimuth=${azimuth}`);
+  seenFrom = (frame: number, [distance, azimuth]: Point, fov: number, width: number, height: number) =>
+    `/api/frames/${frame}/seen.png?distance=${distance}&azimuth=${azimuth}&fov=${fov}&width=${width}&height=${height}`;
   spot = async (frame: number, u: number, v: number) =>
     (await get<{ point: Point }>(`/api/frames/${frame}/spot?u=${u}&v=${v}`)).point;
   stretches = () => get<Stretch[]>("/api/model");
@@ -114,6 +120,8 @@ export class Export implements Source {
   tile = (layer: string, level: number, column: number, row: number) => `tiles/${layer}/${level}/${column}/${row}.png`;
   frame = (frame: number) => `frames/${frame}.jpg`;
   spot = async (): Promise<Point> => { throw new RefusedError("Moving by the frame needs boresight review.", false); };
+  stand = async (): Promise<Stand> => { throw new RefusedError("Seeing frame and model alike needs boresight review.", false); };
+  seenFrom = (frame: number) => this.frame(frame);
   quality = async () => this.data.quality;
   comparison = async () => this.data.comparison ?? null;
   stretches = async () => this.data.model.stretches;

@@ -1,23 +1,30 @@
 /** The detailed model, stretch by stretch: those next to the eye are loaded, those far from it are let go. */
 import * as THREE from "three";
 import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
+import type { Lamp } from "./lamp";
 import { byPlace, placesOf, Strip } from "./painted";
 import type { Pipe, Vector } from "./pipe";
 import type { Session } from "./session";
+import { thinned } from "./thinned";
 import type { Point, Stretch } from "./types";
 
 const MM = 1e-3;
-const PHOTO = "photo", LIT = "photo, lit";
+const PHOTO = "photo";
+/** As recorded, evenly lit; with raking light on its relief; in the light of a recorded frame. */
+export type Light = "even" | "raking" | "frame";
 // The variants of model.glb, for a copy that may not hand its pictures to the model.
 const VARIANTS: Record<string, string> = { deviation_nominal: "deviation" };
 const ANISOTROPY = 8;
 // What a browser without a graphics card can still turn, and what keeps the tab's memory small.
 const MOST_TRIANGLES = 215_000;
 const AT_ONCE = 2;
+// While the view moves without a graphics card: cells of this many radii along and around keep a 4 inch pipe below 30 000
+// triangles in 200 mm, which a processor draws in a third of the time of all of them, and the photo hides their corners.
+const THINNED_RADII = 0.05;
 
 interface Part {
   mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material>; at: Point[]; span: Point;
-  painted: { strip: Strip; material: THREE.Material } | null; wanted: string;
+  painted: { strip: Strip; material: THREE.Material } | null; wanted: string; all: number; lights: Record<Light, THREE.Material>;
 }
 
 export class Stretches {
@@ -27,9 +34,10 @@ export class Stretches {
   private readonly coming = new Set<number>();
   private at = 0;
   private gain = 1;
-  private isLit = false;
+  private light: Light = "even";
+  private isThin = false;
 
-  constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly isPlain: boolean, private readonly changed: () => void) {}
+  constructor(private readonly session: Session, private readonly pipe: Pipe, private readonly lamp: Lamp, private readonly isPlain: boolean, private readonly changed: () => void) {}
 
   async start(): Promise<void> { this.list = await this.session.source.stretches(); }
 
@@ -53,18 +61,28 @@ export class Stretches {
     if (next.length) await Promise.all(next.map((k) => this.load(k)));
   }
 
-  /** Show the chosen layer: the photo as it was recorded, or lit so that its relief reads; or error colours. */
-  dress(isLit = this.isLit): void {
-    this.isLit = isLit;
+  /** Show the chosen layer: the photo in a light, or error colours. */
+  dress(light = this.light): void {
+    this.light = light;
     for (const part of this.parts) this.wear(part);
   }
 
+  /** Draw fewer triangles, where a browser without a graphics card moves the view, or all of them. */
+  thin(isThin: boolean): void {
+    this.isThin = isThin && this.isPlain;
+    for (const part of this.parts) this.range(part);
+  }
+
+  private range({ mesh: { geometry }, all }: Part): void {
+    if (this.isThin) geometry.setDrawRange(all, geometry.index!.count - all); else geometry.setDrawRange(0, all);
+  }
+
   private wear(part: Part): void {
-    const { session } = this, { mesh, variants } = part;
+    const { session } = this, { mesh, variants, lights } = part;
     const isPhoto = session.layer === PHOTO;
     part.wanted = isPhoto ? PHOTO : `${session.layer} ${session.limits()!.join(" ")}`;
-    if (isPhoto) mesh.material = variants.get(this.isLit ? LIT : PHOTO)!;
-    else if (session.source.readOnly) mesh.material = variants.get(VARIANTS[session.layer] ?? session.layer) ?? variants.get(PHOTO)!;
+    if (isPhoto) mesh.material = lights[this.light];
+    else if (session.source.readOnly) mesh.material = variants.get(VARIANTS[session.layer] ?? session.layer) ?? lights.even;
     else if (part.painted?.material.name === part.wanted) mesh.material = part.painted.material;
     else void this.paint(part, part.wanted).catch((e: Error) => session.say(e.message));
   }
@@ -146,21 +164,40 @@ export class Stretches {
     }
     const { map: picture, name: title } = variants.get(PHOTO) as THREE.MeshStandardMaterial;
     variants.get(PHOTO)!.dispose();
+    variants.delete(PHOTO);
     if (picture) picture.anisotropy = this.isPlain ? 1 : ANISOTROPY;
-    // As recorded: the camera has seen the wall in its own light, and no other is put on it.
-    variants.set(PHOTO, mesh.material = new THREE.MeshBasicMaterial({ map: picture, name: title }));
-    variants.set(LIT, new THREE.MeshLambertMaterial({ map: picture, name: `${title}, lit` }));
-    for (const material of variants.values()) {
+    // The camera has seen the wall in its own light: no other is put on it unless relief is to be seen.
+    const lights = {
+      even: new THREE.MeshBasicMaterial({ map: picture, name: title }),
+      raking: new THREE.MeshLambertMaterial({ map: picture, name: `${title}, raking light` }),
+      frame: this.lamp.material(picture, `${title}, light of the frame`),
+    };
+    for (const material of [...variants.values(), ...Object.values(lights)]) {
       const { map } = material as THREE.MeshBasicMaterial;
       // Colours pass as they are and one level of the picture is enough: both are dear without a graphics card.
       if (map && this.isPlain) [map.colorSpace, map.minFilter] = [THREE.NoColorSpace, THREE.LinearMipmapNearestFilter];
       material.side = THREE.DoubleSide;
       material.clippingPlanes = [];
     }
-    const at = this.coordinates(mesh), span = spanOf(at);
-    const part: Part = { painted: null, wanted: "", at: at.map(([s, a]) => [s, a] as Point), span, mesh, base: Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array), away: this.away(at, mesh), variants };
+    const at = this.coordinates(mesh), places = at.map(([s, a]) => [s, a] as Point);
+    const part: Part = {
+      mesh, variants, lights, painted: null, wanted: "", at: places, span: spanOf(at), all: mesh.geometry.index!.count, away: this.away(at, mesh),
+      base: Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array),
+    };
+    if (this.isPlain) this.addThinned(part);
     if (this.gain !== 1) shape(part, this.gain);
     return part;
+  }
+
+  /** Append a part's thinned triangles to its own. */
+  private addThinned(part: Part): void {
+    const { geometry } = part.mesh, whole = geometry.index!.array, { radius_mm: radius } = this.session.run;
+    const few = thinned(whole, part.at, [THINNED_RADII * radius, THINNED_RADII]);
+    const both = new Uint32Array(whole.length + few.length);
+    both.set(whole);
+    both.set(few, whole.length);
+    geometry.setIndex(new THREE.BufferAttribute(both, 1));
+    this.range(part);
   }
 
   /** Distance, azimuth and radius of each vertex; vertices are stored in the pipe's own frame, only the node above turns them. */
@@ -191,11 +228,11 @@ function shape({ mesh, base, away }: Part, gain: number): void {
   position.needsUpdate = true;
 }
 
-function free({ mesh, variants, painted }: Part): void {
+function free({ mesh, variants, lights, painted }: Part): void {
   mesh.geometry.dispose();
   painted?.strip.dispose();
   painted?.material.dispose();
-  for (const material of new Set(variants.values())) {
+  for (const material of [...Object.values(lights), ...new Set(variants.values())]) {
     const map = (material as THREE.MeshStandardMaterial).map;
     map?.dispose();
     (map?.source.data as ImageBitmap | undefined)?.close?.();

@@ -88,6 +88,11 @@ export interface Curve { mm: number[]; depth_mm: (number | null)[]; sigma_mm: (n
 export interface Profile { along: Curve; around: Curve }
 
 export interface Sight { frame: number; time_s: number; illumination: string; spot_px: Point; ring_px: Point[] }
+/** Where a frame's camera stood, turned to a spot, and recorded over evenly lit brightness, by polar angle and azimuth in the camera. */
+export interface Stand {
+  frame: number; eye_p: [number, number, number]; target_p: [number, number, number]; up_p: [number, number, number]; R_pc: number[][];
+  polar_rad: Point; light: number[][];
+}
 export interface Layer { levels: number; width: number; height: number; distance_mm: [number, number]; azimuth_rad: number }
 /** A part of the model between two distances. */
 export interface Stretch { from_mm: number; to_mm: number; triangles: number }

@@ -1,0 +1,37 @@
+/** A coarser skin of the same vertices, for a browser that has no graphics card, while the view moves. */
+import type { Point } from "./types";
+
+/**
+ * Triangles between the first vertices of cells of distance and azimuth; `at` gives each vertex's place and `cell` the
+ * sizes in mm and rad. Vertices at the edges of the skin stay, so that parts still meet.
+ */
+export function thinned(index: ArrayLike<number>, at: Point[], cell: Point): Uint32Array {
+  const stands = standIns(index, at, cell);
+  const out = new Uint32Array(index.length);
+  let n = 0;
+  for (let k = 0; k < index.length; k += 3) {
+    const [a, b, c] = [stands[index[k]!]!, stands[index[k + 1]!]!, stands[index[k + 2]!]!];
+    if (a === b || b === c || c === a) continue;
+    out[n++] = a; out[n++] = b; out[n++] = c;
+  }
+  return out.slice(0, n);
+}
+
+/** For each vertex the one that stands for it: the first of its cell, or itself at an edge. */
+function standIns(index: ArrayLike<number>, at: Point[], cell: Point): Uint32Array {
+  // Around an inner vertex each neighbour follows one triangle's corner and precedes another's: the differences cancel.
+  const open = new Float64Array(at.length);
+  for (let k = 0; k < index.length; k += 3) {
+    const [a, b, c] = [index[k]!, index[k + 1]!, index[k + 2]!];
+    open[a]! += b - c; open[b]! += c - a; open[c]! += a - b;
+  }
+  const first = new Map<number, number>();
+  const across = Math.ceil((2 * Math.PI) / cell[1]) + 2;
+  return Uint32Array.from(at, ([s, a], k) => {
+    if (open[k]) return k;
+    const key = Math.floor(s / cell[0]) * across + Math.floor((a + Math.PI) / cell[1]);
+    const there = first.get(key);
+    if (there === undefined) first.set(key, k);
+    return there ?? k;
+  });
+}
