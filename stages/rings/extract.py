@@ -17,6 +17,7 @@ from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
 from stages.rings.colour import discriminant_weights, excess_weights, mix
+from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
 from stages.rings.noise import clip_level_of, noise_response
 from stages.rings.sectors import Sectors, cut_sectors
@@ -76,6 +77,7 @@ def extract_rings(
     _compare_rings(samples)
     wander = wander_px(_some(samples))
     _report(context, samples, wander)
+    warn_of_rings(samples, wander, context)
     np.hypot(samples.sigma_px, np.float32(wander), out=samples.sigma_px)
     return samples
 

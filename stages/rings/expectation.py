@@ -1,0 +1,92 @@
+"""What the rings of a sound recording look like, and what is said of one whose rings do not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.arrays import Bool, Byte, Float
+from pipeline.artefacts.findings import clock_of_azimuth
+from pipeline.artefacts.measured import RingSamples, RingValidity
+from pipeline.machine.stage import Context
+from pipeline.pages import notation
+
+_NOT_THE_LINE = (RingValidity.GLINT, RingValidity.GHOST, RingValidity.OUTLIER, RingValidity.WIDTH)
+# Share of such samples. Sound recordings (the three open ones) have 0.06 % at most, seven glints a frame make
+# 2.2 %: the geometric middle.
+_MOST_NOT_THE_LINE = 0.004
+# Share of the line that is lost in any other way: 0 in sound recordings. Chosen: from here on a pit of some
+# millimetres may lie unseen.
+_MOST_UNSEEN = 0.02
+# Part of the rings in which an azimuth shows no line, and how far around, from which the sector is named:
+# less than half of the rings leave wall between them, and a degree is a millimetre of a 4 inch pipe.
+_HIDDEN, _HIDDEN_RAD = 0.5, np.radians(1.0)
+# Wander in line widths. Speckle and texture leave 0.06 to 0.10 in sound recordings. Chosen: half more.
+_MOST_WANDER = 0.15
+_NAMED_FRAMES = 8
+
+
+def warn_of_rings(samples: RingSamples, wander_px: float, context: Context) -> None:
+    """Warn where frames have no ring, a sector shows no line, or the line is not what it should be."""
+    rejected = samples.validity == RingValidity.FRAME_REJECTED
+    ring = ~rejected.all(1)
+    if not ring.all():
+        frames = samples.frame[~ring]
+        more = f" and {len(frames) - _NAMED_FRAMES} more" if len(frames) > _NAMED_FRAMES else ""
+        context.warn(
+            f"{len(frames)} of {len(ring)} laser frames show no ring: frame "
+            f"{', '.join(str(f) for f in frames[:_NAMED_FRAMES])}{more}. Their wall is not measured. What to "
+            "do: look at these pictures; the laser may have been off or its light hidden"
+        )
+    validity = samples.validity[ring]
+    missing = np.asarray((validity != RingValidity.VALID).mean(0))
+    _warn_of_sectors(missing, samples.azimuth_rad, context)
+    _warn_of_shares(validity[:, missing <= _HIDDEN], context)
+    width = float(np.median(samples.width_px[samples.valid]))
+    if wander_px > _MOST_WANDER * width:
+        context.warn(
+            f"the line wanders by {wander_px:.2f} px beyond its noise, {wander_px / width:.2f} of its width, "
+            "where sound recordings have 0.1 at most: strong compression, interlacing or coarse speckle. σ "
+            "holds it; small defects may be missed. What to do: record with less compression"
+        )
+
+
+def _warn_of_shares(validity: Byte, context: Context) -> None:
+    """Warn of how many samples (F, A) show no line, and how many another light."""
+    unseen = np.isin(validity, (RingValidity.NO_LINE, RingValidity.LOW_CONTRAST, RingValidity.SATURATED))
+    other = np.isin(validity, _NOT_THE_LINE)
+    if validity.size and unseen.mean() > _MOST_UNSEEN:
+        context.warn(
+            f"{100 * unseen.mean():.1f} % of the ring samples show no line that could be measured: it is too "
+            "faint or clipped, where sound recordings lose none. What to do: set the exposure of the laser "
+            "frames anew, clean window and laser"
+        )
+    if validity.size and other.mean() > _MOST_NOT_THE_LINE:
+        context.warn(
+            f"{100 * other.mean():.1f} % of the ring samples show light that is not the line: glints, "
+            "ghosts, splashes or compression, where sound recordings have 0.1 % at most. They are left out; what "
+            "looks like a line may pass for a finding of one or two rings. What to do: clean the window, "
+            "shade reflections, expose the laser frames less; look at the findings' pictures in the review"
+        )
+
+
+def _warn_of_sectors(missing: Float, azimuth_rad: Float, context: Context) -> None:
+    """Name the sectors in which most rings show no line: ``missing`` is the share of rings (A,)."""
+    step = 2 * np.pi / len(azimuth_rad)
+    for first, count in _runs_around(missing > _HIDDEN):
+        if count < len(missing) and count * step >= _HIDDEN_RAD:
+            ends = clock_of_azimuth(azimuth_rad[first] + step * np.array([0, count]))
+            context.warn(
+                f"the line is missing between {notation.clock(float(ends[0]))} and "
+                f"{notation.clock(float(ends[1]))} in the picture in most rings: the laser is hidden or weak "
+                "there, or something is on the window. The wall there is not inspected. What to do: clean "
+                "window and laser; record once more with the probe rolled"
+            )
+
+
+def _runs_around(mask: Bool) -> list[tuple[int, int]]:
+    """Return (first, count) of the runs of true cells around the circle."""
+    if mask.all() or not mask.any():
+        return [(0, len(mask))] if mask.all() else []
+    first = int(np.argmin(mask))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.roll(mask, -first).astype(np.int8), [0]])))
+    return [((int(a) + first) % len(mask), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,58 @@
+"""Rings unlike those of a sound recording are warned of by what is wrong with them; sound ones are not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.measured import RingSamples, RingValidity
+from stages.rings.expectation import warn_of_rings
+from tests.quiet import quiet_context
+
+RINGS, AZIMUTHS = 40, 360
+SOUND_WANDER_PX, WIDTH_PX = 0.1, 1.2
+
+
+def sound() -> RingSamples:
+    plain = np.full((RINGS, AZIMUTHS), WIDTH_PX, np.float32)
+    azimuth = np.linspace(-np.pi, np.pi, AZIMUTHS, endpoint=False)
+    validity = np.zeros((RINGS, AZIMUTHS), np.uint8)
+    return RingSamples(2 * np.arange(RINGS), azimuth, np.zeros(2), plain, plain, plain, plain, validity)
+
+
+def told(rings: RingSamples, wander_px: float = SOUND_WANDER_PX) -> str:
+    warnings: list[str] = []
+    warn_of_rings(rings, wander_px, replace(quiet_context(), warn=warnings.append))
+    return "\n".join(warnings)
+
+
+def spoilt(rows: slice, columns: slice, reason: RingValidity) -> RingSamples:
+    rings = sound()
+    rings.validity[rows, columns] = reason
+    return rings
+
+
+def test_sound_rings_and_a_few_bad_samples_are_no_matter() -> None:
+    assert told(sound()) == ""
+    assert told(spoilt(slice(3, 5), slice(10, 20), RingValidity.GLINT)) == ""
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "reason", "words"),
+    [
+        (slice(5, 8), slice(None), RingValidity.FRAME_REJECTED, "frame 10, 12, 14"),
+        (slice(None), slice(-5, None), RingValidity.NO_LINE, "between 8:50 and 9:00"),
+        (slice(0, 10), slice(0, 90), RingValidity.LOW_CONTRAST, "6.2 % of the ring samples show no line"),
+        (slice(0, 10), slice(0, 20), RingValidity.GLINT, "1.4 % of the ring samples show light"),
+    ],
+)
+def test_what_is_wrong_is_named(rows: slice, columns: slice, reason: RingValidity, words: str) -> None:
+    text = told(spoilt(rows, columns, reason))
+    assert words in text
+    assert text.count("What to do") == 1
+
+
+def test_a_line_that_wanders_is_named() -> None:
+    assert "the line wanders by 0.30 px" in told(sound(), 0.3)
