@@ -65,7 +65,7 @@ def _warn_of_shares(validity: Byte, context: Context) -> None:
             f"{100 * other.mean():.1f} % of the ring samples show light that is not the line: glints, "
             "ghosts, splashes or compression, where sound recordings have 0.1 % at most. They are left out; "
             "what looks like a line may pass for a finding of one or two rings. What to do: clean the "
-            "window, shade reflections, expose the laser frames less; look at the findings' pictures in the review"
+            "window, shade reflections, expose the laser frames less; look at the findings' pictures"
         )
 
 
