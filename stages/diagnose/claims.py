@@ -31,7 +31,7 @@ _GOES_WITH = {
     "time_offset": (FixedTo.TIME, "speed"),
 }
 # Another recording has its own events, its own aliases, and a P that is rolled otherwise.
-_OF_ONE_RECORDING = frozenset({"time_s", "slip_mm", "frequency_hz", "direction_deg"})
+_OF_ONE_RECORDING = frozenset({"time_s", "duration_s", "slip_mm", "frequency_hz", "direction_deg"})
 _ROCKING_P = 0.01
 # Of a swing: what one ring takes for a turn of the camera.
 _TURNED = 0.01
@@ -87,6 +87,11 @@ class Claim:
     agreements: tuple[Agreement, ...] = ()
 
     @property
+    def of_gauge_alone(self) -> bool:
+        """Whether it tells of an event of the gauge run, which the inspection does not share."""
+        return "time_s" in self.parameters and self.where == "gauge"
+
+    @property
     def found(self) -> EffectFound:
         """The effect with the chance that it is the right name."""
         drilled = _DRILLED[Channel(self.location.channel)]
@@ -94,6 +99,7 @@ class Claim:
             self.name, chance_of_name(self.p_value, len(self.alike), self.agreements, drilled),
             self.parameters, self.statement, effect(self.name).law,
             tuple(a.confirmation for a in self.agreements),
+            recording="gauge" if self.of_gauge_alone else "",
         )  # fmt: skip
 
 
@@ -104,7 +110,7 @@ def claims_of(field: Seen | None, gauge: Seen | None) -> list[Claim]:
     for name in dict.fromkeys((*of_gauge, *of_field)):
         each = [c for c in (of_gauge.get(name), of_field.get(name)) if c is not None]
         if len(each) == 2:
-            out.append(_borne_out(*sorted(each, key=lambda c: c.p_value)))
+            out.append(_borne_out(*sorted(each, key=lambda c: (c.of_gauge_alone, c.p_value))))
         else:
             out.append(_against(each[0], field if name in of_gauge else gauge))
     return sorted((c for c in out if not _excluded(c, out)), key=lambda c: c.p_value)
@@ -142,8 +148,14 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence) -> Claim:
 
 
 def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
-    size = {"slip_mm": Value(step.gain_mm, step.sigma_mm), "time_s": Value(step.time_s, step.time_sigma_s)}
-    words = f"The encoder's wheel slips at {step.time_s:.2f} s and its reading gains {step.gain_mm:+.2f} mm."
+    size = {
+        "slip_mm": Value(step.gain_mm, step.sigma_mm), "time_s": Value(step.time_s, step.time_sigma_s),
+        "duration_s": Value(step.lasting_s, step.time_sigma_s),
+    }  # fmt: skip
+    words = (
+        f"The encoder's wheel slips at {step.time_s:.2f} s for about {step.lasting_s:.2f} s and its reading "
+        f"gains {step.gain_mm:+.2f} mm."
+    )
     where = (step.place - 1, step.place)
     location = _stretch(travel, where, FixedTo.TIME, "event")
     return Claim("encoder_slip", size, words, step.p_value, (), travel.source, location, step.agreements)

@@ -30,8 +30,8 @@ _OF_CAMERA = frozenset({"principal_point", "focal_scale", "pixel_aspect", "radia
 
 
 def encoder_effects(effects: Sequence[EffectFound]) -> tuple[EffectFound, ...]:
-    """Return the effects that falsify the readings."""
-    return tuple(e for e in effects if e.name in _OF_ENCODER)
+    """Return the effects that falsify the inspection's readings."""
+    return tuple(e for e in effects if e.name in _OF_ENCODER and e.recording != "gauge")
 
 
 def with_true_readings(recording: Recording, effects: Sequence[EffectFound]) -> Recording:
@@ -61,7 +61,7 @@ def _shift(encoder: Encoder, true_mm: Float, effects: Sequence[EffectFound]) -> 
 
 
 def _shape(effect: EffectFound) -> Shape:
-    return (effect.parameters["time_s"].value,) if "time_s" in effect.parameters else ()
+    return tuple(effect.parameters[n].value for n in ("time_s", "duration_s") if n in effect.parameters)
 
 
 def _tilt(p: dict[str, float], a: Float, shape: Shape) -> None:

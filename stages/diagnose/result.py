@@ -100,7 +100,10 @@ class CourseFound:
 
 @dataclass(frozen=True)
 class EffectFound:
-    """An effect with its size, the chance that it is the right name, and what confirms it."""
+    """An effect with its size, the chance that it is the right name, and what confirms it.
+
+    ``recording`` is ``gauge`` where it happened in the gauge run alone; else it is empty.
+    """
 
     name: str
     probability: float
@@ -109,6 +112,7 @@ class EffectFound:
     equation: str
     confirmed_by: tuple[Confirmation, ...] = ()
     course: CourseFound | None = None
+    recording: str = ""
 
 
 @dataclass(frozen=True)
@@ -263,7 +267,7 @@ def _effect(found: EffectFound) -> dict[str, object]:
         "parameters": {k: _plain(v) for k, v in found.parameters.items()},
         "statement": found.statement, "equation": found.equation,
         "confirmed_by": [_plain(c) for c in found.confirmed_by],
-        "course": None if found.course is None else _course(found.course),
+        "course": None if found.course is None else _course(found.course), "recording": found.recording,
     }  # fmt: skip
 
 

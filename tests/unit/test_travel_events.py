@@ -49,6 +49,19 @@ def test_a_slip_is_found_with_size_and_time(reverses: bool, gain_mm: float) -> N
         assert found.time_sigma_s < 0.02
 
 
+@pytest.mark.parametrize(("lasts_s", "gain_mm"), [(0.12, 2.0), (0.25, -3.4)])
+def test_a_wheel_that_slips_for_a_while_slips_once(lasts_s: float, gain_mm: float) -> None:
+    sight, encoder = seen(np.random.default_rng(0), False), read(False)
+    part = np.clip((encoder.time_s - 3.0) / lasts_s, 0.0, 1.0)
+    (found,) = slips(sight, replace(encoder, distance_mm=encoder.distance_mm + gain_mm * part))
+    assert found.gain_mm == pytest.approx(gain_mm, abs=4 * found.sigma_mm)
+    assert found.sigma_mm < 0.1
+    assert found.time_s == pytest.approx(3.0 + lasts_s / 2, abs=3 * found.time_sigma_s)
+    assert found.lasting_s == pytest.approx(lasts_s, abs=0.07)
+    assert all(a.confirmation.agrees for a in found.agreements)
+    assert found.agreements
+
+
 def test_two_slips_of_opposite_sign_are_two() -> None:
     sight = seen(np.random.default_rng(3))
     found = slips(sight, read(slips=((2.0, 8.0), (4.5, -5.0))))

@@ -87,7 +87,7 @@ class EncoderScale(Scalar):
 
 
 class EncoderSlip(Worded):
-    """The encoder's wheel slips once; the shape is the time."""
+    """The encoder's wheel slips once; the shape is the time of its middle, and how long it takes, if it does."""
 
     name = "encoder_slip"
     amplitudes = one(name, 2.0)
@@ -99,8 +99,11 @@ class EncoderSlip(Worded):
         return tuple((float(t),) for t in duration_s * np.arange(1, count) / count)
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
-        """Return the gain at all later times."""
-        return np.asarray(amplitude[0] * (travel.time_s > shape[0]))
+        """Return what has come of the gain, evenly while it lasts."""
+        time_s, *lasting_s = shape
+        if not lasting_s:
+            return np.asarray(amplitude[0] * (travel.time_s > time_s))
+        return np.asarray(amplitude[0] * np.clip((travel.time_s - time_s) / lasting_s[0] + 0.5, 0.0, 1.0))
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the gain and when it comes."""

@@ -195,11 +195,14 @@ def travel_of_run(run: FieldRun, source: str = "field") -> TravelEvidence | None
 
 
 def _slips(run: FieldRun, travel: TravelEvidence | None) -> Int:
-    """Return the frames before which the readings jump."""
+    """Return the frames before which the readings jump: all while a slip lasts."""
     if travel is None:
         return np.zeros(0, np.int64)
-    steps = (*travel.slips, *travel.doubtful)
-    return np.array([int(np.searchsorted(run.measured.time_s, s.time_s)) for s in steps], np.int64)
+    time_s, found = run.measured.time_s, [np.zeros(0, np.int64)]
+    for s in (*travel.slips, *travel.doubtful):
+        first, last = np.searchsorted(time_s, [s.time_s - s.lasting_s / 2, s.time_s + s.lasting_s / 2])
+        found.append(np.arange(first, last + 1))
+    return np.unique(np.concatenate(found))
 
 
 def _evidence(run: FieldRun, asked: Asked, slips: Int) -> Evidence:

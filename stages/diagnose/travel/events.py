@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
+from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.model import (
@@ -18,9 +19,10 @@ from stages.diagnose.travel.model import (
     fitted,
     moment,
 )
-from stages.diagnose.travel.sight import Sight
+from stages.diagnose.travel.sight import Sight, readings_at
 
-_MOST = 8
+# So many steps and stray pictures are taken up, one after the other.
+_MOST = 16
 _ENTERS = 1e-4
 # A step needs pictures on both of its sides, else it is one stray picture.
 _SIDE = 3
@@ -30,9 +32,13 @@ _APART = 9.0
 # Debt: data/debts.md.
 _UNNOTICED = 2
 _WITHIN, _TIMING = 3.0, 0.03
-# Duration of a slip, and number of readings around it that its speed is taken from. Debt: data/debts.md.
-SLIPS_WITHIN_S = 0.03
+# Prior of how long a wheel slips: evenly between the time of a few readings, as over a bead, and this, as in
+# mud or grease. What creeps for longer is held by the noise's random walk.
+SHORTEST_S, LONGEST_S = 0.03, 0.5
+# Least number of readings around a slip that its speed is taken from. Debt: data/debts.md.
 _AROUND = 8
+# Least number of other moments that tell how far a reading's own motion imitates a slip.
+_LEAST_OTHERS = 20
 _TAIL = 2.275
 
 
@@ -46,7 +52,11 @@ def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: floa
     lasting_mm, sigma_mm
         By how much the reading is ahead of the pictures after the moment, and 1 σ.
     """
-    jump, sigma = reading_jump(encoder, at)
+    return _told_by_reading(lasting_mm, sigma_mm, *reading_jump(encoder, at))
+
+
+def _told_by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: float) -> Agreement | None:
+    """Return whether the reading's own jump, with 1 σ, is what it keeps on gaining on the pictures."""
     if not np.isfinite(sigma):
         return None
     lasting = Part(
@@ -63,25 +73,54 @@ def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: floa
 def reading_jump(encoder: Encoder, at: int) -> tuple[float, float]:
     """Return what the reading gains around a moment beyond its own speed before and after, mm, and 1 σ.
 
-    1 σ is a quarter of the range that holds the same sum at 95.4 % of all other moments, turns and bursts
-    included. NaN too close to the ends.
+    NaN too close to the ends.
     """
     step = np.diff(encoder.distance_mm)
     rate = float(np.median(np.diff(encoder.time_s)))
-    width = 2 * max(int(np.ceil(SLIPS_WITHIN_S / rate / 2)), 1) - 1
-    side = width // 2
-    reach = side + _AROUND
-    if not reach <= at < len(step) - reach:
-        return float("nan"), float("nan")
-    weight = np.full(2 * reach + 1, -width / (2 * _AROUND))
+    width = 2 * max(int(np.ceil(SHORTEST_S / rate / 2)), 1) - 1
+    weight = np.full(width + 2 * _AROUND, -width / (2 * _AROUND))
     weight[_AROUND : _AROUND + width] = 1.0
+    return _filtered(step, weight, at - len(weight) // 2)
+
+
+def _filtered(step: Float, weight: Float, first: int) -> tuple[float, float]:
+    """Return the weighted sum of the steps from ``first`` on, and 1 σ.
+
+    1 σ is a quarter of the range that holds the same sum at 95.4 % of all other moments, turns and bursts
+    included. NaN where the steps do not reach, or there are too few other moments.
+    """
+    if not 0 <= first <= len(step) - len(weight):
+        return float("nan"), float("nan")
     gained = np.correlate(step, weight, mode="valid")
-    here = at - reach
-    others = np.delete(gained, slice(max(here - 2 * reach, 0), here + 2 * reach + 1))
-    if len(others) < 4 * reach:
+    others = np.delete(gained, slice(max(first - len(weight) + 1, 0), first + len(weight)))
+    if len(others) < _LEAST_OTHERS:
         return float("nan"), float("nan")
     low, high = np.percentile(others, [_TAIL, 100 - _TAIL])
-    return float(gained[here]), float(high - low) / 4
+    return float(gained[first]), float(high - low) / 4
+
+
+def course_of_reading(fit: TravelFit, place_in_list: int, encoder: Encoder) -> Agreement | None:
+    """Return whether the reading's own motion shows a slip that lasts, as pictures and readings together do.
+
+    How the slip goes on from picture to picture is taken from both; how large it is, from the reading alone,
+    as what is not motion at an even acceleration. None when it cannot tell.
+    """
+    event, sight = fit.events[place_in_list], fit.sight
+    gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
+    course = np.pad(_course(fit, place_in_list), event.during)
+    even = np.vander(np.linspace(-1, 1, len(course)), 2)
+    weight = course - even @ np.linalg.lstsq(even, course, rcond=None)[0]
+    step = np.diff(readings_at(encoder, sight.time_s))
+    first = event.place - event.during - 1 - event.during
+    jump, jump_sigma = _filtered(step, weight * gain_mm / float(weight @ course), first)
+    return _told_by_reading(gain_mm, sigma, jump, jump_sigma)
+
+
+def _course(fit: TravelFit, place_in_list: int) -> Float:
+    """Return what the reading gains from picture to picture while an event lasts, (during + 1,) mm."""
+    event = fit.events[place_in_list]
+    gained = fit.difference_mm - fit.columns[:, 1:4] @ fit.values[1:4]
+    return np.diff(gained[event.place - event.during - 1 : event.place + 1])
 
 
 @dataclass(frozen=True)
@@ -101,6 +140,8 @@ class StepFound:
         What explains it as well.
     missing_s : float
         Time of missing pictures that would explain it.
+    lasting_s : float
+        How long it takes, as of a wheel that slips evenly.
     agreements : tuple of Agreement
         What the reading alone says of it.
     """
@@ -113,26 +154,64 @@ class StepFound:
     p_value: float
     rivals: tuple[EventKind, ...]
     missing_s: float
+    lasting_s: float = SHORTEST_S
     agreements: tuple[Agreement, ...] = ()
 
 
 def with_events(sight: Sight, encoder: Encoder) -> TravelFit:
     """Return the fit with the events that the readings ask for, the strongest first."""
     fit = fitted(sight, encoder, (), None)
-    while len(fit.events) < _MOST:
+    for _ in range(_MOST):
         event, score, count = _strongest(fit)
         if chance(score, count, len(sight.time_s)) > _ENTERS:
             break
-        fit = fitted(sight, encoder, (*fit.events, event), None)
-    return _without_needless(fit, encoder)
+        fit = fitted(sight, encoder, _joined(sight, (*fit.events, event)), None)
+    fit = _without_needless(fit, encoder)
+    wider = tuple(_with_its_ends(sight, e) for e in fit.events)
+    return fit if wider == fit.events else fitted(sight, encoder, wider, None)
+
+
+def _with_its_ends(sight: Sight, event: Event) -> Event:
+    """Return a slip that lasts with a picture more on either side: how it begins and ends shows in none alone."""
+    if not event.during:
+        return event
+    first, end = max(event.place - event.during - 1, 1), min(event.place + 1, len(sight.time_s) - 1)
+    return Event(event.kind, end, end - first)
+
+
+def _joined(sight: Sight, events: tuple[Event, ...]) -> tuple[Event, ...]:
+    """Return the events; a step with others that come while a wheel may still be slipping is one of them."""
+    out: list[Event] = []
+    for event in sorted(events, key=lambda e: e.place - e.during):
+        both = _one_slip(out[-1], event) if out else None
+        lasts_s = LONGEST_S if both is None else _around_s(sight, both)[1] - _around_s(sight, both)[0]
+        # Between the pictures around it the slip is shorter than that by as much as a picture's time.
+        if both is not None and lasts_s < LONGEST_S + sight.time_s[both.place] - sight.time_s[both.place - 1]:
+            out[-1] = both
+        else:
+            out.append(event)
+    return tuple(out)
+
+
+def _one_slip(first: Event, second: Event) -> Event | None:
+    """Return the slip that two events are together; None where both are stray pictures."""
+    if EventKind.STEP not in (first.kind, second.kind):
+        return None
+    begins = min(e.place - e.during for e in (first, second))
+    end = max(e.place + (e.kind is EventKind.OUTLIER) for e in (first, second))
+    return Event(EventKind.STEP, end, end - begins)
+
+
+def _around_s(sight: Sight, event: Event) -> tuple[float, float]:
+    """Return when the last picture before an event was taken, and the first one after it."""
+    return float(sight.time_s[event.place - event.during - 1]), float(sight.time_s[event.place])
 
 
 def _without_needless(fit: TravelFit, encoder: Encoder) -> TravelFit:
     """Return the fit less the events that those found later have made needless."""
     while fit.events:
-        z2 = (fit.values[4:] / fit.sigma[4:]) ** 2
-        least = int(np.argmin(z2))
-        if chance(float(z2[least]), 2 * len(fit.sight.time_s), len(fit.sight.time_s)) <= _ENTERS:
+        least = int(np.argmin(fit.event_z2))
+        if chance(fit.event_z2[least], 2 * len(fit.sight.time_s), len(fit.sight.time_s)) <= _ENTERS:
             break
         fit = fitted(fit.sight, encoder, fit.events[:least] + fit.events[least + 1 :], None)
     return fit
@@ -170,6 +249,46 @@ def _strongest(fit: TravelFit) -> tuple[Event, float, int]:
 
 def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     event, sight = fit.events[place_in_list], fit.sight
+    gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
+    rivals, missing_s = _rivals(fit, place_in_list, encoder)
+    # Somewhere between two pictures; where the reading itself jumps, as long as a short slip lasts.
+    within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
+    if event.during:
+        time_s, lasting_s = _middle_and_duration(fit, place_in_list)
+        again, jumps_s = course_of_reading(fit, place_in_list, encoder), within_s
+    else:
+        k, lasting_s, jumps_s = moment(sight, encoder, event.place), SHORTEST_S, SHORTEST_S
+        time_s = float(encoder.time_s[k] + encoder.time_s[k + 1]) / 2
+        again = jump_of_reading(encoder, k, gain_mm, sigma)
+    if again is not None and again.confirmation.agrees:
+        # Errors of pictures cannot make the encoder's reading jump.
+        rivals, within_s = (), jumps_s
+    count = len(sight.time_s)
+    z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
+    return StepFound(
+        event.place, time_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
+        missing_s, lasting_s, () if again is None else (again,),
+    )  # fmt: skip
+
+
+def _middle_and_duration(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
+    """Return when a slip that lasts has its middle, and the duration of an even one of the same spread, s."""
+    event, time_s = fit.events[place_in_list], fit.sight.time_s
+    around = time_s[event.place - event.during - 1 : event.place + 1]
+    course, middle = _course(fit, place_in_list), around[:-1] + np.diff(around) / 2
+    share = course / course.sum()
+    mean = float(np.clip(share @ middle, around[0], around[-1]))
+    # Within a gap between pictures the slip spreads evenly, as its course takes it to do.
+    spread = float(share @ (middle - mean) ** 2) + float(np.median(np.diff(around))) ** 2 / 12
+    return mean, float(np.clip(np.sqrt(12 * max(spread, 0.0)), SHORTEST_S, np.ptp(around)))
+
+
+def _rivals(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[tuple[EventKind, ...], float]:
+    """Return what explains a step as well, and the time of missing pictures that would."""
+    event, sight = fit.events[place_in_list], fit.sight
+    if event.during:
+        # Pictures that drift for a while look the same, but for the reading's own motion; fiducials do not drift.
+        return () if sight.placed else (EventKind.OUTLIER,), 0.0
     others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
     without = fitted(sight, encoder, others, fit.noise)
     # The step itself does not count as speed.
@@ -179,8 +298,7 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
         value, gain = without.whitened.gain(candidate_columns(sight, kind, speed))
         near = slice(max(event.place - 2, 0), event.place + 3)
         size[kind], score[kind] = float(value[near][np.argmax(gain[near])]), float(gain[near].max())
-    at = 4 + place_in_list
-    sigma = float(fit.sigma[at])
+    sigma = float(fit.sigma[4 + place_in_list])
     rivals = tuple(
         k
         for k in EventKind
@@ -188,20 +306,7 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
         and score[k] > score[event.kind] - _APART
         and (k is not EventKind.LOST_TIME or _whole_frames(sight, size[k], sigma, speed[event.place]))
     )
-    z2 = (fit.values[at] / sigma) ** 2 if np.isfinite(sigma) else 0.0
-    count = len(sight.time_s)
-    k = moment(sight, encoder, event.place)
-    time_s = (encoder.time_s[k] + encoder.time_s[k + 1]) / 2
-    again = jump_of_reading(encoder, k, float(fit.values[at]), sigma)
-    # Somewhere between two pictures; where the reading itself jumps, as long as a slip lasts.
-    within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
-    if again is not None and again.confirmation.agrees:
-        # Errors of pictures cannot make the encoder's reading jump.
-        rivals, within_s = (), SLIPS_WITHIN_S
-    return StepFound(
-        event.place, float(time_s), within_s / np.sqrt(12), float(fit.values[at]), sigma,
-        chance(z2, 2 * count, count), rivals, size[EventKind.LOST_TIME], () if again is None else (again,),
-    )  # fmt: skip
+    return rivals, size[EventKind.LOST_TIME]
 
 
 def _whole_frames(sight: Sight, missing_s: float, sigma_mm: float, speed_mm_s: float) -> bool:

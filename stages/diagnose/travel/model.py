@@ -36,16 +36,21 @@ class EventKind(StrEnum):
     """What happens at one moment."""
 
     STEP = "the reading gains"
-    OUTLIER = "one picture is off"
+    OUTLIER = "pictures are off"
     LOST_TIME = "frames are missing"
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something between frames ``place`` − 1 and ``place`` of a `Sight` (an outlier: in frame ``place``)."""
+    """Something between frames ``place`` − 1 and ``place`` of a `Sight` (an outlier: in frame ``place``).
+
+    A step that takes its time began ``during`` pictures earlier. How far it has come in each of these is free:
+    a wheel need not slip evenly.
+    """
 
     kind: EventKind
     place: int
+    during: int = 0
 
 
 @dataclass(frozen=True)
@@ -56,16 +61,17 @@ class TravelFit:
     ----------
     sight : Sight
     events : tuple of Event
-    values : (4 + E,)
-        Offset in mm, scale, delay in s, play in mm; then gains in mm (for lost time: in s).
-    covariance : (4 + E, 4 + E)
+    values : (4 + E + D,)
+        Offset in mm, scale, delay in s, play in mm; then gains in mm (for lost time: in s); then how far off
+        each picture is that was taken during an event.
+    covariance : (4 + E + D, 4 + E + D)
         Infinite variance where this motion tells nothing.
     noise : DriftNoise
     difference_mm : (N,)
         Reading − sight, less the offset only.
     whitened : Whitened
         Around ``values``.
-    columns : (N, 4 + E)
+    columns : (N, 4 + E + D)
         What each value adds to reading − sight, per unit.
     told_apart : bool
         Whether delay or play is there, and the other does not explain it nearly as well.
@@ -83,8 +89,14 @@ class TravelFit:
 
     @property
     def sigma(self) -> Float:
-        """(4 + E,) 1 σ of the values."""
+        """(4 + E + D,) 1 σ of the values."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0)))
+
+    @property
+    def event_z2(self) -> Float:
+        """(E,) squares of the events' gains over their σ."""
+        own = slice(4, 4 + len(self.events))
+        return np.asarray((self.values[own] / self.sigma[own]) ** 2)
 
 
 def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: DriftNoise | None) -> TravelFit:
@@ -111,7 +123,7 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     left = float(whitened.residual @ whitened.weighted) / max(len(plain) - len(values), 1)
     covariance = max(left, 1.0) * whitened.covariance
     covariance[SCALE, SCALE] += sight.scale_sigma**2
-    values[4:] += [_gain(encoder, sight, e) for e in events]
+    values[4 : 4 + len(events)] += [_gain(encoder, sight, e) for e in events]
     return TravelFit(
         sight, events, values, covariance, noise, plain - np.median(plain), whitened, end.columns, told_apart
     )
@@ -237,8 +249,8 @@ def moment(sight: Sight, encoder: Encoder, place: int) -> int:
 
 
 def _gain(encoder: Encoder, sight: Sight, event: Event) -> float:
-    """Return what one reading gains at a step beyond its neighbours, mm; 0 for other events."""
-    if event.kind is not EventKind.STEP:
+    """Return what one reading gains at a step beyond its neighbours, mm; 0 for other and longer events."""
+    if event.kind is not EventKind.STEP or event.during:
         return 0.0
     k = moment(sight, encoder, event.place)
     around = np.diff(encoder.distance_mm)[max(k - _AROUND, 0) : k + _AROUND + 1]
@@ -254,10 +266,12 @@ def _without_steps(sight: Sight, encoder: Encoder, events: tuple[Event, ...]) ->
 
 
 def event_columns(sight: Sight, events: tuple[Event, ...], speed: Float) -> Float:
-    """Return (N, E)."""
+    """Return (N, E + D): what each event adds, then each picture taken during one."""
     if not events:
         return np.zeros((len(sight.time_s), 0))
-    return np.stack([candidate_columns(sight, e.kind, speed)[:, e.place] for e in events], 1)
+    each = [candidate_columns(sight, e.kind, speed)[:, e.place] for e in events]
+    free = [k for e in events for k in range(e.place - e.during, e.place)]
+    return np.concatenate([np.stack(each, 1), np.eye(len(sight.time_s))[:, free]], axis=1)
 
 
 def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Float:

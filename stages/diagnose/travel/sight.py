@@ -33,6 +33,8 @@ class Sight:
         Relative 1 σ of the scale of ``distance_mm``.
     frame_time_s : float
         Usual time from one frame of the recording to the next.
+    placed : bool
+        Whether fiducials place every picture, so that none of its errors lasts.
     """
 
     frame: Int
@@ -41,6 +43,7 @@ class Sight:
     path_mm: Float
     scale_sigma: float
     frame_time_s: float
+    placed: bool = False
 
     @property
     def direction(self) -> Float:
@@ -81,7 +84,9 @@ def sight_of_poses(recording: Recording, T_pc: Float, index: Int, scale_sigma: f
     """Return the way in a gauge run from poses (N, 4, 4), where fiducials (``index``) show it."""
     posed = np.zeros(len(T_pc), bool)
     posed[index] = True
-    return _sight(recording, recording.frames.frame, T_pc[:, 2, 3], posed, scale_sigma)
+    return replace(
+        _sight(recording, recording.frames.frame, T_pc[:, 2, 3], posed, scale_sigma), placed=True
+    )
 
 
 def readings_at(encoder: Encoder, time_s: Float) -> Float:
