@@ -87,7 +87,7 @@ class EncoderScale(Scalar):
 
 
 class EncoderSlip(Worded):
-    """The encoder's wheel slips once; the shape is the time of its middle, and how long it takes, if it does."""
+    """The encoder's wheel slips once; the shape is the time of its middle and, if it lasts, for how long."""
 
     name = "encoder_slip"
     amplitudes = one(name, 2.0)

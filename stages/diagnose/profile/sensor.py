@@ -8,15 +8,27 @@ from scipy.ndimage import uniform_filter1d
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from stages.diagnose.profile.cells import Cells
-from stages.diagnose.profile.finding import Finding, Size, finding, regress, tested, untestable
+from stages.diagnose.profile.finding import (
+    Finding,
+    Regression,
+    Size,
+    finding,
+    regress,
+    tested,
+    untestable,
+)
 from stages.diagnose.profile.measure import LineProfiles
 
 # Locking of a line to pixels by pixel integration, rounding and compression, px. Debt: data/debts.md.
 LOCKING_FLOOR_PX = 1.5e-3
-# Variance of gains that speckle on a wall at rest, or compression, may imitate. Debt: data/debts.md.
+# Gains that speckle on a wall at rest may imitate. What compression imitates is measured. Debt: data/debts.md.
 GAIN_FLOOR = 0.01
+# Codecs code blocks of 8 px, so that what they leave is alike over several pixels. Those above each other lie
+# across the rows along which gains are compared, so that gains of single pixels have nothing in common there.
+_ROWS_APART = (1, 2, 3, 4)
 _SMOOTH_AZIMUTHS = 41
 _LEAST_SEEN = 3.0e3
+_LEAST_PIXELS = 500
 _TILE_PX = 64
 
 
@@ -53,18 +65,20 @@ def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Find
     """Return the finding of `fixed_pattern`: gains of single pixels, alike in two halves of the frames.
 
     The halves' covariance is the variance of what stays in the pixels. A pixel is compared with its
-    neighbours along the row, so that the line's own shape falls out.
+    neighbours along the row, so that the line's own shape falls out. What pixels above each other have in
+    common is not their own: that is what codec and line leave, and it counts as an error of the variance.
     """
     gain, seen = _gains(profiles, image_size)
     rough = [g - _row_means(g, s) for g, s in zip(gain, seen, strict=True)]
-    both = seen[0] & seen[1]
-    tiles = _tiles(image_size)[both]
-    product = (rough[0] * rough[1])[both]
-    if len(product) < 500:
+    tiles = _tiles(image_size)
+    fit = _in_common(rough, seen, tiles, 0)
+    if fit is None:
         return untestable("fixed_pattern", "The line does not come back to the same pixels.")
-    fit = regress(np.ones((len(product), 1)), product, tiles)
     variance = float(fit.coefficient[0]) * 1.5
-    test = tested(variance, 1.5 * float(fit.sigma[0]), GAIN_FLOOR**2, fit.groups)
+    apart = [one for rows in _ROWS_APART if (one := _in_common(rough, seen, tiles, rows)) is not None]
+    shared = max((abs(float(one.coefficient[0])) for one in apart), default=0.0)
+    floor = float(np.hypot(GAIN_FLOOR**2, 1.5 * shared))
+    test = tested(variance, 1.5 * float(fit.sigma[0]), floor, fit.groups)
     sigma = test.sigma
     size = float(np.sqrt(max(variance, 0.0)))
     return finding(
@@ -72,6 +86,15 @@ def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Find
         (Size("relative", "", size, sigma / (2 * max(size, np.sqrt(sigma)))),),
         f"Pixels keep gains of their own of {100 * size:.2f} % (1 σ).", alike=("dust",),
     )  # fmt: skip
+
+
+def _in_common(rough: list[Float], seen: list[Bool], tiles: Int, rows: int) -> Regression | None:
+    """Return the halves' covariance of pixels so many rows apart; None where too few are seen."""
+    other, shows = np.roll(rough[1], -rows, 0), np.roll(seen[1], -rows, 0)
+    both = seen[0] & shows
+    if np.count_nonzero(both) < _LEAST_PIXELS:
+        return None
+    return regress(np.ones((np.count_nonzero(both), 1)), (rough[0] * other)[both], tiles[both])
 
 
 def _smoothed(values: Float, valid: Bool) -> Float:

@@ -172,7 +172,7 @@ def with_events(sight: Sight, encoder: Encoder) -> TravelFit:
 
 
 def _with_its_ends(sight: Sight, event: Event) -> Event:
-    """Return a slip that lasts with a picture more on either side: how it begins and ends shows in none alone."""
+    """Return a slip that lasts with a picture more on either side: none alone shows how it begins and ends."""
     if not event.during:
         return event
     first, end = max(event.place - event.during - 1, 1), min(event.place + 1, len(sight.time_s) - 1)
@@ -287,7 +287,8 @@ def _rivals(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[tuple
     """Return what explains a step as well, and the time of missing pictures that would."""
     event, sight = fit.events[place_in_list], fit.sight
     if event.during:
-        # Pictures that drift for a while look the same, but for the reading's own motion; fiducials do not drift.
+        # Pictures that drift for a while look the same, but for the reading's own motion. Fiducials do not
+        # drift.
         return () if sight.placed else (EventKind.OUTLIER,), 0.0
     others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
     without = fitted(sight, encoder, others, fit.noise)

@@ -44,8 +44,8 @@ class EventKind(StrEnum):
 class Event:
     """Something between frames ``place`` − 1 and ``place`` of a `Sight` (an outlier: in frame ``place``).
 
-    A step that takes its time began ``during`` pictures earlier. How far it has come in each of these is free:
-    a wheel need not slip evenly.
+    A step that takes its time began ``during`` pictures earlier. How far it has come in each of these is
+    free: a wheel need not slip evenly.
     """
 
     kind: EventKind

@@ -84,9 +84,7 @@ def sight_of_poses(recording: Recording, T_pc: Float, index: Int, scale_sigma: f
     """Return the way in a gauge run from poses (N, 4, 4), where fiducials (``index``) show it."""
     posed = np.zeros(len(T_pc), bool)
     posed[index] = True
-    return replace(
-        _sight(recording, recording.frames.frame, T_pc[:, 2, 3], posed, scale_sigma), placed=True
-    )
+    return replace(_sight(recording, recording.frames.frame, T_pc[:, 2, 3], posed, scale_sigma), placed=True)
 
 
 def readings_at(encoder: Encoder, time_s: Float) -> Float:
