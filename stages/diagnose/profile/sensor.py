@@ -21,7 +21,8 @@ from stages.diagnose.profile.measure import LineProfiles
 
 # Locking of a line to pixels by pixel integration, rounding and compression, px. Debt: data/debts.md.
 LOCKING_FLOOR_PX = 1.5e-3
-# Gains that speckle on a wall at rest may imitate. What compression imitates is measured. Debt: data/debts.md.
+# Gains that speckle on a wall at rest may imitate; what compression imitates is measured. Debt:
+# data/debts.md.
 GAIN_FLOOR = 0.01
 # Codecs code blocks of 8 px, so that what they leave is alike over several pixels. Those above each other lie
 # across the rows along which gains are compared, so that gains of single pixels have nothing in common there.

@@ -172,7 +172,7 @@ def with_events(sight: Sight, encoder: Encoder) -> TravelFit:
 
 
 def _with_its_ends(sight: Sight, event: Event) -> Event:
-    """Return a slip that lasts with a picture more on either side: none alone shows how it begins and ends."""
+    """Return a slip that lasts with a picture more on either side: none alone shows its begin and end."""
     if not event.during:
         return event
     first, end = max(event.place - event.during - 1, 1), min(event.place + 1, len(sight.time_s) - 1)
