@@ -6,7 +6,8 @@ import pytest
 
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
-from stages.calibrate.boards.detect import Charuco, Chessboard, detect
+from stages.calibrate.boards.detect import Charuco, Chessboard, detect, grid
+from stages.calibrate.boards.refine import WINDOW_SHARE, refine, refine_in_windows
 from tests.board_scene import board_points, chessboard_picture, facing_pose, render
 
 CAMERA = KannalaBrandt((800, 600), (230.0, 229.5), (398.3, 301.2), (-0.0118, 0.0008, -0.0008, 0.0001))
@@ -66,6 +67,26 @@ def test_red_and_white_board_is_found_in_its_darkest_channel():
     view = detect(np.stack([dark, dark, bright], -1), BOARD, "a.png")
     assert view is not None
     assert _rms_to_nearest(view.uv, true) < LIMIT_PX
+
+
+def test_corners_in_a_defocused_picture_are_better_than_detected_and_than_always_refined():
+    """Blur as wide as the slanted squares: OpenCV's detector and its refinement both err by up to some px."""
+    random = np.random.default_rng(11)
+    errors = {"detected": [], "refined": [], "chosen": []}
+    for blur_px, theta in ((0.0, 0.6), (3.0, 0.6), (5.0, 0.1), (5.0, 0.5)):
+        T_cb = facing_pose([np.sin(theta), 0.4 * np.sin(theta), np.cos(theta)], 110.0, [0.3, -0.3, 0.2])
+        image, true = _chess_scene(T_cb)
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), blur_px)) if blur_px else image
+        image = np.clip(image + random.normal(0, 3, image.shape), 0, 255).astype(np.uint8)
+        found, uv = cv2.findChessboardCornersSB(image, (8, 6), flags=cv2.CALIB_CB_EXHAUSTIVE)
+        assert found
+        uv = uv.reshape(-1, 2).astype(float)
+        chosen = refine(image, uv, grid(8, 6, BOARD.square_mm), WINDOW_SHARE)
+        always = refine_in_windows(image, uv, WINDOW_SHARE)
+        for name, places in (("detected", uv), ("refined", always), ("chosen", chosen)):
+            errors[name].append(_rms_to_nearest(places, true))
+    rms = {name: np.sqrt(np.mean(np.square(e))) for name, e in errors.items()}
+    assert rms["chosen"] < min(rms["detected"], rms["refined"]), (rms, errors)
 
 
 def test_no_board_no_corners():

@@ -13,19 +13,17 @@ from itertools import product
 
 import cv2
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float, Image
 from pipeline.instrument.camera.calibration import BoardView
+from stages.calibrate.boards.refine import WINDOW_SHARE, refine
 
 LEAST_CORNERS = 12
 _SHORTEST_SIDE = 4
-_SEARCHED_SIDE_PX = 1000
 _MOST_MISSING = 2
+_SEARCHED_SIDE_PX = 1000
 _QUICK = cv2.CALIB_CB_ACCURACY
 _THOROUGH = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
-_WINDOW_SHARE, _SMALLEST_WINDOW, _LARGEST_WINDOW = 0.33, 2, 20
-_STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
 _CONTRAST_LIMIT, _CONTRAST_TILES = 4.0, (8, 8)
 
 
@@ -86,8 +84,16 @@ def detect(image: Image, board: Board, name: str) -> BoardView | None:
     ``image`` is (H, W) grey or (H, W, 3) BGR.
     """
     if isinstance(board, Charuco):
-        return _charuco(_grey(image), board, name)
+        return _charuco(grey_of(image), board, name)
     return _chessboard(image, board, name)
+
+
+def shows_whole(image: Image, board: Board) -> bool:
+    """Return whether a quick look at an image shows the board, a chessboard as a whole."""
+    grey = grey_of(image)
+    if isinstance(board, Charuco):
+        return _charuco(grey, board, "") is not None
+    return bool(cv2.findChessboardCornersSB(grey, (board.columns, board.rows), flags=_QUICK)[0])
 
 
 def _chessboard(image: Image, board: Chessboard, name: str) -> BoardView | None:
@@ -101,51 +107,51 @@ def _chessboard(image: Image, board: Chessboard, name: str) -> BoardView | None:
 
 def _part_of_chessboard(image: Image, board: Chessboard, name: str) -> BoardView | None:
     """Look for the largest part in a picture of moderate size, and refine it in the image itself."""
-    grey = _grey(image)
+    grey = grey_of(image)
     scale = min(_SEARCHED_SIDE_PX / max(grey.shape), 1.0)
     small = np.asarray(cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
-    for size in _parts(board):
-        for picture in _pictures(small):
-            found, uv = cv2.findChessboardCornersSB(picture, size, flags=_THOROUGH)
-            if found:
-                coarse = (np.array(uv, float).reshape(-1, 2) + 0.5) / scale - 0.5
-                return _view(grey, size, board, name, coarse)
+    for picture in _pictures(small):
+        part = _upright(largest_grid(picture), board)
+        if part is not None:
+            coarse = (part.reshape(-1, 2) + 0.5) / scale - 0.5
+            return _view(grey, (part.shape[1], part.shape[0]), board, name, coarse)
+    return None
+
+
+def largest_grid(grey: Image) -> Float | None:
+    """Return the corners (R, C, 2), px, of the largest chessboard in a picture; None where none is seen."""
+    smallest, flags = (_SHORTEST_SIDE, _SHORTEST_SIDE), _THOROUGH | cv2.CALIB_CB_LARGER
+    found, uv, cells = cv2.findChessboardCornersSBWithMeta(grey, smallest, flags)
+    return np.array(uv, float).reshape(*cells.shape[:2], 2) if found else None
+
+
+def _upright(corners: Float | None, board: Chessboard) -> Float | None:
+    """Return a grid with its rows along the board's; None where more than two rows or columns lack."""
+    if corners is None:
+        return None
+    for turned in (corners, np.rot90(corners)):
+        missing = np.subtract((board.rows, board.columns), turned.shape[:2])
+        if missing.min() >= 0 and missing.max() <= _MOST_MISSING:
+            return np.ascontiguousarray(turned)
     return None
 
 
 def _view(picture: Image, size: tuple[int, int], board: Chessboard, name: str, uv: Float) -> BoardView:
     xyz_b = grid(*size, board.square_mm)
-    return BoardView(name, xyz_b, _refined(picture, uv, _WINDOW_SHARE), numbered=False)
+    return BoardView(name, xyz_b, refine(picture, uv, xyz_b, WINDOW_SHARE), numbered=False)
 
 
-def _grey(image: Image) -> Image:
+def grey_of(image: Image) -> Image:
+    """Return an image (H, W) or (H, W, 3), BGR, in grey."""
     return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
 def _pictures(image: Image) -> list[Image]:
     """Return the ways to look at an image: as it is, its darkest channel, and with local contrast."""
-    grey = _grey(image)
+    grey = grey_of(image)
     enhanced = np.asarray(cv2.createCLAHE(_CONTRAST_LIMIT, _CONTRAST_TILES).apply(grey), np.uint8)
     coloured = image.ndim == 3 and bool(np.any(image != grey[..., None]))
     return [grey, np.ascontiguousarray(image.min(-1)), enhanced] if coloured else [grey, enhanced]
-
-
-def _parts(board: Chessboard) -> list[tuple[int, int]]:
-    """Return the sizes of the board's parts, the largest first."""
-    shorter = range(_MOST_MISSING + 1)
-    parts = [(board.columns - a, board.rows - b) for a in shorter for b in shorter if a + b > 0]
-    return sorted((p for p in parts if min(p) >= _SHORTEST_SIDE), key=lambda p: -p[0] * p[1])
-
-
-def _refined(picture: Image, uv: Float, share: float) -> Float:
-    """Refine each corner in a window of ``share`` of its squares, whose size varies in a fisheye."""
-    spacing = np.asarray(cKDTree(uv).query(uv, 2)[0])[:, 1]
-    halves = np.clip(np.floor(share * spacing), _SMALLEST_WINDOW, _LARGEST_WINDOW).astype(int)
-    refined = uv.astype(np.float32)
-    for i, half in enumerate(halves):
-        size = (int(half), int(half))
-        refined[i] = cv2.cornerSubPix(picture, refined[i : i + 1].copy(), size, (-1, -1), _STOP)[0]
-    return refined.astype(float)
 
 
 def _charuco(grey: Image, board: Charuco, name: str) -> BoardView | None:
@@ -155,7 +161,8 @@ def _charuco(grey: Image, board: Charuco, name: str) -> BoardView | None:
     if len(best.uv) < LEAST_CORNERS or _in_one_line(best.xyz_b):
         return None
     clear_of_markers = (board.square_mm - board.marker_mm) / 2 / board.square_mm
-    return BoardView(name, best.xyz_b, _refined(grey, best.uv, min(clear_of_markers, _WINDOW_SHARE)))
+    refined = refine(grey, best.uv, best.xyz_b, min(clear_of_markers, WINDOW_SHARE))
+    return BoardView(name, best.xyz_b, refined)
 
 
 def _charuco_layout(grey: Image, board: cv2.aruco.CharucoBoard, name: str) -> BoardView:

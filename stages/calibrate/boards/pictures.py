@@ -18,11 +18,14 @@ from pipeline.instrument.camera.calibration import BoardView
 from pipeline.machine.plan import Source
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.input_file import InputFile, content_key, input_file
-from stages.calibrate.boards.detect import LEAST_CORNERS, Board, Charuco, detect
+from stages.calibrate.boards.detect import LEAST_CORNERS, Board, Charuco, detect, shows_whole
+from stages.calibrate.boards.kinds import pattern_seen
 
 Image = NDArray[np.uint8]
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
 _NAME = "boards"
+_FIRST = 3
+"""Pictures looked at for another pattern than the one stated; three in about 5 s."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,7 @@ def find_boards(
         When the board is in none of them.
     """
     files, board = [file.path for file in pictures.files], target.board
+    refuse_another_pattern(files, board)
     views: list[BoardView] = []
     rejected: list[tuple[str, str]] = []
     sizes: dict[tuple[int, int], Path] = {}
@@ -122,6 +126,22 @@ def find_boards(
                 views.append(view)
     context.report("rejected: pictures without the board", len(rejected), "pictures")
     return FoundBoards(tuple(views), _only_size(sizes, files, views, board), tuple(rejected))
+
+
+def refuse_another_pattern(files: Sequence[Path], board: Board) -> None:
+    """Raise `UnusableError` where the first pictures show another pattern than the board that was stated.
+
+    A whole search takes seconds a picture; this one looks at the first pictures, until one shows the board.
+    """
+    for file in files[:_FIRST]:
+        image = read_picture(file)
+        if image is None or shows_whole(image, board):
+            return
+        seen = pattern_seen(image, board)
+        if seen is not None:
+            pattern, hint = seen
+            stated = f"{board.columns} × {board.rows}"
+            raise UnusableError(_NAME, f"{file.name} shows {pattern}, not the board of {stated}", hint=hint)
 
 
 def read_picture(file: Path) -> Image | None:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float, Int
+from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.instrument.camera.base import Camera
 from pipeline.instrument.camera.calibration import BoardSurvey, BoardView
 from stages.calibrate.boards.bundle import (
@@ -35,6 +36,7 @@ _TURNS = 6
 _PLACINGS = 2
 _CAMERA = Free(np.arange(8), FLAT)
 _WIDEST_RAD = 2.0
+_QUARTER_TURNS = tuple(rotation_from_vector(np.array([0.0, 0.0, k * np.pi / 2])).round() for k in range(4))
 
 
 def nominal_board(views: Sequence[BoardView]) -> BoardSurvey:
@@ -54,7 +56,8 @@ def applied(survey: BoardSurvey, view: BoardView) -> BoardView:
 def placed(survey: BoardSurvey, view: BoardView, camera: Camera, huber_px: float) -> BoardView:
     """Return a view at the place on the board, of all that its grid fits, where it agrees best.
 
-    A chessboard may be seen upside down or in part; which, only its own irregularities tell.
+    A chessboard may be seen upside down or in part, and a part turned sideways; which, only its own
+    irregularities tell.
     """
     places = [view] if view.numbered else _placements(survey, view) or [view]
     return min(places, key=lambda v: _pose_cost(applied(survey, v), camera, huber_px))
@@ -132,8 +135,7 @@ def _index(survey: BoardSurvey, xyz_b: Float) -> Int:
 
 def _placements(survey: BoardSurvey, view: BoardView) -> list[BoardView]:
     found = []
-    for sign in (1.0, -1.0):
-        turned = view.xyz_b * np.array([sign, sign, 1.0])
+    for turned in (view.xyz_b @ R_bb for R_bb in _QUARTER_TURNS):
         for corner in survey.nominal_mm:
             moved = turned + (corner - turned[0])
             if np.all(_index(survey, moved) < len(survey.nominal_mm)):
