@@ -237,6 +237,7 @@ def _report(context: Context, estimate: RunEstimate, texture: TrackedTexture, tr
     context.report("texture observations", texture.store.spool.count, "")
     context.report("lit frames without enough texture", int(texture.poses.lost[1:].sum()), "frames")
     context.report("median reprojection error", estimate.reprojection_px, "px")
+    context.report("reprojection error against the σ of matching", estimate.excess, "times")
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))

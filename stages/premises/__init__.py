@@ -24,6 +24,7 @@ from stages.premises.light import (
     rhythm_of,
     row_times,
     rows_by_motion,
+    rows_of_repeats,
     steps_of_wall,
 )
 from stages.premises.pictures import Pictures, look_at_pictures
@@ -161,7 +162,11 @@ def _story(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int
     """Return which row belongs to which picture; as they come where the table knows one light."""
     count, stated = len(frames.frame), _lights_of(table.illumination)
     wrong = (light != Light.UNKNOWN) & (light != stated[:count])
-    if not wrong.any() or len(np.unique(stated)) < 2:
+    if len(np.unique(stated)) < 2:
+        lit = count > 2 and stated[0] == Light.WALL
+        rows = np.arange(count)
+        return Story(rows_of_repeats(rows, pictures) if lit else rows, np.zeros(count, bool))
+    if not wrong.any():
         return Story(np.arange(count), np.zeros(count, bool))
     return cheapest_story(Lights(light, stated, pattern_breaks(light), repeated(pictures, light)))
 
@@ -232,13 +237,13 @@ def _warn_of_frames(
             f"the illumination in frames.csv is not what {len(wrong)} pictures show: {_numbers(wrong)}. The "
             "pictures are believed. What to do: correct the column illumination"
         )
-    left = len(table.frame) - 1 - int(changes.row[-1])
+    again = frame[np.diff(changes.row, prepend=-1) < 1]
+    left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
     if left > 0:
         context.warn(
             f"the video ends early: frames.csv lists {left} of {len(table.frame)} frames more than there are "
             "pictures. Only what was filmed is measured. What to do: copy the video again, it may be cut off"
         )
-    again = frame[np.diff(changes.row, prepend=-1) < 1]
     _warn_of(again, "repeat the picture before and are left out", "nothing, or repair the recorder", context)
     _warn_of(frame[~pictures.seen], "cannot be decoded", "copy the video again", context)
     dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
@@ -283,7 +288,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: _Changes, context: Co
 
 PREMISES = Stage(
     "premises",
-    "1",
+    "2",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -38,6 +38,9 @@ _NINE_IN_TEN = 1.645
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
 _LEAST_STEPS = 12
+# A picture repeats the one before where it changes by so small a part of what is usual; half as much again
+# as a usual step tells one step from two.
+_STANDS, _ONE_STEP = 0.25, 1.5
 # The encoder is asked within so many frames whether the probe itself leapt.
 _NEARBY = 10
 
@@ -195,6 +198,26 @@ def rows_by_motion(row: Int, steps: Steps, rhythm: int, table: FrameTable, encod
     return out
 
 
+def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
+    """Return ``row`` (F,) of a recording in one light with repeated pictures on the row before them.
+
+    A picture is repeated where the wall stands for that one picture and moves before and after. Where it
+    then goes on by a usual step, the table counted the repetition, and all rows behind move up; where it goes
+    on by two, the repetition stands in for a lost picture, and the rows behind are right.
+    """
+    size = np.abs(np.nan_to_num(pictures.step))
+    usual = median_filter(size, _AROUND_STEP, mode="nearest")
+    stands = (pictures.partner == np.arange(len(row)) - 1) & (size < _STANDS * usual)
+    stands &= pictures.change < _STANDS * np.nanmedian(pictures.change)
+    moves = size > 2 * _STANDS * usual
+    again = stands[1:-1] & moves[:-2] & moves[2:]
+    out = row.copy()
+    for k in np.flatnonzero(again) + 1:
+        counted = size[k + 1] < _ONE_STEP * usual[k + 1]
+        out[k : None if counted else k + 1] -= 1
+    return out
+
+
 def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tuple[int, int, int]]:
     """Return (start, end, pictures lost in whole rhythms) of the steps that stand out, the clearest first."""
     period_s = float(np.median(np.diff(time_s)))
@@ -234,5 +257,5 @@ def repeated(pictures: Pictures, light: Int) -> Bool:
         like = light == kind
         compared = like & (pictures.partner >= 0)
         if compared.any():
-            out |= like & follows & (pictures.change < 0.25 * np.median(pictures.change[compared]))
+            out |= like & follows & (pictures.change < _STANDS * np.median(pictures.change[compared]))
     return out

@@ -13,7 +13,15 @@ from stages.premises import PremisesParameters, check_premises
 from tests.drawn_run import BASELINE, RADIUS, drawn_run
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
-from tests.spoiled_recordings import SPOILERS, Spoiled, lost, repeated, swapped_from, wrong_at_random
+from tests.spoiled_recordings import (
+    SPOILERS,
+    KeptFrames,
+    Spoiled,
+    lost,
+    repeated,
+    swapped_from,
+    wrong_at_random,
+)
 
 COUNT, STEP_MM = 60, 1.0
 
@@ -203,4 +211,20 @@ def test_repeated_pictures_are_left_out(good, run):
     found, told = checked(spoiled.recording, run.probe)
     assert len(found.frame) == len(spoiled.recording.frames.frame) - 1
     assert np.all(np.diff(found.time_s) > 0)
+    assert any("repeat the picture before" in t for t in told)
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_a_repeated_picture_in_one_light_is_left_out(good, run, replaced):
+    lit = np.flatnonzero(good.frames.illumination == "led")
+    kept = np.insert(lit, 12, lit[11]) if not replaced else np.where(np.arange(len(lit)) == 12, lit[11], lit)
+    time_s = np.arange(len(kept)) / 15
+    table = FrameTable(np.arange(len(kept)), time_s, np.full(len(kept), "both"))
+    found, told = checked(
+        replace(good, frames=table, source=KeptFrames(good.source, kept), encoder=None), run.probe
+    )
+    assert 12 not in found.frame
+    assert len(found.frame) == len(kept) - 1
+    behind = time_s[13:] if replaced else time_s[12:-1]
+    np.testing.assert_allclose(found.time_s[12:], behind)
     assert any("repeat the picture before" in t for t in told)

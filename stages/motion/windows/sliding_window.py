@@ -33,6 +33,8 @@ from stages.motion.windows.submaps import (
 
 _MARGIN_MM = 20.0
 """Length of axis before the first and beyond the last wall in view, for poses that move while adjusted."""
+_RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
+"""Median length of an error of two coordinates, of 1 σ each."""
 
 
 @dataclass(frozen=True)
@@ -104,12 +106,15 @@ class RunEstimate:
         Windows in which a step could still gain something.
     reprojection_px : float
         Median over the windows of the median reprojection error.
+    excess : float
+        Median over the windows of how many times the σ predicted by matching that error is.
     """
 
     joined: JoinedRun
     trials: int
     unsettled: int
     reprojection_px: float
+    excess: float
 
 
 @dataclass(frozen=True)
@@ -128,11 +133,15 @@ class _End:
     trials: int
     settled: bool
     reprojection_px: float
+    excess: float
 
     @staticmethod
-    def of(estimate: Estimate) -> _End:
+    def of(estimate: Estimate, measured: Measurements) -> _End:
         adjusted = estimate.adjusted
-        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px)
+        size = np.linalg.norm(adjusted.equations.texture.residual, axis=1)
+        in_sigma = size / (_RAYLEIGH_MEDIAN * measured.tracks.sigma_px)
+        excess = float(np.median(in_sigma)) if size.size else 0.0
+        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, excess)
 
 
 def adjust_run(
@@ -150,9 +159,9 @@ def adjust_run(
     """
     windows = cut_windows(len(run.time_s), parameters.window_frames, parameters.overlap_frames)
     if len(windows) == 1:
-        estimate = _adjusted(run, windows[0], parameters)[0]
+        estimate, measured = _adjusted(run, windows[0], parameters)
         check(estimate)
-        return _run_estimate(joined_at_once(estimate), [_End.of(estimate)])
+        return _run_estimate(joined_at_once(estimate), [_End.of(estimate, measured)])
     alone: list[_Alone] = []
     for window in windows:
         alone.append(_adjusted_alone(run, window, parameters, check))
@@ -164,7 +173,7 @@ def adjust_run(
         measured = run.measured(windows[k], parameters)
         estimate = estimate_with_shared(own.state, measured, shared.value, own.smooth_sigma, parameters)
         check(estimate)
-        found.append((_submap(estimate, windows, k), _End.of(estimate)))
+        found.append((_submap(estimate, windows, k), _End.of(estimate, measured)))
         progress(len(windows) + len(found), 2 * len(windows))
     return _run_estimate(join_submaps([f[0] for f in found], shared), [f[1] for f in found])
 
@@ -178,8 +187,8 @@ def joined_at_once(estimate: Estimate) -> JoinedRun:
 
 
 def _run_estimate(joined: JoinedRun, ends: Sequence[_End]) -> RunEstimate:
-    error = float(np.median([e.reprojection_px for e in ends]))
-    return RunEstimate(joined, sum(e.trials for e in ends), sum(not e.settled for e in ends), error)
+    error, excess = (float(np.median([getattr(e, n) for e in ends])) for n in ("reprojection_px", "excess"))
+    return RunEstimate(joined, sum(e.trials for e in ends), sum(not e.settled for e in ends), error, excess)
 
 
 def _adjusted(
