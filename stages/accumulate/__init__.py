@@ -30,6 +30,8 @@ __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 _REPORTED_ROWS = 2000
 # A branch, step or collapse may take half of the radius somewhere, not from most of a pipe. Not measured.
 _IMPOSSIBLE, _MOST_IMPOSSIBLE = 0.5, 0.5
+# Share from which such wall is told. Chosen: a branch of half of the diameter in a metre of pipe has more.
+_FEW_IMPOSSIBLE = 0.002
 # Places fixed to the image that are warned of one by one; the largest first.
 _TOLD_PLACES = 4
 
@@ -84,7 +86,7 @@ def accumulate_wall(
         radius_map = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm)
         fill(wall, stretch, radius_map, on_wall, survey)
         context.progress(done, len(stretches))
-    _refuse_impossible_radii(wall, trajectory)
+    _judge_radii(wall, trajectory, context)
     _report(context, wall, spread)
     _warn_of_fixed(fixed, context)
     return wall
@@ -119,12 +121,19 @@ def _fixed_in_words(place: FixedPlace) -> str:
     )
 
 
-def _refuse_impossible_radii(wall: Wall, trajectory: Trajectory) -> None:
-    """End the run when half of the wall lies off the motion's radius by half of it: the poses are wrong."""
+def _judge_radii(wall: Wall, trajectory: Trajectory, context: Context) -> None:
+    """Warn where some of the wall lies off the motion's radius by half of it; end the run where half does."""
     rows = slice(None, None, max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1))
     radius = wall.radius_map.radius_mm[rows]
     known = radius[np.isfinite(radius)]
     impossible = np.abs(known - trajectory.radius_mm) > _IMPOSSIBLE * trajectory.radius_mm
+    if known.size and _FEW_IMPOSSIBLE < impossible.mean() <= _MOST_IMPOSSIBLE:
+        context.warn(
+            f"{100 * impossible.mean():.1f} % of the wall lies more than {100 * _IMPOSSIBLE:.0f} % off the "
+            f"pipe's radius of {trajectory.radius_mm:.4g} mm, from {known.min():.4g} to {known.max():.4g} "
+            "mm: a branch, a joint that stands open, or rings that were measured wrongly. What to do: look "
+            "at the pictures there, and do not use their findings unseen"
+        )
     if known.size and impossible.mean() > _MOST_IMPOSSIBLE:
         raise UnusableError(
             "accumulate",

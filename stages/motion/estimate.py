@@ -43,6 +43,11 @@ _LARGEST_CHANGE = 0.1
 median radius errs by far less. Not measured."""
 _LEAST_TRACKED = 0.5
 """Share of the lit frames that texture must be followed in where there is no encoder. Not measured."""
+_MOST_LOST = 0.05
+"""Share of the lit frames without enough texture that is told; sound recordings have none. Not measured."""
+_MOST_EXCESS = 6.0
+"""Reprojection error in σ of matching that is told: 2.9 in open-1, 3.4 in open-3, 4.0 with seven glints in
+each frame. Chosen: half more than the worst of these."""
 _FEWEST_COLUMNS = 240
 """Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
 _OBSERVATIONS_AT_ONCE = 1 << 16
@@ -238,11 +243,30 @@ def _report(context: Context, estimate: RunEstimate, texture: TrackedTexture, tr
     context.report("lit frames without enough texture", int(texture.poses.lost[1:].sum()), "frames")
     context.report("median reprojection error", estimate.reprojection_px, "px")
     context.report("reprojection error against the σ of matching", estimate.excess, "times")
+    _warn_of_texture(estimate.excess, texture.poses, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     context.report("distance travelled", travelled, "mm")
     context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")
+
+
+def _warn_of_texture(excess: float, tracked: TrackedPoses, context: Context) -> None:
+    """Warn where texture was lost, or where its matches contradict each other more than is usual."""
+    lost = tracked.frames[1:][tracked.lost[1:]]
+    if len(lost) > _MOST_LOST * len(tracked.frames):
+        context.warn(
+            f"in {len(lost)} of {len(tracked.frames)} lit frames too little texture was found, first in "
+            f"frame {lost[0]}: there the motion rests on rings, encoder and smoothness. What to do: look at "
+            "these pictures; more light, a sharper lens or a slower pull show more texture"
+        )
+    if excess > _MOST_EXCESS:
+        context.warn(
+            f"matches of texture contradict each other by {excess:.1f} times their σ, where sound recordings "
+            "have 3 to 4: reflections, compression or lights that move with the probe are taken for the "
+            "wall. Distance and roll may be off by more than their σ. What to do: compare the distance with "
+            "the encoder or a tape, record with less compression"
+        )
 
 
 def _motion_of_run(
