@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
@@ -23,10 +23,12 @@ from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Plan, Selection, Source, make_plan
 from pipeline.machine.run_folder import RunFolder, claimed, logged
 from pipeline.machine.runner import Runner
+from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Stage, of_role, plain
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
+from pipeline.recording.decoded_once import decoded_once
 from pipeline.recording.input_file import content_key
 from pipeline.system.stopping import stop_wish
 
@@ -199,7 +201,17 @@ def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
         record = partial(write_run_record, job.command, job.about, job.configuration, plan, job.folder)
         workers = len(os.sched_getaffinity(0))
         runner = Runner(
-            plan, job.exporters, folder, record, headline, display, logger, wish, workers, made_by, lent,
-            job.at_once,
+            _decoding_once(plan, folder), job.exporters, folder, record, headline, display, logger, wish,
+            workers, made_by, lent, job.at_once,
         )  # fmt: skip
         return runner.run(selection)
+
+
+def _decoding_once(plan: Plan, folder: RunFolder) -> Plan:
+    """Return the plan with recordings whose frames the stages share."""
+    scratch = Scratch(folder.internal)
+    sources = [
+        replace(s, value=decoded_once(s.value, scratch)) if isinstance(s.value, Recording) else s
+        for s in plan.sources
+    ]
+    return replace(plan, sources=tuple(sources))

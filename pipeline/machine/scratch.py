@@ -43,7 +43,7 @@ class Scratch:
         size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
         if size < _MAP_FROM_BYTES:
             return np.zeros(shape, kind)
-        with self._file() as stream:
+        with self.file() as stream:
             # Room taken now: where the disk fills under a mapped file, the system ends the program.
             with disk_errors_named(self.place):
                 os.posix_fallocate(stream.fileno(), 0, size)
@@ -58,9 +58,10 @@ class Scratch:
 
     def spool(self, dtype: DTypeLike, record: tuple[int, ...] = ()) -> Spool:
         """Return an empty list of records, each of a shape, that grows on the disk."""
-        return Spool(np.dtype(dtype), record, self._file(), self.place)
+        return Spool(np.dtype(dtype), record, self.file(), self.place)
 
-    def _file(self) -> IO[bytes]:
+    def file(self) -> IO[bytes]:
+        """Return an empty file without a name; raises `InputError` where the disk refuses it."""
         with disk_errors_named(self.place):
             self.place.mkdir(exist_ok=True)
             return tempfile.TemporaryFile(dir=self.place)

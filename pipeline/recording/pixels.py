@@ -28,18 +28,23 @@ def pixels(frame: av.VideoFrame, planes: Planes) -> Image:
     return np.asarray(frame.to_ndarray(format="bgr24"), np.uint8)
 
 
+def shown(frame: av.VideoFrame | None, planes: Planes) -> Image | None:
+    """Return the `pixels` of a frame; None where there is no frame."""
+    return None if frame is None else pixels(frame, planes)
+
+
 def _luma(frame: av.VideoFrame) -> Image:
     """Return the luma plane without a copy where there is one of 8 bits."""
     name, bits = frame.format.name, frame.format.components[0].bits
     if name.startswith("gray"):
-        return _plane((frame if bits == 8 else frame.reformat(format="gray")).planes[0])
+        return plane_of((frame if bits == 8 else frame.reformat(format="gray")).planes[0])
     if frame.format.is_rgb or frame.format.has_palette:
         return np.asarray(cv2.cvtColor(frame.to_ndarray(format="bgr24"), cv2.COLOR_BGR2GRAY), np.uint8)
     planar = name.startswith(("yuv", "nv")) and bits == 8
-    return _plane((frame if planar else frame.reformat(format="yuv420p")).planes[0])
+    return plane_of((frame if planar else frame.reformat(format="yuv420p")).planes[0])
 
 
-def _plane(plane: av.video.plane.VideoPlane) -> Image:
+def plane_of(plane: av.video.plane.VideoPlane) -> Image:
     """Return a view (H, W) of a plane of bytes, without its padding; keeps the frame's memory alive."""
     return np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)[:, : plane.width]
 
@@ -48,7 +53,7 @@ def _bgr_444(frame: av.VideoFrame) -> Image:
     """Convert full-resolution chroma by one matrix, as swscale does, in a fifth of its time."""
     full = frame.color_range == ColorRange.JPEG or frame.format.name == "yuvj444p"
     weights = _BT709 if frame.colorspace == Colorspace.ITU709 else _BT601
-    yuv = cv2.merge([_plane(p) for p in frame.planes])
+    yuv = cv2.merge([plane_of(p) for p in frame.planes])
     return np.asarray(cv2.transform(yuv, _yuv_to_bgr(weights, full)), np.uint8)
 
 

@@ -16,7 +16,7 @@ from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
 from pipeline.recording.background import in_background
 from pipeline.recording.base import FrameTable, Planes, ascending, complete
-from pipeline.recording.pixels import pixels
+from pipeline.recording.pixels import shown
 from pipeline.recording.video_index import VideoIndex, list_frames
 
 # Fixed, so that which frames of a damaged file are given up does not depend on the machine.
@@ -26,7 +26,7 @@ _RESTART_FRAMES = 8
 # A decoder holds back at most this many frames: 16 for reordering and one a thread.
 _HELD_BACK = 16 + _THREADS
 # Frames made ready while one is worked on, and from how many on a thread of its own is worth it.
-_AHEAD, _FEW = 12, 3
+AHEAD, FEW = 12, 3
 # Times of a frame in video and table are the same when they differ by less than this part of a period.
 _SAME_TIME = 0.25
 
@@ -76,14 +76,18 @@ class VideoSource:
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`; frames that the file does not hold yield None."""
         wanted = ascending(frames)
-        found = self._read(np.flatnonzero(np.isin(self.numbers, wanted)), planes)
-        return complete(wanted, found if wanted.size < _FEW else in_background(found, _AHEAD))
+        found = ((number, shown(frame, planes)) for number, frame in self.decoded(wanted))
+        return found if wanted.size < FEW else in_background(found, AHEAD)
 
-    def _read(self, places: Int, planes: Planes) -> Iterator[tuple[int, Image]]:
+    def decoded(self, wanted: Int) -> Iterator[tuple[int, av.VideoFrame | None]]:
+        """Yield the frames of ascending numbers as they are decoded; None where one cannot be trusted."""
+        return complete(wanted, self._sound(np.flatnonzero(np.isin(self.numbers, wanted))))
+
+    def _sound(self, places: Int) -> Iterator[tuple[int, av.VideoFrame]]:
         for stretch in _stretches(places, self.index):
             for place, frame in complete(stretch, self._decode(stretch)):
                 if frame is not None:
-                    yield int(self.numbers[place]), pixels(frame, planes)
+                    yield int(self.numbers[place]), frame
 
     def _decode(self, wanted: Int) -> Iterator[tuple[int, av.VideoFrame]]:
         """Yield the frames that can be trusted, from the keyframe before the first wanted one on.

@@ -1,0 +1,193 @@
+"""Decoded frames kept on the disk while a run lasts, so that its stages decode a video once between them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import threading
+import weakref
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import IO
+
+import av
+import numpy as np
+
+from pipeline.arrays import Byte, Image, Int
+from pipeline.errors import InputError
+from pipeline.machine.scratch import Scratch
+from pipeline.recording.background import in_background
+from pipeline.recording.base import Illumination, Planes, Recording, ascending
+from pipeline.recording.pixels import plane_of, shown
+from pipeline.recording.video import AHEAD, FEW, VideoSource
+
+# Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
+# Frames beyond it are decoded again. A disk that is nearly full is left to the results.
+_MOST_BYTES, _SHARE_OF_FREE = 4 << 30, 0.25
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Where a frame's planes lie in the file, and what they are.
+
+    Attributes
+    ----------
+    offset : int
+        Of the first plane in the file, bytes.
+    planes : tuple of (int, int)
+        Height and width of the planes that are kept, one after the other.
+    whole : bool
+        Whether all planes are kept, or the luma alone.
+    size : (int, int)
+        Width and height of the frame, px.
+    pixel_format, color_range, colorspace
+        As the decoder gave them.
+    """
+
+    offset: int
+    planes: tuple[tuple[int, int], ...]
+    whole: bool
+    size: tuple[int, int]
+    pixel_format: str
+    color_range: int
+    colorspace: int
+
+
+@dataclass
+class FrameStore:
+    """Frames in an unnamed file, put and taken by several threads.
+
+    Attributes
+    ----------
+    stream : file
+    room : int
+        Bytes that the file may still take; 0 once the disk has refused one.
+    """
+
+    stream: IO[bytes]
+    room: int
+    _end: int = 0
+    _kept: dict[int, Kept | None] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def __post_init__(self) -> None:
+        weakref.finalize(self, self.stream.close)
+
+    def holds(self, number: int, planes: Planes) -> bool:
+        """Return whether a frame is there, or known to be unreadable."""
+        kept = self._kept.get(number)
+        return number in self._kept if kept is None else kept.whole or planes == "grey"
+
+    def put(self, number: int, frame: av.VideoFrame | None, luma_only: bool) -> None:
+        """Keep a frame where its format, the limit and the disk allow it."""
+        if frame is None:
+            self._kept[number] = None
+        elif _is_planar(frame) and not (luma_only and self._kept.get(number)):
+            chosen = frame.planes[:1] if luma_only else frame.planes
+            self._write(number, frame, [np.ascontiguousarray(plane_of(p)) for p in chosen])
+
+    def take(self, number: int, planes: Planes) -> Image | None:
+        """Return the pixels of a frame that is there, as `pipeline.recording.pixels.pixels` gives them."""
+        kept = self._kept[number]
+        if kept is None:
+            return None
+        if planes == "grey":
+            return self._read(kept, 1)[0]
+        return shown(_rebuilt(kept, self._read(kept, len(kept.planes))), planes)
+
+    def _write(self, number: int, frame: av.VideoFrame, planes: list[Byte]) -> None:
+        size = sum(p.nbytes for p in planes)
+        with self._lock:
+            offset = self._end
+            if size > self.room:
+                return
+            self.room, self._end = self.room - size, offset + size
+        try:
+            written = os.pwritev(self.stream.fileno(), [p.data for p in planes], offset)
+        except OSError:  # the disk is full or takes no file of this size: go on without
+            written = 0
+        if written < size:
+            self.room = 0
+            return
+        self._kept[number] = Kept(
+            offset, tuple((p.shape[0], p.shape[1]) for p in planes), len(planes) == len(frame.planes),
+            (frame.width, frame.height), frame.format.name, int(frame.color_range), int(frame.colorspace),
+        )  # fmt: skip
+
+    def _read(self, kept: Kept, count: int) -> list[Byte]:
+        planes = [np.empty(shape, np.uint8) for shape in kept.planes[:count]]
+        if os.preadv(self.stream.fileno(), [p.data for p in planes], kept.offset) < sum(
+            p.nbytes for p in planes
+        ):
+            raise OSError("the file of decoded frames was cut short")
+        return planes
+
+
+@dataclass(frozen=True)
+class DecodedOnce:
+    """Frames of a video; each is decoded when it is first asked for and kept for the next stage.
+
+    Attributes
+    ----------
+    video : VideoSource
+    store : FrameStore
+    dim : frozenset of int
+        Frames without the lamps' light, of which the luma alone is kept.
+    """
+
+    video: VideoSource
+    store: FrameStore
+    dim: frozenset[int]
+
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.video.image_size
+
+    def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
+        """See `FrameSource.read`."""
+        wanted = ascending(frames)
+        found = self._found(wanted.tolist(), planes)
+        return found if wanted.size < FEW else in_background(found, AHEAD)
+
+    def _found(self, wanted: list[int], planes: Planes) -> Iterator[tuple[int, Image | None]]:
+        missing = [n for n in wanted if not self.store.holds(n, planes)]
+        decoded, due = self.video.decoded(np.array(missing, np.int64)), set(missing)
+        for number in wanted:
+            if number not in due:
+                yield number, self.store.take(number, planes)
+                continue
+            _, frame = next(decoded)
+            self.store.put(number, frame, number in self.dim)
+            yield number, shown(frame, planes)
+
+
+def decoded_once(recording: Recording, scratch: Scratch) -> Recording:
+    """Return the recording with frames that are decoded once, however many stages ask for them.
+
+    Their bytes are those of the video's frames; what a stage makes of them is not changed. A recording of
+    single images, or one for which the disk has no room, is returned as it is.
+    """
+    if not isinstance(recording.source, VideoSource):
+        return recording
+    try:
+        stream = scratch.file()
+    except InputError:  # the stages' own results will say so
+        return recording
+    room = int(min(_MOST_BYTES, _SHARE_OF_FREE * shutil.disk_usage(scratch.place).free))
+    dim = frozenset(recording.frames.of(Illumination.LASER).tolist())
+    return replace(recording, source=DecodedOnce(recording.source, FrameStore(stream, room), dim))
+
+
+def _is_planar(frame: av.VideoFrame) -> bool:
+    """Return whether every plane is one of bytes, as in almost all videos."""
+    name, bits = frame.format.name, frame.format.components[0].bits
+    return bits == 8 and (name == "gray" or (name.startswith("yuv") and name.endswith("p")))
+
+
+def _rebuilt(kept: Kept, planes: list[Byte]) -> av.VideoFrame:
+    frame = av.VideoFrame(*kept.size, kept.pixel_format)
+    for plane, content in zip(frame.planes, planes, strict=True):
+        plane_of(plane)[:] = content
+    frame.color_range, frame.colorspace = kept.color_range, kept.colorspace
+    return frame
