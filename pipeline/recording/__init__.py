@@ -5,22 +5,53 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.recording.bag import (
-    open_mcap_recording,
-    open_ros,
-    recognise_mcap,
-    recognise_ros1,
-    recognise_ros2,
-)
 from pipeline.recording.base import Recording
 from pipeline.recording.folder import open_folder
 from pipeline.recording.folder import recognise as recognise_folder
 
+
+def _open_ros(path: Path) -> Recording:
+    """Open a bag of ROS; what reads bags is slow to import and needed for them alone."""
+    from pipeline.recording.bag import open_ros
+
+    return open_ros(path)
+
+
+def _open_mcap(path: Path) -> Recording:
+    from pipeline.recording.bag import open_mcap_recording
+
+    return open_mcap_recording(path)
+
+
+def recognise_ros1(path: Path) -> str | None:
+    """Return why ``path`` is not a ROS 1 bag, or None when it is one."""
+    return _refusal_by_start(path, b"#ROSBAG V")
+
+
+def recognise_mcap(path: Path) -> str | None:
+    """Return why ``path`` is not an MCAP file, or None when it is one."""
+    return _refusal_by_start(path, b"\x89MCAP0\r\n")
+
+
+def recognise_ros2(path: Path) -> str | None:
+    """Return why ``path`` is not a ROS 2 bag, or None when it is one."""
+    if not path.is_dir():
+        return "it is not a folder"
+    return None if (path / "metadata.yaml").is_file() else "there is no metadata.yaml in it"
+
+
+def _refusal_by_start(path: Path, start: bytes) -> str | None:
+    if not path.is_file():
+        return "it is not a file"
+    with path.open("rb") as opened:
+        return None if opened.read(len(start)) == start else "it does not start as one"
+
+
 _READERS = (
     ("recording folder", recognise_folder, open_folder),
-    ("ROS 1 bag", recognise_ros1, open_ros),
-    ("ROS 2 bag", recognise_ros2, open_ros),
-    ("MCAP file", recognise_mcap, open_mcap_recording),
+    ("ROS 1 bag", recognise_ros1, _open_ros),
+    ("ROS 2 bag", recognise_ros2, _open_ros),
+    ("MCAP file", recognise_mcap, _open_mcap),
 )
 
 

@@ -102,23 +102,6 @@ class BagSource:
         return image if fits else None
 
 
-def recognise_ros1(path: Path) -> str | None:
-    """Return why ``path`` is not a ROS 1 bag, or None when it is one."""
-    return _refusal_by_start(path, b"#ROSBAG V")
-
-
-def recognise_mcap(path: Path) -> str | None:
-    """Return why ``path`` is not an MCAP file, or None when it is one."""
-    return _refusal_by_start(path, b"\x89MCAP0\r\n")
-
-
-def recognise_ros2(path: Path) -> str | None:
-    """Return why ``path`` is not a ROS 2 bag, or None when it is one."""
-    if not path.is_dir():
-        return "it is not a folder"
-    return None if (path / "metadata.yaml").is_file() else "there is no metadata.yaml in it"
-
-
 def open_ros(path: Path) -> Recording:
     """Open a ROS 1 or ROS 2 bag; see the module for what it must hold.
 
@@ -170,13 +153,6 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
         inspection=described.inspection,
         imu=imu,
     )
-
-
-def _refusal_by_start(path: Path, start: bytes) -> str | None:
-    if not path.is_file():
-        return "it is not a file"
-    with path.open("rb") as opened:
-        return None if opened.read(len(start)) == start else "it does not start as one"
 
 
 def _sidecar(path: Path) -> Path:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from types import ModuleType
 
 import libusb_package
+
+# With these open3d draws in notebooks, which nothing here does: half of its import, and 40 MiB.
+_NOTEBOOKS = ("dash", "plotly", "plotly.graph_objects")
 
 
 def give_back_memory() -> None:
@@ -24,6 +29,26 @@ def open3d() -> ModuleType:
     It is linked to libusb-1.0; the package `libusb-package` brings that, so no system package is needed.
     """
     ctypes.CDLL(str(libusb_package.get_library_path()), mode=ctypes.RTLD_GLOBAL)
-    import open3d as module
-
+    with _without(_NOTEBOOKS):
+        import open3d as module
     return module
+
+
+class _Absent(ModuleType):
+    """Stands for a module of which nothing is used."""
+
+    def __getattr__(self, name: str) -> None:
+        if name.startswith("__"):
+            raise AttributeError(name)
+
+
+@contextmanager
+def _without(names: tuple[str, ...]) -> Iterator[None]:
+    """Leave modules out of what is imported meanwhile."""
+    absent = [name for name in names if name not in sys.modules]
+    sys.modules.update({name: _Absent(name) for name in absent})
+    try:
+        yield
+    finally:
+        for name in absent:
+            del sys.modules[name]

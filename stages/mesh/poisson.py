@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 
 import numpy as np
-import pymeshlab
 from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float, Int
@@ -105,6 +104,8 @@ def poisson_surface(xyz_p: Float, normal_p: Float, cell_mm: float, reach_mm: flo
 
     Statistical outliers are left out first.
     """
+    import pymeshlab  # slow to import, and most walls do not fold over
+
     kept = _without_outliers(xyz_p)
     points = xyz_p[kept]
     depth = int(np.clip(np.ceil(np.log2(_BOX * np.ptp(points, axis=0).max() / cell_mm)), 5, _LARGEST_DEPTH))

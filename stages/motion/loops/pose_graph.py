@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from pipeline.arrays import Float, Int
 from pipeline.geometry.axis import axis_through, frames_at, to_pipe
@@ -127,7 +127,7 @@ def _probabilities(covariance: Float, closures: Closures, out: set[int]) -> dict
     for place in np.unique(closures.place[keep]).tolist():
         mine = closures.place[keep] == place
         square = float(pull[mine] @ np.linalg.solve(information[np.ix_(mine, mine)], pull[mine]))
-        found[place] = float(chi2.sf(square, int(mine.sum())))
+        found[place] = float(chdtrc(int(mine.sum()), square))
     return found
 
 

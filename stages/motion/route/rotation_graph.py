@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import rotation_from_vector, skew, vector_from_rotation
@@ -157,7 +157,7 @@ class RotationGraph:
             replace(g, nodes=replace(g.nodes, variance=g.nodes.variance * excess))._least_cost()
             for g in (self, free)
         ]
-        return bool(cost[0] - cost[1] > chi2.isf(_CHANCE, 2 * int(straight.sum())))
+        return bool(cost[0] - cost[1] > chdtri(2 * int(straight.sum()), _CHANCE))
 
     def _least_cost(self) -> float:
         return self._equations(self._minimum()).cost
