@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shlex
 import sys
 from collections.abc import Sequence
@@ -145,6 +146,7 @@ def run(
     from pipeline.machine.display import ProgressDisplay
     from pipeline.machine.plan import Selection
 
+    gc.freeze()  # what was imported stays: looking for garbage in it takes a fiftieth of a run
     console = Console(stderr=True)
     parameters = configuration(config, assignments or ())
     if follow:

@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA
-from pipeline.arrays import Byte, Image
+from pipeline.arrays import Byte, Image, Int
 from stages.texture.project import TileProjection
 
 Short = NDArray[np.uint16]
@@ -18,6 +18,9 @@ REFLECTANCE_SCALE = 32.0
 _SATURATED = 250
 # Above the largest number of views a tile may have; with 18 bits of brightness a key fits in 31 bits.
 _MOST_VIEWS = 256
+_NO_SAMPLE = np.int32(2**31 - 1)
+# Pixels whose samples are sorted side by side: two registers of 16 numbers of 32 bits where there are such.
+_AT_ONCE = 32
 
 
 class TileStack:
@@ -25,7 +28,7 @@ class TileStack:
 
     def __init__(self, views: int, rows: int, columns: int) -> None:
         # Views before columns: samples of a view are written one after the other.
-        self._values = np.zeros((rows, views, columns, 3), np.uint16)
+        self._values = np.empty((rows, views, columns, 3), np.uint16)
         self._weights = np.zeros((rows, views, columns), np.uint8)
         self._used = 0
 
@@ -40,46 +43,63 @@ class TileStack:
 
     def blend(self) -> tuple[Short, Byte]:
         """Return the blended colours (rows, columns, 3) and how many samples stand behind each."""
-        colour, count = blend_samples(self._values.swapaxes(1, 2), self._weights.swapaxes(1, 2))
-        return colour, count
+        return blend_samples(self._values, self._weights)
 
 
 @njit(cache=True, nogil=True)
 def _store(sample, inverse_brightness, weight, view, values, weights):  # type: ignore[no-untyped-def]
+    """Write a view's samples and weights; values of weight 0 mean nothing."""
     rows, columns = weight.shape
+    gain = np.empty(3 * columns)
     for i in range(rows):
+        colour, line = sample[i].reshape(-1), values[i, view].reshape(-1)
+        for j in range(columns):
+            gain[3 * j] = gain[3 * j + 1] = gain[3 * j + 2] = REFLECTANCE_SCALE * inverse_brightness[i, j]
+        for k in range(3 * columns):
+            line[k] = np.uint16(min(65535.0, colour[k] * gain[k] + 0.5))
         for j in range(columns):
             w = weight[i, j]
-            if w <= 0:
-                continue
-            brightest = max(sample[i, j, 0], sample[i, j, 1], sample[i, j, 2])
+            brightest = max(colour[3 * j], colour[3 * j + 1], colour[3 * j + 2])
             # A clipped sample counts only where there is no other.
-            weights[i, view, j] = 1 if brightest >= _SATURATED else max(1, min(255, int(254 * w) + 1))
-            gain = REFLECTANCE_SCALE * inverse_brightness[i, j]
-            for c in range(3):
-                values[i, view, j, c] = min(65535, int(sample[i, j, c] * gain + 0.5))
+            worth = np.int32(1) if brightest >= _SATURATED else max(1, min(255, np.int32(254 * w) + 1))
+            weights[i, view, j] = np.uint8(worth if w > 0 else 0)
+
+
+def _sorting_network(keys: int) -> Int:
+    """Return the pairs (N, 2) of places to be put in order one after the other to sort so many keys.
+
+    K. Batcher, "Sorting networks and their applications", 1968: odd-even merge sort. Which pairs there are
+    does not depend on the keys, so that many pixels are sorted by the same instructions.
+    """
+    pairs, size = [], 1
+    while size < keys:
+        apart = size
+        while apart >= 1:
+            for j in range(apart % size, keys - apart, 2 * apart):
+                for low in range(j, j + min(apart, keys - j - apart)):
+                    if low // (2 * size) == (low + apart) // (2 * size):
+                        pairs.append((low, low + apart))
+            apart //= 2
+        size *= 2
+    return np.array(pairs, np.int64).reshape(-1, 2)
 
 
 @njit(cache=True, nogil=True)
-def _sort_in(values, weights, key, grey, weight, where):  # type: ignore[no-untyped-def]
-    """Put the brightness of one pixel's samples into ``grey`` in ascending order; return how many.
+def _sorted_keys(values, weights, first, end, network, key):  # type: ignore[no-untyped-def]
+    """Write the keys of some pixels' samples to ``key`` (views, pixels), each pixel's in ascending order.
 
-    A sample's place is how many keys are below its own, four times the brightness and then the view; counting
-    them is quicker than sorting, as many are compared at once.
+    A key is four times the brightness and then the view; samples without weight come last, as `_NO_SAMPLE`.
     """
-    n = 0
-    for k in range(len(weights)):
-        if weights[k] > 0:
-            four = np.int32(values[k, 0]) + 2 * np.int32(values[k, 1]) + np.int32(values[k, 2])
-            key[n] = four * _MOST_VIEWS + k
-            n += 1
-    for m in range(n):
-        own, place = key[m], np.int32(0)
-        for other in range(n):
-            place += np.int32(key[other] < own)
-        k = own & (_MOST_VIEWS - 1)
-        grey[place], weight[place], where[place] = 0.25 * (own // _MOST_VIEWS), weights[k], k
-    return n
+    for k in range(len(key)):
+        for j in range(first, end):
+            four = np.int32(values[k, j, 0]) + 2 * np.int32(values[k, j, 1]) + np.int32(values[k, j, 2])
+            own = four * np.int32(_MOST_VIEWS) + np.int32(k)
+            key[k, j - first] = own if weights[k, j] > 0 else _NO_SAMPLE
+    for m in range(len(network)):
+        low, high = key[network[m, 0]], key[network[m, 1]]
+        for p in range(_AT_ONCE):
+            a, b = low[p], high[p]
+            low[p], high[p] = min(a, b), max(a, b)
 
 
 @njit(cache=True, nogil=True)
@@ -124,8 +144,7 @@ def _biweight_mean(values, grey, weight, where, n, out):  # type: ignore[no-unty
     out[0], out[1], out[2] = int(blue / total + 0.5), int(green / total + 0.5), int(red / total + 0.5)
 
 
-@njit(cache=True, nogil=True)
-def blend_samples(values, weights):  # type: ignore[no-untyped-def]
+def blend_samples(values: Short, weights: Byte) -> tuple[Short, Byte]:
     """Return robust weighted means (rows, columns, 3) and counts (rows, columns).
 
     Tukey's biweight on brightness about the weighted median, with the weighted median of absolute
@@ -133,19 +152,33 @@ def blend_samples(values, weights):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    values : (rows, columns, views, 3) uint16
-    weights : (rows, columns, views) uint8
+    values : (rows, views, columns, 3) uint16
+    weights : (rows, views, columns) uint8
         0 where a view does not show the pixel.
     """
-    rows, columns, views = weights.shape
+    colour, count = _blended(values, weights, _sorting_network(values.shape[1]))
+    return colour, count
+
+
+@njit(cache=True, nogil=True)
+def _blended(values, weights, network):  # type: ignore[no-untyped-def]
+    rows, views, columns = weights.shape
     out = np.zeros((rows, columns, 3), np.uint16)
     counts = np.zeros((rows, columns), np.uint8)
     grey, weight = np.empty(views, np.float32), np.empty(views, np.float32)
-    where, key = np.empty(views, np.int64), np.empty(views, np.int32)
+    where, key = np.empty(views, np.int64), np.zeros((views, _AT_ONCE), np.int32)
     for i in range(rows):
-        for j in range(columns):
-            n = _sort_in(values[i, j], weights[i, j], key, grey, weight, where)
-            counts[i, j] = n
-            if n > 0:
-                _biweight_mean(values[i, j], grey, weight, where, n, out[i, j])
+        for first in range(0, columns, _AT_ONCE):
+            end = min(first + _AT_ONCE, columns)
+            _sorted_keys(values[i], weights[i], first, end, network, key)
+            for j in range(first, end):
+                n = 0
+                while n < views and key[n, j - first] != _NO_SAMPLE:
+                    k = key[n, j - first] & (_MOST_VIEWS - 1)
+                    grey[n] = 0.25 * (key[n, j - first] // _MOST_VIEWS)
+                    weight[n], where[n] = weights[i, k, j], k
+                    n += 1
+                counts[i, j] = n
+                if n > 0:
+                    _biweight_mean(values[i, :, j], grey, weight, where, n, out[i, j])
     return out, counts

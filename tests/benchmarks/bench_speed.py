@@ -2,12 +2,13 @@
 
     python -m tests.benchmarks.bench_speed OUT RECORDING... [--apart] [--score FILE] [--flame]
 
-Every recording is decoded once with PyAV, every frame, on one thread; then it is run from nothing, and decoded
-again: the ratio takes the mean of both, so that a machine that is busy otherwise slows down both alike. Told
-are the processor time of each stage, the ratio, the most memory, and which part of the cores was busy. Stages
-that work side by side have a line together, unless ``--apart`` runs them one after the other. ``--score``
-names a script that is called with run folder and recording and prints figures as JSON, from the truth beside
-the recording. ``--flame`` draws OUT/NAME.svg with py-spy where it is installed; it slows the run down.
+Every recording is decoded once with PyAV, every frame, on one thread; then it is run from nothing, and
+decoded again: the ratio takes the mean of both, so that a machine that is busy otherwise slows down both
+alike. Told are the processor time of each stage, the ratio, the most memory, and which part of the cores was
+busy. Stages that work side by side have a line together, unless ``--apart`` runs them one after the other.
+``--score`` names a script that is called with run folder and recording and prints figures as JSON, from the
+truth beside the recording. ``--flame`` draws OUT/NAME.svg with py-spy where it is installed; it slows the run
+down.
 """
 
 from __future__ import annotations

@@ -40,14 +40,14 @@ def test_blend_agrees_with_plain_numpy():
     values[:, :, 4] = 20000
     weights = random.integers(0, 255, (6, 7, 15)).astype(np.uint8)
     weights[:, :, 3] = 0
-    colour, count = blend_samples(values, weights)
+    colour, count = blend_samples(values.swapaxes(1, 2).copy(), weights.swapaxes(1, 2).copy())
     expected = [[plain_blend(values[i, j], weights[i, j]) for j in range(7)] for i in range(6)]
     assert np.abs(colour - np.array(expected)).max() <= 0.51
     assert np.array_equal(count, (weights > 0).sum(-1))
 
 
 def test_blend_leaves_pixels_without_samples_empty():
-    colour, count = blend_samples(np.ones((2, 2, 3, 3), np.uint16), np.zeros((2, 2, 3), np.uint8))
+    colour, count = blend_samples(np.ones((2, 3, 2, 3), np.uint16), np.zeros((2, 3, 2), np.uint8))
     assert colour.max() == 0
     assert count.max() == 0
 
