@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
-import cv2
 import numpy as np
+from scipy.fft import irfft2, next_fast_len, rfft2
 from scipy.optimize import brentq
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Complex, Float
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
 from stages.defects.relief import Relief, WallRelief
@@ -43,11 +44,47 @@ class Template:
 
 @dataclass(frozen=True)
 class Weighed:
-    """Relief over its variance (S, A), one over its variance, and where the wall was measured."""
+    """Relief over its variance (S, A), one over its variance, and where the wall was measured.
+
+    ``reach`` is the largest half length of a template, rows.
+    """
 
     signal: Float
     weight: Float
     seen: Bool
+    reach: int
+
+    @cached_property
+    def signal_spectrum(self) -> Complex:
+        """The Fourier transform of ``signal``, zero beyond its ends."""
+        return self._spectrum(self.signal)
+
+    @cached_property
+    def weight_spectrum(self) -> Complex:
+        """The Fourier transform of ``weight``, zero beyond its ends."""
+        return self._spectrum(self.weight)
+
+    def filtered(self, spectrum: Complex, kernel: Float) -> Float:
+        """Return the correlation (S, A) with a template's kernel: periodic in azimuth, zero beyond the ends.
+
+        Templates look alike upside down, so that correlation is convolution.
+        """
+        rows, columns = self._shape
+        padded = np.zeros((rows, columns))
+        i, j = (np.arange(n) - n // 2 for n in kernel.shape)
+        # A template that is longer than the circle is wound round it.
+        np.add.at(padded, np.ix_(i % rows, j % columns), kernel)
+        found = irfft2(spectrum * rfft2(padded), (rows, columns))
+        return np.asarray(found[: len(self.seen)])
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return next_fast_len(len(self.seen) + self.reach, real=True), self.seen.shape[1]
+
+    def _spectrum(self, image: Float) -> Complex:
+        padded = np.zeros(self._shape)
+        padded[: len(image)] = image
+        return np.asarray(rfft2(padded), complex)
 
 
 @dataclass(frozen=True)
@@ -111,9 +148,10 @@ def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: 
     threshold = _threshold(_seen_mm2(relief), bank, false_alarms)
     filters = _fitted(relief, [template.kernel(relief.cell_mm) for template in bank])
     into, inward = (scratch.zeros(relief.shape, bool) for _ in range(2))
-    parts = stretches(relief.shape[0], max(len(f.kernel) for f in filters) // 2)
+    overlap = max(len(f.kernel) for f in filters) // 2
+    parts = stretches(relief.shape[0], overlap)
     for done, part in enumerate(parts, 1):
-        near = _weighed(relief.rows(part.wide))
+        near = _weighed(relief.rows(part.wide), overlap)
         for used in filters:
             score = used.standardised(near)[part.inner]
             into[part.own] |= score > threshold
@@ -144,9 +182,9 @@ def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float)
     return float(brentq(excess, 1.0, 40.0)) if excess(1.0) > 0 else 1.0
 
 
-def _weighed(relief: Relief) -> Weighed:
+def _weighed(relief: Relief, reach: int) -> Weighed:
     weight = np.where(relief.seen, 1 / relief.sigma_mm**2, 0.0)
-    return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen)
+    return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen, reach)
 
 
 def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
@@ -157,7 +195,7 @@ def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
     """
     overlap = max(map(len, kernels)) // 2
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
-    walls = [_weighed(relief.rows(part.wide)) for part in parts]
+    walls = [_weighed(relief.rows(part.wide), overlap) for part in parts]
     seen = np.concatenate([w.seen[part.inner] for w, part in zip(walls, parts, strict=True)])
     filters = []
     for kernel in kernels:
@@ -173,17 +211,5 @@ def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
 
 def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float]:
     """Return the response (S, A) of unit variance in white noise, and how much was seen of each template."""
-    power = _filtered(wall.weight, kernel**2)
-    return _filtered(wall.signal, kernel) / np.sqrt(np.maximum(power, 1e-30)), power
-
-
-def _filtered(image: Float, kernel: Float) -> Float:
-    """Return the correlation with ``kernel``, periodic in azimuth, zero beyond the ends."""
-    rows, columns = kernel.shape[0] // 2, kernel.shape[1] // 2
-    turns = -(-columns // image.shape[1])
-    wide = np.concatenate([image] * (2 * turns + 1), 1)
-    first = turns * image.shape[1] - columns
-    wide = wide[:, first : first + image.shape[1] + 2 * columns]
-    padded = np.pad(wide, ((rows, rows), (0, 0)))
-    out = cv2.filter2D(padded, cv2.CV_64F, kernel, borderType=cv2.BORDER_CONSTANT)
-    return np.asarray(out[rows : rows + image.shape[0], columns : columns + image.shape[1]])
+    power = wall.filtered(wall.weight_spectrum, kernel**2)
+    return wall.filtered(wall.signal_spectrum, kernel) / np.sqrt(np.maximum(power, 1e-30)), power

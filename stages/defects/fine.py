@@ -91,7 +91,7 @@ def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wante
                     basis[3], basis[4], basis[5] = s * s, s * q, q * q
                     for a in range(6):
                         right[a] += w * basis[a] * deviation[k]
-                        for b in range(6):
+                        for b in range(a, 6):
                             normal[a, b] += w * basis[a] * basis[b]
                     count += 1
                     before = before or s <= 0.0
@@ -101,6 +101,7 @@ def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wante
         weight = normal[0, 0]
         for a in range(6):
             normal[a, a] += 1e-4 * weight
+            normal[a:, a] = normal[a, a:]
         found = np.linalg.solve(normal, right)
         # mean of x² over a millimetre about its middle is 1 / 12
         out[row, column] = found[0] + (found[3] + found[5]) / 12.0
