@@ -61,8 +61,8 @@ def _store(sample, inverse_brightness, weight, view, values, weights):  # type: 
             w = weight[i, j]
             brightest = max(colour[3 * j], colour[3 * j + 1], colour[3 * j + 2])
             # A clipped sample counts only where there is no other.
-            worth = np.int32(1) if brightest >= _SATURATED else max(1, min(255, np.int32(254 * w) + 1))
-            weights[i, view, j] = np.uint8(worth if w > 0 else 0)
+            worth = 1 if brightest >= _SATURATED else max(1, min(255, int(254 * w) + 1))
+            weights[i, view, j] = worth if w > 0 else 0
 
 
 def _sorting_network(keys: int) -> Int:
