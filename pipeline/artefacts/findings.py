@@ -188,7 +188,7 @@ _PACP = {
     DefectKind.PIT: "SCP (surface damage, corrosion)",
     DefectKind.CORROSION: "SCP (surface damage, corrosion)",
     DefectKind.GOUGE: "SZ (surface damage, other)",
-    DefectKind.DENT: "D (deformed)",
+    DefectKind.DENT: "DFBR (deformed, bulging round)",
     DefectKind.DEPOSIT: "DAZ (deposits attached, other)",
     DefectKind.WELD: "MGO (general observation: weld bead)",
 }

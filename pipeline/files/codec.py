@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from importlib import import_module
+from itertools import combinations
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -68,7 +69,22 @@ def decode(tree: Json, array: Callable[[str], Array], kind: type) -> Any:
 
 def digest(value: object) -> str:
     """Return a SHA-256 of the content of an artefact: equal content, equal digest."""
+    return _digest(*encode(value))
+
+
+def is_digest_of(recorded: str, value: object) -> bool:
+    """Return whether a digest is that of a value, or was before its class had some field that is None now."""
     tree, arrays = encode(value)
+    own = tree.get("fields") if isinstance(tree, dict) else None
+    if not isinstance(tree, dict) or not isinstance(own, dict):
+        return recorded == _digest(tree, arrays)
+    unset = [name for name, part in own.items() if part is None]
+    dropped = (some for count in range(len(unset) + 1) for some in combinations(unset, count))
+    older = (tree | {"fields": {n: part for n, part in own.items() if n not in some}} for some in dropped)
+    return any(recorded == _digest(t, arrays) for t in older)
+
+
+def _digest(tree: Json, arrays: dict[str, Array]) -> str:
     total = hashlib.sha256(canonical(tree))
     for name, array in sorted(arrays.items()):
         total.update(f"{name} {array.dtype.str} {array.shape}".encode())

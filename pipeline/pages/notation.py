@@ -43,7 +43,7 @@ def measured(value: float | None, sigma: float | None, unit: str = "mm") -> str:
     if value is None or not math.isfinite(value):
         return "not seen"
     if sigma is None or not math.isfinite(sigma) or sigma <= 0:
-        return f"{value:.4g} {unit}".strip()
+        return f"{float(f'{value:.4g}'):.10g} {unit}".strip()
     digits = max(0, min(_MOST_DIGITS, 1 - math.floor(math.log10(sigma))))
     least = 10.0**-digits
     spread = f"< {least:.{digits}f}" if sigma < least / 2 else f"{sigma:.{digits}f}"

@@ -243,6 +243,72 @@ def test_the_pdf_is_fit_to_be_kept(papers: dict[str, bytes]) -> None:
         assert "Revision 1, signed" in plain(text)
 
 
+def pdfa_faults(pdf: bytes) -> list[str]:
+    """Return what of ISO 19005-2 a PDF breaks, by clause, as far as its objects show it.
+
+    veraPDF is in no package index; these are the rules that a report could break: structure of the file,
+    encryption, filters, colour, fonts with their meaning, actions, attachments, annotations, transparency.
+    """
+    reader, faults = PdfReader(BytesIO(pdf)), []
+    root, head = reader.trailer["/Root"], pdf.split(b"\n", 2)
+    rules = [
+        ("6.1.2 header", bool(re.fullmatch(rb"%PDF-1\.[0-7]", head[0].strip()))),
+        ("6.1.2 binary comment", head[1][:1] == b"%" and sum(b > 127 for b in head[1][1:5]) == 4),
+        ("6.1.3 file identifier", "/ID" in reader.trailer),
+        ("6.1.3 encryption", "/Encrypt" not in reader.trailer),
+        ("6.1.3 data after the end", pdf.rstrip(b"\r\n").endswith(b"%%EOF")),
+        ("6.5.1 no actions on opening", "/AA" not in root and not isinstance(root.get("/OpenAction"), dict)),
+        ("6.6.2 metadata unfiltered", "/Filter" not in root["/Metadata"]),
+        ("6.8 no attachments", "/EmbeddedFiles" not in root.get("/Names", {})),
+        ("6.10 no XFA", "/AcroForm" not in root),
+    ]
+    intent = root["/OutputIntents"][0].get_object()
+    rules.append(("6.2.3 output intent", intent["/S"] == "/GTS_PDFA1" and "/DestOutputProfile" in intent))
+    for number in range(1, reader.trailer["/Size"]):
+        thing = reader.get_object(number)
+        if isinstance(thing, dict):
+            rules += [(f"{clause} (object {number})", good) for clause, good in _object_rules(thing)]
+    faults += [clause for clause, good in rules if not good]
+    return faults
+
+
+def _object_rules(thing: dict[str, Any]) -> list[tuple[str, bool]]:
+    """Return which rules for single objects one keeps."""
+    kind, sort = thing.get("/Type"), thing.get("/Subtype")
+    filters = str(thing.get("/Filter", ""))
+    rules = [
+        ("6.1.7 no LZW", "/LZW" not in filters and "/Crypt" not in filters),
+        ("6.2.4 no DeviceCMYK beside an RGB intent", "/DeviceCMYK" not in str(thing.get("/ColorSpace", ""))),
+        (
+            "6.5.1 action",
+            thing.get("/S") not in ("/JavaScript", "/Launch", "/Sound", "/Movie", "/ImportData"),
+        ),
+        ("6.2.5 transfer function", "/TR" not in thing),
+    ]
+    if sort == "/Image":
+        rules.append(("6.2.8 no interpolation", not thing.get("/Interpolate", False)))
+    if kind == "/Annot" and sort != "/Popup":
+        rules.append(("6.3.2 annotations print", thing.get("/F", 0) & 0b100110 == 0b100))
+    if kind == "/Font" and sort in ("/Type0", "/TrueType", "/Type1"):
+        rules.append(("6.2.11.7 characters have a meaning", "/ToUnicode" in thing))
+    if kind == "/FontDescriptor":
+        rules.append(("6.2.11.4 font inside", bool({"/FontFile", "/FontFile2", "/FontFile3"} & set(thing))))
+    return rules
+
+
+def test_the_pdf_keeps_the_rules_of_pdf_a(papers: dict[str, bytes]) -> None:
+    pdf = papers["report.pdf"]
+    assert pdfa_faults(pdf) == []
+    spoiled = {
+        "6.1.2 header": pdf.replace(b"%PDF-1.7", b"%PDF-2.7", 1),
+        "6.1.3 data after the end": pdf + b"x",
+        "6.2.3 output intent": pdf.replace(b"/GTS_PDFA1", b"/GTS_PDFX01"[:10], 1),
+        "6.2.11.7": pdf.replace(b"/ToUnicode", b"/ToUnicorn"),
+    }
+    for clause, other in spoiled.items():
+        assert any(clause in fault for fault in pdfa_faults(other)), f"the control: {clause}"
+
+
 def test_the_whole_wall_and_every_finding_that_stands_have_their_picture(papers: dict[str, bytes]) -> None:
     with zipfile.ZipFile(BytesIO(papers["pictures.zip"])) as archive:
         assert sorted(archive.namelist()) == sorted(

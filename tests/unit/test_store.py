@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.files.codec import digest, encode
+from pipeline.files.codec import digest, encode, is_digest_of
 from pipeline.machine.outcome import Number
 from pipeline.machine.stage import Parameters
 from pipeline.machine.store import Provenance, Store
@@ -120,6 +120,15 @@ def test_other_content_has_another_digest(change: dict[str, Any]) -> None:
     assert digest(tree()) == digest(tree())
     assert digest(replace(tree(), **change)) != digest(tree())
     assert digest(replace(tree(), array=np.arange(1000, dtype=np.int32))) != digest(tree())
+
+
+def test_a_digest_from_before_a_class_had_a_field_is_known_again() -> None:
+    older = make_dataclass("Grown", ["size"], frozen=True)
+    newer = make_dataclass("Grown", ["size", ("more", object, None)], frozen=True)
+    for recorded in (digest(older(1)), digest(newer(1))):
+        assert is_digest_of(recorded, newer(1))
+        assert not is_digest_of(recorded, newer(2))
+        assert not is_digest_of(recorded, newer(1, 2)), "what is set counts"
 
 
 def truncate(path: Path) -> None:

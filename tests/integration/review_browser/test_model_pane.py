@@ -78,6 +78,20 @@ def test_from_outside_the_pipe_fills_the_pane(page: Tab) -> None:
     page.page.click("text=Inside")
 
 
+@pytest.mark.parametrize("hour", [12, 3, 6, 9, 4.5])
+def test_from_outside_the_chosen_place_is_on_the_near_side(page: Tab, hour: float) -> None:
+    page.page.click("text=Outside")
+    azimuth = np.radians(30 * (hour - 3))
+    x, y, _ = page.js(f"{_SPOT_ON_SCREEN}([60, {azimuth}])")
+    assert max(abs(x), abs(y)) < 0.9
+    facing = page.js(f"""(() => {{ const {{ pipe, eye: {{ camera }}, spot: {{ marker }} }} = boresight.model;
+      const at = pipe.point(60, {azimuth}, 1), axis = pipe.at(60).origin;
+      const away = camera.position.clone().sub(marker.position);
+      return away.x * (at[0] - axis[0]) - away.y * (at[1] - axis[1]) - away.z * (at[2] - axis[2]); }})()""")
+    page.page.click("text=Inside")
+    assert facing > 0, "not hidden behind the pipe"
+
+
 def test_the_model_alone_and_back(page: Tab) -> None:
     before = page.page.locator(".model .stage").bounding_box()
     page.page.click("text=Maximise")

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from pipeline.pages import notation
 from tests.review_browser import Tab
 
 SPOT = (60.0, -1.2)
@@ -157,3 +158,25 @@ def test_at_rest_the_model_is_sharp_and_not_drawn_on(page: Tab) -> None:
     assert page.js("boresight.model.renderer.getPixelRatio() / boresight.model.pixelRatio") == pytest.approx(
         1
     )
+
+
+def test_the_page_writes_numbers_and_places_as_the_papers_do(page: Tab) -> None:
+    """Each function of words.ts against that of notation.py: halves of a digit, signs, sizes."""
+    values = [0.0, 0.125, -0.375, 0.15, 2.5, 1.0005, 41.25, 41.75, -1.4825, 99.9996, 12345.6, 7 / 24]
+    sigmas = [0.0, 4e-5, 0.0125, 0.0285, 0.25, 0.5, 3.2, 25.0, 1500.0]
+    hours = [0.0, 0.0083333, 0.5083333, 3.1415, 7.775, 7.0083333, 11.99166667, 11.9999, 12.5]
+    asked = {
+        "measured": [[v, s, "mm"] for v in values for s in sigmas] + [[None, 0.1, "mm"], [1.5, None, "MPa"]],
+        "depth": [[v, s] for v in values for s in sigmas] + [[None, None]],
+        "distanceExtent": [[v, v - 0.25, v + 1.35] for v in values] + [[None, 1.25, 2.75]],
+        "clockOfHours": [[h] for h in hours],
+        "clockExtent": [[h, h + wide] for h in hours for wide in (0.008333333, 0.7, 11.99, 12.0)],
+        "moment": [["2026-11-22T18:30:59.123456+00:00"]],
+    }
+    own = {
+        "measured": notation.measured, "depth": notation.depth, "distanceExtent": notation.distance,
+        "clockOfHours": notation.clock, "clockExtent": notation.clock_extent, "moment": notation.moment,
+    }  # fmt: skip
+    for name, cases in asked.items():
+        shown = page.js(f"{json.dumps(cases)}.map((c) => boresight.words.{name}(...c))")
+        assert shown == [own[name](*case) for case in cases], name

@@ -34,7 +34,7 @@ function parts(session: Session, found: Comparison, view: CompareView): HTMLElem
     element("section", {}, element("h2", {}, `${session.run.name} against ${found.earlier}`), element("p", {}, found.statement)),
     view.root,
     element("section", {}, element("h2", {}, "Outcome of each finding"),
-      element("p", { class: "quiet" }, "Depths are read on both walls with one method within one outline; growth is positive into the wall. Its σ holds noise as clean wall beside it shows it, the maps' resolution, registration and calibration. p is after Holm over all findings; ◆ marks what is declared a change."),
+      element("p", { class: "quiet" }, "Both walls are read by the same method within the same outline. Growth into the wall is positive; its σ includes the noise of the clean wall beside the finding, the resolution of the maps, the registration and the calibration. p is the probability of such a change by chance, corrected for the number of findings (Holm). ◆ marks a change that is declared."),
       element("div", { class: "scroll" }, growthTable(session, found, view)),
       element("p", {}, element("a", { href: `${folder}growth.csv`, download: "growth.csv" }, "growth.csv"), " ", element("a", { href: `${folder}growth.json`, download: "growth.json" }, "growth.json"))),
     element("section", {}, element("h2", {}, "How the runs lie on each other"), registrationTable(found), element("div", { class: "plots" }, ...courses(found.registration))),

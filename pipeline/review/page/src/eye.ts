@@ -14,6 +14,8 @@ const BEFORE_RADII = 1.1;
 const [FOV_INSIDE, FOV_NEAR, FOV_OUTSIDE] = [80, 52, 30];
 export const FOV_STAND = 44;
 const MARGIN = 1.12;
+// From outside, the eye looks at the spot askew by so much along the pipe: depth reads, and up stays up at 12 and 6 o'clock.
+const ASIDE = 0.5;
 const MOST_PITCH_RAD = 1.3;
 
 export class Eye {
@@ -72,7 +74,7 @@ export class Eye {
     this.camera.lookAt(toModel(target_p).multiplyScalar(MM));
   }
 
-  /** Stand inside, as far along as last; or outside, so that the pipe fills the picture: returns what is looked at there. */
+  /** Stand inside, as far along as last; or outside, on the spot's side, so that the pipe fills the picture: returns what is looked at there. */
   stand(): THREE.Vector3 | null {
     if (this.isInside) {
       this.lens(FOV_INSIDE);
@@ -85,7 +87,8 @@ export class Eye {
     const centre = toModel(this.pipe.at(middle).origin).multiplyScalar(MM);
     this.lens(FOV_OUTSIDE);
     this.camera.up.set(0, 1, 0);
-    const direction = new THREE.Vector3(0.85, 0.4, 0.35).normalize();
+    const { x, y, tangent } = this.pipe.at(this.session.cursor[0]), a = this.session.cursor[1];
+    const direction = toModel(x).multiplyScalar(Math.cos(a)).addScaledVector(toModel(y), Math.sin(a)).addScaledVector(toModel(tangent), -ASIDE).normalize();
     this.camera.position.copy(centre).addScaledVector(direction, this.farOff(direction, centre, middle, length));
     return centre;
   }

@@ -11,11 +11,12 @@ import { Session } from "./session";
 import { signPage } from "./sign";
 import { Export, Server, type Exported, type Source } from "./source";
 import { ToolBar } from "./tools";
+import * as words from "./words";
 import { element } from "./words";
 
 const REFRESH_MS = 4000;
 
-declare global { interface Window { BORESIGHT?: Exported; boresight?: { session: Session; model: ModelView; flat: FlatView } } }
+declare global { interface Window { BORESIGHT?: Exported; boresight?: { session: Session; model: ModelView; flat: FlatView; words: typeof words } } }
 
 async function start(): Promise<void> {
   const source: Source = window.BORESIGHT ? new Export(window.BORESIGHT) : new Server();
@@ -41,7 +42,7 @@ async function start(): Promise<void> {
   const look = () => void session.refresh().catch((e: Error) => session.lose(e));
   look();
   if (!source.readOnly) window.setInterval(() => { if (!document.hidden) look(); }, REFRESH_MS);
-  window.boresight = { session, model, flat };
+  window.boresight = { session, model, flat, words };
   if (findings.order.length) session.select(findings.order[0]!.id);
 }
 

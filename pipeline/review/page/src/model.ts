@@ -120,8 +120,8 @@ export class ModelView {
       this.lamp.take(stand);
       this.eye.standAs(stand);
       if (this.controls) this.controls.enabled = false;
-      this.explain();
     }
+    this.explain();
     this.fine.dress(this.light);
     this.draw();
   }
@@ -139,7 +139,7 @@ export class ModelView {
     this.within.setAttribute("aria-pressed", String(this.eye.isInside));
     this.without.setAttribute("aria-pressed", String(!this.eye.isInside));
     this.cut.disabled = this.eye.isInside;
-    this.raking.disabled = !this.eye.isInside;
+    this.raking.disabled = !this.eye.isInside || this.session.stand !== null;
     this.canvas.title = this.hint.textContent = this.eye.isInside ? "Wheel or W S flies, drag or A D looks around, a click moves the spot (ring)."
       : "Drag turns, wheel zooms, right drag shifts, a click moves the spot (ring).";
   }
@@ -217,7 +217,7 @@ export class ModelView {
   private follow(): void {
     const [distance, azimuth] = this.session.cursor;
     if (this.eye.isInside && this.controls && !this.isStaying && !this.session.stand) this.eye.turnTo(distance, azimuth);
-    else if (!this.eye.isInside && !this.fine.isAll) this.stand();
+    else if (!this.eye.isInside && !this.isStaying) this.stand();
     this.spot.follow();
     this.draw();
   }

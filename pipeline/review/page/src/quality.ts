@@ -20,9 +20,9 @@ export function qualityPage(session: Session): HTMLElement {
     measured,
     element("section", {}, element("h2", {}, "Instrument diagnosis"), element("p", {}, run.diagnosis
       ? `${run.diagnosis.verdict}: ${run.diagnosis.statement}`
-      : "Not run. boresight diagnose compares this recording with what the stated probe predicts; lay its diagnosis.json and diagnosis.html into the run folder."), pictures),
-    run.warnings.length ? element("section", {}, element("h2", {}, "Noticed while reading"), element("ul", {}, ...run.warnings.map((w) => element("li", {}, w)))) : null,
-    element("details", {}, element("summary", {}, "What every stage reports"), element("div", { class: "columns" }, ...stages)),
+      : "Not run. boresight diagnose tests whether the instrument was as its probe file states. To show the answer here, copy its diagnosis.json and diagnosis.html into the run folder."), pictures),
+    run.warnings.length ? element("section", {}, element("h2", {}, "Warnings of this run"), element("ul", {}, ...run.warnings.map((w) => element("li", {}, w)))) : null,
+    element("details", {}, element("summary", {}, "All figures, stage by stage"), element("div", { class: "columns" }, ...stages)),
     element("section", {}, element("h2", {}, "Made from"), element("table", {},
       ...Object.entries(run.inputs).map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, `SHA-256 ${v}`))))));
   // Asked for when it is first looked at: the first view has the server to itself.
@@ -39,9 +39,9 @@ function rows(numbers: Quantity[]): HTMLElement[] {
 function sections({ plots, samples, facts }: Quality): HTMLElement[] {
   return [
     element("section", {}, element("h2", {}, "Along the pipe"), element("div", { class: "plots" }, ...plots.map(plot))),
-    element("section", {}, element("h2", {}, "Ring samples: used, and not used by reason"), element("table", {},
+    element("section", {}, element("h2", {}, "Ring samples used, and why others were not"), element("table", {},
       ...samples.map((s) => element("tr", {}, element("th", { scope: "row" }, s.reason),
-        element("td", {}, String(s.count)), element("td", {}, `${number(s.share_percent, 2)} %`))))),
+        element("td", { class: "count" }, String(s.count)), element("td", { class: "count" }, `${number(s.share_percent, 2)} %`))))),
     element("section", {}, element("h2", {}, "Instrument"), element("table", {}, ...rows(facts))),
   ];
 }

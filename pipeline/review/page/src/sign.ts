@@ -45,7 +45,7 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
   const lost = state.lost.map((e) => element("li", {}, `${e.who} ${told(session, e.action)}`));
   if (lost.length) made.push(element("section", {}, element("h2", {}, "Decisions without their finding"),
     element("p", {}, "The run was computed again and no longer shows what these were taken on."), element("ul", {}, ...lost)));
-  made.push(element("section", {}, element("h2", {}, "History"), element("ol", { class: "history" },
+  if (state.history.length) made.push(element("section", {}, element("h2", {}, "History"), element("ol", { class: "history" },
     ...state.history.map((e) => element("li", {}, `${moment(e.at)} ${e.who}: ${told(session, e.action)}`)))));
   return made;
 }
@@ -95,7 +95,7 @@ function assumptions(session: Session): HTMLElement {
   const strength = element("input", { type: "number", min: "1", max: "5000", step: "any", id: "yield", value: String(assumed.yield_mpa ?? "") });
   const value = (input: HTMLInputElement) => (input.value ? Number(input.value) : null);
   return element("section", {}, element("h2", {}, "Pipe data"),
-    element("p", { class: "quiet" }, "Before signing. Wall thickness gives wall loss and POF class; with the yield strength also the failure pressure by B31G. Empty: not known."),
+    element("p", { class: "quiet" }, "Before signing. From the wall thickness follow wall loss and POF class, with the yield strength also the failure pressure by B31G. Leave empty what is not known."),
     element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "assume", wall_thickness_mm: value(wall), yield_mpa: value(strength) }); } },
       element("label", { for: "wall" }, "Wall thickness, mm"), wall,
       element("label", { for: "yield" }, "Yield strength, MPa"), strength,
@@ -113,8 +113,8 @@ function inspection(session: Session): HTMLElement {
   const inputs = FACTS.map(([name]) => element("input", { type: name === "date" ? "date" : "text", maxlength: "200", id: `fact-${name}`, value: described[name] ?? "" }));
   const facts = () => Object.fromEntries(FACTS.map(([name], k) => [name, (inputs[k] as HTMLInputElement).value.trim()]));
   return element("section", {}, element("h2", {}, "The inspection"),
-    element("p", { class: "quiet" }, "Before signing. This is printed at the head of every report; what is left empty is named there as not stated."),
-    element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "describe", ...facts() }); } },
+    element("p", { class: "quiet" }, "Before signing. This stands at the head of every report; what is left empty appears there as “not stated”."),
+    element("form", { class: "sign facts", submit: (e) => { e.preventDefault(); void session.act({ do: "describe", ...facts() }); } },
       ...FACTS.flatMap(([name, label], k) => [element("label", { for: `fact-${name}` }, label), inputs[k] as HTMLInputElement]),
       element("button", {}, "Use in the reports")));
 }

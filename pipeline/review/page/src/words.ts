@@ -1,4 +1,4 @@
-/** Numbers and places in words. */
+/** Numbers and places in words, the same as in `pipeline/pages/notation.py`. */
 export const TURN = 2 * Math.PI;
 // Of the chosen finding and the spot: no colour map and no wall has it.
 export const CHOSEN_COLOUR = "#ff4fd8";
@@ -26,7 +26,15 @@ export function distanceExtent(peak: number | null | undefined, from: number, to
 }
 
 export function number(value: number | null | undefined, digits = 2): string {
-  return value === null || value === undefined || !Number.isFinite(value) ? "–" : value.toFixed(digits);
+  return value === null || value === undefined || !Number.isFinite(value) ? "–" : fixed(value, digits);
+}
+
+/** A number with so many digits; halves go to the even digit, as in Python, so that page and papers say the same. */
+function fixed(value: number, digits: number): string {
+  const halves = value * 2 ** (digits + 1); // exact; a half of the last digit is an odd number of these
+  if (!Number.isInteger(halves) || halves % 2 === 0) return value.toFixed(digits);
+  const below = Math.floor(Math.abs(value) * 10 ** digits);
+  return (Math.sign(value) * (below + (below % 2)) / 10 ** digits).toFixed(digits);
 }
 
 const MOST_DIGITS = 3;
@@ -34,11 +42,11 @@ const MOST_DIGITS = 3;
 /** A value and its 1 σ, with as many digits as the σ bears, and no more than anyone can use. */
 export function measured(value: number | null, sigma: number | null, unit = "mm"): string {
   if (value === null || !Number.isFinite(value)) return "not seen";
-  if (sigma === null || !(sigma > 0)) return `${value.toPrecision(4)} ${unit}`.trim();
+  if (sigma === null || !(sigma > 0)) return `${String(Number(value.toPrecision(4)))} ${unit}`.trim();
   const digits = Math.max(0, Math.min(MOST_DIGITS, 1 - Math.floor(Math.log10(sigma))));
   const least = 10 ** -digits;
-  const spread = sigma < least / 2 ? `< ${least.toFixed(digits)}` : sigma.toFixed(digits);
-  return `${value.toFixed(digits)} ± ${spread} ${unit}`.trim();
+  const spread = sigma < least / 2 ? `< ${least.toFixed(digits)}` : fixed(sigma, digits);
+  return `${fixed(value, digits)} ± ${spread} ${unit}`.trim();
 }
 
 /** A depth in words: metal that is missing is deep, what stands into the bore is inward. */
