@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from pipeline.api.diagnosis.switches import switches_of
+from pipeline.api.like import MEASURED, Changed, scene_like
 from pipeline.files.shipped import PRIORS, SCENES, file_or_shipped
-from pipeline.simulator.effects.switch import parse_switches
+from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.premises import Premise
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.produce import Order, Places, beside, produce
 from pipeline.simulator.scene import Scene, read_scene
+from stages.diagnose.drill.cases import ANSWER
 
 # Is told the name of a scene, how many of its frames are rendered, and how many it has.
 Progress = Callable[[str, int, int], None]
@@ -92,6 +97,80 @@ def simulate(
     places = Places(folder, beside(folder) if truth is None else Path(truth), seal)
     (made,) = _produced([Order(changed, file, places)], progress)
     return made
+
+
+def simulate_like(
+    run: Path | str,
+    recording: Path | str,
+    *,
+    truth: Path | str | None = None,
+    effects: Sequence[str] = (),
+    speed: float = 1.0,
+    probe: Path | str | None = None,
+    defects: Sequence[str] = (),
+    seed: int = 0,
+    frames: int | None = None,
+    progress: Progress | None = None,
+) -> Simulated:
+    """Render a recording of a run's pipe by its probe and in its light, with what is to be other.
+
+    The truth holds the scene and the measured pipe, so that `simulate` takes it again.
+
+    Parameters
+    ----------
+    run : path
+        Folder of a completed run, whose recording is still there.
+    recording : path
+        Folder of the recording, which must not be there yet.
+    truth : path, optional
+        As in `simulate`.
+    effects : sequence of str
+        Effects to switch on, as in `simulate`; the folder of a diagnosis stands for all that it found.
+    speed : float
+        By which the way is gone faster.
+    probe : path, optional
+        File of another probe.
+    defects : sequence of str
+        To put in: each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg.
+    seed : int
+        Of noise and of the defects' shapes.
+    frames : int, optional
+        Render only so many, from the first.
+    progress : callable, optional
+        As in `simulate`.
+
+    Raises
+    ------
+    InputError
+        When run, probe, diagnosis, effect, defect or folder cannot be used.
+    UnusableError
+        When the run tells too little, or the scene cannot show what it is meant to show.
+    """
+    folder = Path(recording)
+    places = Places(folder, beside(folder) if truth is None else Path(truth))
+    changed = Changed(speed, None if probe is None else Path(probe), defects)
+    with TemporaryDirectory(dir=_existing(folder.parent), prefix=".like-") as temporary:
+        room = Path(temporary)
+        scene = scene_like(Path(run), folder.name, room, changed)
+        update: dict[str, object] = {"seed": seed, "effects": {s.key: s.numbers for s in _switched(effects)}}
+        scene = _shortened(scene.model_copy(update=update), frames)
+        (made,) = _produced([Order(scene, room / "scene.yaml", places)], progress)
+        shutil.copy2(room / MEASURED, places.truth / MEASURED)
+    return made
+
+
+def _existing(folder: Path) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _switched(effects: Sequence[str]) -> tuple[Switch, ...]:
+    """Return the switches of texts; the folder of a diagnosis stands for what it found."""
+    found: list[Switch] = []
+    for text in effects:
+        answer = Path(text) / ANSWER
+        found += switches_of(answer).found if answer.is_file() else parse_switches([text])
+    return parse_switches([s.text for s in found])
 
 
 def simulate_pairs(

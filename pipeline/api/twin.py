@@ -26,7 +26,7 @@ from pipeline.machine.reproduce import check_inputs_unchanged, read_run_record
 from pipeline.pages import page_template
 from stages.catalogue import PIPELINE
 from stages.texture import TEXTURE
-from stages.twin import TWIN
+from stages.twin import PHOTOMETRY, TWIN
 
 _MEASURED = PIPELINE[: PIPELINE.index(TEXTURE) + 1]
 
@@ -87,7 +87,7 @@ def twin_job(
             raise InputError(diagnosis, "holds no probe.yaml", expected="the folder of boresight diagnose")
         tried = try_diagnosis(diagnosis, output / "gauge", display)
     earlier = {s.name: record.configuration[s.name] for s in _MEASURED if s.name in record.configuration}
-    stages = (*_MEASURED, TWIN)
+    stages = (*_MEASURED, PHOTOMETRY, TWIN)
     configuration = resolve(stages, None, settings, earlier, run / "run.json")
     job = open_job(record.recording, output, probe, stages, EXPORTERS, configuration, "twin")
     if diagnosis is None:

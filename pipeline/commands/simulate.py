@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 
-from pipeline.api.simulate import Progress, Simulated, simulate_pairs
+from pipeline.api.simulate import Progress, Simulated, simulate_like, simulate_pairs
 from pipeline.api.simulate import simulate as simulate_scene
 from pipeline.errors import InputError
 
@@ -27,7 +27,9 @@ def simulate(
     effects: Annotated[
         list[str] | None,
         typer.Option(
-            "--with", metavar="NAME=VALUES", help="an effect, such as laser_tilt=0.6@40; repeatable"
+            "--with",
+            metavar="NAME=VALUES",
+            help="an effect, such as laser_tilt=0.6@40, or with --like a diagnosis' folder; repeatable",
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="in place of the scene's; of the draw")] = None,
@@ -40,6 +42,22 @@ def simulate(
     prior: Annotated[
         Path, typer.Option(metavar="FILE", help="what to draw from: a file, or the name of a shipped one")
     ] = Path("pairs"),
+    like: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="this run's pipe, way, probe and light, in place of a scene"),
+    ] = None,
+    speed: Annotated[
+        float, typer.Option(min=0.01, max=100, help="with --like: go so many times faster")
+    ] = 1.0,
+    probe: Annotated[Path | None, typer.Option(metavar="FILE", help="with --like: another probe")] = None,
+    defects: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--defect",
+            metavar="KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH",
+            help="with --like: a defect to put in, in mm and deg, such as pit,120,45,6,5,1.2; repeatable",
+        ),
+    ] = None,
     seal: Annotated[
         bool, typer.Option("--seal", help="give the recording hashes of its truth, for open-seal")
     ] = False,
@@ -59,8 +77,19 @@ def simulate(
                 progress=progress,
             )  # fmt: skip
             made: Iterator[Simulated] = (recording for pair in pairs for recording in pair)
+        elif like is not None:
+            if scene or seal:
+                raise InputError("--like", "takes no SCENE and no --seal", hint="leave them out")
+            made = iter([
+                simulate_like(
+                    like, output, truth=truth, effects=effects or (), speed=speed, probe=probe,
+                    defects=defects or (), seed=seed or 0, frames=frames, progress=progress,
+                )
+            ])  # fmt: skip
         elif scene is None:
-            raise InputError("simulate", "is given no scene", hint="name a scene file, or use --draw N")
+            raise InputError(
+                "simulate", "is given no scene", hint="name a scene file, --like RUN or --draw N"
+            )
         else:
             one = simulate_scene(
                 scene, output, truth=truth, effects=effects or (), seed=seed, frames=frames, seal=seal,

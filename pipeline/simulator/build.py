@@ -23,11 +23,12 @@ from pipeline.simulator.instrument import (
     lamp_azimuth_rad,
 )
 from pipeline.simulator.line_light import REFERENCE_MM
-from pipeline.simulator.motion import Odometer, motion_of
+from pipeline.simulator.motion import Motion, Odometer, motion_of, motion_through
 from pipeline.simulator.scene import LightScene, Scene, SensorScene
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.build import build_wall, facts_of
 from pipeline.simulator.wall.grid import Wall
+from pipeline.simulator.wall.measured import read_measured
 
 # Number of the random stream of the instrument's draw; the wall's streams hash their purpose (`Seeds`).
 _INSTRUMENT_STREAM = 1
@@ -59,12 +60,19 @@ def plain_truth(scene: Scene, file: Path) -> SceneTruth:
         instrument=true_instrument(scene, stated, wall),
         wall=wall,
         facts=facts_of(scene.pipe),
-        motion=motion_of(scene.motion, float(time_s[-1]) + 1.0),
+        motion=_motion(scene, wall, float(time_s[-1]), file.parent),
         odometer=_odometer(scene),
         frames=FrameTable(np.arange(scene.frames), time_s, light),
         frame_rate=scene.frame_rate,
         rendering=scene.rendering,
     )
+
+
+def _motion(scene: Scene, wall: Wall, last_s: float, folder: Path) -> Motion:
+    if scene.motion.measured is None:
+        return motion_of(scene.motion, last_s + 1.0)
+    way = read_measured(folder / scene.motion.measured)
+    return motion_through(way.T_pc, way.time_s / scene.motion.speed, wall.axis)
 
 
 def true_instrument(scene: Scene, stated: Probe, wall: Wall) -> TrueInstrument:

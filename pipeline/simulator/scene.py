@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import yaml
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import read_yaml
@@ -86,13 +86,23 @@ class MotionScene(Parameters):
     """The camera's way: legs of speed along the axis, joined smoothly, and how it sways."""
 
     start_mm: float = Field(0.0, description="distance at the first frame")
-    legs: tuple[LegScene, ...] = Field(min_length=1, description="in order")
+    legs: tuple[LegScene, ...] = Field((), description="in order; none with a measured way")
+    measured: str | None = Field(
+        None, description="way of a run (NPZ of simulate --like), relative to the scene's folder"
+    )
+    speed: float = Field(1.0, gt=0, le=100, description="by which a measured way is gone faster")
     easing_s: float = Field(0.2, gt=0, le=10, description="over which speeds run into each other")
     x_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     y_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     yaw_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     pitch_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     roll_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
+
+    @model_validator(mode="after")
+    def _require_one_way(self) -> Self:
+        if bool(self.legs) == bool(self.measured):
+            raise ValueError("give either legs or a measured way")
+        return self
 
 
 class OdometerScene(Parameters):

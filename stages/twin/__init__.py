@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
@@ -16,7 +16,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checked_frames import CheckedFrames
 from stages.twin.compare import Comparison, block_ratios, exposure_of
-from stages.twin.locate import full_size, places_in_image
+from stages.twin.locate import ImagePlace, full_size, places_in_image
 from stages.twin.name import Exposures, cannot_tell, dirt, flicker, noise_figures, of_line, state_figures
 from stages.twin.render import render_frame
 from stages.twin.scene import Scene, scene_of
@@ -25,8 +25,8 @@ from stages.twin.state import PhotometricState, Sampled, estimate_state, sample_
 _EVERY = 10
 
 
-class TwinParameters(Parameters):
-    """Parameters of the twin."""
+class PhotometryParameters(Parameters):
+    """Parameters of the photometric state."""
 
     sampled: int = Field(
         12,
@@ -34,12 +34,59 @@ class TwinParameters(Parameters):
         le=200,
         description="measured frames of each light that lamps, laser and noise are taken from",
     )
-    compared: int = Field(
-        60, ge=2, le=1000, description="most frames that are re-rendered, spread over the recording"
-    )
     blur_px: float = Field(
         0.9, ge=0.3, le=5.0, description="1 σ of lens and pixel that the photo is seen with"
     )
+
+
+class TwinParameters(Parameters):
+    """Parameters of the twin."""
+
+    compared: int = Field(
+        60, ge=2, le=1000, description="most frames that are re-rendered, spread over the recording"
+    )
+
+
+@dataclass(frozen=True)
+class Photometry:
+    """The photometric state of a run, and where the image is darker or brighter in all frames.
+
+    Attributes
+    ----------
+    state : PhotometricState
+        Its ``gain_map`` holds what dirt lets through, where some was found.
+    places : tuple of ImagePlace
+    blur_px : float
+        1 σ of lens and pixel that it holds for.
+    """
+
+    state: PhotometricState
+    places: tuple[ImagePlace, ...]
+    blur_px: float
+
+
+def measure_photometry(
+    recording: Recording,
+    frames: CheckedFrames,
+    probe: Probe,
+    rings: RingSamples,
+    trajectory: Trajectory,
+    wall: Wall,
+    texture: WallTexture,
+    parameters: PhotometryParameters,
+    context: Context,
+) -> Photometry:
+    """Estimate camera noise, lamps, laser line, blur and dirt from frames that the run has measured."""
+    _, measured = _split(frames, trajectory, 0)
+    scene = scene_of(probe, trajectory, wall, texture, parameters.blur_px)
+    sampled = sample_frames(
+        recording, frames.frame[measured], frames.illumination[measured], parameters.sampled
+    )
+    state = estimate_state(scene, sampled, rings, context)
+    places, gain = places_in_image(_ratios(scene, state, sampled))
+    if gain is not None:
+        state = replace(state, gain_map=full_size(gain, state.outside.shape))
+    return Photometry(state, places, parameters.blur_px)
 
 
 def compare_with_twin(
@@ -50,6 +97,7 @@ def compare_with_twin(
     trajectory: Trajectory,
     wall: Wall,
     texture: WallTexture,
+    photometry: Photometry,
     parameters: TwinParameters,
     context: Context,
 ) -> Twin:
@@ -60,19 +108,17 @@ def compare_with_twin(
     UnusableError
         When no frame could be re-rendered.
     """
-    compared, measured = _split(frames, trajectory, parameters.compared, context)
-    scene = scene_of(probe, trajectory, wall, texture, parameters.blur_px)
-    sampled = sample_frames(
-        recording, frames.frame[measured], frames.illumination[measured], parameters.sampled
-    )
-    state = estimate_state(scene, sampled, rings, context)
-    places, gain = places_in_image(_ratios(scene, state, sampled))
-    cleaned = state if gain is None else replace(state, gain_map=full_size(gain, state.outside.shape))
+    compared, _ = _split(frames, trajectory, parameters.compared)
+    if frames.withheld is None:
+        context.warn(_NONE_WITHHELD)
+    scene = scene_of(probe, trajectory, wall, texture, photometry.blur_px)
+    cleaned, places = photometry.state, photometry.places
+    gain, state = cleaned.gain_map, replace(cleaned, gain_map=None)
     exposures, comparison = Exposures(), Comparison()
     light = dict(zip(frames.frame.tolist(), frames.illumination.tolist(), strict=True))
     dirty = dirt(places, state.outside.shape)
     for done, (frame, image) in enumerate(recording.read(compared, "grey")):
-        context.progress(len(compared) + done, 2 * len(compared))
+        context.progress(done, len(compared))
         if image is None:
             continue
         kind, above = (
@@ -98,22 +144,23 @@ def compare_with_twin(
     )  # fmt: skip
 
 
-def _split(frames: CheckedFrames, trajectory: Trajectory, most: int, context: Context) -> tuple[Int, Bool]:
-    """Return the frames to compare, and which (N,) of all the run has measured."""
+_NONE_WITHHELD = (
+    "no frame was withheld from the run, so that the compared frames are ones that wall, motion and photo "
+    "were made from: errors that the run has fitted away do not show. What to do: run the recording with "
+    "--set premises.withhold=10"
+)
+
+
+def _split(frames: CheckedFrames, trajectory: Trajectory, most: int) -> tuple[Int, Bool]:
+    """Return up to ``most`` frames to compare, and which (N,) of all the run has measured."""
     posed = np.isin(frames.frame, trajectory.frame)
-    withheld = frames.withheld
-    if withheld is None:
-        context.warn(
-            "no frame was withheld from the run, so that the compared frames are ones that wall, motion and "
-            "photo were made from: errors that the run has fitted away do not show. What to do: run the "
-            "recording with --set premises.withhold=10"
-        )
-        withheld = np.zeros(len(frames.frame), bool)
-        withheld[_EVERY // 2 :: _EVERY - 1] = True
-        compared = frames.frame[withheld & posed]
+    if frames.withheld is None:
+        chosen = np.zeros(len(frames.frame), bool)
+        chosen[_EVERY // 2 :: _EVERY - 1] = True
         measured = posed
     else:
-        compared, measured = frames.frame[withheld & posed], posed & ~withheld
+        chosen, measured = frames.withheld, posed & ~frames.withheld
+    compared = frames.frame[chosen & posed]
     few = np.unique(np.linspace(0, len(compared) - 1, min(most, len(compared))).round().astype(int))
     return compared[few], measured
 
@@ -136,9 +183,16 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
     context.report("mismatches found", len(found), "")
 
 
+PHOTOMETRY = Stage(
+    "photometry",
+    "1",
+    PhotometryParameters,
+    measure_photometry,
+    "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
+)
 TWIN = Stage(
     "twin",
-    "1",
+    "2",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -3,6 +3,9 @@
 ``python -m tests.benchmarks.bench_twin swaps OUT``: every gauge run of the shared recordings, its line
 re-rendered as stated, with its own answer, with the true effects, and with the answers of other probes. A
 right answer must fit better than any other. The truth is opened for scoring alone.
+
+``python -m tests.benchmarks.bench_twin like OUT --run RUN``: a recording like a run, with a pit put in, is
+rendered and run in its turn: its wall against the one that was measured, and the pit.
 """
 
 from __future__ import annotations
@@ -17,8 +20,12 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.api.diagnosis.switches import Switches, moves_line, switches_of
 from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
+from pipeline.api.opened import open_run
+from pipeline.api.run import run as run_recording
+from pipeline.api.simulate import simulate_like
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe_file import read_with_source
 from pipeline.machine.configuration import resolve
@@ -39,6 +46,8 @@ from tests.shared_data import PROJECT_ROOT
 _OPEN = ("open-1", "open-2")
 _BLIND = tuple(f"a{k:02d}" for k in range(1, 13))
 _KNOCK = "mount_knock"
+_PIT = (45.0, 1.2)
+_SEEN_AHEAD_MM = 60.0
 _FRAMES = 24
 _WRONG = 3
 _STAGES = tuple(s.for_role("gauge") for s in (PREMISES, RINGS, FIDUCIALS))
@@ -132,10 +141,42 @@ def swaps(folder: Path, answers: Path) -> None:
     print(f"swapped answers fit worse than a probe's own: {worse} of {pairs}")
 
 
+def like(folder: Path, run: Path, frames: int) -> None:
+    """Render a recording like a run with a pit put in, run it, and print how alike the two walls are."""
+    first, last = (float(open_run(run).wall.radius_map.distance_mm[k]) for k in (0, -1))
+    at = min(first + 0.5 * _SEEN_AHEAD_MM, (first + last) / 2)
+    start = time.process_time()
+    made = simulate_like(
+        run, folder / "recording", frames=frames, defects=[f"pit,{at:.0f},{_PIT[0]},6,6,{_PIT[1]}"], seed=3
+    )
+    print(f"rendered {made.frames} frames, {time.process_time() - start:.0f} s of processor time", flush=True)
+    run_recording(made.recording, folder / "run")
+    again = open_run(folder / "run")
+    true = open_run(run).wall.radius_map
+    seen = again.wall.radius_map
+    # Distance and roll are counted from the first frame in both runs.
+    at_rows = np.round((seen.distance_mm - true.distance_mm[0]) / (true.distance_mm[1] - true.distance_mm[0]))
+    inside = (at_rows >= 0) & (at_rows < len(true.distance_mm))
+    off = seen.radius_mm[inside] - true.radius_mm[at_rows[inside].astype(int)]
+    off = off[np.isfinite(off)]
+    print(f"radius, again less measured: median {np.median(off):+.4f} mm, robust {robust_spread(off):.4f} mm")
+    for finding in again.findings():
+        place = np.array(finding.outline).mean(0)
+        print(f"found {finding.kind} at {place[0]:.0f} mm, depth {finding.size.depth_mm:.2f} mm")
+    print(f"put in: pit at {at:.0f} mm, {_PIT[1]} mm deep")
+    for warning in again.warnings:
+        print(f"warning: {warning}")
+
+
 if __name__ == "__main__":
     words = argparse.ArgumentParser(description=__doc__)
-    words.add_argument("what", choices=["swaps"])
+    words.add_argument("what", choices=["swaps", "like"])
+    words.add_argument("--run", type=Path, help="run folder for like")
+    words.add_argument("--frames", type=int, default=100, help="frames of the recording for like")
     words.add_argument("folder", type=Path)
     words.add_argument("--answers", type=Path, default=Path("data/blind-a"), help="folder of diagnoses")
     given = words.parse_args()
-    swaps(given.folder, given.answers)
+    if given.what == "swaps":
+        swaps(given.folder, given.answers)
+    else:
+        like(given.folder, given.run, given.frames)

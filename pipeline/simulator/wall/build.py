@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from pipeline.simulator.wall.albedo import FINEST_OVER_RADIUS, lay_photograph, p
 from pipeline.simulator.wall.description import Bend, Fiducials, Pipe
 from pipeline.simulator.wall.fiducials import markers_of, paint_fiducials, require_room
 from pipeline.simulator.wall.grid import Grid, Wall, grid_over
+from pipeline.simulator.wall.measured import read_measured
 from pipeline.simulator.wall.noise import Seeds
 from pipeline.simulator.wall.shape import add_relief, axis_curvature, base_radius
 
@@ -58,9 +60,11 @@ def build_wall(pipe: Pipe, seed: int, folder: Path) -> Wall:
     Raises
     ------
     InputError
-        When fiducials have no room, or a photograph cannot be read.
+        When fiducials have no room, or a photograph or a measured wall cannot be read.
     """
     seeds = Seeds(seed)
+    if pipe.measured is not None:
+        return _with_defects(read_measured(folder / pipe.measured).wall, pipe, seeds)
     span, radius = (pipe.from_mm, pipe.to_mm), pipe.diameter_mm / 2
     shape = grid_over(span, radius, pipe.cell_mm)
     texture = grid_over(span, radius, texel_mm(pipe))
@@ -72,6 +76,19 @@ def build_wall(pipe: Pipe, seed: int, folder: Path) -> Wall:
         shape=shape.cells,
         radius_mm=np.asarray(radius_mm, np.float32),
         texture=texture.cells,
+        albedo_bgr=np.ascontiguousarray(albedo[..., ::-1]),
+        gloss=pipe.surface.gloss,
+    )
+
+
+def _with_defects(wall: Wall, pipe: Pipe, seeds: Seeds) -> Wall:
+    """Return a measured wall with the scene's welds, defects and branches put in."""
+    radius_mm = float(wall.radius_mm.mean(dtype=float))
+    shape, texture = Grid(wall.shape, radius_mm), Grid(wall.texture, radius_mm)
+    albedo = stain(wall.albedo_bgr[..., ::-1].copy(), texture, pipe, seeds)
+    return replace(
+        wall,
+        radius_mm=np.asarray(add_relief(wall.radius_mm.astype(float), shape, pipe, seeds), np.float32),
         albedo_bgr=np.ascontiguousarray(albedo[..., ::-1]),
         gloss=pipe.surface.gloss,
     )

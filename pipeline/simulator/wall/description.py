@@ -157,4 +157,7 @@ class Pipe(Parameters):
     relief: Relief = Field(default_factory=lambda: Relief.model_validate({}))
     surface: Surface = Field(default_factory=lambda: Surface.model_validate({}))
     photograph: Photograph | None = None
+    measured: str | None = Field(
+        None, description="wall of a run (NPZ of simulate --like), relative to the scene's folder"
+    )
     fiducials: Fiducials | None = None

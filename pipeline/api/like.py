@@ -1,0 +1,268 @@
+"""A scene like a run: its pipe, its way, its probe and its light, for `boresight simulate --like`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from pipeline.api.job import Job, probe_source, result_of, run_job
+from pipeline.api.opened import Run, open_run
+from pipeline.arrays import Float, Float32
+from pipeline.artefacts.measured import RingSamples, Trajectory, WallTexture
+from pipeline.artefacts.measured import Wall as MeasuredWall
+from pipeline.errors import InputError
+from pipeline.files.codec import digest
+from pipeline.files.yaml_file import read_yaml
+from pipeline.machine.configuration import resolve
+from pipeline.machine.display import SilentDisplay
+from pipeline.machine.plan import Selection, Source
+from pipeline.machine.reproduce import read_run_record
+from pipeline.recording.base import Illumination, Recording
+from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.review.run_files import RunFiles
+from pipeline.simulator.build import plain_truth
+from pipeline.simulator.render import renderer_of
+from pipeline.simulator.scene import Scene, scene_from
+from pipeline.simulator.wall.grid import Wall, WallGrid
+from pipeline.simulator.wall.measured import MeasuredPipe, write_measured
+from stages.texture.surface import wall_surface
+from stages.twin import PHOTOMETRY, Photometry
+from stages.twin.reflectance import LUMA_BGR
+from stages.twin.scene import SHADING_MM, SMOOTHING_MM
+
+MEASURED = "measured.npz"
+_BEYOND_MM = 250.0
+"""By so much the photo is mirrored beyond its ends: a camera looks farther ahead than the run saw."""
+_ROUNDS, _LOOKED_AT = 3, 3
+"""Rounds in which the lights are set, since clipping bends them, and frames of each light for it."""
+_LIT = 10.0
+"""Grey levels above black from which a pixel tells of a light."""
+_CLEAR_OF_WHITE = 250.0
+_DEFECT = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth_mm")
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What is to be other than in the run.
+
+    Attributes
+    ----------
+    speed : float
+        By which the way is gone faster.
+    probe : Path or None
+        File of another probe.
+    defects : sequence of str
+        To put in, each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg, as in
+        ``pit,120,45,6,5,1.2``.
+    """
+
+    speed: float = 1.0
+    probe: Path | None = None
+    defects: Sequence[str] = ()
+
+
+def scene_like(run: Path, name: str, folder: Path, changed: Changed) -> Scene:
+    """Return the scene of a run, and write the measured pipe that it refers to into a folder.
+
+    The photometric state is estimated from frames of the run (`stages.twin`); the lights are set so that
+    rendered frames are as bright as the recorded ones.
+
+    Raises
+    ------
+    InputError
+        When the run, its recording, the probe or a defect cannot be used.
+    UnusableError
+        When the run's wall or frames tell too little.
+    """
+    record, opened, files = read_run_record(run), open_run(run), RunFiles(run)
+    recording = opened.recording()
+    frames = files.artefact(CheckedFrames)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_measured(_measured(opened, frames), folder / MEASURED)
+    light = _photometry(opened, frames, recording, folder / "photometry")
+    values = _values(opened, recording, frames, record.probe, name)
+    values |= _seen_light(light, *_grey_of_colour(recording, frames))
+    scene = _with_lights(scene_from(values, run), folder / "scene.yaml", recording)
+    return change(scene, changed)
+
+
+def _values(run: Run, recording: Recording, frames: CheckedFrames, probe: Path, name: str) -> dict[str, Any]:
+    """Return the scene but for its lights and sensor."""
+    radius = float(np.nanmean(run.wall.radius_map.radius_mm))
+    return {
+        "name": name,
+        "summary": f"like the run {run.path.name} of {recording.name}",
+        "frames": len(run.trajectory.frame),
+        "frame_rate": recording.frame_rate,
+        "pattern": frames.illumination[np.isin(frames.frame, run.trajectory.frame)].tolist(),
+        "probe": dict(read_yaml(probe).values),
+        "truth": "stated",
+        "pipe": {
+            "diameter_mm": 2 * radius,
+            "nominal_diameter_mm": recording.pipe.nominal_diameter_mm,
+            "measured": MEASURED,
+            "relief": {"roughness_mm": 0.0},
+            "surface": {"gloss": 0.0},
+        },
+        "motion": {"measured": MEASURED},
+    }
+
+
+def _measured(run: Run, frames: CheckedFrames) -> MeasuredPipe:
+    trajectory = run.trajectory
+    time_s = frames.time_s[np.isin(frames.frame, trajectory.frame)]
+    return MeasuredPipe(_wall(run.wall, run.texture), time_s - time_s[0], trajectory.T_pc)
+
+
+def _wall(measured: MeasuredWall, photo: WallTexture) -> Wall:
+    """Return the measured wall with its gaps filled; beyond its ends the photo is mirrored."""
+    surface = wall_surface(measured, SMOOTHING_MM, SHADING_MM)
+    # The simulator's columns lie half a cell farther on.
+    radius = (surface.radius_mm + np.roll(surface.radius_mm, -1, axis=1)) / 2
+    step = float(surface.distance_mm[1] - surface.distance_mm[0])
+    shape = WallGrid(float(surface.distance_mm[0]), step, *radius.shape)
+    more = min(round(_BEYOND_MM / photo.mm_per_px), len(photo.bgra) - 1)
+    columns = round(2 * math.pi / photo.rad_per_px)
+    at = (
+        -math.pi + (np.arange(columns) + 0.5) * photo.rad_per_px - photo.azimuth_from_rad
+    ) / photo.rad_per_px
+    albedo = np.pad(
+        photo_as_reflectance(photo)[:, np.round(at).astype(int) % columns],
+        ((more, more), (0, 0), (0, 0)),
+        "reflect",
+    )
+    first = photo.distance_from_mm - more * photo.mm_per_px
+    texture = WallGrid(first, photo.mm_per_px, *albedo.shape[:2])
+    return Wall(surface.axis, shape, radius.astype(np.float32), texture, albedo)
+
+
+def photo_as_reflectance(photo: WallTexture) -> Float32:
+    """Return the photo (H, W, 3) as reflectance from 0 to 1; what was not seen takes the mean about it."""
+    known = (photo.bgra[..., 3] > 0).astype(np.float32)
+    colour = photo.bgra[..., :3].astype(np.float32) / 255
+    if known.all():
+        return np.asarray(colour, np.float32)
+    mean = colour[known > 0].mean(0)
+    wide = cv2.GaussianBlur(colour * known[..., None], (0, 0), 15)
+    share = cv2.GaussianBlur(known, (0, 0), 15)[..., None]
+    about = np.where(share > 0.01, wide / np.maximum(share, 0.01), mean)
+    return np.where(known[..., None] > 0, colour, about).astype(np.float32)
+
+
+def _photometry(run: Run, frames: CheckedFrames, recording: Recording, folder: Path) -> Photometry:
+    """Return the photometric state, worked out under the runner."""
+    parts: tuple[tuple[type, object], ...] = (
+        (CheckedFrames, frames), (RingSamples, run.rings), (Trajectory, run.trajectory),
+        (MeasuredWall, run.wall), (WallTexture, run.texture),
+    )  # fmt: skip
+    key = RunFiles(run.path).version
+    sources = [Source(kind, value, digest((kind.__name__, key))) for kind, value in parts]
+    sources += [Source(Recording, recording, recording.content_key), probe_source(run.probe())]
+    stages = (PHOTOMETRY,)
+    job = Job("simulate", tuple(sources), stages, (), resolve(stages, None, ()), folder)
+    run_job(job, Selection(), SilentDisplay())
+    return result_of(job, Photometry)
+
+
+def _grey_of_colour(recording: Recording, frames: CheckedFrames) -> tuple[float, float]:
+    """Return offset and slope of grey levels over the luma of B, G, R, which a video's range may shift."""
+    chosen = frames.frame[np.linspace(0, len(frames.frame) - 1, _LOOKED_AT).astype(int)]
+    grey, colour = (
+        [image.astype(float) for _, image in recording.read(chosen, form) if image is not None]
+        for form in ("grey", "bgr")
+    )
+    luma = np.stack([image @ LUMA_BGR for image in colour]).ravel()
+    use = (luma > 0) & (luma < _CLEAR_OF_WHITE)
+    if not use.any() or float(np.ptp(luma[use])) < _LIT:
+        return 0.0, 1.0
+    slope, offset = np.polyfit(luma[use], np.stack(grey).ravel()[use], 1)
+    return float(offset), float(slope)
+
+
+def _seen_light(found: Photometry, offset: float, slope: float) -> dict[str, Any]:
+    """Return lights and sensor of the photometric state, as a scene has them.
+
+    ``offset`` and ``slope`` lead from the luma of a colour picture, which is rendered, to the grey levels
+    that the state is in.
+    """
+    state = found.state
+    noise, line, lamp = state.noise, state.line, state.lamp
+    sensor: dict[str, float] = {"black_level": max((noise.black.value - offset) / slope, 0.0)}
+    if math.isfinite(noise.electrons_per_level.value):
+        sensor["full_well_e"] = max(255 * slope * noise.electrons_per_level.value, 20.0)
+        sensor["read_noise_e"] = max(noise.read_electrons.value, 0.0)
+    values: dict[str, Any] = {"sensor": sensor}
+    if line is not None:
+        # A pixel alone blurs by 1/√12 px; the simulator's samples do that themselves.
+        sensor["psf_sigma_px"] = math.sqrt(max(line.blur_px.value**2 - 1 / 12, 0.09))
+        values["laser"] = {"speckle": float(np.clip(line.speckle.value, 0, 0.5))}
+    if lamp is not None:
+        cosine = np.cos(np.minimum(lamp.theta_rad, math.radians(85)))
+        weight = 1 / np.maximum(lamp.falloff_sd, 1e-3)
+        lobe = float(np.polyfit(np.log(cosine), lamp.log_falloff, 1, w=weight)[0])
+        values["light"] = {"lobe": float(np.clip(lobe, 0, 20)), "even": 0.0}
+    return values
+
+
+def _with_lights(scene: Scene, file: Path, recording: Recording) -> Scene:
+    """Return the scene with laser and LEDs so bright that frames are as bright as the recorded ones."""
+    light = np.array([scene.pattern[k % len(scene.pattern)] for k in range(scene.frames)])
+    for _ in range(_ROUNDS):
+        renderer = renderer_of(plain_truth(scene, file))
+        for kind, part, field in (
+            (Illumination.LASER, "laser", "peak"),
+            (Illumination.LED, "light", "level"),
+        ):
+            number = np.flatnonzero(light == kind.value)
+            if not len(number):
+                continue
+            chosen = number[(np.linspace(0.3, 0.7, _LOOKED_AT) * len(number)).astype(int)]
+            read = recording.read(chosen, "bgr")
+            recorded = [image @ LUMA_BGR for _, image in read if image is not None]
+            rendered = [renderer.frame(int(n)) @ LUMA_BGR for n in chosen]
+            ratio = _ratio(recorded, rendered, scene.sensor.black_level)
+            old = getattr(scene, part)
+            new = old.model_copy(update={field: float(np.clip(getattr(old, field) * ratio, 1e-3, 50))})
+            scene = scene.model_copy(update={part: new})
+    return scene
+
+
+def _ratio(recorded: Sequence[Float], rendered: Sequence[Float], black: float) -> float:
+    """Return how much brighter recorded frames are where both are lit."""
+    above = [np.stack(recorded) - black, np.stack(rendered) - black]
+    use = (above[0] > _LIT) & (above[1] > _LIT)
+    if not use.any():
+        return 1.0
+    return float(above[0][use].sum(dtype=float) / above[1][use].sum(dtype=float))
+
+
+def change(scene: Scene, changed: Changed) -> Scene:
+    """Return the scene with another speed, probe and further defects."""
+    motion = scene.motion.model_copy(update={"speed": changed.speed})
+    defects = [_defect(text) for text in changed.defects]
+    pipe = type(scene.pipe).model_validate(scene.pipe.model_dump() | {"defects": tuple(defects)})
+    frames = max(int((scene.frames - 1) / changed.speed) + 1, 2)
+    update: dict[str, Any] = {"motion": motion, "pipe": pipe, "frames": frames}
+    if changed.probe is not None:
+        update["probe"] = dict(read_yaml(changed.probe).values)
+    return scene.model_copy(update=update)
+
+
+def _defect(text: str) -> dict[str, Any]:
+    words = [w.strip() for w in text.split(",")]
+    try:
+        numbers = [float(w) for w in words[1:]]
+        return dict(zip(_DEFECT, (words[0], *numbers), strict=True))
+    except ValueError as error:
+        raise InputError(
+            "--defect",
+            f"{text!r} is not understood",
+            expected="KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH",
+            hint="write, for instance, pit,120,45,6,5,1.2: mm and deg",
+        ) from error
