@@ -74,7 +74,12 @@ class LaserSheet:
 
     def slope(self, azimuth_rad: Float) -> Float:
         """Return dz/dq (...) of the sheet's rays at azimuth ψ (...) in C."""
-        return np.asarray(self._slope_basis(azimuth_rad) @ self._slope_coefficients())
+        psi = np.asarray(azimuth_rad, float)
+        slope = self.tilt_x * np.cos(psi) + self.tilt_y * np.sin(psi) + np.tan(self.cone_rad)
+        for m, along, across in zip(_WAVES, self.waviness[::2], self.waviness[1::2], strict=True):
+            if along or across:  # most sheets are stated without waves, and sines take long
+                slope = slope + along * np.cos(m * psi) + across * np.sin(m * psi)
+        return np.asarray(slope)
 
     def height(self, azimuth_rad: Float) -> Float:
         """Return z (...) in mm at which the ray of azimuth ψ leaves the axis."""

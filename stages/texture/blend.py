@@ -34,11 +34,15 @@ class TileStack:
 
     def add(self, image: Image, projection: TileProjection) -> None:
         """Sample a view's ``image`` (H, W, 3) where ``projection`` puts the tile's pixels."""
-        uv = projection.uv
-        sample = cv2.remap(image, uv[..., 0], uv[..., 1], cv2.INTER_CUBIC)
-        _store(
-            sample, projection.inverse_brightness, projection.weight, self._used, self._values, self._weights
-        )
+        seen = np.flatnonzero(projection.weight.any(1))
+        if seen.size:
+            rows = slice(seen[0], seen[-1] + 1)
+            uv = projection.uv[rows]
+            _store(
+                cv2.remap(image, uv[..., 0], uv[..., 1], cv2.INTER_CUBIC),
+                projection.inverse_brightness[rows], projection.weight[rows], self._used,
+                self._values[rows], self._weights[rows],
+            )  # fmt: skip
         self._used += 1
 
     def blend(self) -> tuple[Short, Byte]:
