@@ -26,6 +26,7 @@ from pipeline.recording.base import (
     Recording,
 )
 from stages.calibrate.gauge.adjust import Measurements
+from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.edges import Edges, Sighting, joined, predicted_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from stages.calibrate.gauge.poses import FirstPose, PosedFrames, poses_of_all_frames
@@ -33,6 +34,7 @@ from stages.calibrate.gauge.result import GaugeCalibration, calibration_of
 from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
 from stages.calibrate.gauge.state import GaugeParameters
 
+USUAL = GaugeParameters.model_validate({"ring_bins": 120})
 RING_PX, EDGE_PX = 0.1, 0.1
 _NEAREST, _FARTHEST = 10.0, 55.0
 
@@ -177,7 +179,14 @@ def fiducials_of(
 
 def calibrated(run: GaugeRun, parameters: GaugeParameters | None = None) -> GaugeCalibration:
     """Return what the calibration makes of a run."""
-    parameters = parameters or GaugeParameters.model_validate({"ring_bins": 120})
+    parameters = parameters or USUAL
+    given = measured_run(run, parameters)
+    finding = solve(given.start, given.measured, given.source, given.posed, parameters)
+    return calibration_of("made", run.recording.frames.frame, run.gauge, finding)
+
+
+def measured_run(run: GaugeRun, parameters: GaugeParameters = USUAL) -> MeasuredRun:
+    """Return a run as the calibration measures it."""
     T_pc = poses_of_all_frames(run.recording, run.posed, run.rings, run.stated)
     source = RingSource(run.rings, run.rings.frame, run.gauge)
     measured = Measurements(
@@ -185,8 +194,7 @@ def calibrated(run: GaugeRun, parameters: GaugeParameters | None = None) -> Gaug
         run.recording.encoder, run.gauge.radius_sigma_mm, LOOSE,
     )  # fmt: skip
     start = first_unknowns(T_pc, run.posed.index, run.gauge, measured, run.stated, parameters)
-    finding = solve(start, measured, source, run.posed.index, parameters)
-    return calibration_of("made", run.recording.frames.frame, run.gauge, finding)
+    return MeasuredRun(start, measured, source, run.posed.index, np.zeros(0, np.int64))
 
 
 def in_sigma(run: GaugeRun, result: GaugeCalibration) -> dict[str, float]:

@@ -73,6 +73,15 @@ def smooth(drawn: Drawn, *, parameters: SmoothParameters, context: Context) -> S
     return Smoothed(np.convolve(drawn.values, kernel, "same"), parameters.width)
 
 
+@dataclass(frozen=True)
+class Weighed:
+    value: float
+
+
+def weigh(drawn: Drawn, total: Total | None, *, parameters: Parameters, context: Context) -> Weighed:
+    return Weighed(float(drawn.values.sum()) if total is None else total.total)
+
+
 def add_up(drawn: Drawn, smoothed: Smoothed, *, parameters: TotalParameters, context: Context) -> Total:
     total = parameters.weights[0] * drawn.values.sum() + parameters.weights[1] * smoothed.values.sum()
     return Total(float(total), (smoothed, replace(smoothed, width=1)))
@@ -81,6 +90,7 @@ def add_up(drawn: Drawn, smoothed: Smoothed, *, parameters: TotalParameters, con
 DRAW = Stage("draw", "1", DrawParameters, draw, "numbers from nowhere")
 SMOOTH = Stage("smooth", "1", SmoothParameters, smooth, "numbers to smooth numbers")
 TOTAL = Stage("total", "1", TotalParameters, add_up, "everything to one number")
+WEIGH = Stage("weigh", "1", Parameters, weigh)
 TOYS = (DRAW, SMOOTH, TOTAL)
 
 

@@ -21,9 +21,16 @@ measured."""
 _STRONGEST_FALL = 0.01
 """Factor of the damping after a step that gained all it promised; Nielsen has 1/3. Not measured."""
 
+Watch = Callable[[], object]
+"""Called before every step of a solver: tells how far it is, and raises when the user wishes it to stop."""
+
 State = TypeVar("State")
 Step = TypeVar("Step")
 Scales = TypeVar("Scales")
+
+
+def unwatched() -> None:
+    """Let a solver run to its end."""
 
 
 class Linear(Protocol[Step]):
@@ -121,6 +128,7 @@ def minimise(
     moved: Callable[[State, Any], State],
     judged_anew: Callable[[Equations], tuple[Equations, Scales | None]],
     stop: Stop,
+    watch: Watch = unwatched,
 ) -> Minimum[State, Equations]:
     """Minimise a robust cost.
 
@@ -137,6 +145,8 @@ def minimise(
     judged_anew
         Gives equations judged by the scales that their own residuals show, and these scales.
     stop
+    watch
+        Is called before every step.
 
     Raises
     ------
@@ -146,6 +156,7 @@ def minimise(
     state, damping = start, Damping()
     equations, scales = judged_anew(linearised(state, None))
     for trial in range(1, stop.trials + 1):
+        watch()
         step = _step(equations, damping)
         if step is None:
             damping = damping.after(0.0)

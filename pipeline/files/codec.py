@@ -2,7 +2,7 @@
 
 Any frozen dataclass whose fields are arrays, numbers, strings, None, enumeration members, parameters of a
 stage, tuples or mappings of such, or further dataclasses can be encoded; nothing else can, so that nothing is
-stored by half.
+stored by half. A field with `NOT_STORED` has its default again when it is read.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from importlib import import_module
 from itertools import combinations
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -25,6 +26,8 @@ Json: TypeAlias = "bool | int | float | str | list[Json] | dict[str, Json] | Non
 # Packages of this program.
 OWN_PACKAGES = ("pipeline", "stages")
 Array = NDArray[Any]
+NOT_STORED: Mapping[str, bool] = MappingProxyType({"stored": False})
+"""``metadata`` of a dataclass' field that belongs to the computation, not to its result."""
 
 
 class CodecError(ValueError):
@@ -119,7 +122,8 @@ def _encode_compound(value: object, place: str, arrays: dict[str, Array]) -> Jso
     if isinstance(value, BaseModel):
         return {"model": _name_of(type(value)), "values": value.model_dump(mode="json")}
     if is_dataclass(value) and not isinstance(value, type):
-        content = {f.name: getattr(value, f.name) for f in fields(value) if f.init}
+        kept = (f.name for f in fields(value) if f.init and f.metadata.get("stored", True))
+        content = {name: getattr(value, name) for name in kept}
         return {
             "class": _name_of(type(value)),
             "fields": {k: _encode(v, _inside(place, k), arrays) for k, v in content.items()},

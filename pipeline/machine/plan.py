@@ -148,7 +148,7 @@ def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Se
     steps: list[Step] = []
     for stage in stages:
         _check_wiring(stage, keys, stages)
-        inputs = {name: _found(kind, stage, keys) for name, kind in stage.inputs().items()}
+        inputs = _wired(stage, keys, stages)
         parameters = configuration.of(stage.configured_as)
         key = _key(stage, parameters, {name: keys[kind] for name, kind in inputs.items()})
         origins = set[type]().union(*(made_from[kind] for kind in inputs.values()))
@@ -164,14 +164,21 @@ def _found(kind: type, stage: Stage, made: Mapping[type, str]) -> type:
     return own if own in made else kind
 
 
+def _wired(stage: Stage, made: Mapping[type, str], stages: Sequence[Stage]) -> dict[str, type]:
+    """Return the classes of a stage's arguments, without those that may be None and that nothing makes."""
+    found = {name: _found(kind, stage, made) for name, kind in stage.inputs().items()}
+    known = {*made, *(s.output() for s in stages)}
+    return {name: kind for name, kind in found.items() if kind in known or name not in stage.may_lack()}
+
+
 def _check_wiring(stage: Stage, made: Mapping[type, str], stages: Sequence[Stage]) -> None:
     if [s.label for s in stages].count(stage.label) > 1:
         raise PipelineError(f"two stages are named {stage.label}")
     if stage.output() in made:
         name = plain(stage.output()).__name__
         raise PipelineError(f"stage {stage.label} makes {name}, which is there already")
-    for kind in stage.inputs().values():
-        if _found(kind, stage, made) not in made:
+    for kind in _wired(stage, made, stages).values():
+        if kind not in made:
             makers = [s.label for s in stages if s.output() == kind]
             why = f"stage {makers[0]}, which must come before, makes it" if makers else "no stage makes it"
             raise PipelineError(f"stage {stage.label} needs {plain(kind).__name__}: {why}")

@@ -189,12 +189,11 @@ class Runner:
 
     def _artefact(self, step: Step, numbers: list[Number]) -> object:
         """Call a stage; what became of its input meanwhile goes before whatever else it raises."""
+        inputs: dict[str, object] = dict.fromkeys(step.stage.may_lack())
+        inputs |= {argument: self._artefacts[kind] for argument, kind in step.inputs}
+        context = self._context(step, numbers)
         try:
-            return step.stage.function(
-                **{argument: self._artefacts[kind] for argument, kind in step.inputs},
-                parameters=step.parameters,
-                context=self._context(step, numbers),
-            )
+            return step.stage.function(**inputs, parameters=step.parameters, context=context)
         finally:
             for source in self._plan.sources:
                 source.refuse_changed()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from types import NoneType
 from typing import Annotated, Any, Protocol, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -28,6 +29,10 @@ class Progress(Protocol):
 
     def __call__(self, done: int, total: int) -> None:
         """Report ``done`` of ``total`` units of work."""
+
+
+def unheard(done: int, total: int) -> None:
+    """Take progress that nobody asked for."""
 
 
 class Warn(Protocol):
@@ -98,12 +103,19 @@ def role_of(kind: type) -> str:
     return next((m.role for m in marks if isinstance(m, Of)), "")
 
 
+def _not_none(kind: type) -> type:
+    """Return the class of an argument that may also be None."""
+    kinds = get_args(kind)
+    return next(k for k in kinds if k is not NoneType) if NoneType in kinds else kind
+
+
 @dataclass(frozen=True)
 class Stage:
     """A step of the pipeline as a plain, picklable, module-level constant.
 
     The runner wires stages by type: every argument of ``function`` other than ``parameters`` and
     ``context`` is an artefact class made by an earlier stage, or one of the sources `Recording`, `Probe`.
+    One that may be None is None where neither is there.
 
     Attributes
     ----------
@@ -151,6 +163,13 @@ class Stage:
 
     def inputs(self) -> dict[str, type]:
         """Return argument name to artefact class, in the order of the function's signature."""
+        return {name: _not_none(kind) for name, kind in self._arguments().items()}
+
+    def may_lack(self) -> set[str]:
+        """Return the arguments that may be None."""
+        return {name for name, kind in self._arguments().items() if NoneType in get_args(kind)}
+
+    def _arguments(self) -> dict[str, type]:
         hints = get_type_hints(self.function, include_extras=True)
         return {k: v for k, v in hints.items() if k not in ("parameters", "context", "return")}
 

@@ -58,15 +58,17 @@ class Store:
             When the artefact has a field that cannot be stored.
         """
         tree, arrays = encode(artefact)
+        same = _alike(arrays)
+        own = {name: array for name, array in arrays.items() if name not in same}
         final = self._place(provenance.stage, provenance.key)
         temporary = self.folder / f".new-{final.name}"
         with disk_errors_named(self.folder):
             try:
-                files = _write_arrays(temporary, arrays)
+                files = _write_arrays(temporary, own)
                 remove(final)
                 temporary.rename(final)
                 sync_folder(self.folder)
-                replace_json(final / _MANIFEST, _manifest(provenance, tree, files))
+                replace_json(final / _MANIFEST, _manifest(provenance, tree, files, same))
             except OSError:
                 remove(temporary)
                 raise
@@ -87,7 +89,7 @@ class Store:
             provenance = decode(manifest["provenance"], _no_array, Provenance)
             if provenance.key != key:
                 raise CodecError("the result of another key")
-            artefact = decode(manifest["artefact"], partial(_load, folder), kind)
+            artefact = _artefact(folder, manifest, kind)
         except (OSError, ValueError, KeyError, TypeError):
             return None
         return Stored(artefact, provenance)
@@ -102,7 +104,7 @@ class Store:
             manifest = _read_manifest(folder)
             made = decode(manifest["provenance"], _no_array, Provenance)
             whole = made.key == key and self.has(stage, key)
-            return decode(manifest["artefact"], partial(_load, folder), kind) if whole else None
+            return _artefact(folder, manifest, kind) if whole else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
@@ -130,6 +132,13 @@ class Store:
         return self.folder / f"{stage}-{key[:12]}"
 
 
+def _alike(arrays: Mapping[str, NDArray[Any]]) -> dict[str, str]:
+    """Return for each array that stands under an earlier name too, that name."""
+    first: dict[int, str] = {}
+    names = {name: first.setdefault(id(array), name) for name, array in arrays.items()}
+    return {name: earlier for name, earlier in names.items() if name != earlier}
+
+
 def _write_arrays(folder: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, FileRecord]:
     remove(folder)
     folder.mkdir()  # not its parents: a run folder removed meanwhile would come back without the rest
@@ -142,8 +151,13 @@ def _write_array(path: Path, array: NDArray[Any]) -> FileRecord:
     return write_synced(path, lambda w: np.lib.format.write_array(w, array, allow_pickle=False))
 
 
-def _load(folder: Path, name: str) -> NDArray[Any]:
-    path = folder / f"{name}.npy"
+def _artefact(folder: Path, manifest: Mapping[str, Any], kind: type) -> Any:
+    # manifests of earlier versions name no array twice
+    return decode(manifest["artefact"], partial(_load, folder, manifest.get("same", {})), kind)
+
+
+def _load(folder: Path, same: Mapping[str, str], name: str) -> NDArray[Any]:
+    path = folder / f"{same.get(name, name)}.npy"
     if path.stat().st_size >= _MAP_FROM_BYTES:
         return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
     array: NDArray[Any] = np.load(path, allow_pickle=False)
@@ -151,11 +165,14 @@ def _load(folder: Path, name: str) -> NDArray[Any]:
     return array
 
 
-def _manifest(provenance: Provenance, tree: Json, files: Mapping[str, FileRecord]) -> Json:
+def _manifest(
+    provenance: Provenance, tree: Json, files: Mapping[str, FileRecord], same: Mapping[str, str]
+) -> Json:
     content: dict[str, Json] = {
         "format": _FORMAT,
         "provenance": encode(provenance).tree,
         "files": {name: {"bytes": r.bytes, "sha256": r.sha256} for name, r in files.items()},
+        "same": dict(same),
         "artefact": tree,
     }
     return {**content, "sha256": hashlib.sha256(canonical(content)).hexdigest()}

@@ -1,24 +1,29 @@
-"""What is measured once of each recording, before anything is asked, and what each channel saw in it."""
+"""What is measured of each recording before anything is asked, and what each channel then says of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from pydantic import Field
 
 from pipeline.arrays import Bool, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Recording
 from pipeline.recording.checked_frames import CheckedFrames
 from stages.calibrate.gauge import GaugeParameters
 from stages.calibrate.gauge.calibrate import MeasuredRun, measure_gauge
 from stages.calibrate.gauge.state import Unknowns
-from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.effects.library import without as library_without
+from stages.diagnose.field.evidence import FieldEvidence, field_evidence, nothing_said
 from stages.diagnose.field.run import FieldRun, field_run
-from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_poses
@@ -26,6 +31,10 @@ from stages.motion import EncoderReadings, Equations, Measurements, MotionParame
 
 _PLACEMENT_SIGMA_MM = 0.05
 _MOST_OF_RING = 0.5
+# What motion against encoder tells better than rings and fiducials do.
+TRAVEL_EFFECTS = frozenset(
+    {"probe_vibration", "encoder_scale", "encoder_slip", "encoder_backlash", "time_offset"}
+)
 
 
 def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> TravelEvidence:
@@ -60,13 +69,20 @@ def _shown(run: MeasuredRun) -> Bool:
     return np.asarray(shown)
 
 
+class DiagnosisParameters(Parameters):
+    """What the diagnosis lets the user choose."""
+
+    without: tuple[str, ...] = Field((), description="effects that are left out of the library")
+
+
 @dataclass(frozen=True)
 class Seen:
     """All that one recording says; a channel that could not be examined is None, and the reason is told.
 
     Attributes
     ----------
-    recording : Recording
+    name : str
+        Of the recording.
     geometry : Examined or None
         Rings and fiducials of a gauge run.
     travel : TravelEvidence or None
@@ -76,12 +92,16 @@ class Seen:
         Rings and texture of an inspection.
     """
 
-    recording: Recording
+    name: str
     geometry: Examined | None
     travel: TravelEvidence | None
     profile: ProfileEvidence | None
     shortcomings: tuple[str, ...]
     field: FieldEvidence | None = None
+
+    def with_run(self, run: FieldRun | None) -> Seen:
+        """Return what was seen with the adjusted run that it was seen in, which is not stored with it."""
+        return replace(self, field=replace(self.field, run=run)) if self.field is not None else self
 
 
 @dataclass(frozen=True)
@@ -111,6 +131,11 @@ class Adjusted:
     encoder: EncoderReadings | None
     ring_frames: Int
     parameters: MotionParameters
+
+    @staticmethod
+    def of(run: FieldRun) -> Adjusted:
+        """Return a run without what it was made from."""
+        return Adjusted(**{f.name: getattr(run, f.name) for f in fields(Adjusted)})
 
 
 @dataclass(frozen=True)
@@ -175,7 +200,78 @@ def adjust_freely(
         run = field_run(frames.applied_to(recording), probe, rings, points, parameters, context)
     except UnusableError as error:
         return FreeMotion(None, error.problem)
-    return FreeMotion(Adjusted(**{f.name: getattr(run, f.name) for f in fields(Adjusted)}))
+    return FreeMotion(Adjusted.of(run))
+
+
+def examine_gauge(
+    recording: Recording,
+    frames: CheckedFrames,
+    profile: LineProfile,
+    fiducials: GaugeMeasured,
+    probe: Probe,
+    *,
+    parameters: DiagnosisParameters,
+    context: Context,
+) -> Seen:
+    """Return what a gauge run's rings, fiducials, motion and line profile say."""
+    recording, run, without = frames.applied_to(recording), fiducials.run, parameters.without
+    missing, problem = _profile_problem(profile), fiducials.problem
+    geometry, travel = None, None
+    if run is not None:
+        try:
+            library = _of_geometry(library_without(without), profile.evidence)
+            geometry = examine(run, library, probe, without, progress=context.progress)
+            travel = gauge_travel(recording, run, geometry.searched.found.state)
+            missing += travel.shortcomings
+        except UnusableError as error:
+            problem = error.problem
+    if problem:
+        missing += (f"Rings and fiducials of the gauge run tell nothing: {problem}.",)
+    return Seen(recording.name, geometry, travel, profile.evidence, missing)
+
+
+def examine_field(
+    recording: Recording,
+    frames: CheckedFrames,
+    rings: RingSamples,
+    profile: LineProfile,
+    motion: FreeMotion,
+    probe: Probe,
+    *,
+    parameters: DiagnosisParameters,
+    context: Context,
+) -> Seen:
+    """Return what an inspection's rings, texture, motion and line profile say."""
+    recording = frames.applied_to(recording)
+    run = motion.run(recording, probe, rings)
+    if run is None:
+        found = FieldEvidence(None, nothing_said(recording, motion.problem))
+    else:
+        library = _of_geometry(library_without(parameters.without), profile.evidence)
+        found = field_evidence(run, library, context.progress)
+    missing = (*_profile_problem(profile), *found.channel.shortcomings)
+    return Seen(recording.name, None, found.travel, profile.evidence, missing, found)
+
+
+def _profile_problem(profile: LineProfile) -> tuple[str, ...]:
+    return (f"The line's profile tells nothing: {profile.problem}.",) if profile.problem else ()
+
+
+def _of_geometry(
+    library: Mapping[str, EffectModel], profile: ProfileEvidence | None
+) -> dict[str, EffectModel]:
+    """Return the effects that rings and fiducials are asked about.
+
+    Light moves the line in ways that many causes share: where the profile was examined, only those count that
+    it shows.
+    """
+    shown = {f.effect for f in profile.found} if profile is not None else None
+    return {
+        name: model
+        for name, model in library.items()
+        if name not in TRAVEL_EFFECTS
+        and (effect(name).family != "photometric" or shown is None or name in shown)
+    }
 
 
 LINE_PROFILE = Stage("line_profile", "1", Parameters, examine_line, "what the line's light says of effects")
@@ -185,22 +281,19 @@ FIDUCIALS = Stage(
 FREE_MOTION = Stage(
     "free_motion", "1", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
-
-
-@dataclass(frozen=True)
-class FieldMeasured:
-    """An inspection with all that was measured of it."""
-
-    recording: Recording
-    rings: RingSamples
-    profile: LineProfile
-    motion: FreeMotion
-
-
-@dataclass(frozen=True)
-class GaugeRecorded:
-    """A gauge run with all that was measured of it."""
-
-    recording: Recording
-    profile: LineProfile
-    measured: GaugeMeasured
+GAUGE_EVIDENCE = Stage(
+    "gauge_evidence",
+    "1",
+    DiagnosisParameters,
+    examine_gauge,
+    "what a gauge run shows of effects",
+    "diagnosis",
+)
+FIELD_EVIDENCE = Stage(
+    "field_evidence",
+    "1",
+    DiagnosisParameters,
+    examine_field,
+    "what an inspection shows of effects",
+    "diagnosis",
+)

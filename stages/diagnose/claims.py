@@ -135,7 +135,7 @@ def _every(seen: Seen) -> Iterable[Claim]:
         yield from (_of_slip(s, travel) for s in travel.slips if s.p_value < TRAVEL_FOUND)
         yield from (_of_swing(line, seen, travel) for line in travel.lines if _is_swing(line))
     if seen.profile is not None:
-        yield from (_of_finding(f, seen.profile, seen.recording.name) for f in seen.profile.found)
+        yield from (_of_finding(f, seen.profile, seen.name) for f in seen.profile.found)
 
 
 def _of_estimate(e: TravelEstimate, travel: TravelEvidence) -> Claim:

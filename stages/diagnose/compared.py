@@ -9,7 +9,6 @@ from threadpoolctl import threadpool_limits
 
 from pipeline.arrays import Byte, Float
 from pipeline.recording.base import Recording
-from stages.diagnose.channels import Seen
 from stages.diagnose.correct import Correction
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
@@ -45,7 +44,11 @@ class Compared:
 
 
 def compared(
-    field: FieldRun | None, corrected: FieldRun | None, gauge: Seen | None, correction: Correction | None
+    field: FieldRun | None,
+    corrected: FieldRun | None,
+    examined: Examined | None,
+    gauge: Recording | None,
+    correction: Correction | None,
 ) -> Compared | None:
     """Return the residuals of the field, else of the gauge; None where neither has any.
 
@@ -53,11 +56,12 @@ def compared(
     ----------
     field, corrected
         The field with the stated and with the corrected probe.
+    examined, gauge
+        What rings and fiducials of the gauge run say, and its recording.
     """
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
-            examined = gauge.geometry if gauge is not None else None
             of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
             linear = _beyond_probe(examined, correction)
             if field is None:
@@ -85,11 +89,10 @@ def with_pictures(found: Diagnosis, seen: Compared | None) -> Diagnosis:
     )  # fmt: skip
 
 
-def _of_gauge(gauge: Seen, examined: Examined) -> GaugeResiduals:
+def _of_gauge(gauge: Recording, examined: Examined) -> GaugeResiduals:
     searched = examined.searched
     terms = examined.best.fit.terms if examined.best is not None else ()
-    frames = gauge.recording.frames.frame
-    return rings_against_fiducials(searched.run, searched.nothing.state, terms, frames)
+    return rings_against_fiducials(searched.run, searched.nothing.state, terms, gauge.frames.frame)
 
 
 def _gauge_alone(of: GaugeResiduals) -> Compared:

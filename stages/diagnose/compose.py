@@ -35,8 +35,8 @@ def composed(
     said = _said(examined, every, without, bool(unexplained))
     asked = said.members if said.verdict is Verdict.CLASS else [e.name for e in said.effects]
     return Diagnosis(
-        recording=field.recording.name if field is not None else "",
-        gauge=gauge.recording.name if gauge is not None else "",
+        recording=field.name if field is not None else "",
+        gauge=gauge.name if gauge is not None else "",
         verdict=said.verdict,
         global_p=_global_p(field, gauge),
         location=_location(examined, every, asked) or (_IN_PROFILE if unexplained else None),
@@ -160,7 +160,7 @@ def _location(examined: Examined | None, claims: Sequence[Claim], asked: Sequenc
 
 def _unexplained_profile(*recordings: Seen | None) -> tuple[str, ...]:
     """Return sentences on what the lines' profiles show and no shape with a name fits."""
-    profiles = [(s.recording.name, s.profile) for s in recordings if s is not None and s.profile is not None]
+    profiles = [(s.name, s.profile) for s in recordings if s is not None and s.profile is not None]
     return tuple(f"{name}: {p.unexplained.statement}" for name, p in profiles if p.unexplained is not None)
 
 

@@ -5,19 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 
 from pipeline.arrays import Float
+from pipeline.artefacts.measured import RingSamples
+from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context, Of, Parameters, Stage
 from pipeline.recording.base import Encoder, Recording
+from pipeline.recording.checked_frames import CheckedFrames
+from stages.diagnose.channels import Adjusted, FreeMotion, Seen
 from stages.diagnose.effects.base import Amplitude, Shape, Travel
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.field.run import FieldRun, with_probe
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import prior_sigma
 from stages.diagnose.gauge.run import Term
-from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate
+from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, stated_belief
 from stages.diagnose.result import EffectFound
 
 Change = Callable[[dict[str, float], Float, Shape], None]
@@ -148,6 +155,60 @@ def correction_by_gauge(examined: Examined, probe: Probe, stated: Stated, source
         replace(made, calibrated_from=source),
         tuple(n for n in names if at.sayable(n)), tuple(n for n in names if not at.sayable(n)),
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """What a gauge run makes of the stated probe; None where it tells nothing of it."""
+
+    correction: Correction | None
+
+
+def correct(seen: Seen, probe: Probe, *, parameters: Parameters, context: Context) -> Corrected:
+    """Put what a gauge run shows into the stated probe."""
+    if seen.geometry is None:
+        return Corrected(None)
+    return Corrected(correction_by_gauge(seen.geometry, probe, stated_belief(probe), seen.name))
+
+
+@dataclass(frozen=True)
+class CorrectedMotion:
+    """An inspection adjusted with the corrected probe; None where there is none, or it does not fit."""
+
+    adjusted: Adjusted | None
+
+    def run(self, stated: FieldRun, correction: Correction) -> FieldRun | None:
+        """Return the adjusted run of the stated one and the correction that it was made from."""
+        if self.adjusted is None:
+            return None
+        return replace(stated, probe=correction.probe, **vars(self.adjusted))
+
+
+def adjust_corrected(
+    recording: Recording,
+    frames: CheckedFrames,
+    rings: RingSamples,
+    motion: FreeMotion,
+    probe: Probe,
+    corrected: Annotated[Corrected, Of("gauge")],
+    *,
+    parameters: Parameters,
+    context: Context,
+) -> CorrectedMotion:
+    """Adjust an inspection anew with the probe that its gauge run corrects."""
+    run = motion.run(frames.applied_to(recording), probe, rings)
+    if run is None or corrected.correction is None:
+        return CorrectedMotion(None)
+    try:
+        return CorrectedMotion(Adjusted.of(with_probe(run, corrected.correction.probe, context)))
+    except UnusableError:
+        return CorrectedMotion(None)
+
+
+CORRECTION = Stage("correction", "1", Parameters, correct, "the stated probe with what was found put in")
+CORRECTED_MOTION = Stage(
+    "corrected_motion", "1", Parameters, adjust_corrected, "an inspection's motion with the corrected probe"
+)
 
 
 @dataclass(frozen=True)

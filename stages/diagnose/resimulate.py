@@ -12,9 +12,11 @@ from threadpoolctl import threadpool_limits
 
 from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
+from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.physics.catalogue import EFFECTS, effect
 from pipeline.physics.course import Course
 from pipeline.recording.base import Recording
+from pipeline.recording.checked_frames import CheckedFrames
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.exact import room_mm
@@ -22,6 +24,7 @@ from pipeline.simulator.truth import SceneTruth
 from stages.calibrate.gauge.scene import gauge_scene
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.courses import Coursed
+from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
 
@@ -64,10 +67,22 @@ class Resimulated:
         return before, after
 
 
-def resimulate(gauge: Seen | None) -> Resimulated | None:
-    """Simulate held-out rings of the gauge run anew; None where nothing was found in one."""
-    examined = gauge.geometry if gauge is not None else None
-    if gauge is None or examined is None or examined.best is None or not examined.best.fit.terms:
+@dataclass(frozen=True)
+class Resimulation:
+    """The gauge run simulated again; None where nothing was found in it that the simulator has."""
+
+    simulated: Resimulated | None
+
+
+def resimulate(
+    recording: Recording, frames: CheckedFrames, seen: Seen, *, parameters: Parameters, context: Context
+) -> Resimulation:
+    """Simulate held-out rings of a gauge run again, without and with what was found in it."""
+    return Resimulation(_resimulated(frames.applied_to(recording), seen.geometry))
+
+
+def _resimulated(gauge: Recording, examined: Examined | None) -> Resimulated | None:
+    if examined is None or examined.best is None or not examined.best.fit.terms:
         return None
     run, start, terms = examined.searched.run, examined.searched.nothing.state, examined.best.fit.terms
     if any(not _switchable(t) for t in terms):
@@ -79,9 +94,14 @@ def resimulate(gauge: Seen | None) -> Resimulated | None:
     try:
         with threadpool_limits(1):
             without, found = fit(relaxed, start, ()), fit(relaxed, start, nothing)
-            return _compared(gauge.recording, run, frames, without, found)
+            return _compared(gauge, run, frames, without, found)
     except (np.linalg.LinAlgError, InputError):
         return None
+
+
+RESIMULATION = Stage(
+    "resimulation", "1", Parameters, resimulate, "held-out rings simulated with what was found in a gauge run"
+)
 
 
 def held_out(run: GaugeRun) -> Int:

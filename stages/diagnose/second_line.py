@@ -76,7 +76,7 @@ def held_against_rings(seen: Seen, sheet: SheetByRings) -> Seen:
         return replace(seen, profile=seen.profile.with_finding(kept))
     withdrawn = replace(second, p_value=1.0, confirms=(), agreements=())
     words = (
-        f"The line's profile of {seen.recording.name} shows faint light beside the line. It is not light "
+        f"The line's profile of {seen.name} shows faint light beside the line. It is not light "
         f"bounced across the bore: its place would ask for {told.confirmation.measured.partition(': ')[2]}, "
         f"and the rings say {told.confirmation.prediction.partition(': ')[2]}."
     )

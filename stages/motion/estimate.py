@@ -164,7 +164,7 @@ def adjust_at_once(
     UnusableError
         When rings and texture do not determine the motion.
     """
-    estimate = estimate_state(start, measured, parameters)
+    estimate = estimate_state(start, measured, parameters, partial(context.progress, 0, 1))
     _report_steps(context, estimate.adjusted.trials, int(not estimate.adjusted.settled))
     _require_convergence(radius_mm, estimate)
     joined, has_encoder = joined_at_once(estimate), measured.encoder is not None

@@ -28,9 +28,8 @@ from pipeline.physics.course import Course, CourseKind
 from pipeline.simulator.effects.switch import Switch, switches_from_mapping
 from pipeline.simulator.prior import Prior, draw_pair, read_prior
 from pipeline.simulator.scene import Scene
-from stages.diagnose.channels import Seen, gauge_travel
+from stages.diagnose.channels import TRAVEL_EFFECTS, Seen, gauge_travel
 from stages.diagnose.compose import composed
-from stages.diagnose.diagnose import TRAVEL_EFFECTS
 from stages.diagnose.drill.answer import Answer, Concealed
 from stages.diagnose.drill.figures import figures
 from stages.diagnose.drill.score import Trial
@@ -137,7 +136,7 @@ def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
         travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
     except UnusableError as error:
         missing = (str(error),)
-    seen = Seen(simulated.recording, geometry, travel, None, missing)
+    seen = Seen(simulated.recording.name, geometry, travel, None, missing)
     found = to_json(composed(None, seen, stated, left_out))
     answer = {k: found[k] for k in _KEPT if k in found}
     answer["candidates"] = [c for c in found["candidates"] if c["probability"] > 1e-3]  # type: ignore[attr-defined]

@@ -114,7 +114,7 @@ def test_a_second_diagnosis_computes_nothing(diagnosed, pair):
     words = ["diagnose", str(pair[0]), "--gauge", str(pair[1]), "-o", str(diagnosed)]
     assert CliRunner().invoke(app, words).exit_code == 0
     assert set(states(diagnosed).values()) == {"reused"}
-    assert len(states(diagnosed)) == 10
+    assert len(states(diagnosed)) == 15
     assert contents(diagnosed) == before
 
 

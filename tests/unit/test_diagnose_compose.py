@@ -20,7 +20,6 @@ from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
 from tests.shared_data import PROJECT_ROOT
-from tests.toys import toy_recording
 
 AGREES = Agreement(Confirmation("first half: 0.02", "second half: 0.02", True), 30.0)
 DIFFERS = Agreement(Confirmation("first half: 0.02", "second half: -0.01", False), 1e-12)
@@ -38,7 +37,7 @@ def real_probe() -> Probe:
 
 def seen(source: str, **shown: object) -> Seen:
     travel = TravelEvidence(source, (), (), (), (), None, (), ())
-    return Seen(toy_recording(), None, replace(travel, **shown), None, ())  # type: ignore[arg-type]
+    return Seen("toy", None, replace(travel, **shown), None, ())  # type: ignore[arg-type]
 
 
 def answer(probe: Probe, field: Seen | None, gauge: Seen | None, *without: str) -> Diagnosis:

@@ -11,7 +11,7 @@ from pipeline.machine.configuration import resolve
 from pipeline.machine.plan import PipelineError, Plan, Source, make_plan
 from pipeline.machine.stage import Context, Of, Parameters, Stage, of_role
 from pipeline.recording.base import Recording
-from tests.toy_stages import DRAW, SMOOTH, TOTAL, TOYS, Total
+from tests.toy_stages import DRAW, SMOOTH, TOTAL, TOYS, WEIGH, Drawn, Total
 from tests.toys import toy_recording
 
 
@@ -103,3 +103,12 @@ def test_a_seed_depends_on_what_the_result_is_made_from_alone() -> None:
     one, other = two_recordings("a" * 64, "b" * 64), two_recordings("a" * 64, "c" * 64)
     assert one.step("draw").seed == other.step("draw").seed
     assert one.step("gauge draw").seed != other.step("gauge draw").seed
+
+
+def test_what_may_be_none_is_left_out_where_no_stage_makes_it_and_waited_for_where_one_does() -> None:
+    alone, both = plan_of(DRAW, WEIGH).step("weigh"), plan_of(*TOYS, WEIGH).step("weigh")
+    assert dict(alone.inputs) == {"drawn": Drawn}
+    assert dict(both.inputs) == {"drawn": Drawn, "total": Total}
+    assert alone.key != both.key
+    with pytest.raises(PipelineError, match="stage weigh needs Total: stage total, which must come before"):
+        plan_of(DRAW, SMOOTH, WEIGH, TOTAL)

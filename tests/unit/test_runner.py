@@ -27,7 +27,7 @@ from pipeline.machine.runner import FailedError
 from pipeline.machine.stage import Context, Parameters, Stage
 from tests.disk_limit import file_size_limit
 from tests.shared_data import PROJECT_ROOT
-from tests.toy_stages import DRAW, SMOOTH, Drawn, DrawParameters, Total
+from tests.toy_stages import DRAW, SMOOTH, TOYS, WEIGH, Drawn, DrawParameters, Total, Weighed
 from tests.toys import run_toys, toy_job
 
 
@@ -223,6 +223,17 @@ def linger_right(drawn: Drawn, *, parameters: Parameters, context: Context) -> R
         time.sleep(0.01)
         context.progress(1, 2)
     raise AssertionError("it went on")
+
+
+@pytest.mark.parametrize(("stages", "weighed"), [((DRAW,), "nothing else"), (TOYS, "the total")])
+def test_a_stage_is_given_none_for_what_no_stage_makes(
+    tmp_path: Path, stages: tuple[Stage, ...], weighed: str
+) -> None:
+    job = replace(toy_job(tmp_path), stages=(*stages, WEIGH), exporters=())
+    job = replace(job, configuration=resolve(job.stages))
+    run_job(job, Selection(), SilentDisplay())
+    wanted = result_of(job, Total).total if weighed == "the total" else result_of(job, Drawn).values.sum()
+    assert result_of(job, Weighed).value == wanted
 
 
 def forked_job(folder: Path, left: Any, right: Any) -> Job:

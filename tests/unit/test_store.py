@@ -16,7 +16,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.files.codec import digest, encode, is_digest_of
+from pipeline.files.codec import NOT_STORED, digest, encode, is_digest_of
 from pipeline.machine.outcome import Number
 from pipeline.machine.stage import Parameters
 from pipeline.machine.store import Provenance, Store
@@ -188,3 +188,29 @@ def test_a_look_gives_what_is_whole_and_never_discards(tmp_path: Path) -> None:
     assert store.look("grow", KEY, Tree) is None
     array.write_bytes(content)
     assert same(store.look("grow", KEY, Tree), tree()), "what is being written is left to whoever writes it"
+
+
+@dataclass(frozen=True)
+class Watched:
+    """An artefact with something of its computation in it."""
+
+    leaf: Leaf
+    watch: Callable[[], None] = field(default=print, metadata=NOT_STORED)
+
+
+def test_an_array_that_stands_in_several_places_is_written_once(tmp_path: Path) -> None:
+    once = np.arange(6.0)
+    leaf = Leaf("a", 1.0, once)
+    tree = Tree(leaf, (leaf, Leaf("b", 2.0, once)), Mood.CALM, 1, True, (), once.copy())
+    Store(tmp_path).write(tree, PROVENANCE)
+    assert len(list(tmp_path.rglob("*.npy"))) == 2
+    stored = Store(tmp_path).read("grow", KEY, Tree)
+    assert stored is not None
+    assert digest(stored.artefact) == digest(tree)
+
+
+def test_what_belongs_to_the_computation_is_not_stored(tmp_path: Path) -> None:
+    Store(tmp_path).write(Watched(Leaf("a", 1.0, np.zeros(2)), lambda: None), PROVENANCE)
+    stored = Store(tmp_path).read("grow", KEY, Watched)
+    assert stored is not None
+    assert stored.artefact.watch is print

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor
+from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.adjustment.robust import cluster_covariance, robust_spread
 from pipeline.arrays import Float
@@ -70,8 +71,10 @@ class Solution:
         return total
 
 
-def adjust(state: Unknowns, measured: Measurements, parameters: GaugeParameters) -> Solution:
-    """Minimise all residuals together by Gauss-Newton with Cauchy weights.
+def adjust(
+    state: Unknowns, measured: Measurements, parameters: GaugeParameters, watch: Watch = unwatched
+) -> Solution:
+    """Minimise all residuals together by Gauss-Newton with Cauchy weights; ``watch`` before every step.
 
     Raises
     ------
@@ -79,6 +82,7 @@ def adjust(state: Unknowns, measured: Measurements, parameters: GaugeParameters)
         When something is not determined.
     """
     for _ in range(parameters.iterations):
+        watch()
         solution = _linearised(state, measured, parameters)
         frames, border = solution.factor.step()
         state = state.step(frames, border)

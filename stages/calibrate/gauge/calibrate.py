@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.adjustment.motion_priors import LOOSE
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
@@ -69,7 +71,7 @@ def calibrate_gauge(
     run = measure_gauge(recording, rings, probe, parameters, context)
     premises.require_offset(run.start.T_pc, parameters)
     gauge, wrong = run.source.gauge, run.wrong_fiducials
-    finding = _solved(run, parameters)
+    finding = _solved(run, parameters, partial(context.progress, 0, 1))
     numbers = np.union1d(gauge.ids[wrong], gauge.ids[finding.wrong_fiducials])
     finding = replace(
         finding, wrong_fiducials=numbers, wrong_rings=recording.frames.frame[finding.wrong_rings]
@@ -117,11 +119,11 @@ def measure_gauge(
     return MeasuredRun(start, measured, source, posed.index, wrong)
 
 
-def _solved(run: MeasuredRun, parameters: GaugeParameters) -> Finding:
+def _solved(run: MeasuredRun, parameters: GaugeParameters, watch: Watch) -> Finding:
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
-            return solve(run.start, run.measured, run.source, run.posed, parameters)
+            return solve(run.start, run.measured, run.source, run.posed, parameters, watch)
     except np.linalg.LinAlgError as error:
         raise UnusableError("calibrate", f"the run does not determine the instrument ({error})") from error
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
@@ -55,14 +56,22 @@ def first_unknowns(
 
 
 def solve(
-    start: Unknowns, measured: Measurements, source: RingSource, posed: Int, parameters: GaugeParameters
+    start: Unknowns,
+    measured: Measurements,
+    source: RingSource,
+    posed: Int,
+    parameters: GaugeParameters,
+    watch: Watch = unwatched,
 ) -> Finding:
-    """Adjust with loose motion, learn from it, leave out what is outvoted, choose the sheet's model."""
-    loose = adjust(start, measured, parameters)
+    """Adjust with loose motion, learn from it, leave out what is outvoted, choose the sheet's model.
+
+    ``watch`` is called before every step of an adjustment.
+    """
+    loose = adjust(start, measured, parameters, watch)
     state = loose.state
     on_bore = source.on_bore(state.T_pc, state.probe, parameters)
     measured = replace(measured, rings=on_bore, smooth_sigma=third_difference_sigma(state.T_pc, posed))
-    smooth = adjust(state, measured, parameters)
+    smooth = adjust(state, measured, parameters, watch)
     rings, fiducials = wrong_rings(smooth, measured), wrong_fiducials(smooth)
     if len(rings) or len(fiducials):
         measured = replace(
@@ -70,8 +79,8 @@ def solve(
             rings=on_bore.select(~np.isin(on_bore.frame, rings)),
             edges=measured.edges.select(~np.isin(measured.edges.marker, fiducials)),
         )
-        smooth = adjust(smooth.state, measured, parameters)
-    solution, sheet, evidence = chosen(smooth, measured, parameters)
+        smooth = adjust(smooth.state, measured, parameters, watch)
+    solution, sheet, evidence = chosen(smooth, measured, parameters, watch)
     return Finding(solution, measured, sheet, evidence, fiducials, rings, on_bore.left_out)
 
 
@@ -90,7 +99,7 @@ def wrong_fiducials(solution: Solution) -> Int:
 
 
 def chosen(
-    plain: Solution, measured: Measurements, parameters: GaugeParameters
+    plain: Solution, measured: Measurements, parameters: GaugeParameters, watch: Watch = unwatched
 ) -> tuple[Solution, SheetModel, dict[SheetModel, float]]:
     """Return the solution with decentring and waviness if the data ask for them.
 
@@ -102,14 +111,15 @@ def chosen(
     asked, evidence, solutions = [], {}, {SheetModel.PLAIN: plain}
     count = len(np.unique(plain.rings.cluster))
     for model in (SheetModel.DECENTRED, SheetModel.WAVY):
-        solutions[model] = adjust(_extended(plain.state, model, parameters), measured, parameters)
+        solutions[model] = adjust(_extended(plain.state, model, parameters), measured, parameters, watch)
         drop = (cost - solutions[model].cost(edge_spread, ring_spread)) / alike
         evidence[model] = drop
         more = len(solutions[model].state.instrument) - len(plain.state.instrument)
         if drop > parameters.evidence + more * np.log(count):
             asked.append(model)
     if len(asked) == 2:
-        both = adjust(_extended(plain.state, SheetModel.DECENTRED_WAVY, parameters), measured, parameters)
+        start = _extended(plain.state, SheetModel.DECENTRED_WAVY, parameters)
+        both = adjust(start, measured, parameters, watch)
         return both, SheetModel.DECENTRED_WAVY, evidence
     model = asked[0] if asked else SheetModel.PLAIN
     return solutions[model], model, evidence

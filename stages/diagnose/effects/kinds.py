@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,10 +15,11 @@ from pipeline.physics.effect import Quantity
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 
 
+@dataclass(frozen=True)
 class Worded(EffectModel):
     """An effect whose statement is a sentence with its quantities put in."""
 
-    words: str
+    words: ClassVar[str]
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return the effect in a plain sentence with its size."""

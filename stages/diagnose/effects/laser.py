@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipeline.arrays import Float
@@ -160,6 +162,7 @@ class BeamDecentre(Directed):
         return cosine(points.azimuth_rad, amplitude)
 
 
+@dataclass(frozen=True)
 class SheetWaviness(EffectModel):
     """The sheet's rays rise and fall m times around the ring; the shape is m."""
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.arrays import Float, Int
+from pipeline.files.codec import NOT_STORED
 from pipeline.geometry.axis import to_pipe
+from pipeline.machine.stage import Progress, unheard
 from pipeline.physics.effect import Channel
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.effects.base import EffectModel, Shape
@@ -123,17 +125,18 @@ class FieldEvidence:
 
     Attributes
     ----------
-    run : FieldRun or None
-        None when rings and texture alone do not determine the motion.
     travel : TravelEvidence or None
         Motion against encoder, and lines in the motion.
     channel : ChannelEvidence
         Evidence of rings and texture together, with the travel's anomalies and all shortcomings.
+    run : FieldRun or None
+        None when rings and texture alone do not determine the motion. It is not stored with the evidence:
+        a stage of its own holds it.
     """
 
-    run: FieldRun | None
     travel: TravelEvidence | None
     channel: ChannelEvidence
+    run: FieldRun | None = field(default=None, metadata=NOT_STORED)
 
     def about(self, asked: Asked) -> Evidence | None:
         """Return the evidence about other effects or shapes; None without a motion."""
@@ -142,7 +145,9 @@ class FieldEvidence:
         return _evidence(self.run, asked, _slips(self.run, self.travel))
 
 
-def field_evidence(run: FieldRun, library: Mapping[str, EffectModel]) -> FieldEvidence:
+def field_evidence(
+    run: FieldRun, library: Mapping[str, EffectModel], progress: Progress = unheard
+) -> FieldEvidence:
     """Return what a field recording says of every effect whose columns it can have.
 
     Poses, landmarks, the pipe's radius, ovality and axis, errors of matching and the encoder's creep are
@@ -150,16 +155,16 @@ def field_evidence(run: FieldRun, library: Mapping[str, EffectModel]) -> FieldEv
     """
     travel = travel_of_run(run)
     asked, slips = asked_of(library, run, travel), _slips(run, travel)
+    progress(0, 1 + _STRETCHES)
     try:
         whole = _evidence(run, asked, slips)
     except np.linalg.LinAlgError:
-        return FieldEvidence(run, travel, nothing_said(run.recording, ""))
-    regimes = tuple(_regimes(run, asked, slips))
+        return FieldEvidence(travel, nothing_said(run.recording, ""), run)
+    regimes = tuple(_regimes(run, asked, slips, progress))
     missing = (*(travel.shortcomings if travel else ()), *shortcomings_of(run))
     anomalies = travel.anomalies if travel else ()
-    return FieldEvidence(
-        run, travel, ChannelEvidence("field", Channel.RING, whole, regimes, anomalies, missing)
-    )
+    channel = ChannelEvidence("field", Channel.RING, whole, regimes, anomalies, missing)
+    return FieldEvidence(travel, channel, run)
 
 
 def asked_of(
@@ -221,11 +226,12 @@ def _cells(distance_mm: Float, azimuth_rad: Float) -> Int:
     return np.asarray(100 * along + around)
 
 
-def _regimes(run: FieldRun, asked: Asked, slips: Int) -> Sequence[tuple[str, Evidence]]:
+def _regimes(run: FieldRun, asked: Asked, slips: Int, progress: Progress) -> Sequence[tuple[str, Evidence]]:
     """Return the evidence of stretches on their own; one that tells nothing is left out."""
     edges = np.linspace(0, len(run.measured.time_s), _STRETCHES + 1).round().astype(int)
     out = []
     for k in range(_STRETCHES):
+        progress(1 + k, 1 + _STRETCHES)
         first, end = int(edges[k]), int(edges[k + 1])
         if end - first < _LEAST_FRAMES:
             continue

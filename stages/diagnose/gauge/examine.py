@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from pipeline.arrays import Bool
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Progress, unheard
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.course import CourseKind
 from stages.calibrate.gauge.calibrate import MeasuredRun
@@ -37,6 +39,8 @@ _IN_TIME = MappingProxyType({
     CourseKind.EXPONENTIAL: "drift", CourseKind.SINUSOID: "periodic", CourseKind.SPEED: "speed",
     CourseKind.REVERSAL: "reversal", CourseKind.DISTANCE: "static",
 })  # fmt: skip
+# Of an examination: preparation, search, judgement of what was found.
+_PARTS = 3
 # A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
@@ -162,7 +166,7 @@ class Examined:
 
 def examine(
     run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe, without: Collection[str] = (),
-    courses: tuple[CourseKind, ...] = SEARCHED,
+    courses: tuple[CourseKind, ...] = SEARCHED, progress: Progress = unheard,
 ) -> Examined:  # fmt: skip
     """Search a gauge run for left-out effects, each law also with each of ``courses``.
 
@@ -178,13 +182,14 @@ def examine(
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
-            measurements, start = prepare(run)
+            measurements, start = prepare(run, partial(progress, 0, _PARTS))
             nothing = fit(measurements, start, ())
             about, shapes = ability(measurements, nothing, library)
             table = feasibility(about, shapes, library, stated)
             groups = inseparable(table, about, shapes, library, stated)
             coursed = with_courses(library, courses)
-            searched = search(measurements, nothing, coursed, stated)
+            searched = search(_watched(measurements, 1, progress), nothing, coursed, stated)
+            searched = replace(searched, run=_watched(searched.run, 2, progress))
             # Effects that the library lacks move rings and fiducials as well.
             beyond = patterns_p(searched.run, searched.nothing, stated)
             seen = Examined(searched, None, (), table, groups, patterns_p=beyond)
@@ -194,6 +199,11 @@ def examine(
             return replace(judged, unsplit=(*judged.unsplit, *_untested(judged, without)))
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
+
+
+def _watched(run: GaugeRun, done: int, progress: Progress) -> GaugeRun:
+    """Return the run for the part of the examination after so many others."""
+    return replace(run, watch=partial(progress, done, _PARTS))
 
 
 def _untested(judged: Examined, without: Collection[str]) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -45,19 +46,28 @@ class Fit:
 
     Attributes
     ----------
+    run : GaugeRun
     state : Unknowns
     terms : tuple of Term
     cost : float
         Weighted sum of squares, priors of the stated instrument included.
-    linearised : Linearised
-    reduced : Reduced
     """
 
+    run: GaugeRun
     state: Unknowns
     terms: tuple[Term, ...]
     cost: float
-    linearised: Linearised
-    reduced: Reduced
+
+    @cached_property
+    def linearised(self) -> Linearised:
+        """The run's equations there."""
+        return linearise(self.run, self.state, self.terms, ())
+
+    @cached_property
+    def reduced(self) -> Reduced:
+        """The equations with the poses eliminated."""
+        at = self.linearised
+        return eliminate_poses(at.equations, at.motion, len(self.state.T_pc))
 
 
 def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int = _ITERATIONS) -> Fit:
@@ -192,11 +202,12 @@ def own_parameters(state: Unknowns) -> Unknowns:
 
 
 def _at(run: GaugeRun, state: Unknowns, terms: tuple[Term, ...]) -> Fit:
-    linearised = linearise(run, state, terms, ())
-    reduced = eliminate_poses(linearised.equations, linearised.motion, len(state.T_pc))
+    found = Fit(run, state, terms, np.nan)
     _, pull, value = _prior(state, terms, run)
     # The poses' own step is part of the cost; what is left of the globals' step is below _CONVERGED.
-    return Fit(state, terms, reduced.misfit + float(value @ pull), linearised, reduced)
+    made = replace(found, cost=found.reduced.misfit + float(value @ pull))
+    vars(made).update(linearised=found.linearised, reduced=found.reduced)  # not computed twice
+    return made
 
 
 def _prior(state: Unknowns, terms: Sequence[Term], run: GaugeRun) -> tuple[Float, Float, Float]:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.arrays import Float, Int
+from pipeline.files.codec import NOT_STORED
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
@@ -61,6 +63,8 @@ class GaugeRun:
         1 σ of the poses' third differences.
     edge_weight, ring_weight : (E,), (R,)
         Fixed, so that hypotheses are compared on the same measurements.
+    watch : Watch
+        Called at every linearisation; it is no part of the measurements and is not stored.
     """
 
     edges: Edges
@@ -72,6 +76,7 @@ class GaugeRun:
     motion_sigma: Float
     edge_weight: Float
     ring_weight: Float
+    watch: Watch = field(default=unwatched, repr=False, compare=False, metadata=NOT_STORED)
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,7 @@ def linearise(
     with_baseline: bool = False,
 ) -> Linearised:  # fmt: skip
     """Return the equations with columns for globals, terms, the effects asked about, and the baseline."""
+    run.watch()
     edges, edge_at = _without_edge_shift(run, state, terms)
     rings, ring_at = _without_ring_shift(run, state, terms)
     residual = _off_bore(state, rings)

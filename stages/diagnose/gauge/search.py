@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.adjust import adjust
@@ -53,7 +54,7 @@ _FREE = GaugeParameters.model_validate(
 )
 
 
-def prepare(measured_run: MeasuredRun) -> tuple[GaugeRun, Unknowns]:
+def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeRun, Unknowns]:
     """Return the run's measurements, and poses by an instrument free to follow whatever is there.
 
     Rings before the first frame with fiducials and after the last do not count: a ring alone does not tell
@@ -61,16 +62,16 @@ def prepare(measured_run: MeasuredRun) -> tuple[GaugeRun, Unknowns]:
     """
     measured, source, posed = measured_run.measured, measured_run.source, measured_run.posed
     measured = replace(measured, rings=_between(measured.rings, posed))
-    loose = adjust(_freed(measured_run.start), measured, _FREE).state
+    loose = adjust(_freed(measured_run.start), measured, _FREE, watch).state
     rings = _between(source.on_bore(loose.T_pc, loose.probe, _FREE), posed)
     sigma = third_difference_sigma(loose.T_pc, posed)
-    smooth = adjust(loose, replace(measured, rings=rings, smooth_sigma=sigma), _FREE).state
+    smooth = adjust(loose, replace(measured, rings=rings, smooth_sigma=sigma), _FREE, watch).state
     rings = _between(source.on_bore(smooth.T_pc, smooth.probe, _FREE), posed)
     run = GaugeRun(
         measured.edges, rings, bin_widths(source.rings, source.index, rings),
         measured.time_s, measured.encoder,
         max(measured.bore_sigma_mm, 1e-3), _LOOSER * sigma,
-        measured.edges.sigma_px**-2, np.ones(len(rings.frame)),
+        measured.edges.sigma_px**-2, np.ones(len(rings.frame)), watch,
     )  # fmt: skip
     return weighed(run, smooth, ()), stated_start(smooth)
 

@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from pipeline.adjustment.bordered import Factor, Step
-from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, minimise
+from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, Watch, minimise, unwatched
 from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float
 from pipeline.errors import UnusableError
@@ -51,8 +51,12 @@ class Estimate:
         return self.adjusted.state
 
 
-def estimate_state(start: State, measured: Measurements, parameters: MotionParameters) -> Estimate:
+def estimate_state(
+    start: State, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
+) -> Estimate:
     """Adjust with loose motion first, estimate from it how smooth the motion is, then adjust again.
+
+    ``watch`` is called before every step.
 
     Raises
     ------
@@ -60,16 +64,23 @@ def estimate_state(start: State, measured: Measurements, parameters: MotionParam
         When the motion is not determined.
     """
     with _refusing_undetermined():
-        loose = adjust(start, measured, parameters, ROUGHLY).state
+        loose = adjust(start, measured, parameters, ROUGHLY, watch).state
         sigma = third_difference_sigma(loose.T_pc, measured.tracks.poses.frames)
-        smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY)
+        smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         return Estimate(smooth, smooth.equations.factor(), sigma)
 
 
 def estimate_with_shared(
-    state: State, measured: Measurements, shared: Float, smooth_sigma: Float, parameters: MotionParameters
+    state: State,
+    measured: Measurements,
+    shared: Float,
+    smooth_sigma: Float,
+    parameters: MotionParameters,
+    watch: Watch = unwatched,
 ) -> Estimate:
     """Adjust from a window's own optimum with the shared parameters (S,) held.
+
+    ``watch`` is called before every step.
 
     Raises
     ------
@@ -78,11 +89,17 @@ def estimate_with_shared(
     """
     held = replace(measured, smooth_sigma=smooth_sigma, shared=shared)
     with _refusing_undetermined():
-        found = adjust(state.with_shared(shared), held, parameters, CLOSELY)
+        found = adjust(state.with_shared(shared), held, parameters, CLOSELY, watch)
         return Estimate(found, found.equations.factor(), smooth_sigma)
 
 
-def adjust(state: State, measured: Measurements, parameters: MotionParameters, enough: float) -> Adjusted:
+def adjust(
+    state: State,
+    measured: Measurements,
+    parameters: MotionParameters,
+    enough: float,
+    watch: Watch = unwatched,
+) -> Adjusted:
     """Minimise the robust cost of all residuals, until a step promises less than the share ``enough`` of it.
 
     Raises
@@ -102,7 +119,7 @@ def adjust(state: State, measured: Measurements, parameters: MotionParameters, e
         return rescaled(equations, measured.tracks, scales), scales
 
     stop = Stop(parameters.iterations, enough, _ONE_SIGMA)
-    return minimise(state, equations_at, moved, with_new_scales, stop)
+    return minimise(state, equations_at, moved, with_new_scales, stop, watch)
 
 
 @contextmanager

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
@@ -159,22 +161,24 @@ def adjust_run(
     """
     windows = cut_windows(len(run.time_s), parameters.window_frames, parameters.overlap_frames)
     if len(windows) == 1:
-        estimate, measured = _adjusted(run, windows[0], parameters)
+        estimate, measured = _adjusted(run, windows[0], parameters, partial(progress, 0, 1))
         check(estimate)
         return _run_estimate(joined_at_once(estimate), [_End.of(estimate, measured)])
     alone: list[_Alone] = []
-    for window in windows:
-        alone.append(_adjusted_alone(run, window, parameters, check))
-        progress(len(alone), 2 * len(windows))
+    for k, window in enumerate(windows):
+        watch = partial(progress, k, 2 * len(windows))
+        alone.append(_adjusted_alone(run, window, parameters, check, watch))
     measured = run.measured(windows[-1], parameters)
     shared = fuse_shared([a.told for a in alone], _new_shares(windows), measured, alone[-1].state)
     found: list[tuple[Submap, _End]] = []
     for k, own in enumerate(alone):
         measured = run.measured(windows[k], parameters)
-        estimate = estimate_with_shared(own.state, measured, shared.value, own.smooth_sigma, parameters)
+        watch = partial(progress, len(windows) + k, 2 * len(windows))
+        estimate = estimate_with_shared(
+            own.state, measured, shared.value, own.smooth_sigma, parameters, watch
+        )
         check(estimate)
         found.append((_submap(estimate, windows, k), _End.of(estimate, measured)))
-        progress(len(windows) + len(found), 2 * len(windows))
     return _run_estimate(join_submaps([f[0] for f in found], shared), [f[1] for f in found])
 
 
@@ -192,16 +196,20 @@ def _run_estimate(joined: JoinedRun, ends: Sequence[_End]) -> RunEstimate:
 
 
 def _adjusted(
-    run: MeasuredRun, window: Window, parameters: MotionParameters
+    run: MeasuredRun, window: Window, parameters: MotionParameters, watch: Watch
 ) -> tuple[Estimate, Measurements]:
     measured = run.measured(window, parameters)
-    return estimate_state(run.start(window, measured, parameters), measured, parameters), measured
+    return estimate_state(run.start(window, measured, parameters), measured, parameters, watch), measured
 
 
 def _adjusted_alone(
-    run: MeasuredRun, window: Window, parameters: MotionParameters, check: Callable[[Estimate], None]
+    run: MeasuredRun,
+    window: Window,
+    parameters: MotionParameters,
+    check: Callable[[Estimate], None],
+    watch: Watch,
 ) -> _Alone:
-    estimate, measured = _adjusted(run, window, parameters)
+    estimate, measured = _adjusted(run, window, parameters, watch)
     check(estimate)
     return _Alone(estimate.state, estimate.smooth_sigma, shared_information(estimate, measured))
 
