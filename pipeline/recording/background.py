@@ -13,7 +13,7 @@ Coming = Future[tuple[int, Item] | None]
 
 
 def in_background(items: Pairs[Item], ahead: int) -> Pairs[Item]:
-    """Return ``items`` in order, of which one thread makes up to ``ahead`` before they are asked for.
+    """Return ``items`` in order; one thread makes up to ``ahead`` of them before they are asked for.
 
     It starts at once. What making an item raises is raised in the item's place.
     """

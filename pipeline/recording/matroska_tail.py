@@ -20,17 +20,17 @@ _AT_ONCE = 1 << 20
 
 @dataclass(frozen=True)
 class MatroskaTail:
-    """A Matroska file of whose head it is known where it ends."""
+    """A Matroska file whose head ends at a known byte."""
 
     path: Path
     head_bytes: int
 
     def since(self, cluster: int) -> HeadAndTail:
-        """Return the file's head and all from a cluster on that begins at byte ``cluster``."""
+        """Return the file's head, and everything from byte ``cluster`` on, at which a cluster begins."""
         return HeadAndTail(self, cluster)
 
     def place_of(self, place: int, cluster: int) -> int:
-        """Return where in the file a byte lies that is at ``place`` of `since` a cluster."""
+        """Return the place in the file of a byte that `since` gives at ``place``."""
         return place - self.head_bytes + cluster
 
     def last_cluster(self, after: int) -> int:

@@ -1,7 +1,12 @@
-"""What a video file lists without being decoded, and which frames damage reaches."""
+"""What a video file lists without being decoded, and which frames damage reaches.
+
+Coded pictures tell by themselves whether others are predicted from them (H.264), and by checksums whether
+they are whole (FFV1).
+"""
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -11,7 +16,11 @@ import av
 import numpy as np
 
 from pipeline.arrays import Bool, Int
-from pipeline.recording.codec_headers import checksums_hold, is_reference, length_bytes
+
+_SLICES = (1, 2, 3, 4, 5)
+_LENGTH_PREFIXED = 1
+_FOOTER_BYTES = 8
+_MIRRORED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 
 
 @dataclass(frozen=True)
@@ -47,12 +56,12 @@ class VideoIndex:
 
     @property
     def intra(self) -> bool:
-        """Whether every frame stands for itself."""
+        """Whether every frame is coded without reference to others."""
         return self.timed and self.keyframes.size == self.pts.size
 
     @cached_property
     def settled(self) -> Int:
-        """(N,) Number of the last shown among each frame and those coded before it."""
+        """(N,) Highest number among each frame and all frames that are coded before it."""
         return np.asarray(np.maximum.accumulate(np.argsort(self.coded))[self.coded])
 
     @cached_property
@@ -75,7 +84,7 @@ class VideoIndex:
         return any(key <= d and self.coded[d] <= place for d in damaged)
 
     def with_gaps(self, gaps: Int) -> VideoIndex:
-        """Return the index, knowing that frames are missing from the file right before frames ``gaps``.
+        """Return the index of a file from which frames are missing right before the frames ``gaps``.
 
         The missing ones may be part of the prediction of those shown after them, and of those shown before
         them by no more than the reordering, up to the next keyframe.
@@ -138,8 +147,18 @@ def index_of(
 class Packet(NamedTuple):
     """A coded frame.
 
-    Its time, can decoding begin there, does its checksum hold, do others refer to it, and its first byte in
-    what was read; −1 where that is not known.
+    Attributes
+    ----------
+    pts
+        Time of presentation, in the stream's unit.
+    key
+        Whether decoding can begin there.
+    sound
+        Whether its checksum holds.
+    reference
+        Whether others may be predicted from it.
+    place
+        Its first byte in what was read; −1 where that is not known.
     """
 
     pts: int | None
@@ -147,3 +166,42 @@ class Packet(NamedTuple):
     sound: bool
     reference: bool
     place: int
+
+
+def checksums_hold(packet: bytes) -> bool:
+    """Tell whether a coded frame is a row of slices whose checksums are right.
+
+    Each slice ends with its length (3 bytes), a status (1) and what makes the CRC of the whole slice 0 (4).
+    Frames coded without checksums do not pass either.
+    """
+    end = len(packet)
+    while end >= _FOOTER_BYTES:
+        length = int.from_bytes(packet[end - 8 : end - 5], "big") + _FOOTER_BYTES
+        if length > end or _remainder(packet[end - length : end]):
+            return False
+        end -= length
+    return end == 0 and len(packet) > 0
+
+
+def _remainder(data: bytes) -> int:
+    """Return the CRC-32 of RFC 9043, which takes bits the other way round than zlib and starts from 0."""
+    return zlib.crc32(data.translate(_MIRRORED), 0xFFFFFFFF) ^ 0xFFFFFFFF
+
+
+def length_bytes(extradata: bytes | None) -> int:
+    """Return how many bytes the length before each unit takes (ISO/IEC 14496-15); 0 where there is none."""
+    if not extradata or len(extradata) < 5 or extradata[0] != _LENGTH_PREFIXED:
+        return 0
+    return (extradata[4] & 3) + 1
+
+
+def is_reference(packet: bytes, length_size: int) -> bool:
+    """Tell whether others may be predicted from a coded picture, by its first slice; True where unknown."""
+    at = 0
+    while length_size and at + length_size < len(packet):
+        length = int.from_bytes(packet[at : at + length_size], "big")
+        header = packet[at + length_size]
+        if header & 31 in _SLICES:
+            return header >> 5 & 3 != 0
+        at += length_size + length
+    return True

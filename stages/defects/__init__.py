@@ -28,9 +28,8 @@ from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from stages.defects.clean import clean_wall
-from stages.defects.clutter import NO_CLUTTER, Clutter, clutter_of
 from stages.defects.corroborate import Evidence, evidence_for
-from stages.defects.credibility import COUNTED, Credibility, credibility_of
+from stages.defects.credibility import COUNTED, NO_CLUTTER, Clutter, Credibility, clutter_of, credibility_of
 from stages.defects.depth import allowed_by_neighbours, measure_depth
 from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, detect

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.artefacts.measured import PointCloud
 from stages.defects import _is_measured
-from stages.defects.bell import fit_bell
+from stages.defects.depth import fit_bell
 from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief, Typical
 from stages.defects.segment import Region

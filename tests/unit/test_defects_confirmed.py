@@ -7,9 +7,8 @@ import pytest
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
-from stages.defects.clutter import Clutter, clutter_of
 from stages.defects.corroborate import Evidence
-from stages.defects.credibility import credibility_of
+from stages.defects.credibility import Clutter, clutter_of, credibility_of
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
