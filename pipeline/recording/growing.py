@@ -93,7 +93,7 @@ class _Lines:
     head: bytes = b""
 
     def new(self, file: Path, least: int) -> tuple[str, _Lines]:
-        """Return the first line and the new ones (none where fewer than ``least``), and how far it is read now."""
+        """Return the first line and the new ones, none where fewer than ``least``, and where they end."""
         inode = _same(file, self.inode, self.read_bytes)
         with file.open("rb") as stream:
             stream.seek(self.read_bytes)
