@@ -70,13 +70,13 @@ class MotionParameters(Parameters):
     most_observations: int = Field(
         16, ge=3, le=1000, description="most observations of one landmark that enter the adjustment"
     )
-    # Against a probe calibrated on a gauge, matches of open-1-field err by up to 0.05 px, of its copy at
-    # crf 30 by up to 0.2 px. One figure for all recordings; it should be estimated from each.
+    # Against a probe calibrated on a gauge, matches of open-1-field err by up to 0.05 px. Where matches of a
+    # recording disagree by more, more of it is taken to be shared (`with_shared_error`).
     match_bias_px: float = Field(
         0.1,
         gt=0,
         le=2,
-        description="1 σ, px, of the radial error that all texture matches near one polar angle may share",
+        description="least 1 σ, px, of the radial error that matches near one polar angle share",
     )
     turn_sigma_rad: float = Field(
         0.1, gt=0, le=1, description="1 σ, rad, of a turn from frame to frame where no texture shows it"

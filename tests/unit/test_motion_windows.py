@@ -14,7 +14,7 @@ from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, t
 from pipeline.machine.scratch import Scratch
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import ObservationStore
-from stages.motion.windows.sliding_window import RunEstimate, adjust_run
+from stages.motion.windows.sliding_window import RunEstimate, adjust_run, with_shared_error
 from stages.motion.windows.submap_joining import JoinedRun, join_submaps
 from stages.motion.windows.submaps import (
     SharedInformation,
@@ -211,3 +211,10 @@ def test_tracks_come_back_from_the_disk_thinned_and_cut() -> None:
     part = store.between(0, 12)
     assert set(part["landmark"]) == {0}
     assert part["frame"].max() < 12
+
+
+def test_matches_share_more_of_their_error_where_they_disagree_by_more() -> None:
+    usual = MotionParameters()
+    assert with_shared_error(usual, 0.14) is usual
+    assert with_shared_error(usual, 0.6).match_bias_px == pytest.approx(0.2)
+    MotionParameters.model_validate(with_shared_error(usual, 50.0).model_dump())
