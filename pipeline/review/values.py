@@ -46,6 +46,10 @@ class Values:
         columns = part[1] if isinstance(part, tuple) else slice(None)
         return np.asarray(self.cells[part] - self.less[columns], np.float32)
 
+    def levels(self, limits: Limits) -> Byte:
+        """Return the level (S, A) of every cell between limits."""
+        return np.concatenate([limits.levels(self[a : a + _ROWS]) for a in range(0, len(self), _ROWS)])
+
     def range_mm(self) -> tuple[float, float]:
         """Return the smallest and the largest value; 0 where nothing was measured."""
         parts = [self[a : a + _ROWS] for a in range(0, len(self), _ROWS)]

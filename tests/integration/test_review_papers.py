@@ -24,6 +24,7 @@ from pipeline.pages import notation
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.replay import Finding
 from pipeline.review.papers.exchange import EN_COLUMNS, EN_HEADER, PACP_COLUMNS, POF_COLUMNS
+from pipeline.review.papers.pictures import canvas_of
 from pipeline.review.papers.report import PAPERS, paper_of
 from pipeline.review.review import Review, open_review
 from pipeline.review.run_files import RunFiles, measured_findings
@@ -307,6 +308,13 @@ def test_the_pdf_keeps_the_rules_of_pdf_a(papers: dict[str, bytes]) -> None:
     }
     for clause, other in spoiled.items():
         assert any(clause in fault for fault in pdfa_faults(other)), f"the control: {clause}"
+
+
+def test_the_colours_of_a_finding_s_picture_hold_its_depth(review: Review) -> None:
+    canvas = canvas_of(review.files)
+    deepest = max(abs(f.size.depth_mm) for f in standing(review))
+    assert canvas.limits.high_mm == -canvas.limits.low_mm
+    assert canvas.limits.high_mm >= 0.9 * deepest, "a depth is read from points, colours from cells' means"
 
 
 def test_the_whole_wall_and_every_finding_that_stands_have_their_picture(papers: dict[str, bytes]) -> None:

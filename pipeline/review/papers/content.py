@@ -179,5 +179,5 @@ def _signature(signed: bool, signature: Any) -> str:
     if not signed:
         return f"Not signed. Changed since {signature.name} signed."
     standard = f", standard applied: {signature.standard}" if signature.standard else ""
-    remarks = f" {signature.remarks}" if signature.remarks else ""
+    remarks = f" Remarks: {signature.remarks}" if signature.remarks else ""
     return f"Signed by {signature.name}, {notation.moment(signature.at)}{standard}.{remarks}"

@@ -6,7 +6,7 @@ Distance runs to the right and the clock downward, as in every flat picture of b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,11 +22,14 @@ from pipeline.pages import notation
 from pipeline.pages.figure import rendered, tidy
 from pipeline.review.decisions.replay import Finding, Outline
 from pipeline.review.run_files import RunFiles
+from pipeline.review.values import Limits, full_range_mm, values_of
 
 # Pixels of the whole wall, and of one side of a picture about a finding: sharp in print at their size.
 _MAP_PX, _CROP_PX = 600_000, 300
 _LEAST_HALF_MM = 8.0
 _EXAGGERATION = 20.0
+# The end colours mean at least this, or noise would be alarming; the page has the same.
+_LEAST_RANGE_MM = 0.25
 _INK, _SOFT, _BLUE, _ORANGE = "#16202b", "#6b7682", "#0a5ea8", "#b34700"
 _MOST_NUMBERED = 40
 
@@ -38,6 +41,7 @@ class Canvas:
     photo: FlatImage
     deviation: FlatImage
     legend: Overlay
+    limits: Limits
     wall: WallMap
     overlays: Overlays
 
@@ -51,7 +55,7 @@ class Canvas:
         seen = self.wall.distance_mm[np.isfinite(self.wall.radius_mm).any(1)]
         strips = windows(float(seen[0]), float(seen[-1]), self.radius_mm, _MAP_PX)
         shape = strips[0].height_px / strips[0].width_px
-        figure = Figure(figsize=(7.0, min(7.0 * shape, 4.2) * len(strips) + 0.5), layout="constrained")
+        figure = Figure(figsize=(7.0, min(7.0 * shape, 3.3) * len(strips) + 0.5), layout="constrained")
         for axes, window in zip(figure.subplots(len(strips), 1, squeeze=False)[:, 0], strips, strict=True):
             _show(axes, self.photo, window)
             _clock_axis(axes)
@@ -79,11 +83,12 @@ class Canvas:
         return rendered(figure, "svg")
 
     def _legend(self, axes: Axes) -> None:
-        """Draw the colour bar of the deviations, its ends in mm, below their picture."""
+        """Draw the colour bar of the deviations below their picture; its ends hold every measured value."""
         bar = axes.inset_axes((0.0, -0.14, 1.0, 0.07))
         bar.imshow(self.legend.palette_bgr[None, 1:, ::-1], aspect="auto", extent=(0, 1, 0, 1))
-        ends = [f"{v:.2g} mm".replace("-", "−") for v in (self.legend.low_mm, self.legend.high_mm)]
-        bar.set_xticks([0, 1], ends, fontsize=6)
+        ends = (self.limits.low_mm, self.limits.high_mm)
+        told = [f"{abs(v):.2f} mm {notation.direction(v)}" for v in ends]
+        bar.set_xticks([0, 1], told, fontsize=6)
         bar.set_yticks([])
 
     def _section(self, axes: Axes, distance_mm: float, azimuth_rad: float) -> None:
@@ -108,7 +113,7 @@ class Canvas:
         axes.set_title(f"Section at {distance_mm:.1f} mm", fontsize=8)
 
     def _depth(self, axes: Axes, distance_mm: float, azimuth_rad: float, half_mm: float) -> None:
-        """Draw the deviation from the fitted pipe along and around through the peak, inward negative."""
+        """Draw the depth along and around through the peak: deep downward, inward upward, as on the page."""
         wall, fitted = self.wall, self.overlays.reference_radius_mm
         row, column = wall.row(distance_mm), wall.column(azimuth_rad)
         rows = wall.rows(distance_mm - half_mm, distance_mm + half_mm)
@@ -122,8 +127,10 @@ class Canvas:
                   label="around")  # fmt: skip
         axes.axhline(0, color=_SOFT, lw=0.6)
         axes.set_xlabel("mm from the peak", fontsize=7)
-        axes.set_title("Deviation, mm (inward < 0)", fontsize=8)
+        axes.set_title("Depth, mm: deep downward", fontsize=8)
         axes.tick_params(labelsize=6)
+        axes.invert_yaxis()
+        axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}" if abs(value) > 1e-9 else "0")
         tidy(axes)
         axes.legend(fontsize=6, frameon=False)
 
@@ -138,9 +145,12 @@ def canvas_of(files: RunFiles) -> Canvas:
     """
     overlays = files.artefact(Overlays)
     shown = overlays.pictures[0]
+    reach = max(*np.abs(full_range_mm(files, shown.name)), _LEAST_RANGE_MM)
+    limits = Limits(-reach, reach)
+    level = values_of(files, shown.name).levels(limits)
     return Canvas(
-        photo(files.artefact(WallTexture)), overlay_image(overlays, shown), shown,
-        files.artefact(Wall).radius_map, overlays,
+        photo(files.artefact(WallTexture)), replace(overlay_image(overlays, shown), stored=level), shown,
+        limits, files.artefact(Wall).radius_map, overlays,
     )  # fmt: skip
 
 

@@ -150,6 +150,7 @@ export class ModelView {
       if (this.isPlain) this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     } catch {
       this.told.textContent = "This browser shows no 3D (WebGL is off). Everything else works.";
+      this.root.classList.add("blank");
       return;
     }
     this.renderer.localClippingEnabled = true;
