@@ -123,6 +123,9 @@ def run(
     ] = None,
     config: _ConfigFile = None,
     assignments: _Assignments = None,
+    twin: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Keep the dirt out of the photo that this twin found.")
+    ] = None,
     from_stage: Annotated[
         str, typer.Option("--from", metavar="STAGE", help="Compute this stage and all after it again.")
     ] = "",
@@ -142,13 +145,13 @@ def run(
     from rich.console import Console
 
     from pipeline.api.job import run_job
-    from pipeline.api.run import configuration, prepare
+    from pipeline.api.run import configuration, dirt_of, prepare
     from pipeline.machine.display import ProgressDisplay
     from pipeline.machine.plan import Selection
 
     gc.freeze()  # what was imported stays: looking for garbage in it takes a fiftieth of a run
     console = Console(stderr=True)
-    parameters = configuration(config, assignments or ())
+    parameters = configuration(config, [*dirt_of(twin), *(assignments or ())])
     if follow:
         from pipeline.commands.follow import follow as follow_recording
 

@@ -85,7 +85,7 @@ def twin_job(
         probe = diagnosis / "probe.yaml"
         if not probe.is_file():
             raise InputError(diagnosis, "holds no probe.yaml", expected="the folder of boresight diagnose")
-        tried = try_diagnosis(diagnosis, output / "gauge", display)
+        tried = try_diagnosis(diagnosis, output, display)
     earlier = {s.name: record.configuration[s.name] for s in _MEASURED if s.name in record.configuration}
     stages = (*_MEASURED, PHOTOMETRY, TWIN)
     configuration = resolve(stages, None, settings, earlier, run / "run.json")

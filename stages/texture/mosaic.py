@@ -18,7 +18,7 @@ from stages.texture.grid import FlatGrid
 from stages.texture.photometry import Light
 from stages.texture.project import project_tile
 from stages.texture.surface import SurfacePatch, WallSurface
-from stages.texture.views import LitViews, TileViews
+from stages.texture.views import ImagePlaces, LitViews, TileViews
 
 
 @dataclass(frozen=True)
@@ -56,10 +56,12 @@ class Mosaic:
         tiles: range,
         light: Light,
         laser_band_mm: float,
+        left_out: ImagePlaces,
         picture: Blended,
     ) -> None:
         self._grid, self._surface, self._probe = grid, surface, probe
         self._views, self._plan, self._light, self._band = views, plan, light, laser_band_mm
+        self._left_out = left_out
         self._tiles = grid.tiles()
         self._tiles_of: dict[int, list[int]] = defaultdict(list)
         for tile in tiles:
@@ -91,7 +93,7 @@ class Mosaic:
             image,
             project_tile(
                 patch, self._views.T_cp[view], self._probe, self._light.field,
-                float(self._light.gain[view]), self._plan[tile].reach_mm, gap,
+                float(self._light.gain[view]), self._plan[tile].reach_mm, gap, self._left_out,
             ),
         )  # fmt: skip
 

@@ -13,7 +13,7 @@ from pipeline.instrument.probe import Probe
 from stages.texture.grid import NODE_PX
 from stages.texture.light import LightField
 from stages.texture.surface import SurfacePatch
-from stages.texture.views import sheet_distance_mm
+from stages.texture.views import ImagePlaces, clear_of, sheet_distance_mm
 
 _BORDER_PX = 3.0
 
@@ -35,6 +35,7 @@ def project_tile(
     gain: float,
     reach_mm: float,
     gap_mm: float,
+    left_out: ImagePlaces = (),
 ) -> TileProjection:
     """Project the nodes of a tile exactly and the pixels between them by linear interpolation.
 
@@ -48,6 +49,8 @@ def project_tile(
         Distance from the laser sheet at which the weight has fallen to nothing.
     gap_mm
         Half width of the band about the laser line that is not used; 0 where the laser was off.
+    left_out
+        Places of the image that are not used.
     """
     xyz_c = transform(T_cp, patch.xyz_p)
     uv, valid = probe.camera.project(xyz_c)
@@ -60,8 +63,11 @@ def project_tile(
     weight = _enlarge(worth * usable)
     if gap_mm > 0:
         weight = np.where(np.abs(_enlarge(from_sheet)) < gap_mm, np.float32(0), weight)
+    seen_at = _enlarge(np.where(valid[..., None], uv, -100.0))
+    if left_out:
+        weight = np.where(clear_of(left_out, seen_at), weight, np.float32(0))
     inverse = _enlarge(1 / np.maximum(brightness, 0.01))
-    return TileProjection(_enlarge(np.where(valid[..., None], uv, -100.0)), inverse, weight)
+    return TileProjection(seen_at, inverse, weight)
 
 
 def _quality(uv: Float, brightness: Float) -> Float:

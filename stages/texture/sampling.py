@@ -12,7 +12,7 @@ from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from stages.texture.light import irradiance
 from stages.texture.surface import WallSurface
-from stages.texture.views import LitViews, sheet_distance_mm
+from stages.texture.views import ImagePlaces, LitViews, clear_of, sheet_distance_mm
 
 _CELL_COLUMNS = 30
 _CELL_RADII = 0.05
@@ -45,10 +45,16 @@ class LightSampler:
     """Takes samples of the wall cells from one frame after another."""
 
     def __init__(
-        self, surface: WallSurface, probe: Probe, views: LitViews, reach_mm: float, laser_band_mm: float
+        self,
+        surface: WallSurface,
+        probe: Probe,
+        views: LitViews,
+        reach_mm: float,
+        laser_band_mm: float,
+        left_out: ImagePlaces = (),
     ) -> None:
         self._probe, self._views = probe, views
-        self._reach, self._band = reach_mm, laser_band_mm
+        self._reach, self._band, self._left_out = reach_mm, laser_band_mm, left_out
         radius = surface.mean_radius_mm
         first, last = surface.seen_mm
         self._cell_mm = _CELL_RADII * radius
@@ -70,10 +76,12 @@ class LightSampler:
         size = (image.shape[1] // _SHRINK, image.shape[0] // _SHRINK)
         small = cv2.resize(image, size, interpolation=cv2.INTER_AREA).mean(2, dtype=np.float32)
         scale = np.array(size) / np.array([image.shape[1], image.shape[0]])
-        uv = ((self._probe.camera.project(xyz_c).uv + 0.5) * scale - 0.5).astype(np.float32)
+        seen_at = self._probe.camera.project(xyz_c).uv
+        uv = ((seen_at + 0.5) * scale - 0.5).astype(np.float32)
         grey = cv2.remap(small, uv[..., 0], uv[..., 1], cv2.INTER_LINEAR)
         light = irradiance(self._probe.lighting, xyz_c, normal_c) / self._reference
         use = self._usable(view, xyz_c) & (grey > _DARK) & (grey < _BRIGHT) & (light > 0.01)
+        use &= clear_of(self._left_out, seen_at)
         cell = np.arange(rows.start * _CELL_COLUMNS, rows.stop * _CELL_COLUMNS).reshape(grey.shape)
         theta = np.arctan2(np.hypot(xyz_c[..., 0], xyz_c[..., 1]), xyz_c[..., 2])
         azimuth = np.arctan2(xyz_c[..., 1], xyz_c[..., 0])

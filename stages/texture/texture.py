@@ -49,6 +49,11 @@ class TextureParameters(Parameters):
         le=100000,
         description="frames whose light is worked out together; a longer pipe is cut in stretches of so many",
     )
+    left_out: tuple[tuple[float, float, float], ...] = Field(
+        (),
+        description="dirty places of the image that are not used: u, v and radius, px, of each; "
+        "boresight run --twin takes them from a twin",
+    )
     white_quantile: float = Field(
         0.9995, ge=0.5, le=1.0, description="quantile of the brightest colour that stays below 250 of 255"
     )
@@ -72,15 +77,16 @@ def photograph_wall(
     images = _Images(recording, views, sum(len(s.wanted) for s in stretches), context)
 
     ring = float(np.arctan2(surface.mean_radius_mm, probe.laser.baseline_mm))
-    sampler = LightSampler(surface, probe, views, reach, parameters.laser_band_mm)
+    sampler = LightSampler(surface, probe, views, reach, parameters.laser_band_mm, parameters.left_out)
     picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe, ring)
     for stretch in stretches:
         for view, image in images.read(stretch.wanted):
             sampler.add(view, image)
         light = lights.add(sampler.take(stretch.wanted), stretch.wanted, sampler.reference)
         mosaic = Mosaic(
-            grid, surface, probe, views, plan, stretch.tiles, light, parameters.laser_band_mm, picture
-        )
+            grid, surface, probe, views, plan, stretch.tiles, light, parameters.laser_band_mm,
+            parameters.left_out, picture,
+        )  # fmt: skip
         with ThreadPoolExecutor(context.workers) as pool:
             for view, image in images.read(stretch.wanted):
                 mosaic.add(view, image, pool)
