@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from pipeline.arrays import Byte, Float
 from pipeline.recording.base import Recording
@@ -60,17 +59,15 @@ def compared(
         What rings and fiducials of the gauge run say, and its recording.
     """
     try:
-        # More threads gain nothing on blocks this small, and stall when the machine is busy.
-        with threadpool_limits(1):
-            of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
-            linear = _beyond_probe(examined, correction)
-            if field is None:
-                return _gauge_alone(of_gauge) if of_gauge is not None else None
-            if of_gauge is not None and _of_own_clock(examined):
-                # What happens at a time of the gauge run need not happen in the field: the gauge's own
-                # held-out rings tell.
-                return _gauge_alone(of_gauge)
-            return _in_field(field, corrected or field, linear, examined, of_gauge)
+        of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
+        linear = _beyond_probe(examined, correction)
+        if field is None:
+            return _gauge_alone(of_gauge) if of_gauge is not None else None
+        if of_gauge is not None and _of_own_clock(examined):
+            # What happens at a time of the gauge run need not happen in the field: the gauge's own held-out
+            # rings tell.
+            return _gauge_alone(of_gauge)
+        return _in_field(field, corrected or field, linear, examined, of_gauge)
     except np.linalg.LinAlgError:
         return None
 

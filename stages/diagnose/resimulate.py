@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
@@ -92,9 +91,8 @@ def _resimulated(gauge: Recording, examined: Examined | None) -> Resimulated | N
     relaxed = replace(run, ring_weight=_RELAXED * quiet * run.ring_weight)
     nothing = tuple(replace(t, amplitude=0 * t.amplitude) for t in terms)
     try:
-        with threadpool_limits(1):
-            without, found = fit(relaxed, start, ()), fit(relaxed, start, nothing)
-            return _compared(gauge, run, frames, without, found)
+        without, found = fit(relaxed, start, ()), fit(relaxed, start, nothing)
+        return _compared(gauge, run, frames, without, found)
     except (np.linalg.LinAlgError, InputError):
         return None
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from pipeline.api.job import Job, result_of, run_job
 from pipeline.errors import Cancelled, InputError, UnusableError
@@ -234,6 +235,20 @@ def test_a_stage_is_given_none_for_what_no_stage_makes(
     run_job(job, Selection(), SilentDisplay())
     wanted = result_of(job, Total).total if weighed == "the total" else result_of(job, Drawn).values.sum()
     assert result_of(job, Weighed).value == wanted
+
+
+def count_threads(drawn: Drawn, *, parameters: Parameters, context: Context) -> Weighed:
+    threads = [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+    return Weighed(float(max(threads)))
+
+
+def test_linear_algebra_runs_on_one_thread_whatever_the_number_of_cores(tmp_path: Path) -> None:
+    stages = (DRAW, Stage("threads", "1", Parameters, count_threads))
+    job = replace(toy_job(tmp_path), stages=stages, exporters=(), configuration=resolve(stages))
+    with threadpool_limits(2, "blas"):
+        run_job(job, Selection(), SilentDisplay())
+        assert count_threads(None, parameters=Parameters(), context=None).value == 2, "given back"  # type: ignore[arg-type]
+    assert result_of(job, Weighed).value == 1
 
 
 def forked_job(folder: Path, left: Any, right: Any) -> Job:
