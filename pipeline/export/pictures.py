@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Common viewers and graphics cards refuse pictures with a side of more than 16384 px.
 _MOST_ROWS = 16384
+# Of PNG: of 9 levels the one above which noisy photos hardly shrink any more.
+_COMPRESSION = 3
 # Of an overlay's figure: dots per inch, mm of pipe per inch, the longest figure (12000 px at 120 dpi, which
 # viewers still open).
 _DPI, _MM_PER_INCH, _LONGEST_INCH = 120, 30.0, 100.0
@@ -76,7 +78,7 @@ def _shrunk_along(bgra: Byte, step: int) -> Byte:
 
 
 def _write_png(path: Path, bgra: Byte) -> None:
-    encoded, png = cv2.imencode(".png", bgra, [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    encoded, png = cv2.imencode(".png", bgra, [cv2.IMWRITE_PNG_COMPRESSION, _COMPRESSION])
     if not encoded:
         raise OSError(f"{path.name}: the picture cannot be encoded")
     path.write_bytes(png.tobytes())
@@ -92,7 +94,10 @@ def write_overlays(overlays: Overlays, folder: Path) -> None:
     """
     for overlay in overlays.pictures:
         figure = overlay_figure(overlays, overlay)
-        figure.savefig(folder / f"{overlay.name}.png", dpi=_DPI, metadata={"Software": "boresight"})
+        figure.savefig(
+            folder / f"{overlay.name}.png", dpi=_DPI, metadata={"Software": "boresight"},
+            pil_kwargs={"compress_level": _COMPRESSION},
+        )  # fmt: skip
 
 
 def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:

@@ -72,9 +72,9 @@ def joined(parts: Sequence[Flat]) -> Flat:
 
 def shrunk(flat: Flat, width_px: int, height_px: int, step: int) -> Flat:
     """Return pictures with the photo of a given size and every ``step``-th cell of the error colours."""
-    bgra = flat.bgra
-    alpha = bgra[..., 3:].astype(np.float32) / 255
-    both = np.dstack([bgra[..., :3] * alpha, alpha])
+    both = flat.bgra.astype(np.float32)
+    both[..., 3] /= 255
+    both[..., :3] *= both[..., 3:]
     small = cv2.resize(both, (max(width_px, 1), max(height_px, 1)), interpolation=cv2.INTER_AREA)
     colour = small[..., :3] / np.maximum(small[..., 3:], 1e-6)
     out = np.dstack([colour, np.where(small[..., 3:] > 0.5, 255, 0)])
