@@ -1,10 +1,13 @@
 """Hard footage made of an open recording, run and scored: one line of the table for each kind and seed.
 
 usage: python -m tests.benchmarks.bench_hard_footage OUT [KIND ...]
-           [--recording NAME] [--frames N] [--seeds N] [--probe FILE]
+           [--recording NAME] [--frames N] [--seeds N] [--probe FILE] [--spoil-answers]
 
 Without KIND all are made. What is there in OUT is kept: footage, run and score are made once. The footage of
 `SPOILT` is the shared `harder.py`'s; that of `OWN` is made here, so that nothing is fitted to the former.
+
+With `--spoil-answers` runs that are there are scored once more with a wall 0.3 mm too wide and findings moved
+by 30 mm: every figure must then be bad.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import json
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -147,20 +151,45 @@ def scored(footage: Path, run: Path, more: list[str]) -> dict[str, dict[str, flo
         command = [sys.executable, "-m", "pipeline.cli", "run", str(footage), "-o", str(run), *more]
         with run.with_suffix(".log").open("w", encoding="utf-8") as log:
             subprocess.run(command, check=True, stdout=log, stderr=subprocess.STDOUT)
-        score = [sys.executable, str(shared("score_run.py")), str(run), str(footage)]
-        kept.write_text(subprocess.run(score, check=True, capture_output=True, text=True).stdout, "utf-8")
+        kept.write_text(json.dumps(score_of(run, footage)), "utf-8")
     out: dict[str, dict[str, float]] = json.loads(kept.read_text("utf-8"))
+    return out
+
+
+def spoilt(footage: Path, run: Path) -> dict[str, dict[str, float]]:
+    """Score the run's answers when wall and findings are wrong."""
+    with tempfile.TemporaryDirectory() as folder:
+        wrong = Path(folder) / "run"
+        shutil.copytree(run, wrong, ignore=shutil.ignore_patterns(".boresight", "tileset", "*.glb", "*.ply"))
+        wall = dict(np.load(wrong / "radius_map.npz"))
+        wall["radius_mm"] = wall["radius_mm"] + 0.3
+        np.savez(wrong / "radius_map.npz", **wall)
+        found = json.loads((wrong / "defects.json").read_text("utf-8"))
+        for defect in found["defects"] if isinstance(found, dict) else found:
+            defect["distance_from_mm"] += 30
+            defect["distance_to_mm"] += 30
+        (wrong / "defects.json").write_text(json.dumps(found), "utf-8")
+        return score_of(wrong, footage)
+
+
+def score_of(run: Path, footage: Path) -> dict[str, dict[str, float]]:
+    score = [sys.executable, str(shared("score_run.py")), str(run), str(footage)]
+    out: dict[str, dict[str, float]] = json.loads(
+        subprocess.run(score, check=True, capture_output=True, text=True).stdout
+    )
     return out
 
 
 def line(name: str, score: dict[str, dict[str, float]], run: Path) -> str:
     wall, defects, apart = score["wall"], score["defects"], json.loads((run / "unconfirmed.json").read_text())
+    warned = json.loads((run / "run.json").read_text("utf-8"))["warnings"]
     return (
         f"{name:28s} random {wall['radius_mad_sigma_mm']:.3f} bias {wall['radius_bias_mm']:+.3f} mm, "
         f"inside 95 % {100 * wall['within_1.96_sigma']:.1f}, "
         f"axial {score['trajectory']['axial_end_error_percent']:+.2f} %, "
         f"missed {defects['missed']}, false {defects['unmatched']}, unconfirmed {len(apart)}, "
-        f"registration {score['texture']['registration_median_mm']:.3f} mm"
+        f"registration {score['texture']['registration_median_mm']:.3f} mm, "
+        f"warned by {', '.join(sorted({w.split(':')[0] for w in warned})) or 'none'}"
     )
 
 
@@ -172,6 +201,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=170)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--probe")
+    parser.add_argument("--spoil-answers", action="store_true")
     asked = parser.parse_args()
     more = ["--probe", asked.probe] if asked.probe else []
     asked.out.mkdir(parents=True, exist_ok=True)
@@ -181,7 +211,8 @@ def main() -> None:
             footage, run = asked.out / name, asked.out / f"{name}-run"
             if not footage.is_dir():
                 make(kind, shared("recordings", asked.recording), footage, asked.frames, seed)
-            print(line(name, scored(footage, run, more), run), flush=True)
+            score = scored(footage, run, more)
+            print(line(name, spoilt(footage, run) if asked.spoil_answers else score, run), flush=True)
 
 
 if __name__ == "__main__":
