@@ -66,18 +66,6 @@ def quaternion_from_rotation(rotation: Float) -> Float:
     return np.asarray(np.where(q[..., :1] < 0, -q, q))
 
 
-def rotation_from_quaternion(q: Float) -> Float:
-    """Return (..., 3, 3) rotations of quaternions (w, x, y, z), normalised first."""
-    q = np.asarray(q, float)
-    w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.asarray(np.stack([np.stack(r, -1) for r in rows], -2))
-
-
 def inverse(T_ba: Float) -> Float:
     """Return ``T_ab`` (..., 4, 4)."""
     rotation = np.swapaxes(T_ba[..., :3, :3], -1, -2)

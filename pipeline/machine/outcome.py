@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
+from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
+
 Artefact = TypeVar("Artefact")
 # Name of a number that is no number but words to be shown before all others.
 WARNING = "warning"
@@ -22,6 +24,13 @@ class State(StrEnum):
     UNUSABLE = "unusable"
     FAILED = "failed"
     CANCELLED = "cancelled"
+
+    @classmethod
+    def after(cls, error: BoresightError) -> State:
+        """Return how a stage stands that ended with an error."""
+        if isinstance(error, Cancelled):
+            return cls.CANCELLED
+        return cls.UNUSABLE if isinstance(error, UnusableError | InputError) else cls.FAILED
 
 
 def state_word(state: str) -> str:

@@ -92,6 +92,10 @@ class Plan:
         """Return the hash of every source by what it is: ``recording``, ``probe``; or ``gauge``, its role."""
         return {role_of(s.kind) or plain(s.kind).__name__.lower(): s.key for s in self.sources if s.key}
 
+    def key(self) -> str:
+        """Return the key of all results together."""
+        return hashlib.sha256("".join(s.key for s in self.steps).encode()).hexdigest()
+
     def keys(self) -> dict[type, str]:
         """Return the key of every source and result by its class."""
         return {s.kind: s.key for s in self.sources} | {s.output: s.key for s in self.steps}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import threading
 import time
@@ -12,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
+from pipeline.errors import BoresightError, Cancelled, InputError
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.display import Display
 from pipeline.machine.exporter import Exporter, Writer, published_key, withdraw
@@ -78,7 +77,7 @@ class Runner:
         self._display, self._logger, self._wish, self._workers = display, logger, wish, workers
         self._lent, self._at_once = lent, at_once
         self._keys = plan.keys() | {
-            Results: _key_of_all(plan),
+            Results: plan.key(),
             MadeBy: made_by.key if made_by is not None else "",
         }
         self._outcomes = {
@@ -111,7 +110,7 @@ class Runner:
                 self._publish_results(selection)
             return self._note(State.COMPLETED)
         except BoresightError as error:
-            self._end(_state_of(error), str(error))
+            self._end(State.after(error), str(error))
             raise
         except Exception as error:
             self._at = self._writer.failed or self._at
@@ -272,11 +271,8 @@ class Runner:
         for name, outcome in self._outcomes.items():
             if outcome.state == State.RUNNING:
                 own = name == self._at.removeprefix("stage ")
-                self._outcomes[name] = replace(
-                    outcome,
-                    state=state if own else State.CANCELLED,
-                    problem=problem if own else f"stopped with {self._at}",
-                )
+                how, why = (state, problem) if own else (State.CANCELLED, f"stopped with {self._at}")
+                self._outcomes[name] = replace(outcome, state=how, problem=why)
                 self._display.ended(self._outcomes[name])
         try:
             self._note(state, problem)
@@ -300,13 +296,3 @@ def _next(waiting: list[Step], running: Collection[Step], at_once: int) -> Step 
     if step is not None:
         waiting.remove(step)
     return step
-
-
-def _state_of(error: BoresightError) -> State:
-    if isinstance(error, Cancelled):
-        return State.CANCELLED
-    return State.UNUSABLE if isinstance(error, UnusableError | InputError) else State.FAILED
-
-
-def _key_of_all(plan: Plan) -> str:
-    return hashlib.sha256("".join(s.key for s in plan.steps).encode()).hexdigest()

@@ -116,11 +116,6 @@ class WallRelief:
         s, psi = self.radius_map.distance_mm, self.radius_map.azimuth_rad
         return float(s[1] - s[0]), float(psi[1] - psi[0]) * self.radius_mm
 
-    @property
-    def extent_mm(self) -> tuple[float, float]:
-        """Length and circumference of the wall."""
-        return self.shape[0] * self.cell_mm[0], self.shape[1] * self.cell_mm[1]
-
     def rows_in(self, length_mm: float) -> int:
         """Return how many rows reach over a length."""
         return int(np.ceil(length_mm / self.cell_mm[0]))

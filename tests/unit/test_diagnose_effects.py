@@ -10,16 +10,14 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
-from pipeline.physics.effect import Channel
 from stages.diagnose.effects.base import Travel
-from stages.diagnose.effects.generic import GENERIC, Moves, smooth_columns, smooth_texture_columns
+from stages.diagnose.effects.generic import GENERIC, Moves
 from stages.diagnose.effects.library import (
     LIBRARY,
     NOT_PREDICTED,
     columns,
     reading_columns,
     ring_shift_px,
-    shown_in,
     texture_columns,
     texture_shift_px,
     without,
@@ -235,11 +233,6 @@ def test_the_library_without_some_knows_the_others():
         without(["laser_tlit"])
 
 
-def test_effects_of_the_profile_can_be_left_to_the_profile():
-    positions = shown_in((Channel.RING, Channel.TEXTURE, Channel.MOTION), LIBRARY)
-    assert {"line_skew", "subsurface", "vignetting", "motion_blur"} == set(LIBRARY) - set(positions)
-
-
 def test_a_skewed_line_moves_rings_as_a_longer_baseline_does():
     points = line()
     skewed, longer = (columns(LIBRARY[name], points, ())[:, 0] for name in ("line_skew", "baseline"))
@@ -253,11 +246,17 @@ def test_vignetting_draws_the_line_inward_by_its_variance():
     assert shift == pytest.approx(-2.0 * sigma_px**2 * (50.8 / 22.0) / 360.0, rel=1e-6)
 
 
+def generic_columns(points, wanted, of_line):
+    """Columns of the generic terms of the line or of the image, constant and linear in time."""
+    terms = [term for term in GENERIC if (term.moves is Moves.LINE) is of_line]
+    return np.concatenate([wanted(t, points, s) for t in terms for s in t.shapes(0.0, 0.0)], axis=-1)
+
+
 def test_the_generic_basis_mimics_a_tilted_sheet_and_decoys_are_beyond_it():
     rings = [
         ring_points(plain_probe(), Bore(r), 90, time_s=t) for r, t in ((35.0, 1.0), (42.0, 4.0), (50.8, 9.0))
     ]
-    basis = np.concatenate([smooth_columns(ring) for ring in rings])
+    basis = np.concatenate([generic_columns(ring, columns, of_line=True) for ring in rings])
 
     def left(model):
         column = np.concatenate([columns(model, ring, shape_of(model)) for ring in rings])[:, 0]
@@ -272,7 +271,9 @@ def test_the_generic_basis_mimics_a_tilted_sheet_and_decoys_are_beyond_it():
 @pytest.mark.parametrize("name", ["principal_point", "focal_scale", "radial_distortion", "sensor_tilt"])
 def test_the_generic_basis_mimics_a_wrong_lens_on_texture(name):
     walls = [texture_points(plain_probe(), Bore(42.0), ahead) for ahead in (10.0, 25.0, 45.0, 80.0)]
-    basis = np.concatenate([smooth_texture_columns(wall) for wall in walls]).reshape(-1, 144)
+    basis = np.concatenate([generic_columns(wall, texture_columns, of_line=False) for wall in walls]).reshape(
+        -1, 144
+    )
     column = np.concatenate([texture_columns(LIBRARY[name], wall, ()) for wall in walls])[..., 0].ravel()
     fitted = basis @ np.linalg.lstsq(basis, column, rcond=1e-12)[0]
     assert np.linalg.norm(column - fitted) < 1e-6 * np.linalg.norm(column)

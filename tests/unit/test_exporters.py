@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zarr
+from scipy.spatial.transform import Rotation
 
 from pipeline.artefacts.measured import PipePiece, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
 from pipeline.export.arrays import write_radius_map, write_rings
 from pipeline.export.centreline import write_centreline
 from pipeline.export.tables import write_trajectory
 from pipeline.geometry.axis import PipeAxis
-from pipeline.geometry.rigid import from_parts, rotation_from_quaternion, rotation_from_vector
+from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from tests.pose_chain import chain, curved
 
 
@@ -95,7 +96,9 @@ def test_trajectory(tmp_path: Path, random: np.random.Generator) -> None:
     for k, name in enumerate(("x_mm", "y_mm", "z_mm")):
         np.testing.assert_allclose(table[name], T_pc[:, k, 3], rtol=1e-8)
     quaternion = np.stack([table[n] for n in ("qw", "qx", "qy", "qz")], -1)
-    np.testing.assert_allclose(rotation_from_quaternion(quaternion), rotation, atol=1e-8)
+    np.testing.assert_allclose(
+        Rotation.from_quat(quaternion, scalar_first=True).as_matrix(), rotation, atol=1e-8
+    )
     names = [f"sigma_{n}" for n in ("x_mm", "y_mm", "z_mm", "rx_rad", "ry_rad", "rz_rad")]
     for k, name in enumerate(names):
         np.testing.assert_allclose(table[name] ** 2, covariance[:, k, k], rtol=1e-7)

@@ -11,7 +11,6 @@ from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
-from stages.diagnose.effects.library import columns, texture_columns
 from stages.diagnose.effects.nameless import Nameless, growth, two_parts
 
 _HARMONICS = (0, 1, 2, 3, 4)
@@ -144,18 +143,6 @@ class FractionTerm(Nameless):
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
         return "line: a cos(2πρ − φ₀), ρ its image radius in px"
-
-
-def smooth_columns(points: ImagePoints) -> Float:
-    """Return (M, 72) columns of the generic line terms, constant and linear in time, for line points."""
-    terms = [term for term in GENERIC if term.moves is Moves.LINE]
-    return np.concatenate([columns(t, points, s) for t in terms for s in t.shapes(0.0, 0.0)], axis=-1)
-
-
-def smooth_texture_columns(points: ImagePoints) -> Float:
-    """Return (M, 2, 144) columns of the generic image terms, constant and linear in time."""
-    terms = [term for term in GENERIC if term.moves is not Moves.LINE]
-    return np.concatenate([texture_columns(t, points, s) for t in terms for s in t.shapes(0.0, 0.0)], axis=-1)
 
 
 def _term(moves: Moves, harmonic: int, exponent: int) -> GenericTerm:

@@ -9,8 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.catalogue import EFFECTS, effect
-from pipeline.physics.effect import Channel
+from pipeline.physics.catalogue import effect
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.camera import CAMERA_MODELS
 from stages.diagnose.effects.laser import LASER_MODELS, PHOTOMETRIC_MODELS
@@ -119,12 +118,3 @@ def without(names: Collection[str]) -> Mapping[str, EffectModel]:
     """
     left_out = {effect(name).name for name in names}
     return MappingProxyType({name: model for name, model in LIBRARY.items() if name not in left_out})
-
-
-def shown_in(channels: Collection[Channel], library: Mapping[str, EffectModel]) -> Mapping[str, EffectModel]:
-    """Return the effects that show first in one of the channels.
-
-    Those of the profile move rings just as others do (a skewed line as a longer baseline, light from within
-    the wall as a glass tube), so that positions alone cannot name them.
-    """
-    return MappingProxyType({n: model for n, model in library.items() if EFFECTS[n].channel in channels})

@@ -35,7 +35,6 @@ _PARTS = (1.0, 0.5, 0.2, 0.05)
 _ITERATIONS = 8
 _DELAY_SIGMA_S = 0.002
 _PLACEMENT_SIGMA_MM = 0.05
-_LEAST_BORE_SIGMA_MM = 1e-3
 # Prior 1 σ of an effect in plausible sizes: wide, so that the data determine the size. Debt: data/debts.md.
 _WIDE = 100.0
 

@@ -39,6 +39,8 @@ _FAR, _REWEIGHED, _WEIGHINGS = 100.0, 4, 3
 # Debt: data/debts.md.
 _LEAST_SHARE = 0.01
 _CAUCHY = 2.5
+# A bore is not believed to be better known than this. Debt: data/debts.md.
+_LEAST_BORE_SIGMA_MM = 1e-3
 # Factor on the typical jerk: it varies along a run, and the prior must not hold poses where it is larger.
 # Debt: data/debts.md.
 _LOOSER = 5.0
@@ -70,7 +72,7 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
     run = GaugeRun(
         measured.edges, rings, bin_widths(source.rings, source.index, rings),
         measured.time_s, measured.encoder,
-        max(measured.bore_sigma_mm, 1e-3), _LOOSER * sigma,
+        max(measured.bore_sigma_mm, _LEAST_BORE_SIGMA_MM), _LOOSER * sigma,
         measured.edges.sigma_px**-2, np.ones(len(rings.frame)), watch,
     )  # fmt: skip
     return weighed(run, smooth, ()), stated_start(smooth)
