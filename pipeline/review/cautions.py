@@ -59,6 +59,8 @@ def contradiction(finding: Finding) -> str:
 
 def _read_again(files: RunFiles, finding: Finding) -> str:
     """Return why a measured finding's depth changed when its outline was drawn again."""
+    if not finding.edited:
+        return ""
     run = _as_measured(files, files.version).get(finding.original or 0)
     if run is None or run.outline == finding.outline:
         return ""

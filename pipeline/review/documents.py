@@ -110,10 +110,11 @@ def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:
 def state_document(state: State, files: RunFiles) -> dict[str, Any]:
     """Return the findings as they stand."""
     standing, called = [f for f in state.findings if f.status != GONE], labels(state.findings)
+    bore_mm = 2 * files.artefact(Overlays).nominal_radius_mm  # once: a long run has thousands of findings
     return {
         "revision": state.revision,
         "findings": [
-            _finding(f, state, files) | {"label": called[f.id], "covers": _covers(f, standing)}
+            _finding(f, state, files, bore_mm) | {"label": called[f.id], "covers": _covers(f, standing)}
             for f in state.findings
         ],
         "may_undo": state.may_undo,
@@ -191,9 +192,8 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _finding(finding: Finding, state: State, files: RunFiles) -> dict[str, Any]:
+def _finding(finding: Finding, state: State, files: RunFiles, bore_mm: float) -> dict[str, Any]:
     size, wall = finding.size, state.assumed.wall_thickness_mm
-    bore_mm = 2 * files.artefact(Overlays).nominal_radius_mm
     is_loss = DefectKind(finding.kind).is_metal_loss
     loss = 100 * size.depth_mm / wall if wall and is_loss and size.depth_mm > 0 else None
     remaining = None
@@ -235,7 +235,7 @@ def _value_layers(files: RunFiles, overlays: Overlays) -> Iterator[dict[str, Any
     for overlay in overlays.pictures:
         yield overlay_document(overlay) | {"full_mm": full_range_mm(files, overlay.name)}
     loss = overlay_document(overlay_of(overlays, WALL_LOSS))
-    full = (0.0, max(full_range_mm(files, WALL_LOSS)[1], 0.0))
+    full = (0.0, max(full_range_mm(files, "deviation")[1], 0.0))  # of the same values
     yield loss | {"name": WALL_LOSS, "title": "Wall loss", "low_mm": 0.0, "high_mm": full[1], "full_mm": full}
 
 

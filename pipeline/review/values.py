@@ -44,7 +44,7 @@ class Values:
 
     def __getitem__(self, part: Any) -> Float32:
         columns = part[1] if isinstance(part, tuple) else slice(None)
-        return np.asarray(self.cells[part] - self.less[columns], np.float32)
+        return np.asarray(self.cells[part] - self.less[columns].astype(np.float32), np.float32)
 
     def levels(self, limits: Limits) -> Byte:
         """Return the level (S, A) of every cell between limits."""
@@ -52,10 +52,10 @@ class Values:
 
     def range_mm(self) -> tuple[float, float]:
         """Return the smallest and the largest value; 0 where nothing was measured."""
-        parts = [self[a : a + _ROWS] for a in range(0, len(self), _ROWS)]
-        known = [p[np.isfinite(p)] for p in parts]
-        ends = [(float(p.min()), float(p.max())) for p in known if len(p)]
-        return min((e[0] for e in ends), default=0.0), max((e[1] for e in ends), default=0.0)
+        parts = (self[a : a + _ROWS] for a in range(0, len(self), _ROWS))
+        ends = [(np.fmin.reduce(p, axis=None), np.fmax.reduce(p, axis=None)) for p in parts]
+        known = [e for e in ends if np.isfinite(e).all()]
+        return float(min((e[0] for e in known), default=0.0)), float(max((e[1] for e in known), default=0.0))
 
 
 @dataclass(frozen=True)

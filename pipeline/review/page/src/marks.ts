@@ -29,6 +29,7 @@ export class Marks {
   private readonly bar = element("div", { class: "scale-bar" }, element("i"), element("span"));
   private readonly end = element("span", { class: "mark end" });
   private labels: Label[] = [];
+  private casings: LineSegments2[] = [];
   private at = NaN;
   private isInside = true;
 
@@ -50,11 +51,14 @@ export class Marks {
     for (const label of this.labels) label.root.remove();
     this.labels = [];
     for (const group of [this.findings, this.rings]) clear(group);
+    this.casings = [];
     this.ends.forEach((end) => { end.visible = isInside; });
     const near = NEAR_RADII * this.session.run.radius_mm;
-    for (const finding of this.session.standing) {
-      if (finding.size.distance_to_mm > distance - near && finding.size.distance_from_mm < distance + near) this.outline(finding);
-    }
+    const seen = this.session.standing.filter((f) => f.size.distance_to_mm > distance - near && f.size.distance_from_mm < distance + near);
+    const isChosen = (f: Finding) => f.id === this.session.selected;
+    this.outlines(seen.filter((f) => !isChosen(f)), "#ffffff", 1.8, 4);
+    this.outlines(seen.filter(isChosen), CHOSEN_COLOUR, 3, 5.5);
+    for (const finding of seen) this.name(finding, isChosen(finding));
     this.distances();
     this.clock();
     const last = this.session.run.distance_mm[1];
@@ -86,18 +90,24 @@ export class Marks {
     this.bar.lastChild!.textContent = `${mm} mm ${this.isInside ? "at the spot" : "at the axis"}`;
   }
 
-  private outline(finding: Finding): void {
-    const chosen = finding.id === this.session.selected;
-    for (const radii of [WITHIN, AROUND]) {
-      if (radii === WITHIN ? !this.isInside : this.isInside) continue;
-      const place = this.segments(finding.outline, radii);
-      for (const [colour, width, order] of [["#000000", chosen ? 5.5 : 4, 2], [chosen ? CHOSEN_COLOUR : "#ffffff", chosen ? 3 : 1.8, 3]] as [string, number, number][]) {
-        const material = new LineMaterial({ color: colour, linewidth: width, dashed: false, depthTest: !this.isInside, transparent: true });
-        const line = new LineSegments2(new LineSegmentsGeometry().setPositions(place), material);
-        line.renderOrder = order;
-        this.findings.add(line);
-      }
-    }
+  /** Draw without the outlines' casing, which costs as much as they do, while the view moves and would stutter. */
+  thin(isThin: boolean): void { for (const casing of this.casings) casing.visible = !isThin; }
+
+  /** All outlines of a colour as one line: each line is a call to the graphics. */
+  private outlines(findings: Finding[], colour: string, width: number, casing: number): void {
+    const place = findings.flatMap((f) => this.segments(f.outline, this.isInside ? WITHIN : AROUND));
+    if (!place.length) return;
+    const geometry = new LineSegmentsGeometry().setPositions(place);
+    const [below, above] = ([["#000000", casing], [colour, width]] as [string, number][]).map(([color, linewidth], k) => {
+      const line = new LineSegments2(geometry, new LineMaterial({ color, linewidth, depthTest: !this.isInside, transparent: true }));
+      line.renderOrder = 2 + k;
+      return line;
+    }) as [LineSegments2, LineSegments2];
+    this.casings.push(below);
+    this.findings.add(below, above);
+  }
+
+  private name(finding: Finding, chosen: boolean): void {
     const [s, a] = peakOf(finding);
     const name = element("button", {
       class: `mark finding${chosen ? " chosen" : ""}`, tabindex: "-1", "data-finding": finding.id, title: `${finding.label}: ${finding.kind}`,

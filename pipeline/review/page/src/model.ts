@@ -14,13 +14,11 @@ import { Spot } from "./spot";
 import { Stretches, type Light } from "./stretches";
 import { element } from "./words";
 
-const MM = 1e-3;
-const MOST_PIXELS = 1280 * 720;
+const [MM, MOST_PIXELS] = [1e-3, 1280 * 720];
 // Where the raking light stands behind the eye, in radii: it meets the wall beside the spot at about 12°, so that a slope of
 // 0.1 changes its brightness by a third. Strengths make a flat wall there as bright as recorded.
 const RAKING_RADII = 3.5;
 const [AMBIENT, RAKING, SHINING] = [0.35 * Math.PI, 9.7, 0.6 * Math.PI];
-
 export class ModelView {
   private readonly isPlain = drawsPlainly(); // first: it says how colours are to be understood
   readonly root = element("div", { class: "model" });
@@ -175,7 +173,7 @@ export class ModelView {
   }
 
   get parts() { return this.fine.parts; }
-  get isReady(): boolean { return this.fine.isReady; }
+  get isReady() { return this.fine.isReady; }
 
   /** A stretch has come or gone. */
   private grown(): void {
@@ -244,6 +242,7 @@ export class ModelView {
 
   private sharpen(share: number, isMoving: boolean): void {
     this.fine.thin(isMoving);
+    this.marks.thin(isMoving && this.isPlain);
     const ratio = this.pixelRatio * share;
     if (Math.abs(this.renderer!.getPixelRatio() - ratio) > 0.02 * ratio) this.renderer!.setPixelRatio(ratio);
   }
