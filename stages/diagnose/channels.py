@@ -282,7 +282,7 @@ FREE_MOTION = Stage(
     "free_motion", "1", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "gauge_evidence",
+    "evidence",
     "1",
     DiagnosisParameters,
     examine_gauge,
@@ -290,7 +290,7 @@ GAUGE_EVIDENCE = Stage(
     "diagnosis",
 )
 FIELD_EVIDENCE = Stage(
-    "field_evidence",
+    "evidence",
     "1",
     DiagnosisParameters,
     examine_field,
