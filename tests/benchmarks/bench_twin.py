@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.api.diagnosis.switches import Switches, moves_line, switches_of
+from pipeline.api.diagnosis.switches import moves_line, switches_of
 from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
 from pipeline.api.opened import open_run
 from pipeline.api.run import run as run_recording
@@ -64,16 +64,18 @@ class Case:
 
 
 def cases(answers: Path) -> list[Case]:
-    """Return the shared gauge runs; open ones have the true effects as their answer, to save a diagnosis."""
+    """Return the shared gauge runs; one that has no diagnosis gets the true effects as its answer."""
     root = PROJECT_ROOT.parent / "shared" / "recordings"
     found = []
     for name in _OPEN:
         truth = _true(json.loads((root / f"{name}-gauge" / "truth.json").read_text("utf-8"))["effects"])
-        found.append(Case(name, root / f"{name}-gauge", truth, truth))
+        own = answers / name / "diagnosis.json"
+        said = switches_of(own).of_line if own.is_file() else truth
+        found.append(Case(name, root / f"{name}-gauge", said, truth))
     for name in _BLIND:
-        said: Switches = switches_of(answers / name / "diagnosis.json")
+        said = switches_of(answers / name / "diagnosis.json").of_line
         truth = json.loads((root / "blind-a" / "truth" / f"{name}.json").read_text("utf-8"))["effects"]
-        found.append(Case(name, root / "blind-a" / f"{name}-gauge", said.of_line, _true(truth)))
+        found.append(Case(name, root / "blind-a" / f"{name}-gauge", said, _true(truth)))
     return found
 
 
@@ -109,12 +111,14 @@ def gauge_line(case: Case, folder: Path) -> GaugeLine:
     return gauge_line_of(frames.applied_to(recording), rings, measured.run, parameters)
 
 
-def swaps(folder: Path, answers: Path) -> None:
+def swaps(folder: Path, answers: Path, only: str) -> None:
     """Print χ² per pixel of each gauge's line under each instrument, and how many wrong ones fit worse."""
     every = cases(answers)
     different = [c for c in every if c.answer]
     worse = better_than_stated = pairs = named = 0
     for k, case in enumerate(every):
+        if only and case.name != only:
+            continue
         start = time.process_time()
         line = gauge_line(case, folder)
         nowhere = np.zeros(len(line.blocks.of_frame))
@@ -171,12 +175,13 @@ def like(folder: Path, run: Path, frames: int) -> None:
 if __name__ == "__main__":
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("what", choices=["swaps", "like"])
+    words.add_argument("--only", default="", help="one case of swaps")
     words.add_argument("--run", type=Path, help="run folder for like")
     words.add_argument("--frames", type=int, default=100, help="frames of the recording for like")
     words.add_argument("folder", type=Path)
     words.add_argument("--answers", type=Path, default=Path("data/blind-a"), help="folder of diagnoses")
     given = words.parse_args()
     if given.what == "swaps":
-        swaps(given.folder, given.answers)
+        swaps(given.folder, given.answers, given.only)
     else:
         like(given.folder, given.run, given.frames)

@@ -26,7 +26,7 @@ except ModuleNotFoundError as error:
 from pipeline.api.calibration.calibrate import Calibration, calibrate
 from pipeline.api.diagnosis.diagnose import DiagnosisFolder, diagnose, open_diagnosis
 from pipeline.api.run import run
-from pipeline.api.simulate import Simulated, simulate, simulate_pairs
+from pipeline.api.simulate import Simulated, simulate, simulate_like, simulate_pairs
 from pipeline.api.twin import twin
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 from pipeline.files.shipped import PARAMETERS, PRIORS, SCENES, shipped_names
@@ -53,6 +53,7 @@ __all__ = [
     "run",
     "shipped_names",
     "simulate",
+    "simulate_like",
     "simulate_pairs",
     "twin",
 ]
