@@ -28,7 +28,6 @@ class SurveyedWall:
 
     Attributes
     ----------
-    wall, texture
     smoothing_mm : float
         1 σ with which the map was smoothed.
     ring_spacing_mm : float

@@ -40,6 +40,17 @@ _SINGLE: tuple[tuple[str, tuple[str, ...], float], ...] = (
     ("decentre_mm", ("decentre_x_mm", "decentre_y_mm"), 1.0),
     ("waviness_rad", LaserSheet.PARAMETER_NAMES[6:], 1.0),
 )
+_KEYS = (
+    "camera", "laser", "shutter", "lighting", "imu", "standard_uncertainty", "covariance", "calibrated_from",
+    "made_by",
+)  # fmt: skip
+_LASER_KEYS = (
+    "baseline_mm", "opening_angle_deg", "tilt_deg", "tilt_direction_deg", "line_sigma_mm", "wavelength_nm",
+    "decentre_mm", "decentre_direction_deg", "waviness_rad",
+)  # fmt: skip
+_WAVES = len(LaserSheet(1.0).waviness)
+# Rows that are written with four digits are orthonormal to this.
+_ROTATION = 1e-3
 
 
 def covariance_from_stated(stated: Section, names: Sequence[str]) -> Float:
@@ -86,19 +97,6 @@ def _distortion_names(camera_names: Sequence[str]) -> tuple[str, ...]:
 def _rms(variance: dict[str, float], members: Sequence[str]) -> float:
     """Return the root mean square σ of parameters."""
     return math.sqrt(sum(variance[m] for m in members) / len(members))
-
-
-_KEYS = (
-    "camera", "laser", "shutter", "lighting", "imu", "standard_uncertainty", "covariance", "calibrated_from",
-    "made_by",
-)  # fmt: skip
-_LASER_KEYS = (
-    "baseline_mm", "opening_angle_deg", "tilt_deg", "tilt_direction_deg", "line_sigma_mm", "wavelength_nm",
-    "decentre_mm", "decentre_direction_deg", "waviness_rad",
-)  # fmt: skip
-_WAVES = len(LaserSheet(1.0).waviness)
-# Rows that are written with four digits are orthonormal to this.
-_ROTATION = 1e-3
 
 
 @dataclass(frozen=True)
