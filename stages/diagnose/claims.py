@@ -190,7 +190,7 @@ def rocking_excluded(line: Line, seen: Seen) -> bool:
     Seen with the sheet believed at rest, a tilt φ of the sheet moves the ring as a camera r² φ / l off the
     axis does; but only a sheet moves rings against fiducials, the more the wider the bore.
     """
-    if seen.geometry is None or "laser_rocking" in seen.geometry.unsplit:
+    if seen.geometry is None or any("laser_rocking" in names for names in seen.geometry.unsplit):
         return False
     rings, verdicts = seen.geometry.searched.nothing.linearised.rings, seen.geometry.verdicts
     about = [f for f in seen.geometry.feasibility if f.name == "laser_rocking"]

@@ -12,7 +12,15 @@ from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.result import Diagnosis, EffectFound, Location, Verdict, classes_of, record_next
+from stages.diagnose.result import (
+    Diagnosis,
+    EffectFound,
+    Location,
+    Remainder,
+    Verdict,
+    classes_of,
+    record_next,
+)
 
 _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
@@ -33,33 +41,41 @@ def composed(
     every = claims_of(field, gauge)
     unexplained = _unexplained_profile(field, gauge)
     said = _said(examined, every, without, bool(unexplained))
-    asked = said.members if said.verdict is Verdict.CLASS else [e.name for e in said.effects]
+    asked = said.members if said.members else [e.name for e in said.effects]
+    location = _location(examined, every, asked) or (_IN_PROFILE if unexplained else None)
+    identifiable = " ".join(s for s in (_identifiable(said, examined), *unexplained) if s)
+    partly = said.verdict is Verdict.PARTLY
     return Diagnosis(
         recording=field.name if field is not None else "",
         gauge=gauge.name if gauge is not None else "",
         verdict=said.verdict,
         global_p=_global_p(field, gauge),
-        location=_location(examined, every, asked) or (_IN_PROFILE if unexplained else None),
+        location=location,
         effects=said.effects,
-        members=said.members,
-        identifiable=" ".join(s for s in (_identifiable(said, examined), *unexplained) if s),
+        members=() if partly else said.members,
+        identifiable=identifiable,
         fit=examined.quality if examined is not None else None,
-        record_next=_next(said.verdict, asked),
+        record_next=_next(said, asked),
         feasibility=examined.feasibility if examined is not None else (),
         inseparable=examined.inseparable if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
         ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
+        remainder=Remainder(_of_rest(said), None, said.members, identifiable) if partly else None,
     )
 
 
 @dataclass(frozen=True)
 class _Said:
-    """The verdict, the effects it rests on, and the members of its class."""
+    """The verdict, the effects it rests on, and the members of the class that is left."""
 
     verdict: Verdict
     effects: tuple[EffectFound, ...]
     members: tuple[str, ...]
+
+
+def _of_rest(said: _Said) -> Verdict:
+    return Verdict.CLASS if said.members else Verdict.UNEXPLAINED
 
 
 def _said(
@@ -67,26 +83,49 @@ def _said(
 ) -> _Said:
     """Return what rings and fiducials, and then the claims beyond them, come to.
 
-    Where the line's profile shows what nothing explains, ``unexplained``, no name stands alone.
+    What is sure is named, whatever is left beside it; what is left is a class, or unexplained.
     """
     known = [c for c in every if c.name not in without]
-    nameless = unexplained or len(known) < len(every)
-    verdict = verdict_of_rings(examined, bool(known))
+    rings = verdict_of_rings(examined, bool(known))
     of_rings = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(known, of_rings)
-    named = (*of_rings, *(c.found for c in claims))
-    if verdict is Verdict.CLASS and examined is not None:
-        return _Said(verdict, named, classes_of(of_gauge.members(examined)))
-    if nameless and not claims and verdict in (Verdict.CONSISTENT, Verdict.NOT_IDENTIFIABLE):
-        verdict = Verdict.UNEXPLAINED
-    if verdict is Verdict.UNEXPLAINED:
-        return _Said(verdict, tuple(c.found for c in claims), ())
-    if not named:
-        return _Said(verdict, (), ())
-    names, doubted = [e.name for e in named], tuple(n for c in claims for n in _rivals(c))
-    if doubted or nameless or not all(map(_confirmed, named)):
-        return _Said(Verdict.CLASS, named, classes_of([*doubted, *names]))
-    return _Said(Verdict.NAMED, named, ())
+    certain = (*_sure_of_rings(examined, rings, unexplained), *(c.found for c in claims if _is_sure(c)))
+    doubted = [n for c in claims if not _is_sure(c) for n in (*_rivals(c), c.name)]
+    if rings in (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED):
+        unsure = [e.name for e in of_rings if e not in certain]
+        doubted += [*(of_gauge.members(examined) if unsure and examined is not None else ()), *unsure]
+    nameless = unexplained or len(known) < len(every) or _is_nameless(examined, rings)
+    if certain and not doubted and not nameless:
+        return _Said(Verdict.NAMED, certain, ())
+    if certain:
+        return _Said(Verdict.PARTLY, certain, () if nameless else classes_of(doubted))
+    if doubted and rings is not Verdict.UNEXPLAINED:
+        return _Said(Verdict.CLASS, (*of_rings, *(c.found for c in claims)), classes_of(doubted))
+    if nameless:
+        return _Said(Verdict.UNEXPLAINED, tuple(c.found for c in claims), ())
+    return _Said(rings, (), ())
+
+
+def _sure_of_rings(examined: Examined | None, rings: Verdict, unexplained: bool) -> tuple[EffectFound, ...]:
+    """Return the effects that rings and fiducials name for sure.
+
+    Where the line's profile shows what nothing explains, its light may have moved the line, within its width.
+    """
+    if examined is None or rings not in (Verdict.NAMED, Verdict.PARTLY):
+        return ()
+    each = zip(of_gauge.effects_found(examined), of_gauge.sure(examined), strict=True)
+    certain = [e for e, is_sure in each if is_sure]
+    if not unexplained:
+        return tuple(certain)
+    beyond = zip(of_gauge.effects_found(examined), of_gauge.beyond_line(examined), strict=True)
+    moved = {e.name for e, is_beyond in beyond if is_beyond}
+    return tuple(e for e in certain if e.name in moved)
+
+
+def _is_nameless(examined: Examined | None, rings: Verdict) -> bool:
+    """Return whether rings show what no effect of the library explains."""
+    best = examined.best if examined is not None else None
+    return rings is Verdict.UNEXPLAINED or (rings is Verdict.PARTLY and best is not None and not best.named)
 
 
 def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
@@ -108,25 +147,24 @@ def _rivals(claim: Claim) -> tuple[str, ...]:
     return (*claim.alike, *(effect(claim.name).alike if disagree else ()))
 
 
-def _confirmed(found: EffectFound) -> bool:
-    """Return whether a second prediction of the same physics agrees, and none disagrees."""
-    return bool(found.confirmed_by) and all(c.agrees for c in found.confirmed_by)
+def _is_sure(claim: Claim) -> bool:
+    """Return whether nothing else may have made a claim, and a second prediction of its physics agrees."""
+    return not _rivals(claim) and any(a.confirmation.agrees for a in claim.agreements)
 
 
-def _next(verdict: Verdict, asked: Sequence[str]) -> str:
+def _next(said: _Said, asked: Sequence[str]) -> str:
     """Return what to record so that the answer becomes a name."""
-    if verdict is Verdict.UNEXPLAINED:
+    if said.verdict is Verdict.UNEXPLAINED or (said.verdict is Verdict.PARTLY and not said.members):
         return _AGAIN
-    return record_next(asked) if verdict is Verdict.CLASS and asked else ""
+    return record_next(asked) if said.verdict in (Verdict.CLASS, Verdict.PARTLY) and asked else ""
 
 
 def _identifiable(said: _Said, examined: Examined | None) -> str:
     """Return what is determined all the same: the size each cause would have, or an empirical formula."""
     if said.verdict is Verdict.CLASS:
         return "; or ".join(e.statement for e in said.effects)
-    if said.verdict is Verdict.UNEXPLAINED and examined is not None:
-        return of_gauge.formula(examined)
-    return ""
+    nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
+    return of_gauge.formula(examined) if nameless and examined is not None else ""
 
 
 def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Claim]:

@@ -67,6 +67,7 @@ class Verdict(StrEnum):
 
     CONSISTENT = "consistent"
     NAMED = "named"
+    PARTLY = "partly"
     CLASS = "class"
     UNEXPLAINED = "unexplained"
     NOT_IDENTIFIABLE = "not_identifiable"
@@ -211,6 +212,27 @@ class WallPicture:
 
 
 @dataclass(frozen=True)
+class Remainder:
+    """What is left beside effects that are sure.
+
+    Attributes
+    ----------
+    verdict : Verdict
+        ``class`` or ``unexplained``.
+    location : Location or None
+    members : tuple of str
+        The class.
+    formula : str
+        The empirical law of what nothing explains.
+    """
+
+    verdict: Verdict
+    location: Location | None = None
+    members: tuple[str, ...] = ()
+    formula: str = ""
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """What was found, how sure, and what it rests on; fields as in the formats' notes.
 
@@ -241,6 +263,7 @@ class Diagnosis:
     ring_picture: Picture | None = None
     wall_picture: WallPicture | None = None
     notes: tuple[str, ...] = field(default=())
+    remainder: Remainder | None = None
 
 
 def to_json(found: Diagnosis) -> dict[str, object]:
@@ -251,6 +274,7 @@ def to_json(found: Diagnosis) -> dict[str, object]:
         "location": None if found.location is None else _location(found.location),
         "effects": [_effect(e) for e in found.effects],
         "class": list(found.members), "identifiable": found.identifiable,
+        "remainder": None if found.remainder is None else _remainder(found.remainder),
         "fit": None if found.fit is None else _plain(found.fit),
         "record_next": found.record_next,
         "feasibility": [_plain(f) for f in found.feasibility],
@@ -268,6 +292,13 @@ def _effect(found: EffectFound) -> dict[str, object]:
         "statement": found.statement, "equation": found.equation,
         "confirmed_by": [_plain(c) for c in found.confirmed_by],
         "course": None if found.course is None else _course(found.course), "recording": found.recording,
+    }  # fmt: skip
+
+
+def _remainder(left: Remainder) -> dict[str, object]:
+    return {
+        "verdict": str(left.verdict), "location": None if left.location is None else _location(left.location),
+        "class": list(left.members), "formula": left.formula,
     }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from stages.diagnose.agreement import Agreement
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import rocking_excluded
 from stages.diagnose.compose import composed, verdict_of_rings
+from stages.diagnose.correct import encoder_effects
 from stages.diagnose.result import Confirmation, Diagnosis, Verdict
 from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
@@ -113,6 +114,39 @@ def test_a_slip_is_named_only_when_the_reading_alone_shows_it_too(real_probe: Pr
     assert again.verdict is Verdict.NAMED
 
 
+def test_what_is_sure_is_named_though_something_else_remains(real_probe: Probe) -> None:
+    sure = replace(PLAY, agreements=(AGREES,))
+    found = of_gauge(real_probe, estimates=(sure, SCALE))
+    assert found.verdict is Verdict.PARTLY
+    assert [e.name for e in found.effects] == ["encoder_backlash"]
+    assert found.remainder is not None
+    assert found.remainder.verdict is Verdict.CLASS
+    assert "encoder_scale" in found.remainder.members
+    assert found.members == ()
+    assert "encoder_scale" in found.record_next
+
+
+def test_what_is_sure_is_named_beside_what_the_library_lacks(real_probe: Probe) -> None:
+    sure = replace(PLAY, agreements=(AGREES,))
+    found = answer(real_probe, None, seen("gauge", estimates=(sure, SCALE)), "encoder_scale")
+    assert found.verdict is Verdict.PARTLY
+    assert found.remainder is not None
+    assert found.remainder.verdict is Verdict.UNEXPLAINED
+    assert found.remainder.members == ()
+
+
+def test_a_slip_of_the_gauge_run_is_not_the_inspections(real_probe: Probe) -> None:
+    sure = replace(SLIP, agreements=(AGREES,))
+    of_both = answer(
+        real_probe,
+        seen("field", slips=(replace(sure, gain_mm=3.0, p_value=1e-8),)),
+        seen("gauge", slips=(sure,)),
+    )
+    assert of_both.effects[0].parameters["slip_mm"].value == 3.0
+    assert encoder_effects(of_both.effects) == of_both.effects
+    assert encoder_effects(of_gauge(real_probe, slips=(sure,)).effects) == ()
+
+
 def test_a_slip_of_another_recording_confirms_nothing(real_probe: Probe) -> None:
     found = answer(real_probe, seen("field", slips=(SLIP,)), seen("gauge", slips=(SLIP,)))
     assert found.verdict is Verdict.CLASS
@@ -187,6 +221,6 @@ def test_a_swing_that_a_rocking_sheet_may_make_is_a_class(real_probe: Probe) -> 
 def test_what_touches_rings_without_a_pattern_is_the_doing_of_what_motion_shows(
     names: tuple[str, ...], claimed: bool, verdict: Verdict
 ) -> None:
-    best = SimpleNamespace(named=False, names=names)
+    best = SimpleNamespace(named=False, names=names, library_terms=())
     rings = SimpleNamespace(best=best, verdicts=SimpleNamespace(adequacy=0.5), confirmed=(), unsplit=())
     assert verdict_of_rings(cast(Any, rings), claimed) is verdict

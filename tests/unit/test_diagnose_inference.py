@@ -198,26 +198,38 @@ AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
 
 
 def examined(
-    named: bool = True, chance: float = 0.9999, left: float = 0.5, unsplit: tuple[str, ...] = (),
+    shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
+    left: float = 0.5, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),),
 ) -> Any:  # fmt: skip
-    best = SimpleNamespace(named=named, laws=("laser_tilt",))
+    """Return a gauge run in which effects and patterns were found that move rings by so much."""
+    law = SimpleNamespace(law="laser_tilt")
+    terms = tuple(SimpleNamespace(model=law, shift_px=s) for s in (*shifts_px, *patterns_px))
+    library = terms[: len(shifts_px)]
+    fit = SimpleNamespace(terms=terms)
+    best = SimpleNamespace(named=bool(library) and not patterns_px, library_terms=library, fit=fit)
     verdicts = SimpleNamespace(adequacy=left, chance_of=lambda name: chance)
-    return cast(Any, SimpleNamespace(best=best, verdicts=verdicts, confirmed=confirmed, unsplit=unsplit))
+    each = (unsplit, *[()] * (len(library) - 1)) if library else ()
+    return cast(Any, SimpleNamespace(best=best, verdicts=verdicts, confirmed=confirmed, unsplit=each))
 
 
 @pytest.mark.parametrize(
     ("seen", "verdict"),
     [
         (examined(), Verdict.NAMED),
-        (examined(named=False), Verdict.UNEXPLAINED),
+        (examined((), (0.5,), confirmed=()), Verdict.UNEXPLAINED),
+        (examined(patterns_px=(0.5,)), Verdict.PARTLY),
+        (examined(patterns_px=(2.0,)), Verdict.UNEXPLAINED),
+        (examined(patterns_px=(0.5,), chance=0.98), Verdict.UNEXPLAINED),
+        (examined((1.0, 1.0), unsplit=("principal_point",), confirmed=((AGREES,),) * 2), Verdict.PARTLY),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
         (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),
-        (examined(confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.CLASS),
+        (examined((1.0, 1.0), confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.PARTLY),
         (examined(confirmed=((),)), Verdict.CLASS),
-        (examined(chance=0.99), Verdict.CLASS),
+        (examined(chance=0.98), Verdict.CLASS),
         (examined(unsplit=("principal_point",)), Verdict.CLASS),
     ],
 )
-def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict):
+def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict, monkeypatch):
+    monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     assert answer.verdict_of(seen) is verdict

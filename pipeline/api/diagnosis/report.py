@@ -61,6 +61,9 @@ def headline(found: Diagnosis) -> str:
     """Return the answer in one line."""
     if found.verdict is Verdict.NAMED:
         return "Left out: " + " and ".join(e.name.replace("_", " ") for e in found.effects)
+    if found.verdict is Verdict.PARTLY:
+        names = " and ".join(e.name.replace("_", " ") for e in found.effects)
+        return f"Left out: {names}, and something more that has no name yet"
     return _HEADLINES[found.verdict]
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from pipeline.errors import InputError
 from pipeline.files.json_file import read_json
 
-Verdict = Literal["consistent", "named", "class", "unexplained", "not_identifiable"]
+Verdict = Literal["consistent", "named", "partly", "class", "unexplained", "not_identifiable"]
 # JSON has no NaN: a number that is not known is written as null.
 Number = Annotated[float, BeforeValidator(lambda v: float("nan") if v is None else v)]
 
@@ -76,6 +76,15 @@ class Feasibility(BaseModel):
     left: float | None = 1.0
 
 
+class Remainder(BaseModel):
+    """What a diagnosis leaves beside effects that are sure: a class, or what nothing explains."""
+
+    model_config = ConfigDict(frozen=True, populate_by_name=True)
+
+    verdict: Literal["class", "unexplained"]
+    members: tuple[str, ...] = Field((), alias="class")
+
+
 class Answer(BaseModel):
     """What is read of a diagnosis.json; further keys are left alone.
 
@@ -89,6 +98,8 @@ class Answer(BaseModel):
         The effects named, each with its probability, and its parameters with 1 σ.
     members : tuple of str
         The class, which diagnosis.json calls ``class``: effects that cannot be told apart here.
+    remainder : Remainder or None
+        What is left beside the effects, when the verdict is ``partly``.
     fit : Fit or None
     feasibility : tuple of Feasibility
     record_next : str
@@ -102,6 +113,7 @@ class Answer(BaseModel):
     location: Location | None = None
     effects: tuple[NamedEffect, ...] = ()
     members: tuple[str, ...] = Field((), alias="class")
+    remainder: Remainder | None = None
     fit: Fit | None = None
     feasibility: tuple[Feasibility, ...] = ()
     record_next: str = ""

@@ -15,7 +15,8 @@ from stages.diagnose.drill.answer import Answer, Concealed, NamedEffect
 _95 = 1.959964
 _STANDS_OUT = 5.0
 SNR = 8.0
-_FOUND = ("named", "class", "unexplained")
+_FOUND = ("named", "partly", "class", "unexplained")
+_WITH_NAMES = ("named", "partly")
 NOTHING = "nothing"
 _PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 1.0001)
 
@@ -69,7 +70,7 @@ class Trial:
     @property
     def said(self) -> frozenset[str]:
         """Names that the answer gives with confidence."""
-        given = self.answer.effects if self.answer.verdict == "named" else ()
+        given = self.answer.effects if self.answer.verdict in _WITH_NAMES else ()
         return frozenset(e.name for e in given)
 
     @property
@@ -79,8 +80,8 @@ class Trial:
 
     @property
     def exact(self) -> bool:
-        """Whether all that is concealed, and nothing else, is named."""
-        return bool(self.said) and self.said == self.truth
+        """Whether all that is concealed, and nothing else, is named, and nothing said to be left."""
+        return self.answer.verdict == "named" and bool(self.said) and self.said == self.truth
 
     @property
     def misnamed(self) -> bool:
@@ -90,7 +91,8 @@ class Trial:
     @property
     def contained(self) -> bool:
         """Whether the answer, name or class, contains all that is concealed."""
-        return self.truth <= self.said | frozenset(self.answer.members)
+        left = self.answer.remainder.members if self.answer.remainder is not None else ()
+        return self.truth <= self.said | frozenset((*self.answer.members, *left))
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,8 @@ def score(trials: Iterable[Trial]) -> Scores:
     # An effect too small even for an oracle cannot be expected to be called unexplained.
     unknown = [t for t in listed if t.truth & set(t.left_out) and (t.snr is None or t.snr >= SNR)]
     single = [t for t in known if len(t.concealed) == 1]
-    found = [t for t in single if t.found]
+    # What is on pictures alone is not in the catalogue: it has no channel, and no size to be compared.
+    found = [t for t in single if t.found and t.truth <= EFFECTS.keys()]
     clear = [t for t in known if t.snr is not None and t.snr >= SNR]
     z = [s for t in known for s in size_errors(t)]
     removed = [r for t in known if (r := heldout_removed(t.answer)) is not None]
@@ -198,16 +201,19 @@ def shuffled(trials: Sequence[Trial]) -> tuple[Trial, ...]:
 
 def owned(trial: Trial) -> bool:
     """Whether an effect outside the library is called unexplained, or a class of its likes."""
-    likes = {like for name in trial.truth for like in EFFECTS[name].alike}
-    of_its_class = trial.answer.verdict == "class" and bool(likes & set(trial.answer.members))
-    return trial.answer.verdict in ("unexplained", "not_identifiable") or of_its_class
+    likes = {like for name in trial.truth if name in EFFECTS for like in EFFECTS[name].alike}
+    answer = trial.answer
+    left = answer.remainder
+    of_its_class = bool(likes & set(left.members if left is not None else answer.members))
+    verdict = left.verdict if left is not None else answer.verdict
+    return verdict in ("unexplained", "not_identifiable") or (verdict == "class" and of_its_class)
 
 
 def size_errors(trial: Trial) -> list[float]:
     """Return (estimate − truth) / σ of the first quantity of every effect that is rightly named."""
     truth = {c.name: c for c in trial.concealed}
-    given = trial.answer.effects if trial.answer.verdict == "named" else ()
-    errors = (_size_error(e, truth[e.name]) for e in given if e.name in truth)
+    given = trial.answer.effects if trial.answer.verdict in _WITH_NAMES else ()
+    errors = (_size_error(e, truth[e.name]) for e in given if e.name in truth and e.name in EFFECTS)
     return [e for e in errors if e is not None]
 
 

@@ -12,7 +12,15 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.field.confirm import InField, met_in_field
 from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.inference import INSTRUMENT, Evidence, Score, Stated, places_of, score, stated_belief
-from stages.diagnose.result import Diagnosis, EffectFound, Location, Verdict, classes_of, record_next
+from stages.diagnose.result import (
+    Diagnosis,
+    EffectFound,
+    Location,
+    Remainder,
+    Verdict,
+    classes_of,
+    record_next,
+)
 
 # Something was left out when its probability by chance, corrected for all tried, is below this.
 # Debt: data/debts.md.
@@ -151,16 +159,31 @@ def _met(found: Diagnosis, met: Mapping[str, InField | None]) -> Diagnosis:
     effects = tuple(_confirmed(e, met.get(e.name)) for e in found.effects)
     silent = [name for name, each in met.items() if each is None and name in EFFECTS]
     missing = tuple(f"The field by itself tells too little of {name} to bear it out." for name in silent)
-    known = [each for each in met.values() if each is not None]
     found = replace(found, effects=effects, shortcomings=(*found.shortcomings, *missing))
-    if found.verdict is not Verdict.NAMED or all(each.confirmation.agrees for each in known):
+    against = {name for name, each in met.items() if each is not None and not each.confirmation.agrees}
+    withdrawn = [e for e in effects if e.name in against]
+    if found.verdict not in (Verdict.NAMED, Verdict.PARTLY) or not withdrawn:
         return found
-    names = [e.name for e in effects]
     note = "The field contradicts what the gauge run names: see the confirmations."
-    return replace(
-        found, verdict=Verdict.CLASS, members=classes_of(names), record_next=record_next(names),
-        identifiable="; ".join(e.statement for e in effects), notes=(*found.notes, note),
-    )  # fmt: skip
+    found = replace(found, identifiable="; ".join(e.statement for e in withdrawn), notes=(*found.notes, note))
+    kept = tuple(e for e in effects if e.name not in against)
+    return _beside(replace(found, effects=kept or effects), kept, classes_of([e.name for e in withdrawn]))
+
+
+def _beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[str]) -> Diagnosis:
+    """Return the answer with a class more: beside what is sure a remainder, else the answer itself."""
+    before = found.remainder
+    every = _union(members, before.members if before is not None else found.members)
+    if not certain:
+        return replace(
+            found, verdict=Verdict.CLASS, members=every, remainder=None, record_next=record_next(every)
+        )
+    # What is unexplained stays so: a class does not hold it.
+    nameless = before is not None and before.verdict is Verdict.UNEXPLAINED
+    left = Remainder(
+        Verdict.UNEXPLAINED if nameless else Verdict.CLASS, None, every, before.formula if before else ""
+    )
+    return replace(found, verdict=Verdict.PARTLY, members=(), remainder=left, record_next=record_next(every))
 
 
 def _confirmed(effect: EffectFound, met: InField | None) -> EffectFound:
@@ -171,18 +194,20 @@ def _confirmed(effect: EffectFound, met: InField | None) -> EffectFound:
 
 def _alone(found: Diagnosis, alone: FieldAnswer, field: FieldEvidence, with_gauge: bool) -> Diagnosis:
     """Return the class that the field alone shows, beside whatever other channels say."""
-    names = [e.name for e in found.effects]
     note = (
         "The gauge run shows nothing of it: it came or went in between, or does not act there."
         if with_gauge
         else "One pipe of unknown size gives a class of causes, not a name."
     )
     said = [text for text in (found.identifiable, _BY_FIELD + alone.identifiable) if text]
-    return replace(
-        found, verdict=Verdict.CLASS, members=_union(alone.members, classes_of(names)),
-        identifiable="; ".join(said), record_next=alone.next, notes=(*found.notes, note),
-        location=location_in_field(field, alone.shown),
-    )  # fmt: skip
+    certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
+    names = () if certain else classes_of([e.name for e in found.effects])
+    where = location_in_field(field, alone.shown)
+    found = _beside(found, certain, _union(alone.members, names))
+    found = replace(found, identifiable="; ".join(said), record_next=alone.next, notes=(*found.notes, note))
+    if found.remainder is None:
+        return replace(found, location=where)
+    return replace(found, remainder=replace(found.remainder, location=where))
 
 
 def _union(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:

@@ -3,29 +3,57 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.elimination import RING
-from stages.diagnose.gauge.examine import ADEQUATE, Examined
+from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.formula import ADEQUATE
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.search import shift_px
+from stages.diagnose.inference import SURE
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Picture, Verdict
-
-# Likelihoods do not contain the small errors of laws and of image formation, so that odds of 1000 to 1 are
-# asked for instead of 30 to 1: a drawn focal length was once called a cone at 0.99. Debt: data/debts.md.
-CONFIDENT = 0.999
-_IN_CLASS = 0.01
 
 
 def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     """Return the effects of the likeliest hypothesis with sizes and chances."""
     best, verdicts = examined.best, examined.verdicts
-    if best is None or verdicts is None or not best.named:
+    if best is None or verdicts is None:
         return ()
-    each = zip(best.fit.terms, examined.sizes, examined.confirmed, strict=True)
+    each = zip(best.library_terms, examined.sizes, examined.confirmed, strict=False)
     return tuple(_found(verdicts, term, sized, confirmed) for term, sized, confirmed in each)
+
+
+def sure(examined: Examined) -> tuple[bool, ...]:
+    """Return for each effect of the likeliest hypothesis whether its name is sure, whatever else is left.
+
+    It must be as likely as a name has to be, told from all that is like it, and confirmed. Beside patterns
+    for what is left it must move rings or fiducials by more than they do, else it may make up for their
+    error.
+    """
+    best, verdicts = examined.best, examined.verdicts
+    if best is None or verdicts is None or verdicts.adequacy < ADEQUATE:
+        return ()
+    left = [shift_px(best.fit, t) for t in best.fit.terms[len(best.library_terms) :]]
+    each = zip(best.library_terms, examined.unsplit, examined.confirmed, strict=True)
+    return tuple(
+        verdicts.chance_of(term.model.law) > SURE
+        and not alike
+        and bool(confirmed)
+        and all(c.agrees for c in confirmed)
+        and (not left or shift_px(best.fit, term) > max(left))
+        for term, alike, confirmed in each
+    )
+
+
+def beyond_line(examined: Examined) -> tuple[bool, ...]:
+    """Return for each effect whether it moves the line by more than its width, as no light beside it can."""
+    best = examined.best
+    width_px = float(np.median(examined.searched.run.width_px))
+    return tuple(shift_px(best.fit, t) > width_px for t in best.library_terms) if best is not None else ()
 
 
 def _found(verdicts: Verdicts, term: Term, sized: Sized, confirmed: tuple[Confirmation, ...]) -> EffectFound:
@@ -54,18 +82,23 @@ def candidates(examined: Examined) -> tuple[Candidate, ...]:
 
 def members(examined: Examined) -> tuple[str, ...]:
     """Return the names that cannot be ruled out, by these measurements or by what they could tell."""
-    if examined.verdicts is None:
+    verdicts, best = examined.verdicts, examined.best
+    if verdicts is None or best is None:
         return ()
-    pairs = zip(examined.verdicts.probability, examined.verdicts.judged, strict=True)
-    names = [n for p, j in pairs if p > _IN_CLASS and j.named for n in j.laws]
-    return tuple(dict.fromkeys([*names, *examined.unsplit]))
+    certain = {t.model.law for t, is_sure in zip(best.library_terms, sure(examined), strict=False) if is_sure}
+    before = np.cumsum(verdicts.probability) - verdicts.probability
+    likely = [j for j, sum_before in zip(verdicts.judged, before, strict=True) if sum_before < SURE]
+    names = (t.model.law for j in likely for t in j.library_terms)
+    return tuple(n for n in dict.fromkeys((*names, *chain(*examined.unsplit))) if n not in certain)
 
 
 def formula(examined: Examined) -> str:
     """Return the empirical formula for what nothing of the library explains."""
     if examined.verdicts is None:
         return ""
-    terms = examined.verdicts.formula.fit.terms
+    best = examined.best
+    patterns = best.fit.terms[len(best.library_terms) :] if best is not None and best.library_terms else ()
+    terms = patterns or examined.verdicts.formula.fit.terms
     return "; ".join(t.model.equation(t.shape, t.amplitude) for t in terms)
 
 
@@ -94,13 +127,11 @@ def verdict_of(examined: Examined) -> Verdict:
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return Verdict.CONSISTENT
-    if not best.named or verdicts.adequacy < ADEQUATE:
-        return Verdict.UNEXPLAINED
     contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
-    if contradicted and all(contradicted):
+    if not best.library_terms or verdicts.adequacy < ADEQUATE or all(contradicted):
         return Verdict.UNEXPLAINED
-    sure = all(verdicts.chance_of(law) > CONFIDENT for law in best.laws)
-    confirmed = all(each for each in examined.confirmed)
-    # An effect that is contradicted by the field is withdrawn; the others stay.
-    doubted = any(contradicted) or bool(examined.unsplit)
-    return Verdict.NAMED if sure and confirmed and not doubted else Verdict.CLASS
+    if all(sure(examined)):
+        return Verdict.NAMED if best.named else Verdict.PARTLY
+    if any(sure(examined)):
+        return Verdict.PARTLY
+    return Verdict.CLASS if best.named else Verdict.UNEXPLAINED

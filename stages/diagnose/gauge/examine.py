@@ -24,7 +24,7 @@ from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.confirm import Sized, by_bore, confirmations, partial_of, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
 from stages.diagnose.gauge.fit import evidence, fit
-from stages.diagnose.gauge.formula import patterns_p
+from stages.diagnose.gauge.formula import ADEQUATE, patterns_p
 from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.judge import Judged, Regime, Verdicts, judge, judged_of, regimes_of
 from stages.diagnose.gauge.run import GaugeRun, Term
@@ -41,9 +41,6 @@ _IN_TIME = MappingProxyType({
 })  # fmt: skip
 # Of an examination: preparation, search, judgement of what was found.
 _PARTS = 3
-# A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
-# data/debts.md.
-ADEQUATE = 1e-5
 
 
 def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated: Stated) -> Location | None:
@@ -134,8 +131,9 @@ class Examined:
         What could be seen of each effect, before any residual was looked at.
     inseparable : tuple of tuple of str
         Groups of effects that are not told apart here at their typical sizes.
-    unsplit : tuple of str
-        Effects that this run is not expected to tell from those found at the sizes found.
+    unsplit : tuple of tuple of str
+        For each of the best hypothesis' effects, those that this run is not expected to tell from it at its
+        size.
     location : Location or None
     quality : FitQuality or None
     patterns_p : float
@@ -147,7 +145,7 @@ class Examined:
     confirmed: tuple[tuple[Confirmation, ...], ...]
     feasibility: tuple[Feasible, ...]
     inseparable: tuple[tuple[str, ...], ...]
-    unsplit: tuple[str, ...] = ()
+    unsplit: tuple[tuple[str, ...], ...] = ()
     location: Location | None = None
     quality: FitQuality | None = None
     sizes: tuple[Sized, ...] = ()
@@ -196,7 +194,7 @@ def examine(
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))
             judged = _judged(replace(seen, verdicts=judge(searched, coursed, stated)), coursed, stated)
-            return replace(judged, unsplit=(*judged.unsplit, *_untested(judged, without)))
+            return replace(judged, unsplit=_with_untested(judged, without))
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
 
@@ -206,11 +204,13 @@ def _watched(run: GaugeRun, done: int, progress: Progress) -> GaugeRun:
     return replace(run, watch=partial(progress, done, _PARTS))
 
 
-def _untested(judged: Examined, without: Collection[str]) -> tuple[str, ...]:
-    """Return the effects of the found ones' classes that there is no model of."""
-    best = judged.best
-    names = best.laws if best is not None and best.named else ()
-    return tuple(mate for name in names for mate in class_of(name) if mate in without)
+def _with_untested(judged: Examined, without: Collection[str]) -> tuple[tuple[str, ...], ...]:
+    """Return what each term is not told apart from, and what of its class there is no model of."""
+    terms = judged.best.library_terms if judged.best is not None else ()
+    return tuple(
+        (*names, *(mate for mate in class_of(t.model.law) if mate in without))
+        for t, names in zip(terms, judged.unsplit, strict=True)
+    )
 
 
 def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:
@@ -227,8 +227,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
     assert best is not None
     run, regimes = searched.run, verdicts.regimes
     nothing = next(j for j in verdicts.judged if not j.fit.terms)
-    terms = best.fit.terms if best.named else ()
-    alike = searched.alike
+    terms, alike = best.library_terms, searched.alike
     unsplit = not_told_apart(run, searched.nothing, terms, library, stated, alike) if terms else ()
     shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula
     return replace(

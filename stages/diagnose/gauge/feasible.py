@@ -75,8 +75,8 @@ def inseparable(
 def not_told_apart(
     run: GaugeRun, nothing: Fit, terms: Sequence[Term], library: Mapping[str, EffectModel], stated: Stated,
     alike: float,
-) -> tuple[str, ...]:  # fmt: skip
-    """Return the effects that this run is not expected to tell from one of the terms at the size found."""
+) -> tuple[tuple[str, ...], ...]:  # fmt: skip
+    """Return for each term the effects that this run is not expected to tell from it at the size found."""
     laws = {t.model.law for t in terms}
     rivals = [
         (model, shape)
@@ -87,13 +87,13 @@ def not_told_apart(
     about = evidence(run, nothing, [*((t.model, t.shape) for t in terms), *rivals])[0].deflated(alike)
     blocks = [(places_of(about, t.model, t.shape), t.amplitude) for t in terms]
     places = [(model.law, places_of(about, model, shape)) for model, shape in rivals]
-    near = (
-        law
-        for law, rival in places
-        if np.diag(about.information)[rival].min() > 0
-        and any(expected_gain(about, stated, block, size, rival) < APART for block, size in blocks)
-    )
-    return tuple(dict.fromkeys(near))
+    seen = [(law, rival) for law, rival in places if np.diag(about.information)[rival].min() > 0]
+    return tuple(
+        tuple(dict.fromkeys(
+            law for law, rival in seen if expected_gain(about, stated, block, size, rival) < APART
+        ))
+        for block, size in blocks
+    )  # fmt: skip
 
 
 def _shapes_beside(model: EffectModel, terms: Sequence[Term], middle: Shape | None) -> set[Shape]:

@@ -35,26 +35,30 @@ _MOST_TERMS = 4
 _NEEDED = 1e-4
 # Relative error of laws: large patterns are measured far more exactly than laws predict. Debt: data/debts.md.
 _SAME = 0.02
+# A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
+# data/debts.md.
+ADEQUATE = 1e-5
 # Directions with less information than this share of the best one are left out of the test of adequacy.
 # Debt: data/debts.md.
 _WEAK = 1e-3
 
 
-def empirical(run: GaugeRun, nothing: Fit, stated: Stated) -> Fit:
-    """Return the fit with the few patterns that explain the most."""
-    swinging = [s for s in swings(run, nothing, stated) if s.p_value * len(SWINGS) < _NEEDED]
+def empirical(run: GaugeRun, before: Fit, stated: Stated) -> Fit:
+    """Return a fit with the few patterns added that explain the most of what it leaves."""
+    swinging = [s for s in swings(run, before, stated) if s.p_value * len(SWINGS) < _NEEDED]
     words = [*VOCABULARY, *((s.model, s.shape) for s in swinging)]
-    about = evidence(run, nothing, words)[0]
+    about = evidence(run, before, words)[0]
+    own = [(t.model, t.shape) for t in before.terms]
     chosen: list[tuple[EffectModel, Shape, Score]] = []
     for _ in range(_MOST_TERMS):
-        given = _places(about, [(m, s) for m, s, _ in chosen])
+        given = _places(about, [*own, *((m, s) for m, s, _ in chosen)])
         left = [w for w in words if w not in [(m, s) for m, s, _ in chosen]]
         best = _next(about, stated, given, left)
         if best is None:
             break
         chosen.append(best)
     terms = [Term(model, shape, np.zeros(len(model.amplitudes))) for model, shape, _ in chosen]
-    return refined(run, fit(run, nothing.state, terms))
+    return refined(run, fit(run, before.state, (*before.terms, *terms)))
 
 
 def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:

@@ -14,7 +14,7 @@ from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import DECOYS, Nameless
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.formula import adequacy, empirical, says_the_same
+from stages.diagnose.gauge.formula import ADEQUATE, adequacy, empirical, says_the_same
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import refined, scan, span
 from stages.diagnose.gauge.search import Search, refits
@@ -27,6 +27,11 @@ _LEAST_FRAMES = 8
 # Debt: data/debts.md.
 _NAMELESS = 1 / 50
 _PEAK = 2
+# Likelihoods do not contain the small errors of laws and of image formation: what looks like odds of 1000 to
+# 1 counts as 100 to 1. A drawn focal length was once called a cone at 100 to 1. Debt: data/debts.md.
+_TEMPERED = 1.5
+# Rivals that are tried with patterns for what is left, as the found effects are.
+_WITH_PATTERNS = 3
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,11 @@ class Judged:
     def laws(self) -> tuple[str, ...]:
         """Names of the effects' laws, in order."""
         return tuple(sorted({t.model.law for t in self.fit.terms}))
+
+    @property
+    def library_terms(self) -> tuple[Term, ...]:
+        """The effects of the library; patterns for what they leave stand behind them."""
+        return tuple(t for t in self.fit.terms if not isinstance(t.model, Nameless))
 
     @property
     def named(self) -> bool:
@@ -137,8 +147,11 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     run, regimes, alike = searched.run, regimes_of(searched.run), searched.alike
     formula = empirical(run, searched.nothing, stated)
     fits = _distinct(
-        [searched.nothing, searched.found, *searched.rivals, *_decoyed(searched, stated), formula]
-    )
+        [
+            searched.nothing, searched.found, *searched.rivals, *_decoyed(searched, stated), formula,
+            *_with_patterns(searched, stated),
+        ]
+    )  # fmt: skip
     fits = [refined(run, f) for f in fits]
     laws = len({model.law for model in library.values()})
     judged = [judged_of(run, f, regimes, stated, alike, beforehand(run, f, laws)) for f in fits]
@@ -149,11 +162,23 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     allowed = np.array([j.heldout <= nothing.heldout for j in judged])
     total_surprise = np.array([j.surprise + j.beforehand for j in judged])
     allowed &= ~_redundant(run, judged, of_formula, total_surprise)
-    weight = np.where(allowed, np.exp(-0.5 * (total_surprise - total_surprise[allowed].min())), 0.0)
+    behind = (total_surprise - total_surprise[allowed].min()) / _TEMPERED
+    weight = np.where(allowed, np.exp(-0.5 * behind), 0.0)
     order = np.lexsort((total_surprise, -weight))
     ranked = tuple(judged[k] for k in order)
     left = adequacy(run, ranked[0].fit, stated)
     return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike)
+
+
+def _with_patterns(searched: Search, stated: Stated) -> list[Fit]:
+    """Return the found effects and their nearest rivals, each with patterns for what is left, if it is."""
+    run, found = searched.run, searched.found
+    if not found.terms or adequacy(run, found, stated) >= ADEQUATE:
+        return []
+    laws = {t.model.law for t in found.terms}
+    rivals = (f for f in searched.rivals if f.terms and {t.model.law for t in f.terms} != laws)
+    near = sorted(rivals, key=lambda f: f.cost)[:_WITH_PATTERNS]
+    return [empirical(run, f, stated) for f in (found, *near)]
 
 
 def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Bool:
