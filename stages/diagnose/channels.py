@@ -254,7 +254,9 @@ def examine_field(
 
 
 def _profile_problem(profile: LineProfile) -> tuple[str, ...]:
-    return (f"The line's profile tells nothing: {profile.problem}.",) if profile.problem else ()
+    if profile.problem:
+        return (f"The line's profile tells nothing: {profile.problem}.",)
+    return profile.evidence.uncovered if profile.evidence is not None else ()
 
 
 def _of_geometry(

@@ -75,6 +75,8 @@ class Claim:
         As far as it was measured.
     agreements : tuple of Agreement
         Second predictions of the same physics that tell enough.
+    counted : bool
+        Whether names were counted on pictures like these; if not, past cases bear nothing out.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Claim:
     where: str
     location: Location
     agreements: tuple[Agreement, ...] = ()
+    counted: bool = True
 
     @property
     def of_gauge_alone(self) -> bool:
@@ -94,7 +97,7 @@ class Claim:
     @property
     def found(self) -> EffectFound:
         """The effect with the chance that it is the right name."""
-        drilled = _DRILLED[Channel(self.location.channel)]
+        drilled = _DRILLED[Channel(self.location.channel)] if self.counted else 0
         return EffectFound(
             self.name, chance_of_name(self.p_value, len(self.alike), self.agreements, drilled),
             self.parameters, self.statement, effect(self.name).law,
@@ -214,7 +217,8 @@ def _of_finding(f: Finding, profile: ProfileEvidence, where: str) -> Claim:
         azimuth = (middle - width, middle + width)
     fixed_to = str(f.fixed_to) if f.fixed_to is not None else None
     location = Location(str(Channel.PROFILE), fixed_to, f.time, frames=frames, azimuth_deg=azimuth)
-    return Claim(f.effect, size, f.statement, f.p_value, f.alike, where, location, f.agreements)
+    counted = not profile.uncovered
+    return Claim(f.effect, size, f.statement, f.p_value, f.alike, where, location, f.agreements, counted)
 
 
 def _stretch(

@@ -149,7 +149,7 @@ def _rivals(claim: Claim) -> tuple[str, ...]:
 
 def _is_sure(claim: Claim) -> bool:
     """Return whether nothing else may have made a claim, and a second prediction of its physics agrees."""
-    return not _rivals(claim) and any(a.confirmation.agrees for a in claim.agreements)
+    return claim.counted and not _rivals(claim) and any(a.confirmation.agrees for a in claim.agreements)
 
 
 def _next(said: _Said, asked: Sequence[str]) -> str:

@@ -145,9 +145,6 @@ class ChannelEvidence:
         Such as ``gauge``, ``profile of the gauge`` or ``field``.
     channel : Channel
     whole : Evidence
-    regimes : tuple of (str, Evidence)
-        Disjoint parts whose unknowns were eliminated apart (a bore, a stretch of the motion): for judging
-        on held-out regimes. May be empty.
     anomalies : tuple of Anomaly
     shortcomings : tuple of str
         What this recording cannot tell, and why.
@@ -156,7 +153,6 @@ class ChannelEvidence:
     source: str
     channel: Channel
     whole: Evidence
-    regimes: tuple[tuple[str, Evidence], ...] = ()
     anomalies: tuple[Anomaly, ...] = ()
     shortcomings: tuple[str, ...] = ()
 

@@ -16,6 +16,8 @@ from stages.diagnose.channels import Seen
 from stages.diagnose.claims import rocking_excluded
 from stages.diagnose.compose import composed, verdict_of_rings
 from stages.diagnose.correct import encoder_effects
+from stages.diagnose.profile.evidence import Condition, ProfileEvidence
+from stages.diagnose.profile.finding import Size, finding
 from stages.diagnose.result import Confirmation, Diagnosis, Verdict
 from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
@@ -224,3 +226,16 @@ def test_what_touches_rings_without_a_pattern_is_the_doing_of_what_motion_shows(
     best = SimpleNamespace(named=False, names=names, library_terms=())
     rings = SimpleNamespace(best=best, verdicts=SimpleNamespace(adequacy=0.5), confirmed=(), unsplit=())
     assert verdict_of_rings(cast(Any, rings), claimed) is verdict
+
+
+@pytest.mark.parametrize(("width_px", "verdict"), [(1.5, Verdict.NAMED), (9.0, Verdict.CLASS)])
+def test_a_name_needs_pictures_on_which_names_were_counted(
+    real_probe: Probe, width_px: float, verdict: Verdict
+) -> None:
+    size = (Size("skewness", "", 1.0, 0.1),)
+    skewed = replace(finding("line_skew", 20.0, 1e-12, size, "It is skewed."), agreements=(AGREES,))
+    light = ProfileEvidence("gauge", np.arange(3), (skewed,), (Condition("width", width_px, 1.1, 3.2),))
+    found = answer(real_probe, None, replace(seen("gauge"), profile=light))
+    assert found.verdict is verdict
+    assert (found.effects[0].probability > 0.8) is (verdict is Verdict.NAMED)
+    assert bool(light.uncovered) is (verdict is Verdict.CLASS)

@@ -1,6 +1,7 @@
 """Scores of diagnoses: each rate counts what it says, and broken files are refused."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -12,6 +13,7 @@ from stages.diagnose.drill.answer import (
     Fit,
     Location,
     NamedEffect,
+    Remainder,
     read_answer,
     read_concealed,
 )
@@ -205,3 +207,25 @@ def test_the_table_has_every_figure_of_the_demand_once_and_names_its_count():
     } <= set(rows)  # fmt: skip
     assert rows["detected"].text.startswith("Detected at SNR ≥ 8: 1 of 1, 100.0% [20.")
     assert rows["false_alarms"].text.startswith("False alarms where nothing is hidden: none to count")
+
+
+def test_what_is_sure_counts_as_named_and_what_is_left_as_a_class():
+    tilt = NamedEffect(name="laser_tilt", probability=0.99)
+    left = Remainder.model_validate({"verdict": "class", "class": ["focal_scale", "laser_cone"]})
+    partly = Answer(verdict="partly", effects=(tilt,), remainder=left)
+    both = (Concealed(name="laser_tilt", values=(0.5, 10.0)), Concealed(name="laser_cone", values=(0.2,)))
+    trial = Trial("a", both, partly)
+    assert (trial.found, trial.exact, trial.misnamed, trial.contained) == (True, False, False, True)
+    wrong = Trial("b", both[1:], partly)
+    assert (wrong.misnamed, Trial("c", (), partly).misnamed) == (True, True)
+    assert score([Trial("c", (), partly)]).false_alarms.count == 1
+
+
+def test_an_effect_on_pictures_alone_is_scored_without_a_channel():
+    flicker = Trial("a", (Concealed(name="light_flicker", values=(0.1,)),), Answer(verdict="unexplained"))
+    assert (score([flicker]).located.of, score([flicker]).contained.count) == (0, 0)
+    named = replace(
+        flicker, answer=Answer(verdict="named", effects=(NamedEffect(name="light_flicker", probability=1),))
+    )
+    assert score([named]).named_exactly.count == 1
+    assert score([named]).size_count == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,7 @@ from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.kinds import Periodic
 from stages.diagnose.field.reduce import evidence_of, reduced
-from stages.diagnose.field.run import FieldRun, part_of, ring_points
+from stages.diagnose.field.run import FieldRun, ring_points
 from stages.diagnose.field.system import OWN, Asked, field_system
 from stages.diagnose.inference import ChannelEvidence, Evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
@@ -25,8 +25,6 @@ from stages.diagnose.travel.sight import sight_of_trajectory
 # More shapes than this are searched in the motion's spectrum or in the readings, not one by one.
 _FEW_SHAPES = 12
 _CELL_MM, _CELL_RAD = 10.0, np.radians(30.0)
-_STRETCHES = 3
-_LEAST_FRAMES = 40
 # Relative error of a nominal diameter: pipes are made to about 1 %, of which this is 3 σ.
 _DIAMETER_SHARE = 0.03
 _SHORTEST_MM = 40.0
@@ -155,15 +153,14 @@ def field_evidence(
     """
     travel = travel_of_run(run)
     asked, slips = asked_of(library, run, travel), _slips(run, travel)
-    progress(0, 1 + _STRETCHES)
+    progress(0, 1)
     try:
         whole = _evidence(run, asked, slips)
     except np.linalg.LinAlgError:
         return FieldEvidence(travel, nothing_said(run.recording, ""), run)
-    regimes = tuple(_regimes(run, asked, slips, progress))
     missing = (*(travel.shortcomings if travel else ()), *shortcomings_of(run))
     anomalies = travel.anomalies if travel else ()
-    channel = ChannelEvidence("field", Channel.RING, whole, regimes, anomalies, missing)
+    channel = ChannelEvidence("field", Channel.RING, whole, anomalies, missing)
     return FieldEvidence(travel, channel, run)
 
 
@@ -224,20 +221,3 @@ def _cells(distance_mm: Float, azimuth_rad: Float) -> Int:
     along = np.floor((distance_mm - np.min(distance_mm, initial=0.0)) / _CELL_MM).astype(np.int64)
     around = np.floor((azimuth_rad % (2 * np.pi)) / _CELL_RAD).astype(np.int64)
     return np.asarray(100 * along + around)
-
-
-def _regimes(run: FieldRun, asked: Asked, slips: Int, progress: Progress) -> Sequence[tuple[str, Evidence]]:
-    """Return the evidence of stretches on their own; one that tells nothing is left out."""
-    edges = np.linspace(0, len(run.measured.time_s), _STRETCHES + 1).round().astype(int)
-    out = []
-    for k in range(_STRETCHES):
-        progress(1 + k, 1 + _STRETCHES)
-        first, end = int(edges[k]), int(edges[k + 1])
-        if end - first < _LEAST_FRAMES:
-            continue
-        inside = slips[(slips > first) & (slips < end)] - first
-        try:
-            out.append((f"field, stretch {k + 1}", _evidence(part_of(run, first, end), asked, inside)))
-        except np.linalg.LinAlgError:
-            continue
-    return out

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from pipeline.arrays import Float
-from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.generic import VOCABULARY
+from pipeline.arrays import Bool, Float
+from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
-from stages.diagnose.gauge.fit import Fit, kept_columns, own_unknowns
+from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
 from stages.diagnose.gauge.points import BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun, linearise, ring_mm_per_px
@@ -20,6 +19,11 @@ from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, esti
 from stages.diagnose.result import FitQuality
 
 _RIDGE = 1e-9
+# What is predicted; the encoder's readings have no say in it, because they may be wrong themselves.
+_SEEN_KINDS = (RING, EDGE)
+# So long that the poses of a block hold together, so short that several lie on either side of an event.
+_BLOCK_FRAMES = 8
+_SAME_AZIMUTH_RAD = np.radians(3.0)
 
 
 @dataclass(frozen=True)
@@ -39,38 +43,70 @@ Rule = Callable[[Shared], Float]
 def fit_quality(
     run: GaugeRun, nothing: Judged, best: Judged, regimes: Sequence[Regime], stated: Stated
 ) -> FitQuality:
-    """Return the r.m.s. before and after of rings and fiducials, on all and on regimes held out in turn.
+    """Return the r.m.s. before and after of rings and fiducials, on all and on parts held out in turn.
 
-    Before is with the instrument exactly as stated. The noise floor is what is left when the patterns of the
-    empirical vocabulary are free in addition.
+    Before is with the instrument exactly as stated. Parts are the regimes; with a course in the run's own
+    time they are blocks of frames by turns: what comes after a step is not to be told from before it.
     """
-    everything = [Part(np.ones(len(run.time_s), bool))]
-    floor = _rms_px(run, best, everything, [_free], VOCABULARY)
+    everything = [Part(np.ones(len(run.time_s), bool), _SEEN_KINDS)]
+    floor = repeatability_px(run, nothing)
     before = _rms_px(run, nothing, everything, [_as_stated])
     after = _rms_px(run, best, everything, [_free])
-    parts = [r.part for r in regimes]
+    parts = [replace(r.part, kinds=_SEEN_KINDS) for r in regimes]
     if len(parts) < 2:
         return FitQuality("px", before, after, np.nan, np.nan, floor)
+    by_part: Sequence[Evidence] = best.by_regime
+    if any(isinstance(t.model, Coursed) and t.model.kind in OWN_CLOCK for t in best.fit.terms):
+        parts = [Part(frames, _SEEN_KINDS) for frames in _by_turns(len(run.time_s))]
+        by_part = evidence(run, best.fit, (), [replace(p, kinds=Part(p.frames).kinds) for p in parts])[1:]
     learned = [
-        partial(_from_others, total([e for e in best.by_regime if e is not left]), best.fit, stated)
-        for left in best.by_regime
+        partial(_from_others, total([e for e in by_part if e is not left]), best.fit, stated)
+        for left in by_part
     ]
     held_before = _rms_px(run, nothing, parts, [_as_stated] * len(parts))
     return FitQuality("px", before, after, held_before, _rms_px(run, best, parts, learned), floor)
 
 
-def _rms_px(
-    run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequence[Rule],
-    asked: Sequence[tuple[EffectModel, Shape]] = (),
-) -> float:  # fmt: skip
+def _by_turns(frames: int) -> list[Bool]:
+    """Return masks (N,) of the frames in every other block, and in the rest."""
+    block = np.arange(frames) // _BLOCK_FRAMES
+    return [block % 2 == k for k in range(2)]
+
+
+def repeatability_px(run: GaugeRun, nothing: Judged) -> float:
+    """Return the r.m.s. noise of rings and fiducials, whatever is left out of the model.
+
+    Of rings it is what neighbouring ones differ by at the same azimuth, over √2: an error of the instrument
+    is alike in both. Of fiducials it is their edges' own σ.
+    """
+    about = nothing.fit.linearised
+    equations, per_px = about.equations, ring_mm_per_px(about.rings)
+    ring, edge = equations.kind == RING, equations.kind == EDGE
+    weight = np.where(np.isfinite(per_px), equations.weight[ring] * per_px**2, 0.0)
+    value = equations.residual[ring] / per_px
+    outward = run.rings.outward
+    place = np.round(np.arctan2(outward[:, 1], outward[:, 0]) / _SAME_AZIMUTH_RAD).astype(np.int64)
+    turn = np.unique(run.rings.frame, return_inverse=True)[1]
+    order = np.lexsort((turn, place))
+    first, second = order[:-1], order[1:]
+    near = (place[first] == place[second]) & (turn[second] - turn[first] == 1)
+    both = np.sqrt(weight[first] * weight[second])
+    near &= both > 0
+    of_rings = float(np.average((value[second] - value[first])[near] ** 2, weights=both[near])) / 2
+    of_edges = float(equations.weight[edge] @ run.edges.sigma_px**2)
+    squares = weight.sum() * of_rings + of_edges
+    return float(np.sqrt(squares / (weight.sum() + equations.weight[edge].sum())))
+
+
+def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequence[Rule]) -> float:
     """Return the weighted r.m.s. of parts of the run, each with its poses and own unknowns at their best."""
-    about = linearise(run, judged.fit.state, judged.fit.terms, asked, with_baseline=True)
+    about = linearise(run, judged.fit.state, judged.fit.terms, (), with_baseline=True)
     # Smooth patterns of a hundredth of a pixel would take up what is asked about: they stay out of it.
     about.equations.by_global[:, -BASELINE_SIZE:] = 0.0
     per_px = np.full(len(about.equations.frame), np.nan)
     per_px[about.equations.kind == RING] = ring_mm_per_px(about.rings)
     per_px[about.equations.kind == EDGE] = 1.0
-    columns, value = kept_columns(judged.fit, asked)
+    columns, value = kept_columns(judged.fit, ())
     squares = weights = 0.0
     for part, rule in zip(parts, rules, strict=True):
         use = part.frames[about.equations.frame] & np.isin(about.equations.kind, part.kinds)

@@ -35,6 +35,9 @@ Test = Callable[[Cells], tuple[Finding, ...]]
 _HALVES = ("first half of the frames", "second half of the frames")
 # A jackknife over fewer blocks gives no usable σ.
 _LEAST_BLOCKS_OF_HALF = 3
+# What the drawn cases of `python -m tests.benchmarks.bench_profile_nulls` cover, 39 of seed 1 looked at:
+# widths of unclipped lines, heights and clipped shares. They were encoded by H.264 at crf 18 to 34.
+_COUNTED_WIDTH_PX, _COUNTED_HEIGHT, _COUNTED_CLIPPED = (1.1, 3.2), (38.0, 251.0), (0.0, 0.84)
 
 
 def with_halves(findings: tuple[Finding, ...], tests: Sequence[Test], cells: Cells) -> tuple[Finding, ...]:
@@ -73,6 +76,21 @@ def _words(size: Size) -> str:
 
 
 @dataclass(frozen=True)
+class Condition:
+    """How the line is pictured in one respect, and the values at which false alarms were counted."""
+
+    words: str
+    value: float
+    low: float
+    high: float
+
+    @property
+    def covered(self) -> bool:
+        """Whether such pictures were among those counted."""
+        return self.low <= self.value <= self.high
+
+
+@dataclass(frozen=True)
 class ProfileEvidence:
     """What the line's light says of one recording.
 
@@ -84,11 +102,23 @@ class ProfileEvidence:
         Frames lit by the laser alone.
     findings : tuple of Finding
         One an effect, found or not.
+    conditions : tuple of Condition
     """
 
     source: str
     frame: Int
     findings: tuple[Finding, ...]
+    conditions: tuple[Condition, ...] = ()
+
+    @property
+    def uncovered(self) -> tuple[str, ...]:
+        """Sentences on how these pictures differ from all on which the tests' p-values were shown."""
+        return tuple(
+            f"The {c.words} is {c.value:.3g} in {self.source}. The p-values of the line's profile were not "
+            f"shown on pictures like these: false alarms were counted from {c.low:.3g} to {c.high:.3g}."
+            for c in self.conditions
+            if not c.covered
+        )
 
     @property
     def found(self) -> tuple[Finding, ...]:
@@ -159,7 +189,17 @@ def _examined(recording: Recording, rings: RingSamples, probe: Probe, context: C
     telling = [test for test, each in zip(tests, shown, strict=True) if any(f.found for f in each)]
     findings = with_halves(_spot_or_pixels(findings), telling, cells)
     context.report("effects found in the line's profile", sum(f.found for f in findings), "effects")
-    return ProfileEvidence(recording.name, profiles.frame, findings)
+    return ProfileEvidence(recording.name, profiles.frame, findings, _conditions(profiles, geometry))
+
+
+def _conditions(profiles: LineProfiles, geometry: LineGeometry) -> tuple[Condition, ...]:
+    """Return how the line is pictured."""
+    width, height = float(np.nanmedian(geometry.width_px)), float(np.nanmedian(geometry.height))
+    return (
+        Condition("line's median width (1 σ, px)", width, *_COUNTED_WIDTH_PX),
+        Condition("line's median height (grey levels)", height, *_COUNTED_HEIGHT),
+        Condition("share of the line that clips", float(np.nanmean(profiles.clipped)), *_COUNTED_CLIPPED),
+    )
 
 
 def _spot_or_pixels(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:

@@ -223,7 +223,7 @@ def _misfit_at_delay(
     """Return the sum of absolute increments left at a delay, and the play at which they are least."""
     difference = readings_at(steady, sight.time_s + delay_s) - sight.distance_mm
     of_events, left, play_mm = event_columns(sight, events, speed), np.inf, 0.0
-    for _ in range(_PLAYS):
+    for _ in range(_PLAYS if sight.reverses else 1):
         smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
         columns = np.concatenate([np.delete(smooth, DELAY, 1), of_events], 1)
         found = robust_coefficients(difference + off, columns, _QUICKLY)
