@@ -6,15 +6,16 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, Strict, ValidationError, model_validator
 
 from pipeline.errors import InputError
 from pipeline.files.yaml_file import read_yaml
 from pipeline.machine.stage import Parameters
 from pipeline.physics.catalogue import effect
+from pipeline.physics.course import COURSES, Course, CourseKind
 from pipeline.physics.effect import Quantity
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.scene import Scene, read_scene, scene_from
@@ -46,19 +47,28 @@ class Concealable(Parameters):
     name: str = Field(description="of the catalogue")
     weight: float = Field(1.0, gt=0, description="how often, relative to the others")
     size: Range = Field((1.0, 6.0), description="its first quantity over the typical, drawn log-uniformly")
+    course: Annotated[CourseKind, Strict(False)] = Field(
+        CourseKind.CONSTANT, description="how the size changes during a recording"
+    )
     others: dict[str, Range] = Field(
-        default_factory=dict, description="ranges of further quantities, drawn evenly; else the typical"
+        default_factory=dict,
+        description="ranges of further quantities, the course's among them, drawn evenly; else the typical",
     )
 
     @model_validator(mode="after")
     def _in_catalogue(self) -> Concealable:
-        known = [q.name for q in effect(self.name).quantities]
+        known = [q.name for q in self.quantities]
         unknown = sorted(set(self.others) - set(known[1:]))
         if unknown:
             raise ValueError(f"{self.name} has no quantity {unknown[0]!r} beside its size")
         if not 0 < self.size[0] <= self.size[1]:
             raise ValueError(f"{self.name}: size must be two positive numbers, the smaller first")
         return self
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Of the effect and, after these, of its course."""
+        return (*effect(self.name).quantities, *COURSES[self.course])
 
 
 class Prior(Parameters):
@@ -146,13 +156,14 @@ def _draw_effects(prior: Prior, random: np.random.Generator) -> dict[str, dict[s
         if not left:
             break
         one = left[_weighted(random, [e.weight for e in left])]
-        drawn[one.name] = _draw_sizes(one, random)
+        switch = _draw_sizes(one, random)
+        drawn[switch.key] = switch.numbers
         left = [e for e in left if e.name not in (one.name, *effect(one.name).alike)]
     return drawn
 
 
-def _draw_sizes(one: Concealable, random: np.random.Generator) -> dict[str, float]:
-    size, *others = effect(one.name).quantities
+def _draw_sizes(one: Concealable, random: np.random.Generator) -> Switch:
+    size, *others = one.quantities
     factor = float(np.exp(random.uniform(*np.log(one.size))))
     sign = float(random.choice([-1.0, 1.0])) if size.low < 0 else 1.0
     values = {size.name: _fit(size, sign * factor * size.typical)}
@@ -160,7 +171,9 @@ def _draw_sizes(one: Concealable, random: np.random.Generator) -> dict[str, floa
         span = one.others.get(quantity.name, (-180.0, 180.0) if quantity.name == _DIRECTION else None)
         value = float(random.uniform(*span)) if span else quantity.typical
         values[quantity.name] = _fit(quantity, float(np.rint(value)) if quantity.name == "order" else value)
-    return Switch(one.name, tuple(values.values())).quantities
+    own = len(effect(one.name).quantities)
+    numbers = tuple(values.values())
+    return Switch(one.name, numbers[:own], Course(one.course, numbers[own:]))
 
 
 def _fit(quantity: Quantity, value: float) -> float:

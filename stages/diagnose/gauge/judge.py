@@ -14,10 +14,10 @@ from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import DECOYS, Nameless
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.formula import ADEQUATE, adequacy, empirical, says_the_same
+from stages.diagnose.gauge.formula import adequacy, empirical, says_the_same
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import refined, scan, span
-from stages.diagnose.gauge.search import Search, refits
+from stages.diagnose.gauge.search import LEAST_SHARE, Search, refits, shift_px
 from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Evidence, Stated, estimate, total
 
 _STRETCHES = 2
@@ -173,12 +173,17 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
 def _with_patterns(searched: Search, stated: Stated) -> list[Fit]:
     """Return the found effects and their nearest rivals, each with patterns for what is left, if it is."""
     run, found = searched.run, searched.found
-    if not found.terms or adequacy(run, found, stated) >= ADEQUATE:
+    if not found.terms:
+        return []
+    both = empirical(run, found, stated)
+    sizes = [shift_px(both, t) for t in both.terms]
+    own = len(found.terms)
+    if max(sizes[own:], default=0.0) < LEAST_SHARE * max(sizes[:own]):
         return []
     laws = {t.model.law for t in found.terms}
     rivals = (f for f in searched.rivals if f.terms and {t.model.law for t in f.terms} != laws)
     near = sorted(rivals, key=lambda f: f.cost)[:_WITH_PATTERNS]
-    return [empirical(run, f, stated) for f in (found, *near)]
+    return [both, *(empirical(run, f, stated) for f in near)]
 
 
 def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Bool:

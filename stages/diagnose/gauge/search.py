@@ -35,9 +35,9 @@ _RIVAL_ITERATIONS = 5
 # Rivals whose χ² is worse by more than this are not considered; how often and which weights are recomputed.
 # Debt: data/debts.md.
 _FAR, _REWEIGHED, _WEIGHINGS = 100.0, 4, 3
-# A further effect smaller than this share of the first may be an error of the first one's law.
+# A further effect or pattern smaller than this share of the first may be an error of the first one's law.
 # Debt: data/debts.md.
-_LEAST_SHARE = 0.01
+LEAST_SHARE = 0.01
 _CAUCHY = 2.5
 # A bore is not believed to be better known than this. Debt: data/debts.md.
 _LEAST_BORE_SIGMA_MM = 1e-3
@@ -251,7 +251,7 @@ def _extended(
 def _counts(found: Fit) -> bool:
     """Return whether the last effect is large enough beside the others to count."""
     sizes = [shift_px(found, t) for t in found.terms]
-    return len(sizes) < 2 or sizes[-1] > _LEAST_SHARE * max(sizes[:-1])
+    return len(sizes) < 2 or sizes[-1] > LEAST_SHARE * max(sizes[:-1])
 
 
 def _exchanged(
