@@ -10,10 +10,13 @@ from pipeline.physics.course import COURSES, Course, CourseKind
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch, parse_switches, switches_from_mapping
 from pipeline.simulator.laws.bench import bench_truth
+from pipeline.simulator.prior import Concealable, draw_pair, read_prior
 from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px, texture_shift_px, without
+from tests.shared_data import PROJECT_ROOT
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
+RING_LEVEL = PROJECT_ROOT / "tests" / "benchmarks" / "ring_level.yaml"
 BORE = Bore(42.0, (4.0, -7.0, 0.0), (0.03, -0.02, 1.0))
 
 
@@ -137,3 +140,15 @@ def test_statements_and_equations_tell_the_course_and_columns_its_slope():
         assert model.statement(shape, size).endswith(").")
         if shape:
             assert np.isfinite(columns(model, points, shape)).all()
+
+
+def test_a_prior_draws_an_effect_with_its_course():
+    knocked = {"name": "laser_tilt", "course": "step", "others": {"time_s": (1.0, 6.0)}}
+    drawn_from = read_prior(RING_LEVEL).model_copy(
+        update={"effects": (Concealable.model_validate(knocked),), "concealed": (0.0, 1.0)}
+    )
+    ((name, values),) = draw_pair(drawn_from, RING_LEVEL, 3, 0).gauge.effects.items()
+    assert name == "laser_tilt~step"
+    assert 1.0 <= values["time_s"] <= 6.0
+    with pytest.raises(ValueError, match="has no quantity 'period_s'"):
+        Concealable.model_validate(knocked | {"others": {"period_s": (1.0, 6.0)}})
