@@ -199,12 +199,16 @@ AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
 
 def examined(
     shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
-    left: float = 0.5, unsplit: tuple[str, ...] = (),
+    left: float = 0.5, pattern_order: int = 2, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),),
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
-    terms = tuple(SimpleNamespace(model=law, shift_px=s) for s in (*shifts_px, *patterns_px))
+    orders = (*([1] * len(shifts_px)), *([pattern_order] * len(patterns_px)))
+    terms = tuple(
+        SimpleNamespace(model=law, shift_px=s, order=m)
+        for s, m in zip((*shifts_px, *patterns_px), orders, strict=True)
+    )
     library = terms[: len(shifts_px)]
     fit = SimpleNamespace(terms=terms)
     best = SimpleNamespace(named=bool(library) and not patterns_px, library_terms=library, fit=fit)
@@ -220,6 +224,7 @@ def examined(
         (examined((), (0.5,), confirmed=()), Verdict.UNEXPLAINED),
         (examined(patterns_px=(0.5,)), Verdict.PARTLY),
         (examined(patterns_px=(2.0,)), Verdict.UNEXPLAINED),
+        (examined(patterns_px=(0.5,), pattern_order=1), Verdict.UNEXPLAINED),
         (examined(patterns_px=(0.5,), chance=0.98), Verdict.UNEXPLAINED),
         (examined((1.0, 1.0), unsplit=("principal_point",), confirmed=((AGREES,),) * 2), Verdict.PARTLY),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
@@ -232,4 +237,5 @@ def examined(
 )
 def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict, monkeypatch):
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
+    monkeypatch.setattr(answer, "pattern_of", lambda term: ("laser", "static", term.order))
     assert answer.verdict_of(seen) is verdict

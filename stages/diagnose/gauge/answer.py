@@ -9,7 +9,7 @@ import numpy as np
 
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.elimination import RING
-from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.examine import Examined, pattern_of
 from stages.diagnose.gauge.formula import ADEQUATE
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
@@ -32,12 +32,14 @@ def sure(examined: Examined) -> tuple[bool, ...]:
 
     It must be as likely as a name has to be, told from all that is like it, and confirmed. Beside patterns
     for what is left it must move rings or fiducials by more than they do, else it may make up for their
-    error.
+    error; and none of them may have its harmonic and its course, else they may make up for a wrong law.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None or verdicts.adequacy < ADEQUATE:
         return ()
-    left = [shift_px(best.fit, t) for t in best.fit.terms[len(best.library_terms) :]]
+    patterns = best.fit.terms[len(best.library_terms) :]
+    left = [shift_px(best.fit, t) for t in patterns]
+    like = {pattern_of(t)[1:] for t in patterns}
     each = zip(best.library_terms, examined.unsplit, examined.confirmed, strict=True)
     return tuple(
         verdicts.chance_of(term.model.law) > SURE
@@ -45,6 +47,7 @@ def sure(examined: Examined) -> tuple[bool, ...]:
         and bool(confirmed)
         and all(c.agrees for c in confirmed)
         and (not left or shift_px(best.fit, term) > max(left))
+        and pattern_of(term)[1:] not in like
         for term, alike, confirmed in each
     )
 

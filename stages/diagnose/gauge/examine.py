@@ -48,7 +48,7 @@ def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated
     if not judged.fit.terms:
         return None
     term = judged.fit.terms[0]
-    fixed_to, time, harmonic = _pattern(term)
+    fixed_to, time, harmonic = pattern_of(term)
     rings = judged.fit.linearised.rings
     distance = rings.distance_mm if rings.distance_mm is not None else np.zeros(1)
     return Location(
@@ -58,8 +58,8 @@ def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated
     )  # fmt: skip
 
 
-def _pattern(term: Term) -> tuple[str, str, int | None]:
-    """Return what the term is fixed to, its behaviour in time and its harmonic."""
+def pattern_of(term: Term) -> tuple[str, str, int | None]:
+    """Return what a term is fixed to, its behaviour in time and its harmonic."""
     model = term.model
     if isinstance(model, Nameless):
         fixed_to, time, harmonic = model.goes_with(term.shape)

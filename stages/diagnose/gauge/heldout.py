@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Float, Int
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
 from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
@@ -24,6 +24,8 @@ _SEEN_KINDS = (RING, EDGE)
 # So long that the poses of a block hold together, so short that several lie on either side of an event.
 _BLOCK_FRAMES = 8
 _SAME_AZIMUTH_RAD = np.radians(3.0)
+# What reflectance and relief do to a line is alike over a few mm of wall. Debt: data/debts.md.
+_OTHER_WALL_MM = 10.0
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ def fit_quality(
     time they are blocks of frames by turns: what comes after a step is not to be told from before it.
     """
     everything = [Part(np.ones(len(run.time_s), bool), _SEEN_KINDS)]
-    floor = repeatability_px(run, nothing)
+    floor = repeatability_px(run, best.fit)
     before = _rms_px(run, nothing, everything, [_as_stated])
     after = _rms_px(run, best, everything, [_free])
     parts = [replace(r.part, kinds=_SEEN_KINDS) for r in regimes]
@@ -73,29 +75,39 @@ def _by_turns(frames: int) -> list[Bool]:
     return [block % 2 == k for k in range(2)]
 
 
-def repeatability_px(run: GaugeRun, nothing: Judged) -> float:
-    """Return the r.m.s. noise of rings and fiducials, whatever is left out of the model.
+def repeatability_px(run: GaugeRun, found: Fit) -> float:
+    """Return the r.m.s. noise of rings and fiducials, of image and wall.
 
-    Of rings it is what neighbouring ones differ by at the same azimuth, over √2: an error of the instrument
-    is alike in both. Of fiducials it is their edges' own σ.
+    Of rings it is what two of them differ by at the same azimuth on other wall of the same bore, over √2: an
+    error of the instrument that is left is alike in both, so that a bad fit makes no larger floor. Of
+    fiducials it is their edges' own σ.
     """
-    about = nothing.fit.linearised
+    about = found.linearised
     equations, per_px = about.equations, ring_mm_per_px(about.rings)
     ring, edge = equations.kind == RING, equations.kind == EDGE
     weight = np.where(np.isfinite(per_px), equations.weight[ring] * per_px**2, 0.0)
     value = equations.residual[ring] / per_px
-    outward = run.rings.outward
-    place = np.round(np.arctan2(outward[:, 1], outward[:, 0]) / _SAME_AZIMUTH_RAD).astype(np.int64)
-    turn = np.unique(run.rings.frame, return_inverse=True)[1]
-    order = np.lexsort((turn, place))
-    first, second = order[:-1], order[1:]
-    near = (place[first] == place[second]) & (turn[second] - turn[first] == 1)
+    first, second = _on_other_wall(run, found)
     both = np.sqrt(weight[first] * weight[second])
-    near &= both > 0
-    of_rings = float(np.average((value[second] - value[first])[near] ** 2, weights=both[near])) / 2
+    used = both > 0
+    of_rings = float(np.average((value[second] - value[first])[used] ** 2, weights=both[used])) / 2
     of_edges = float(equations.weight[edge] @ run.edges.sigma_px**2)
     squares = weight.sum() * of_rings + of_edges
     return float(np.sqrt(squares / (weight.sum() + equations.weight[edge].sum())))
+
+
+def _on_other_wall(run: GaugeRun, found: Fit) -> tuple[Int, Int]:
+    """Return pairs (P,) of ring bins of one azimuth and bore, as near in time as other wall allows."""
+    outward, along = run.rings.outward, found.state.T_pc[:, 2, 3]
+    place = np.round(np.arctan2(outward[:, 1], outward[:, 0]) / _SAME_AZIMUTH_RAD).astype(np.int64)
+    frames, turn = np.unique(run.rings.frame, return_inverse=True)
+    step_mm = float(np.median(np.abs(np.diff(along[frames])))) if len(frames) > 1 else np.inf
+    apart = min(max(int(np.ceil(_OTHER_WALL_MM / max(step_mm, 1e-9))), 1), max(len(frames) // 4, 1))
+    order = np.lexsort((turn, place))
+    first, second = order[:-apart], order[apart:]
+    alike = (place[first] == place[second]) & (run.rings.section[first] == run.rings.section[second])
+    alike &= turn[second] - turn[first] <= 2 * apart
+    return first[alike], second[alike]
 
 
 def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequence[Rule]) -> float:
