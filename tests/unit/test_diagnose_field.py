@@ -27,7 +27,7 @@ def field_with(signal):
     right = patterns.T @ signal / SIGMA**2
     misfit, cells = float(signal @ signal) / SIGMA**2, 400.0
     whole = Evidence(tuple(columns), information, right, information, misfit, cells)
-    return FieldEvidence(None, None, ChannelEvidence("field", Channel.RING, whole))
+    return FieldEvidence(None, ChannelEvidence("field", Channel.RING, whole))
 
 
 def test_noise_shows_nothing():
