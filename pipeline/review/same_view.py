@@ -198,7 +198,9 @@ def _greys(finder: FrameFinder, frame: int, image: Image, point_p: Float) -> tup
     """Return the grey levels of a frame at points (..., 3) in P, and whether the lamps alone light them."""
     point_c = transform(inverse(_pose(finder, frame)), point_p.reshape(-1, 3))
     uv, valid = finder.probe.camera.project(point_c)
-    valid &= np.abs(finder.off_sheet(point_c)) > _LASER_BAND_MM
+    table = finder.recording.frames
+    if table.illumination[np.searchsorted(table.frame, frame)] == Illumination.BOTH:
+        valid &= np.abs(finder.off_sheet(point_c)) > _LASER_BAND_MM
     grey = cv2.GaussianBlur(image.mean(2, dtype=np.float32), (0, 0), _SMOOTHING_PX)
     u, v = _on_image(uv, valid, point_p.shape[:-1])
     found = np.asarray(cv2.remap(grey, u, v, cv2.INTER_LINEAR, borderValue=(-1,)), float)
