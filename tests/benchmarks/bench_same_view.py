@@ -4,8 +4,8 @@
     python -m tests.benchmarks.bench_same_view RUN [--frames N] [--pictures FOLDER]
 
 Compared are lit frames that no stage of the run has measured; where the run withheld none, measured ones,
-which is said. The page turns the model to four places around the wall, 60° off the camera's axis. Frames lit with the laser on show its
-line, which the model has not: such recordings reach some 25 dB.
+which is said. The page turns the model to four places around the wall, 60° off the camera's axis. Frames lit
+with the laser on show its line, which the model has not: such recordings reach some 25 dB.
 """
 
 from __future__ import annotations
