@@ -34,12 +34,13 @@ class Compared:
     Attributes
     ----------
     before, after : RingResidual
-    fit : FitQuality
+    fit : FitQuality or None
+        None where the gauge run does not tell.
     """
 
     before: RingResidual
     after: RingResidual
-    fit: FitQuality
+    fit: FitQuality | None
 
 
 def compared(
@@ -62,11 +63,11 @@ def compared(
         of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
         linear = _beyond_probe(examined, correction)
         if field is None:
-            return _gauge_alone(of_gauge) if of_gauge is not None else None
+            return _gauge_alone(of_gauge, examined) if of_gauge is not None else None
         if of_gauge is not None and _of_own_clock(examined):
             # What happens at a time of the gauge run need not happen in the field: the gauge's own held-out
             # rings tell.
-            return _gauge_alone(of_gauge)
+            return _gauge_alone(of_gauge, examined)
         return _in_field(field, corrected or field, linear, examined, of_gauge)
     except np.linalg.LinAlgError:
         return None
@@ -92,9 +93,9 @@ def _of_gauge(gauge: Recording, examined: Examined) -> GaugeResiduals:
     return rings_against_fiducials(searched.run, searched.nothing.state, terms, gauge.frames.frame)
 
 
-def _gauge_alone(of: GaugeResiduals) -> Compared:
-    before, after = of.before.rms_px, of.after.rms_px
-    return Compared(of.before, of.after, FitQuality("px", before, after, before, of.heldout.rms_px, after))
+def _gauge_alone(of: GaugeResiduals, examined: Examined | None) -> Compared:
+    """Return the gauge's residuals; how well they fit was judged on parts of its run held out in turn."""
+    return Compared(of.before, of.after, examined.quality if examined is not None else None)
 
 
 def _in_field(

@@ -106,11 +106,10 @@ def _mean(row: Int, column: Int, values: Float, rows: int) -> Float:
 
 @dataclass(frozen=True)
 class GaugeResiduals:
-    """Residuals without and with the effects, and with effects sized on the other bores only."""
+    """Residuals without and with the effects."""
 
     before: RingResidual
     after: RingResidual
-    heldout: RingResidual
 
 
 def rings_against_fiducials(
@@ -130,18 +129,8 @@ def rings_against_fiducials(
     """
     relaxed = replace(run, ring_weight=_GAUGE_RELAXED * run.ring_weight)
     before = _gauge_residual(run, fit(relaxed, start, ()), frames)
-    if not terms:
-        return GaugeResiduals(before, before, before)
-    found = fit(relaxed, start, terms)
-    after = _gauge_residual(run, found, frames)
-    heldout = after.residual_mm.copy(), after.residual_px.copy()
-    nothing = tuple(replace(t, amplitude=0 * t.amplitude) for t in terms)
-    for section in np.unique(run.rings.section):
-        here = run.rings.section == section
-        others = replace(relaxed, ring_weight=np.where(here, 1e-6, 1.0) * relaxed.ring_weight)
-        left = _gauge_residual(run, fit(others, start, nothing), frames)
-        heldout[0][here], heldout[1][here] = left.residual_mm[here], left.residual_px[here]
-    return GaugeResiduals(before, after, replace(after, residual_mm=heldout[0], residual_px=heldout[1]))
+    after = _gauge_residual(run, fit(relaxed, start, terms), frames) if terms else before
+    return GaugeResiduals(before, after)
 
 
 def _gauge_residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:
