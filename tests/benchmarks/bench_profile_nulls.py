@@ -149,15 +149,16 @@ def examined(case: Case, folder: Path) -> dict[str, Any]:
         evidence = profile_evidence(recording, rings, probe, quiet_context())
     except UnusableError as error:
         return told | {"problem": error.problem}
-    names = [f.effect for f in evidence.found] + ["unexplained"] * (evidence.unexplained is not None)
+    classes = [sorted({f.effect, *f.alike}) for f in evidence.found]
+    names = ["|".join(c) for c in classes] + ["unexplained"] * (evidence.unexplained is not None)
     each = {f.effect: {"z": float(f.z), "p": float(f.p_value)} for f in evidence.findings}
     return told | {"found": names, "tests": each}
 
 
 def false_claims(told: dict[str, Any]) -> list[str]:
-    """Return the effects that a case was said to have and has not."""
+    """Return the classes of effects of which a case was said to have one, and has none."""
     true = TRUE_OF_GAMMA if told["condition"]["gamma"] != 1 else frozenset()
-    return [name for name in told.get("found", []) if name not in true]
+    return [name for name in told.get("found", []) if true.isdisjoint(name.split("|"))]
 
 
 def main() -> None:

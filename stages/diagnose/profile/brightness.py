@@ -144,7 +144,11 @@ def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Fi
 
 
 def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
-    """Return the finding of `ambient_light`: grey beside the line in frames lit by the laser alone."""
+    """Return the finding of `ambient_light`: grey beside the line in frames lit by the laser alone.
+
+    A camera that is not linear lifts the faintest light as much: a grey level of 1 in 255 becomes 20 under a
+    response I^(1 / 2.2). Therefore the name never stands alone.
+    """
     height = np.nanmedian(geometry.height, axis=1)
     used = geometry.steady & np.isfinite(height)
     if not used.any():
@@ -156,6 +160,7 @@ def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
     return finding(
         "ambient_light", z, float(2 * norm.sf(abs(z))), (Size("relative", "", worst, sigma),),
         f"Beside the line lies light of {100 * worst:.2f} % of its height where there is most.",
+        alike=("gamma",),
     )  # fmt: skip
 
 
