@@ -12,7 +12,8 @@ from pipeline.machine.display import SilentDisplay
 from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.window import CylinderWindow
-from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, LineBlocks, light_of, sigmas
+from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, sigmas
+from stages.twin.line_blocks import LineBlocks, light_of
 from stages.twin.placement import seen_at
 
 FRAMES, BLOCKS, PIXELS = 12, 30, 160
