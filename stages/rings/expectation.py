@@ -26,8 +26,12 @@ _MOST_WANDER = 0.12
 _NAMED_FRAMES = 8
 
 
-def warn_of_rings(samples: RingSamples, wander_px: float, context: Context) -> None:
-    """Warn where frames have no ring, a sector shows no line, or the line is not what it should be."""
+def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context: Context) -> None:
+    """Warn where frames have no ring, a sector shows no line, or the line is not what it should be.
+
+    ``stepped`` says that the wall is a gauge's: its steps and fiducials break the line by design (0.7 to 2.4
+    % of it in the sound gauge of open-1), so that the shares of broken line say nothing there.
+    """
     rejected = samples.validity == RingValidity.FRAME_REJECTED
     ring = ~rejected.all(1)
     if not ring.all():
@@ -41,7 +45,8 @@ def warn_of_rings(samples: RingSamples, wander_px: float, context: Context) -> N
     validity = samples.validity[ring]
     missing = np.asarray((validity != RingValidity.VALID).mean(0))
     _warn_of_sectors(missing, samples.azimuth_rad, context)
-    _warn_of_shares(validity[:, missing <= _HIDDEN], context)
+    if not stepped:
+        _warn_of_shares(validity[:, missing <= _HIDDEN], context)
     width = float(np.median(samples.width_px[samples.valid]))
     if wander_px > _MOST_WANDER * width:
         context.warn(

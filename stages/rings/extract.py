@@ -77,7 +77,7 @@ def extract_rings(
     _compare_rings(samples)
     wander = wander_px(_some(samples))
     _report(context, samples, wander)
-    warn_of_rings(samples, wander, context)
+    warn_of_rings(samples, wander, recording.kind == "gauge", context)
     np.hypot(samples.sigma_px, np.float32(wander), out=samples.sigma_px)
     return samples
 

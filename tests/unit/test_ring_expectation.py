@@ -22,9 +22,9 @@ def sound() -> RingSamples:
     return RingSamples(2 * np.arange(RINGS), azimuth, np.zeros(2), plain, plain, plain, plain, validity)
 
 
-def told(rings: RingSamples, wander_px: float = SOUND_WANDER_PX) -> str:
+def told(rings: RingSamples, wander_px: float = SOUND_WANDER_PX, stepped: bool = False) -> str:
     warnings: list[str] = []
-    warn_of_rings(rings, wander_px, replace(quiet_context(), warn=warnings.append))
+    warn_of_rings(rings, wander_px, stepped, replace(quiet_context(), warn=warnings.append))
     return "\n".join(warnings)
 
 
@@ -56,3 +56,9 @@ def test_what_is_wrong_is_named(rows: slice, columns: slice, reason: RingValidit
 
 def test_a_line_that_wanders_is_named() -> None:
     assert "the line wanders by 0.30 px" in told(sound(), 0.3)
+
+
+def test_steps_of_a_gauge_break_the_line_by_design() -> None:
+    rings = spoilt(slice(0, 10), slice(0, 90), RingValidity.LOW_CONTRAST)
+    assert told(rings, stepped=True) == ""
+    assert "the line wanders" in told(rings, 0.3, stepped=True)
