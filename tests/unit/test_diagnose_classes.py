@@ -6,7 +6,7 @@ from typing import Any, cast
 import pytest
 
 from pipeline.physics.catalogue import CLASSES, EFFECTS
-from stages.diagnose.gauge.examine import _untested
+from stages.diagnose.gauge.examine import with_untested
 from stages.diagnose.result import alike, class_of, classes_of, record_next
 
 
@@ -40,8 +40,9 @@ def test_what_to_record_next_names_each_recording_once():
 
 
 def test_what_looks_alike_and_has_no_model_is_not_excluded():
-    seen = cast(Any, SimpleNamespace(best=SimpleNamespace(named=True, laws=("dome_axial",))))
-    assert _untested(seen, ("focal_scale", "laser_tilt")) == ("focal_scale",)
-    assert _untested(seen, ()) == ()
-    unnamed = cast(Any, SimpleNamespace(best=SimpleNamespace(named=False, laws=("generic_rows",))))
-    assert _untested(unnamed, ("focal_scale",)) == ()
+    term = SimpleNamespace(model=SimpleNamespace(law="dome_axial"))
+    seen = cast(Any, SimpleNamespace(best=SimpleNamespace(library_terms=(term,)), unsplit=(("baseline",),)))
+    assert with_untested(seen, ("focal_scale", "laser_tilt")) == (("baseline", "focal_scale"),)
+    assert with_untested(seen, ()) == (("baseline",),)
+    unnamed = cast(Any, SimpleNamespace(best=SimpleNamespace(library_terms=()), unsplit=()))
+    assert with_untested(unnamed, ("focal_scale",)) == ()

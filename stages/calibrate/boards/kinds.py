@@ -12,6 +12,8 @@ _LEAST_MARKERS = 4
 """Markers of one dictionary that make a pattern of it: single ones are read into noise."""
 _TAGS = ("DICT_APRILTAG_36h11", "DICT_APRILTAG_25h9", "DICT_APRILTAG_16h5")
 _MARKERS = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
+_LEAST_SIDE = 5
+"""Inner corners a side that make a chessboard of another size: 4 × 4 is read into noise."""
 _CIRCLES = {
     "a grid of circles": cv2.CALIB_CB_SYMMETRIC_GRID,
     "a staggered grid of circles": cv2.CALIB_CB_ASYMMETRIC_GRID,
@@ -60,6 +62,8 @@ def _of_squares(grey: Image, stated: Board) -> tuple[str, str] | None:
     if corners is None:
         return None
     short, long = sorted(corners.shape[:2])
+    if short < _LEAST_SIDE:
+        return None
     seen = f"a chessboard of {long} × {short} inner corners"
     if isinstance(stated, Charuco):
         return seen, "state --board chessboard, and --columns and --rows as inner corners"

@@ -194,7 +194,7 @@ def examine(
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))
             judged = _judged(replace(seen, verdicts=judge(searched, coursed, stated)), coursed, stated)
-            return replace(judged, unsplit=_with_untested(judged, without))
+            return replace(judged, unsplit=with_untested(judged, without))
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
 
@@ -204,7 +204,7 @@ def _watched(run: GaugeRun, done: int, progress: Progress) -> GaugeRun:
     return replace(run, watch=partial(progress, done, _PARTS))
 
 
-def _with_untested(judged: Examined, without: Collection[str]) -> tuple[tuple[str, ...], ...]:
+def with_untested(judged: Examined, without: Collection[str]) -> tuple[tuple[str, ...], ...]:
     """Return what each term is not told apart from, and what of its class there is no model of."""
     terms = judged.best.library_terms if judged.best is not None else ()
     return tuple(
