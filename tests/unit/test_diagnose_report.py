@@ -1,5 +1,7 @@
 """The page of a diagnosis: every verdict renders, numbers that are missing are shown as missing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,12 @@ def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
     assert "understated by 0.21 mm: the pit is 1.01 ± 0.03 mm, not 0.80 mm" in page
     assert "laser_tilt=0.6@40" in page
     assert "below 10⁻⁹" in page
+
+
+def test_a_place_that_was_not_measured_is_said_to_be_not_measured(tmp_path):
+    found = replace(WHOLE, location=Location("profile", None, None))
+    write_page(found, Shown(), tmp_path)
+    assert (tmp_path / "diagnosis.html").read_text().count("not measured") == 4
 
 
 @pytest.mark.parametrize("verdict", [v for v in Verdict if v is not Verdict.NAMED])
