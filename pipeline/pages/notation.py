@@ -69,3 +69,8 @@ def moment(at: str) -> str:
 
 def _known(value: float | None) -> bool:
     return value is not None and math.isfinite(value)
+
+
+def plus_minus(sigma: float, unit: str) -> str:
+    """Return 1 σ in brackets, to stand after a number; ``unit`` is empty for what has none."""
+    return f"(± {sigma:.2g} {unit}".rstrip() + ")"

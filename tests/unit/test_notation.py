@@ -51,3 +51,8 @@ def test_a_depth_has_a_direction_in_place_of_a_sign():
     assert notation.depth(-1.482, 0.05) == "1.482 ± 0.050 mm inward"
     assert notation.depth(1.585, 0.028) == "1.585 ± 0.028 mm deep"
     assert notation.depth(float("nan"), 0.1) == "depth not seen"
+
+
+def test_one_sigma_stands_in_brackets_with_or_without_a_unit():
+    assert notation.plus_minus(0.0123, "mm") == "(± 0.012 mm)"
+    assert notation.plus_minus(0.00062499, "") == "(± 0.00062)"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float
+from pipeline.pages import notation
 from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
@@ -116,7 +117,7 @@ def _words(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float
     numbers = model.quantities(shape, amplitude)
     named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
     spread = float(np.sqrt(np.trace(covariance) / len(amplitude)))
-    return f"{named} (± {spread:.2g} {model.amplitudes[0].unit})"
+    return f"{named} {notation.plus_minus(spread, model.amplitudes[0].unit)}"
 
 
 def _rms(values: Float) -> float:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float
+from pipeline.pages import notation
 from pipeline.physics.course import CourseKind
 from stages.diagnose.agreement import TELLING, same
 from stages.diagnose.effects.base import Shape
@@ -145,7 +146,7 @@ def _words(term: Term, part: Partial) -> str:
     numbers = term.model.quantities(term.shape, part.amplitude)
     spread = float(np.sqrt(np.trace(part.covariance) / len(part.amplitude)))
     named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
-    return f"{named} (± {spread:.2g} {term.model.amplitudes[0].unit})"
+    return f"{named} {notation.plus_minus(spread, term.model.amplitudes[0].unit)}"
 
 
 @dataclass(frozen=True)

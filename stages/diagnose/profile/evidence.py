@@ -13,6 +13,7 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
+from pipeline.pages import notation
 from pipeline.recording.base import Recording
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.profile.brightness import (
@@ -72,7 +73,7 @@ def _halves_agree(
 
 
 def _words(size: Size) -> str:
-    return f"{size.name} {size.value:.4g} (± {size.sigma:.2g}{f' {size.unit}' if size.unit else ''})"
+    return f"{size.name} {size.value:.4g} {notation.plus_minus(size.sigma, size.unit)}"
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import norm
 
 from pipeline.arrays import Bool, Float
+from pipeline.pages import notation
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel
 from pipeline.recording.base import Encoder, Recording
@@ -77,7 +78,7 @@ class TravelEstimate:
     def statement(self) -> str:
         """Return the effect in a plain sentence with its size and uncertainty."""
         words = LIBRARY[self.effect].statement((), np.array([self.value]))
-        return f"{words} (± {self.size_sigma:.2g} {self.unit})"
+        return f"{words} {notation.plus_minus(self.size_sigma, self.unit)}"
 
 
 @dataclass(frozen=True)

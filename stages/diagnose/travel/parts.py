@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
+from pipeline.pages import notation
 from pipeline.physics.catalogue import effect
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, TravelFit
@@ -76,4 +77,4 @@ def split(fit: TravelFit, column: int, first: Bool) -> tuple[Float, Float]:
 
 def _words(column: int, value: float, sigma: float) -> str:
     quantity = effect(SMOOTH[column]).quantities[0]
-    return f"{quantity.name} {value:.4g} (± {sigma:.2g}{f' {quantity.unit}' if quantity.unit else ''})"
+    return f"{quantity.name} {value:.4g} {notation.plus_minus(sigma, quantity.unit)}"
