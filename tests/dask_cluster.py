@@ -11,9 +11,10 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
 
-_PATIENCE_S = 90
+_PATIENCE_S = patience(90)
 
 
 @dataclass

@@ -15,8 +15,10 @@ from typing import Any
 
 import pytest
 
+from tests.patience import patience
+
 _NAMES = ("firefox-esr", "firefox")
-_START_S, _ANSWER_S = 60.0, 60.0
+_START_S, _ANSWER_S = patience(60), patience(60)
 # A fresh profile that opens nothing of its own; without a graphics card the processor draws WebGL.
 _SETTINGS = {
     "marionette.port": 0, "webgl.force-enabled": True, "browser.shell.checkDefaultBrowser": False,
@@ -48,7 +50,7 @@ class Firefox:
         return self.ask("WebDriver:ExecuteScript", script=script, args=[], sandbox=None)["value"]
 
     def until(self, expression: str, seconds: float = 30) -> Any:
-        end = time.monotonic() + seconds
+        end = time.monotonic() + patience(seconds)
         while time.monotonic() < end:
             if found := self.js(expression):
                 return found
@@ -87,7 +89,7 @@ def firefox(folder: Path) -> Iterator[Firefox]:
             window.close()
     finally:
         process.terminate()
-        process.wait(timeout=20)
+        process.wait(timeout=patience(20))
 
 
 def _port(folder: Path, process: subprocess.Popen[bytes]) -> int:

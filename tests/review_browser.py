@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Error, Page, Playwright, sync_playwright
 
+from tests.patience import patience
+
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # The sandbox needs user namespaces, which containers often lack; only the review's own page is opened.
 _ARGUMENTS = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader"]
@@ -55,7 +57,7 @@ class Tab:
     faults: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.page.set_default_timeout(15_000)
+        self.page.set_default_timeout(patience(15_000))
         self.page.on("pageerror", lambda e: self.faults.append(f"error: {e}"))
         self.page.on("dialog", lambda d: (self.faults.append(f"dialog: {d.message}"), d.dismiss()))
         self.page.on("request", self._asked)
@@ -70,14 +72,14 @@ class Tab:
         self.page.goto(address)
         self.page.wait_for_selector(".list .row")
         if model:
-            self.page.wait_for_selector(".veil", state="detached", timeout=60_000)
+            self.page.wait_for_selector(".veil", state="detached", timeout=patience(60_000))
 
     def js(self, expression: str) -> Any:
         return self.page.evaluate(expression)
 
     def until(self, expression: str, seconds: float = 15) -> Any:
         """Wait until an expression is true; the page's policy forbids Playwright's own way."""
-        end = time.monotonic() + seconds
+        end = time.monotonic() + patience(seconds)
         while time.monotonic() < end:
             if found := self.js(expression):
                 return found

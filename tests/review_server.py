@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
 
 
@@ -62,7 +63,7 @@ class ReviewServer:
 
     def kill(self, how: signal.Signals = signal.SIGKILL) -> None:
         self.process.send_signal(how)
-        self.process.wait(timeout=20)
+        self.process.wait(timeout=patience(20))
         self.process.stdout.close()
         self.process.stderr.close()
 
@@ -76,7 +77,7 @@ class ReviewServer:
         own |= {"Origin": self.origin} if method != "GET" else {}
         sent = body if isinstance(body, bytes) else json.dumps(body).encode() if body is not None else b""
         own |= {"Content-Length": str(len(sent))} if sent else {}
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=patience(30))
         try:
             connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
             for name, value in (own | {k.title(): v for k, v in headers.items()}).items():

@@ -18,6 +18,7 @@ from pipeline.errors import InputError
 from tests.bad_recordings import cut_sample
 from tests.batch_queue import kill_job, local_queue, queued
 from tests.dask_cluster import DaskCluster, end
+from tests.patience import patience
 from tests.run_content import run_content
 from tests.shared_data import PROJECT_ROOT
 
@@ -64,7 +65,7 @@ def test_a_lost_worker_loses_nothing(recordings, single, tmp_path):
 
 def working(folder):
     """Wait until a run below a batch's folder is at work in its first stage."""
-    until = time.monotonic() + 120
+    until = time.monotonic() + patience(120)
     while not any("stage rings starts" in f.read_text() for f in folder.glob("*/.boresight/run.log")):
         assert time.monotonic() < until, "no run came to its first stage"
         time.sleep(0.05)
@@ -82,7 +83,7 @@ def test_workers_of_a_cluster_killed_while_they_work_lose_nothing(recordings, si
         for lost in cluster.workers[:]:
             end(lost)
         cluster.add_worker()
-        _, told = batch.communicate(timeout=300)
+        _, told = batch.communicate(timeout=patience(300))
     assert batch.returncode == 3, told
     runs = json.loads((tmp_path / "out" / "batch.json").read_text())["runs"]
     assert {r["name"]: r["state"] for r in runs} == {
@@ -103,7 +104,7 @@ def test_jobs_of_a_queue_killed_while_they_work_are_queued_again(recordings, sin
     lost = queued(queue)
     for job in lost:
         kill_job(job)
-    _, told = batch.communicate(timeout=300)
+    _, told = batch.communicate(timeout=patience(300))
     assert batch.returncode == 0, told
     assert len(queued(queue)) > len(lost)
     assert run_content(tmp_path / "out" / "one") == run_content(single)
@@ -114,12 +115,12 @@ def test_a_scheduler_lost_is_told_and_the_batch_goes_on_later(recordings, single
         batch = batch_of(recordings / "one", tmp_path / "out", "--scheduler", cluster.address)
         working(tmp_path / "out")
         end(cluster.scheduler)
-        _, told = batch.communicate(timeout=120)
+        _, told = batch.communicate(timeout=patience(120))
     assert batch.returncode == 2, told
     assert "the scheduler was lost" in told
     assert "the same command" in told
     again = batch_of(recordings / "one", tmp_path / "out", "--workers", "1")
-    _, told = again.communicate(timeout=300)
+    _, told = again.communicate(timeout=patience(300))
     assert again.returncode == 0, told
     assert run_content(tmp_path / "out" / "one") == run_content(single)
 
@@ -189,7 +190,7 @@ def test_what_a_completed_run_warns_of_is_on_the_page(tmp_path):
 
 def test_workers_and_a_scheduler_exclude_each_other(recordings, tmp_path):
     batch = batch_of(recordings, tmp_path, "--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
-    _, told = batch.communicate(timeout=60)
+    _, told = batch.communicate(timeout=patience(60))
     assert batch.returncode == 2
     assert "--workers: and --scheduler exclude each other" in told
 

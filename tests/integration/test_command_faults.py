@@ -23,6 +23,7 @@ from pipeline.recording.base import Recording
 from stages.calibrate.boards import Pictures
 from tests.bad_recordings import cut_sample
 from tests.faults import obeying_permissions, on_small_disk
+from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
 
 RESULTS = ("a.bin", "b.bin", "answer.json")
@@ -259,7 +260,8 @@ def test_a_folder_that_may_not_be_written_is_told_before_work_is_put_in(
     words = ["prove"] if command == "prove" else [command, str(recording)]
     done = subprocess.run(
         [sys.executable, "-m", "pipeline.cli", *words, "-o", str(locked)],
-        cwd=PROJECT_ROOT, capture_output=True, text=True, preexec_fn=obeying_permissions, timeout=60,
+        cwd=PROJECT_ROOT, capture_output=True, text=True, preexec_fn=obeying_permissions,
+        timeout=patience(60),
     )  # fmt: skip
     locked.chmod(0o755)
     assert done.returncode == 2, done.stderr

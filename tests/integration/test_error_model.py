@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from pipeline.commands.error_model import error_model, error_model_page, page_camera
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.misalignment import MisalignedScan, allowed_tilt_deg, misalignment_error
+from tests.patience import patience
 from tests.shared_data import shared
 
 KEYS = {
@@ -120,7 +121,9 @@ def test_page_model_in_node_is_python():
         f"console.log(JSON.stringify({page_parameters()}.map((p) => {{"
         "const o = b.compute(p); delete o.ring; delete o.image; return o; })))"
     )
-    done = subprocess.run([node, "-e", program], capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(
+        [node, "-e", program], capture_output=True, text=True, check=True, timeout=patience(60)
+    )
     assert_same_as_python(json.loads(done.stdout))
 
 
@@ -143,7 +146,7 @@ def test_page_in_a_browser_is_python(tmp_path):
             browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}",
             "--dump-dom", (tmp_path / "page.html").as_uri(),
         ],
-        capture_output=True, text=True, check=True, timeout=120,
+        capture_output=True, text=True, check=True, timeout=patience(120),
     )  # fmt: skip
     computed = re.search(r'<pre id="computed">(.*?)</pre>', done.stdout, re.DOTALL)
     assert_same_as_python(json.loads(unescape(computed.group(1))))
@@ -162,7 +165,9 @@ def test_page_reads_the_probe_file_as_python_does():
         f"const text = require('fs').readFileSync({json.dumps(str(probe))}, 'utf8');"
         "console.log(JSON.stringify(b.parseProbe(text)))"
     )
-    done = subprocess.run([node, "-e", program], capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(
+        [node, "-e", program], capture_output=True, text=True, check=True, timeout=patience(60)
+    )
     read = json.loads(done.stdout)
     numbers = json.loads(run(str(probe), "--json").stdout)
     scan = MisalignedScan(101.6, read["laser"]["baseline_mm"], 0.6)
@@ -183,7 +188,9 @@ def test_any_other_camera_becomes_a_table_the_page_projects_with():
         f"const b = require({json.dumps(str(model))});"
         f"console.log(JSON.stringify(b.project({json.dumps(camera)}, 30.1, -40.3, 21.7)))"
     )
-    done = subprocess.run([node, "-e", program], capture_output=True, text=True, check=True, timeout=60)
+    done = subprocess.run(
+        [node, "-e", program], capture_output=True, text=True, check=True, timeout=patience(60)
+    )
     exact = KannalaBrandt(CAMERA.image_size, (366.0, 364.0), CAMERA.centre, CAMERA.distortion).project(
         (30.1, -40.3, 21.7)
     )

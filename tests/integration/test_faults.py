@@ -24,6 +24,7 @@ from pipeline.machine.plan import Selection
 from stages.catalogue import PIPELINE
 from tests.bad_recordings import cut_sample
 from tests.faults import MeddlingDisplay, obeying_permissions, on_small_disk
+from tests.patience import patience
 from tests.run_content import run_content
 from tests.shared_data import PROJECT_ROOT
 from tests.toys import run_toys, toy_job
@@ -138,7 +139,7 @@ def test_permission_that_is_lost_amid_a_run(tmp_path: Path, part: str) -> None:
         assert process.poll() is None
         time.sleep(0.01)
     (folder / part).chmod(0o555)
-    _, told = process.communicate(timeout=60)
+    _, told = process.communicate(timeout=patience(60))
     (folder / part).chmod(0o755)
     assert process.returncode == 1
     assert "cannot be written: Permission denied" in told

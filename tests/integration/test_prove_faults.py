@@ -21,6 +21,7 @@ from pipeline.errors import InputError
 from pipeline.simulator.truth_files import seal_truth
 from stages.diagnose.drill.cases import Case
 from tests.faults import obeying_permissions
+from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
 
 
@@ -93,7 +94,8 @@ def test_a_truth_that_may_not_be_read_is_named(drill: Path) -> None:
     (drill / "truth" / "a-gauge" / "truth.json").chmod(0)
     done = subprocess.run(
         [sys.executable, "-m", "pipeline.cli", *proof(drill)],
-        cwd=PROJECT_ROOT, capture_output=True, text=True, preexec_fn=obeying_permissions, timeout=60,
+        cwd=PROJECT_ROOT, capture_output=True, text=True, preexec_fn=obeying_permissions,
+        timeout=patience(60),
     )  # fmt: skip
     assert done.returncode == 2
     assert "a-gauge/truth.json: cannot be read" in done.stderr
@@ -170,7 +172,7 @@ def children_of(pid: int) -> Iterator[int]:
 def test_a_proof_killed_amid_a_diagnosis_leaves_no_process_and_no_rest(drill: Path) -> None:
     command = [sys.executable, "-c", _SLOW_PROOF.format(words=proof(drill))]
     process = subprocess.Popen(command, cwd=PROJECT_ROOT)
-    until = time.monotonic() + 60
+    until = time.monotonic() + patience(60)
     while not (below := [c for c in children_of(process.pid)]):
         assert process.poll() is None
         assert time.monotonic() < until

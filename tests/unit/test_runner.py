@@ -27,6 +27,7 @@ from pipeline.machine.plan import PipelineError, Selection
 from pipeline.machine.runner import FailedError
 from pipeline.machine.stage import Context, Parameters, Stage
 from tests.disk_limit import file_size_limit
+from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
 from tests.toy_stages import DRAW, SMOOTH, TOYS, WEIGH, Drawn, DrawParameters, Total, Weighed
 from tests.toys import run_toys, toy_job
@@ -200,7 +201,7 @@ class Right:
     value: float
 
 
-_MEETING = threading.Barrier(2, timeout=60)
+_MEETING = threading.Barrier(2, timeout=patience(60))
 
 
 def go_left(drawn: Drawn, *, parameters: Parameters, context: Context) -> Left:

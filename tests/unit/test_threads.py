@@ -5,6 +5,7 @@ import threading
 import pytest
 
 from pipeline.system.threads import in_threads
+from tests.patience import patience
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -15,7 +16,7 @@ def test_results_come_in_order_and_are_made_elsewhere(threads: int) -> None:
 
 
 def test_two_are_made_at_once() -> None:
-    meeting = threading.Barrier(2, timeout=60)
+    meeting = threading.Barrier(2, timeout=patience(60))
     assert sorted(in_threads(lambda k: meeting.wait(), range(2), 2)) == [0, 1]
 
 

@@ -16,6 +16,7 @@ from pipeline.artefacts.measured import Wall
 from pipeline.machine.run_folder import RunFolder
 from pipeline.machine.store import Provenance
 from pipeline.review.run_files import RunFiles
+from tests.patience import patience
 from tests.review_browser import Tab, tab
 from tests.review_server import ReviewServer
 
@@ -66,7 +67,7 @@ def compared(sample: Path, earlier: Path, browser, tmp_path_factory) -> Iterator
     with ReviewServer(later, words=words) as server, tab(context, server.origin) as opened:
         opened.open(server.address)
         opened.page_of("Compare")
-        opened.page.wait_for_selector("#compare table.grid", timeout=60_000)
+        opened.page.wait_for_selector("#compare table.grid", timeout=patience(60_000))
         yield opened, server
     context.close()
 
@@ -138,7 +139,7 @@ def settled(page: Tab, picture: str) -> str:
     """Return a picture once all its tiles are there: when it has stopped changing."""
     before, now = "", str(page.js(picture))
     while before != now:
-        page.page.wait_for_timeout(300)
+        page.page.wait_for_timeout(patience(300))
         before, now = now, str(page.js(picture))
     return now
 

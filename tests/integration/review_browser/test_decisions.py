@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.patience import patience
 from tests.review_browser import Tab
 
 
@@ -51,7 +52,7 @@ def test_a_finding_is_not_rejected_without_a_reason(page: Tab) -> None:
     for text in ("", "   "):
         page.page.fill("#reason", text)
         page.keys("Enter")
-        page.page.wait_for_timeout(300)
+        page.page.wait_for_timeout(patience(300))
         assert page.revision == before
     page.keys("Escape")
 

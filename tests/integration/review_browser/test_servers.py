@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.patience import patience
 from tests.review_browser import Tab, tab
 from tests.review_server import ReviewServer
 from tests.sample_run import rerun_sample
@@ -85,7 +86,7 @@ def test_a_run_computed_anew_while_open(browser, sample: Path, tmp_path: Path) -
             with page.one_change():
                 page.keys("a")
         worker = rerun_sample(run, "defects.min_depth_mm=1.3")
-        assert worker.wait(timeout=600) == 0
+        assert worker.wait(timeout=patience(600)) == 0
         page.js("boresight.session.refresh()")
         page.until("document.querySelector('.notice').textContent.includes('computed again')")
         page.page.click("text=Load the new results")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tests.patience import patience
 from tests.review_browser import Tab
 
 
@@ -26,7 +27,7 @@ def test_who_signs_with_findings_undecided_must_say_so(page: Tab) -> None:
     page.page.fill("#sign-name", "Ada")
     page.page.uncheck("#sign-undecided")
     page.page.click('button:text-is("Sign")')
-    page.page.wait_for_timeout(500)
+    page.page.wait_for_timeout(patience(500))
     assert page.js("boresight.session.seal.signature") is None
     for words in ("Pipe data", "Downloads"):
         assert words in shown.locator("h2").all_inner_texts()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.pages import notation
+from tests.patience import patience
 from tests.review_browser import Tab
 
 SPOT = (60.0, -1.2)
@@ -69,7 +70,7 @@ def test_a_click_on_the_frame_moves_to_what_was_clicked(page: Tab) -> None:
     told(page, "#view-frame", "")
     page.page.uncheck("#close-up")
     page.until("boresight.session.cursor[0] === 66 && document.querySelector('.zoomed img').complete")
-    page.page.wait_for_timeout(400)
+    page.page.wait_for_timeout(patience(400))
     box = page.page.locator(".zoomed circle.spot").first.bounding_box()
     page.js("boresight.session.cursor = [20, -3]")  # moved without any view being told
     page.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
@@ -150,10 +151,10 @@ def test_at_rest_the_model_is_sharp_and_not_drawn_on(page: Tab) -> None:
     page.page.locator(".model canvas").focus()
     for _ in range(12):
         page.keys("w")
-    page.page.wait_for_timeout(900)
+    page.page.wait_for_timeout(patience(900))
     drawn = "boresight.model.renderer.info.render.frame"
     before = page.js(drawn)
-    page.page.wait_for_timeout(900)
+    page.page.wait_for_timeout(patience(900))
     assert page.js(drawn) == before
     assert page.js("boresight.model.renderer.getPixelRatio() / boresight.model.pixelRatio") == pytest.approx(
         1
