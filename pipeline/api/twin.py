@@ -117,6 +117,8 @@ def twin_document(found: Twin, tried: DiagnosisTried) -> dict[str, Any]:
         "gauge": gauge,
         "psnr_db": _known(found.psnr_db),
         "psnr_noise_free_db": _known(found.psnr_noise_free_db),
+        "chi2_wall_camera_noise_alone": _known(found.chi2_camera),
+        "stray_light_in_dark": found.stray,
         "seen": found.seen,
         "cannot_tell": [*tried.cannot_tell, *found.cannot_tell],
     }

@@ -22,7 +22,8 @@ class RegionFit:
     """χ² per pixel of what pixels of one kind show, before and after what was found is put in.
 
     Kinds: ``line_core`` and ``line_flank`` within and beyond one width of the laser line, ``wall`` lit by
-    the LEDs, ``dark`` surroundings, ``edge`` of the view. χ² is NaN where there are no pixels.
+    the LEDs, ``dark`` surroundings, ``edge`` of the view. χ² is NaN where pixels are not compared: at the
+    edge, and in the dark where noise is cut off at black.
     """
 
     name: str
@@ -108,6 +109,10 @@ class Twin:
     psnr_db, psnr_noise_free_db : float
         Of the lit wall against a full scale of 255 levels: of the difference, and of what of it the noise
         does not explain; infinite where the noise explains all of it.
+    chi2_camera : float
+        Of the lit wall per pixel, by the camera's noise alone: the error of the photo's place left out.
+    stray : float
+        Share of dark pixels that are brighter than noise explains.
     seen : float
         Share of the view's pixels whose wall is known, in lit frames.
     cannot_tell : tuple of str
@@ -123,6 +128,8 @@ class Twin:
     found: tuple[Mismatch, ...]
     psnr_db: float
     psnr_noise_free_db: float
+    chi2_camera: float
+    stray: float
     seen: float
     cannot_tell: tuple[str, ...]
     views: tuple[TwinView, ...]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -52,7 +53,11 @@ def _show(found: Twin, output: Path) -> None:
     typer.echo(f"{len(found.frame)} {kind} frames compared")
     typer.echo(f"{'region':<14}{'pixels':>12}{'χ² before':>12}{'after':>10}")
     for r in found.regions:
+        if math.isnan(r.chi2_after):
+            typer.echo(f"{r.name:<14}{r.pixels:>12}  not compared")
+            continue
         typer.echo(f"{r.name:<14}{r.pixels:>12}{r.chi2_before:>12.2f}{r.chi2_after:>10.2f}")
+    typer.echo(f"lit wall by the camera's noise alone: χ² per pixel {found.chi2_camera:.2f}")
     typer.echo(f"lit wall: {found.psnr_db:.1f} dB, without the noise {found.psnr_noise_free_db:.1f} dB")
     for mismatch in found.found:
         typer.echo(f"found: {mismatch.name or 'without a name'}: {mismatch.statement}")

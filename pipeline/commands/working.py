@@ -24,7 +24,7 @@ Assignments = Annotated[
 
 
 def worked(job: Job, console: Console) -> RunOutcome:
-    """Run a job with its progress shown, and print its warnings.
+    """Run a job with its progress shown, and print those of its warnings that were not shown with it.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def worked(job: Job, console: Console) -> RunOutcome:
     """
     with ProgressDisplay(console) as display:
         outcome = run_job(job, Selection(), display)
-    print_warnings(warnings_of(outcome.stages), console)
+    print_warnings((w for w in warnings_of(outcome.stages) if w not in display.warnings), console)
     return outcome
 
 

@@ -131,7 +131,7 @@ def compare_with_twin(
         exposures.add(frame, kind, exposure, above, after)
         after = after.brighter(float(np.exp(exposure)), state.noise)
         dirty.add(above, before, after)
-        comparison.add(frame, kind, above, before, after, state.noise.black.value)
+        comparison.add(frame, kind, above, before, after, state.noise)
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     found: tuple[Mismatch, ...] = (*flicker(exposures, state), *dirty.accepted(), *of_line(state, rings))
@@ -139,7 +139,7 @@ def compare_with_twin(
     return Twin(
         np.array([v.frame for v in comparison.views]), frames.withheld is not None,
         noise_figures(state.noise), state_figures(state), comparison.regions(), found,
-        comparison.psnr_db(False), comparison.psnr_db(True),
+        comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
     )  # fmt: skip
 
@@ -185,14 +185,14 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "1",
+    "2",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
 )
 TWIN = Stage(
     "twin",
-    "2",
+    "3",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

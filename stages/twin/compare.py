@@ -10,11 +10,12 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import RegionFit, TwinView
 from pipeline.recording.base import Illumination
+from stages.twin.noise import CameraNoise
 from stages.twin.render import Region, TwinFrame
 
 BLOCK_PX = 8
 """Side of the blocks in which a difference is looked for that stays in one place of the image."""
-_FULL_SCALE = 255.0
+_FULL_SCALE, _STRAY = 255.0, 5.0
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
 
@@ -28,6 +29,12 @@ class Comparison:
         Per `Region`: pixels, and χ² without and with what was found.
     square, noise, lit : float
         Of lit wall: squared differences, their variance by the noise, and pixels.
+    camera : float
+        Of lit wall: squared differences over the variance of the camera's noise alone.
+    stray : float
+        Dark pixels that are brighter than their twin by more than five σ.
+    clipped : bool
+        Whether black is so low that the noise of dark pixels is cut off.
     seen, view : float
         Pixels whose wall is known, and all within the view, in lit frames.
     views : list of TwinView
@@ -39,13 +46,16 @@ class Comparison:
     square: float = 0.0
     noise: float = 0.0
     lit: float = 0.0
+    camera: float = 0.0
+    stray: float = 0.0
+    clipped: bool = False
     seen: float = 0.0
     view: float = 0.0
     views: list[TwinView] = field(default_factory=list)
 
     def add(
         self, frame: int, light: Illumination, above_black: Float32, before: TwinFrame, after: TwinFrame,
-        black: float,
+        noise: CameraNoise,
     ) -> None:  # fmt: skip
         """Count a frame, its grey levels (H, W) given above black."""
         region = before.region
@@ -55,19 +65,27 @@ class Comparison:
         self.before += np.bincount(region.ravel(), _chi2(above_black, before).ravel(), len(Region))
         after_sum = np.bincount(region.ravel(), (z**2).ravel(), len(Region))
         self.after += after_sum
+        self.clipped = noise.clips_black
+        self.stray += float((z[region == Region.DARK] > _STRAY).sum())
         wall = region == Region.WALL
         if light != Illumination.LASER:
-            self.square += float(((above_black - after.level)[wall].astype(float) ** 2).sum())
+            square = (above_black - after.level)[wall].astype(float) ** 2
+            self.square += float(square.sum())
+            self.camera += float((square / noise.variance(after.level[wall])).sum())
             self.noise += float(after.variance[wall].sum(dtype=float))
             self.lit += float(wall.sum())
             self.seen += float(size.sum() - size[Region.UNSEEN] - size[Region.DARK])
             self.view += float(size.sum() - size[Region.DARK])
         counted = [int(r) for r in _COUNTED]
         chi2 = after_sum[counted].sum() / max(size[counted].sum(), 1.0)
-        self.views.append(_view(frame, light, chi2, above_black, after, z, black))
+        self.views.append(_view(frame, light, chi2, above_black, after, z, noise.black.value))
 
     def regions(self) -> tuple[RegionFit, ...]:
-        """Return χ² per pixel by region."""
+        """Return χ² per pixel by region; NaN where pixels are counted and not compared.
+
+        At the edge of the view a pixel is part wall, part mask, and no photo says how much. Of dark pixels
+        the noise is not known where it is cut off at black.
+        """
         return tuple(
             RegionFit(
                 r.name.lower(), int(self.pixels[r]), self._mean(self.before, r), self._mean(self.after, r)
@@ -77,7 +95,19 @@ class Comparison:
         )
 
     def _mean(self, total: Float, region: Region) -> float:
-        return float(total[region] / self.pixels[region]) if self.pixels[region] else float("nan")
+        left_out = region == Region.EDGE or (region == Region.DARK and self.clipped)
+        compared = self.pixels[region] and not left_out
+        return float(total[region] / self.pixels[region]) if compared else float("nan")
+
+    @property
+    def chi2_camera(self) -> float:
+        """χ² per pixel of lit wall by the camera's noise alone; NaN without any."""
+        return self.camera / self.lit if self.lit else float("nan")
+
+    @property
+    def stray_share(self) -> float:
+        """Share of dark pixels that are brighter than noise explains."""
+        return self.stray / max(float(self.pixels[Region.DARK]), 1.0)
 
     def psnr_db(self, without_noise: bool) -> float:
         """Return 20 log of full scale over the root mean square difference of lit wall; NaN without any."""

@@ -1,9 +1,9 @@
 """Differences that stay in one place of the image: dirt on the window, dust, a droplet.
 
 The ratio of recorded to re-rendered brightness of blocks, its median over frames and freed of what is broad,
-is 1 but for noise. Its spread is read off the picture of all blocks itself, robustly: whatever makes blocks
-vary, alike neighbours included, is in it. The bound is that which the largest of so many normal numbers
-passes with the stated probability.
+is 1 but for noise. Its spread is read off the blocks as far from the image's middle, robustly: whatever
+makes them vary, alike neighbours and a photo that is poor far ahead included, is in it. The bound is that
+which the largest of so many normal numbers passes with the stated probability.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float32
 from stages.twin.compare import BLOCK_PX
 
+_RING_BLOCKS, _FEWEST_OF_RING = 4, 30
+"""Rings are 32 px wide: wide enough that one speck is a small part of each but the innermost. Chosen."""
 FALSE_ALARM = 0.01
 """Probability that a recording without dirt shows a place of dirt anywhere. Chosen."""
 _BROAD_BLOCKS, _FEWEST_FRAMES, _FEWEST_BLOCKS = 25, 3, 2
@@ -61,8 +63,8 @@ def places_in_image(ratios: list[Float32]) -> tuple[tuple[ImagePlace, ...], Floa
     middle = np.ones(known.shape, np.float32)
     middle[known] = np.nanmedian(stack[:, known], axis=0)
     change = np.where(known, middle / _broad(middle, known) - 1, 0).astype(np.float32)
-    spread = spread_about_median(change[known])
-    bound = max(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, _LEAST_CHANGE)
+    spread = _spread_of_rings(change, known)
+    bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, _LEAST_CHANGE)
     count, label, _, centre = cv2.connectedComponentsWithStats((np.abs(change) > bound).astype(np.uint8))
     places, gain = [], np.ones_like(change)
     for k in range(1, count):
@@ -73,6 +75,17 @@ def places_in_image(ratios: list[Float32]) -> tuple[tuple[ImagePlace, ...], Floa
         gain[grown & known] = 1 + change[grown & known]
         places.append(_place(inside, centre[k], change, spread, int(known.sum())))
     return tuple(places), gain if places else None
+
+
+def _spread_of_rings(change: Float32, known: Bool) -> Float32:
+    """Return the robust spread (rows, columns) of the blocks as far from the image's middle."""
+    row, column = (np.arange(n) - (n - 1) / 2 for n in change.shape)
+    ring = (np.hypot(row[:, None], column) / _RING_BLOCKS).astype(int)
+    least = spread_about_median(change[known])
+    of_ring = np.full(ring.max() + 1, least)
+    for k in np.flatnonzero(np.bincount(ring[known]) >= _FEWEST_OF_RING):
+        of_ring[k] = max(least, spread_about_median(change[known & (ring == k)]))
+    return np.asarray(of_ring[ring], np.float32)
 
 
 def _broad(values: Float32, known: Bool) -> Float32:
@@ -88,12 +101,13 @@ def _broad(values: Float32, known: Bool) -> Float32:
     return np.where((share > 0.05 * weight) & (share > 1e-6), total / np.maximum(share, 1e-6), coarse)
 
 
-def _place(inside: Bool, centre: Float32, change: Float32, spread: float, blocks: int) -> ImagePlace:
-    strongest = float(change[inside][np.argmax(np.abs(change[inside]))])
-    chance = min(1.0, 2 * blocks * float(norm.sf(abs(strongest) / max(spread, 1e-9))))
+def _place(inside: Bool, centre: Float32, change: Float32, spread: Float32, blocks: int) -> ImagePlace:
+    most = np.unravel_index(np.argmax(np.where(inside, np.abs(change), 0)), change.shape)
+    strongest, sd = float(change[most]), max(float(spread[most]), 1e-9)
+    chance = min(1.0, 2 * blocks * float(norm.sf(abs(strongest) / sd)))
     middle = (np.asarray(centre) + 0.5) * BLOCK_PX - 0.5
     radius = BLOCK_PX * float(np.sqrt(inside.sum() / np.pi))
-    return ImagePlace(float(middle[0]), float(middle[1]), radius, strongest, spread, chance)
+    return ImagePlace(float(middle[0]), float(middle[1]), radius, strongest, sd, chance)
 
 
 def full_size(gain: Float32, shape: tuple[int, ...]) -> Float32:

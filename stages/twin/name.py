@@ -168,6 +168,11 @@ def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
     if state.lamp is not None:
         found.append(
             NamedFigure(
+                "photo_place_px", float(np.median(state.place_px)), float(np.ptp(state.place_px)) / 2, "px"
+            )
+        )
+        found.append(
+            NamedFigure(
                 "exposure_spread", state.lamp.gain.spread, float(np.median(state.lamp.gain.sd)), "relative"
             )
         )

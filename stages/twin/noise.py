@@ -63,6 +63,11 @@ class CameraNoise:
         )
 
     @property
+    def clips_black(self) -> bool:
+        """Whether black lies within three σ of the read noise of grey level 0."""
+        return self.black.value < 3 * float(np.sqrt(max(self.read_variance.value, _LEAST_VARIANCE)))
+
+    @property
     def electrons_per_level(self) -> Figure:
         """Conversion of the photon transfer; infinite where no shot noise shows."""
         k = self.variance_per_level

@@ -12,7 +12,7 @@ from pipeline.arrays import Byte, Float32
 from pipeline.recording.base import Illumination
 from stages.twin.noise import CameraNoise
 from stages.twin.scene import Scene
-from stages.twin.state import PhotometricState
+from stages.twin.state import PhotometricState, slope_squared
 
 _DARK_LEVEL = 3.0
 """Grey levels above black below which lit wall counts as dark."""
@@ -39,7 +39,7 @@ class TwinFrame:
     level : float32
         Grey levels above black; 0 where the region is UNSEEN.
     variance : float32
-        Of camera noise and speckle.
+        Of camera noise, speckle, and the error of the photo's place.
     region : uint8
         `Region`.
     distance_mm, azimuth_rad : float32
@@ -77,6 +77,7 @@ def render_frame(
     level = np.zeros(shape, np.float32)
     region = np.full(shape, Region.DARK, np.uint8)
     distance, azimuth = (np.full(shape, np.nan, np.float32) for _ in range(2))
+    variance = np.zeros(shape, np.float32)
     if light != Illumination.LASER and state.lamp is not None:
         theta, phi, _ = scene.polar
         sight = scene.lit(T_pc)
@@ -89,9 +90,10 @@ def render_frame(
         level = np.nan_to_num(level)
         sharp = np.interp(theta, state.sharpness_theta, state.sharpness).astype(np.float32)
         inside = cv2.erode((region > 0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        place = np.interp(theta, state.sharpness_theta, state.place_px).astype(np.float32)
+        variance += np.where(inside, place**2 * slope_squared(level), 0)
         level += np.where(inside, sharp * cv2.Laplacian(level, cv2.CV_32F), 0)
         distance, azimuth = sight.distance_mm, sight.azimuth_rad
-    variance = None
     if light != Illumination.LED and state.line is not None:
         near = scene.line(T_pc)
         power = state.line.course.at(frame) if log_exposure is None else log_exposure
@@ -103,8 +105,7 @@ def render_frame(
         kind = np.where(away < _CORE_WIDTHS, Region.LINE_CORE, Region.LINE_FLANK)
         region[at] = np.where(flank, kind, np.where(known, region[at], Region.UNSEEN))
         level[at] += np.nan_to_num(line)
-        variance = np.zeros(shape, np.float32)
-        variance[at] = np.nan_to_num(state.line.variance(near, power))
+        variance[at] += np.nan_to_num(state.line.variance(near, power))
         distance[at], azimuth[at] = near.distance_mm, near.azimuth_rad
     if state.gain_map is not None:
         level *= state.gain_map
@@ -113,4 +114,4 @@ def render_frame(
     region[state.edge & (region != Region.UNSEEN)] = Region.EDGE
     noise = state.noise.variance(level)
     level = np.minimum(level, np.float32(state.noise.white - state.noise.black.value))
-    return TwinFrame(level, noise if variance is None else noise + variance, region, distance, azimuth)
+    return TwinFrame(level, noise + variance, region, distance, azimuth)

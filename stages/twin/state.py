@@ -14,7 +14,7 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
 from stages.twin.lamp_light import LampLight, LampSamples
 from stages.twin.line_light import LineLight, LineSamples
-from stages.twin.noise import CameraNoise, QuietWindows, black_and_white, photon_transfer, windows_of
+from stages.twin.noise import CameraNoise, black_and_white, photon_transfer, windows_of
 from stages.twin.scene import LitSight, Scene
 
 _LEAST_LEVEL = 4.0
@@ -40,6 +40,8 @@ class PhotometricState:
     sharpness_theta, sharpness : (Z,)
         By how much the frames are sharper than the photo at polar angles: half the difference of the two
         blurs' variances, px²; positive where the frames are more blurred.
+    place_px : (Z,)
+        1 σ of how far the photo lies beside the frames at those angles, from pixel to pixel, per direction.
     outside, edge : (H, W) bool
         Pixels outside the camera's view, and next to its border.
     gain_map : (H, W) float32 or None
@@ -51,6 +53,7 @@ class PhotometricState:
     line: LineLight | None
     sharpness_theta: Float
     sharpness: Float
+    place_px: Float
     outside: Bool
     edge: Bool
     gain_map: Float32 | None = None
@@ -99,11 +102,12 @@ def estimate_state(
         context.progress(done, 2 * len(sampled))
     lamp, line = lamps.solve(), lines.solve()
     outside, edge = _view([s.image for s, _ in lit], black.value, scene)
-    at, sharpness, windows = _sharpness_and_noise(scene, lamp, lit, black.value, white, edge | outside)
-    noise = photon_transfer(windows, black, white)
+    at, sharpness, left = _sharpness(scene, lamp, lit, black.value, white, edge | outside)
+    noise = photon_transfer([windows_of(f.rest, f.level, f.use) for f in left], black, white)
+    place_px = _place_error(left, noise)
     if line is not None:
         line = lines.with_speckle(line, noise.variance)
-    return PhotometricState(noise, lamp, line, at, sharpness, outside, edge)
+    return PhotometricState(noise, lamp, line, at, sharpness, place_px, outside, edge)
 
 
 def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
@@ -121,27 +125,60 @@ def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
     return outside, border > 0
 
 
-def _sharpness_and_noise(
+@dataclass(frozen=True)
+class _LeftOver:
+    """Of a lit frame, (H, W): recorded less predicted, predicted, zone of the polar angle, what counts."""
+
+    rest: Float32
+    level: Float32
+    zone: Int
+    use: Bool
+
+
+def _sharpness(
     scene: Scene, lamp: LampLight | None, lit: list[tuple[Sampled, LitSight]], black: float, white: float,
     border: Bool,
-) -> tuple[Float, Float, list[QuietWindows]]:  # fmt: skip
-    """Return polar angles, how much blurrier than the photo the frames are there, and windows for noise."""
+) -> tuple[Float, Float, list[_LeftOver]]:  # fmt: skip
+    """Return polar angles, how much blurrier than the photo the frames are there, and what is left over."""
     theta, phi, _ = scene.polar
     if lamp is None or not lit:
-        return np.zeros(2), np.zeros(2), []
+        return np.arange(_ZONES, dtype=float), np.zeros(_ZONES), []
     zones = np.linspace(lamp.theta_rad[0], lamp.theta_rad[-1], _ZONES + 1)
     above, below = np.zeros(_ZONES), np.zeros(_ZONES)
     left: list[tuple[Float32, Float32, Bool, Float32]] = []
+    zone_of = np.clip(np.searchsorted(zones, theta) - 1, 0, _ZONES - 1)
     white_wall = lamp.factor(theta, phi)
     for s, sight in lit[:: max(len(lit) // _NOISE_FRAMES, 1)]:
         level = white_wall * sight.reflectance * sight.irradiance * np.float32(np.exp(lamp.gain.at(s.frame)))
         use = np.isfinite(level) & (level > _LEAST_LEVEL) & (s.image < white) & ~border
         rest = s.image - np.float32(black) - level
         curved = cv2.Laplacian(np.nan_to_num(level), cv2.CV_32F)
-        zone = np.clip(np.searchsorted(zones, theta[use]) - 1, 0, _ZONES - 1)
+        zone = zone_of[use]
         above += np.bincount(zone, (rest * curved)[use], _ZONES)
         below += np.bincount(zone, (curved**2)[use], _ZONES)
         left.append((rest, level, use, curved))
     at, sharpness = (zones[1:] + zones[:-1]) / 2, above / np.maximum(below, 1e-9)
     sharp = np.interp(theta, at, sharpness).astype(np.float32)
-    return at, sharpness, [windows_of(r - sharp * c, level, use) for r, level, use, c in left]
+    return at, sharpness, [_LeftOver(r - sharp * c, level, zone_of, use) for r, level, use, c in left]
+
+
+def _place_error(left: list[_LeftOver], noise: CameraNoise) -> Float:
+    """Return by how far (Z,) single places of the photo lie beside the frames, 1 σ per direction, px.
+
+    What is left over beyond the camera's noise and grows with the square of the slope: errors of the radius
+    map and of poses, which shift the photo from place to place. Blunders count as four σ.
+    """
+    above, below = np.zeros(_ZONES), np.zeros(_ZONES)
+    for f in left:
+        square = slope_squared(f.level)[f.use].astype(float)
+        variance = noise.variance(f.level[f.use]).astype(float)
+        excess = np.minimum(f.rest[f.use].astype(float) ** 2, 16 * variance) - variance
+        above += np.bincount(f.zone[f.use], square * excess, _ZONES)
+        below += np.bincount(f.zone[f.use], square**2, _ZONES)
+    return np.sqrt(np.maximum(above / np.maximum(below, 1e-9), 0.0))
+
+
+def slope_squared(level: Float32) -> Float32:
+    """Return the squared slope, per px, of grey levels (H, W); 0 where a neighbour is unknown."""
+    down, right = np.gradient(level)
+    return np.nan_to_num(down**2 + right**2)

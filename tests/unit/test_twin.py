@@ -1,6 +1,7 @@
 """The twin's parts on made pictures: where rays meet the wall, noise, dirt, exposure, and what is written."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,11 +20,12 @@ from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.locate import full_size, places_in_image
 from stages.twin.name import dirt
-from stages.twin.noise import photon_transfer, windows_of
+from stages.twin.noise import CameraNoise, photon_transfer, windows_of
 from stages.twin.render import Region, TwinFrame
 from stages.twin.sight import wall_seen
 
 BLACK = Figure(16.0, 0.1)
+NOISE = CameraNoise(BLACK, 255.0, Figure(4.0, 0.1), Figure(0.0, 0.0), Figure(0.0, 0.0), Figure(1.0, 0.1))
 
 
 def _bore(radius_mm=50.0, bump_mm=0.0):
@@ -109,6 +111,16 @@ def test_dirt_is_found_where_it_lies():
     assert np.median(whole) == 1
 
 
+def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
+    random = np.random.default_rng(4)
+    ratios = _ratios(random, (80, 30, 0.4))
+    v, u = np.mgrid[0:75, 0:100]
+    far = np.hypot(v - 37, u - 49.5)
+    poor = np.where(far < 8, 0.1 * np.sin(0.7 * (u + 2 * v)), 0)
+    (place,), _ = places_in_image([r + poor.astype(np.float32) for r in ratios])
+    assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
+
+
 def _frame(level, region=Region.WALL):
     unknown = np.full(level.shape, np.nan, np.float32)
     return TwinFrame(
@@ -133,12 +145,35 @@ def test_chi_square_is_one_for_noise_and_more_for_a_difference():
     recorded = (level + 2 * random.standard_normal(level.shape)).astype(np.float32)
     comparison = Comparison()
     wrong = _frame(1.05 * level)
-    comparison.add(7, Illumination.LED, recorded, wrong, _frame(level), 16.0)
+    comparison.add(7, Illumination.LED, recorded, wrong, _frame(level), NOISE)
     fit = next(r for r in comparison.regions() if r.name == "wall")
     assert fit.pixels == level.size
     assert fit.chi2_after == pytest.approx(1.0, abs=0.03)
     assert fit.chi2_before > 3
     assert comparison.psnr_db(False) == pytest.approx(20 * np.log10(255 / 2), abs=0.1)
+
+
+def test_the_edge_is_left_out_and_the_dark_where_its_noise_is_cut_off():
+    level = np.zeros((40, 50), np.float32)
+    above = np.abs(2 * np.random.default_rng(2).standard_normal(level.shape)).astype(np.float32)
+    above[0, :5] = 30.0
+    for black, compared in ((16.0, True), (0.0, False)):
+        comparison = Comparison()
+        frame = _frame(level, Region.DARK)
+        frame.region[:, :10] = Region.EDGE
+        comparison.add(7, Illumination.LED, above, frame, frame, replace(NOISE, black=Figure(black, 0.1)))
+        fits = {r.name: r for r in comparison.regions()}
+        assert fits["edge"].pixels == 400
+        assert np.isnan(fits["edge"].chi2_after)
+        assert np.isfinite(fits["dark"].chi2_after) == compared
+
+
+def test_light_in_the_dark_is_counted():
+    above = np.zeros((40, 50), np.float32)
+    above[:4] = 30.0
+    comparison, frame = Comparison(), _frame(np.zeros_like(above), Region.DARK)
+    comparison.add(7, Illumination.LED, above, frame, frame, NOISE)
+    assert comparison.stray_share == pytest.approx(0.1)
 
 
 def test_dirt_that_frames_do_not_bear_out_is_withdrawn():
@@ -158,7 +193,8 @@ def _twin():
     nameless = Mismatch("", "intensity", "image", (), (), 1e-5, 3.0, 2.0, "Brighter </script> here.")
     return Twin(
         np.array([4]), True, (NamedFigure("white_dn", float("inf"), 0.0),), (),
-        (RegionFit("wall", 0, float("nan"), float("nan")),), (nameless,), 45.0, float("inf"), 0.9, (),
+        (RegionFit("wall", 0, float("nan"), float("nan")),), (nameless,), 45.0, float("inf"),
+        1.1, 0.0, 0.9, (),
         (TwinView(4, "led", 1.2, picture, picture, picture),),
     )  # fmt: skip
 
