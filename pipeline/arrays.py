@@ -1,5 +1,7 @@
 """Names of the array types used in annotations: the name tells the element type, the docstring the shape."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,3 +14,10 @@ Bool = NDArray[np.bool_]
 Byte = NDArray[np.uint8]
 Image = Byte
 """A camera image: (rows, columns) grey or (rows, columns, 3) colour."""
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return a C-contiguous view, or a copy, that cannot be written to: compiled code then knows one kind."""
+    view = np.ascontiguousarray(array).view()
+    view.flags.writeable = False
+    return view

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.arrays import Float
+from pipeline.arrays import Float, read_only
 
 _STEPS, _NEAR_MM = 6, 1e-7
 
@@ -76,7 +76,7 @@ def frames_at(axis: PipeAxis, distance_mm: Float) -> tuple[Float, Float]:
     """
     s = np.asarray(distance_mm, float)
     origin, rotation = np.empty((s.size, 3)), np.empty((s.size, 3, 3))
-    _frames(axis.distance_mm, axis.origin_p, axis.R_pa, s.ravel(), origin, rotation)
+    _frames(*_compiled(axis), read_only(s.ravel()), origin, rotation)
     return origin.reshape(*s.shape, 3), rotation.reshape(*s.shape, 3, 3)
 
 
@@ -97,7 +97,7 @@ def to_pipe(axis: PipeAxis, xyz_p: Float) -> tuple[Float, Float, Float]:
     p = np.asarray(xyz_p, float)
     s = np.array(_nearest(axis, p), float).ravel()
     psi, radius = np.empty_like(s), np.empty_like(s)
-    _locate(axis.distance_mm, axis.origin_p, axis.R_pa, p.reshape(-1, 3), s, psi, radius)
+    _locate(*_compiled(axis), read_only(p.reshape(-1, 3)), s, psi, radius)
     shape = p.shape[:-1]
     return s.reshape(shape), psi.reshape(shape), radius.reshape(shape)
 
@@ -115,6 +115,11 @@ def _nearest(axis: PipeAxis, p: Float) -> Float:
     flat = np.where(np.isfinite(p), p, 0.0).reshape(-1, 3)
     index = cKDTree(axis.origin_p).query(flat)[1]
     return np.asarray(axis.distance_mm[index].reshape(p.shape[:-1]))
+
+
+def _compiled(axis: PipeAxis) -> tuple[Float, Float, Float]:
+    """Return the axis as compiled functions take it: of one kind, so that they are compiled once."""
+    return read_only(axis.distance_mm), read_only(axis.origin_p), read_only(axis.R_pa)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

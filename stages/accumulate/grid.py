@@ -64,8 +64,8 @@ class RingColumns:
         """Return every second ring of each column."""
         part = (slice(None), slice(first, None, 2))
         return RingColumns(
-            self.distance_mm[part], self.radius_mm[part], self.variance[part],
-            self.misalignment_mm[part], self.count[part],
+            self.distance_mm[part].copy(), self.radius_mm[part].copy(), self.variance[part].copy(),
+            self.misalignment_mm[part].copy(), self.count[part].copy(),
         )  # fmt: skip
 
 

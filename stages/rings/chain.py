@@ -49,7 +49,7 @@ def choose_line(candidates: Candidates, expected_px: Float, width_px: float) -> 
     away = candidates.radius_px - (expected_px + slow_around(first))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         brightness = np.where(known, np.log(candidates.score), np.nan)
-    brightness = brightness - slow_around(brightness[:, 0])[:, None]
+    brightness = brightness - slow_around(brightness[:, 0].copy())[:, None]
     spread = robust_spread(brightness[known[:, 0], 0]) if known.any() else 0.0
     odds = -np.minimum(0.5 * (away / (_MOVE_WIDTHS * width_px)) ** 2, _MOST_MOVE)
     odds -= np.minimum(0.5 * (brightness / max(spread, _LEAST_SPREAD)) ** 2, _MOST_BRIGHTNESS)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from pipeline.arrays import read_only
+from pipeline.geometry import axis as module
 from pipeline.geometry.axis import PipeAxis, distance_along, frames_at, from_pipe, to_pipe
 
 
@@ -52,3 +54,23 @@ def test_distance_of_poses_goes_round_a_bend() -> None:
     T_pc[:, :3, 3] = from_pipe(axis, s, np.full(4, 0.7), np.full(4, 3.0))
     np.testing.assert_allclose(distance_along(axis, T_pc), s, atol=1e-3)
     assert T_pc[-1, 2, 3] < T_pc[1, 2, 3]
+
+
+def test_every_kind_of_array_uses_the_code_compiled_for_the_first() -> None:
+    axis = arc_axis(2e-3)
+    stored = PipeAxis(*(read_only(a) for a in (axis.distance_mm, axis.origin_p, axis.R_pa)))
+    points = np.random.default_rng(3).normal(size=(7, 6)) + np.array([30.0, 0, 20] * 2)
+    first = to_pipe(axis, points[:, :3].copy())
+    frames_at(axis, first[0])
+    before = compiled()
+    for same in (axis, stored):
+        for xyz_p in (points[:, :3], read_only(points[:, :3]), np.asfortranarray(points[:, :3])):
+            np.testing.assert_array_equal(to_pipe(same, xyz_p), first)
+            frames_at(same, read_only(first[0]))
+    assert len(before) >= 3, "the control: compiled functions are looked at"
+    assert compiled() == before
+
+
+def compiled() -> dict[str, int]:
+    """Return how often each compiled function of the module was compiled."""
+    return {name: len(k.signatures) for name, k in vars(module).items() if hasattr(k, "signatures")}
