@@ -7,10 +7,11 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from types import MappingProxyType
 
 from pipeline.files.codec import Json, canonical
+from pipeline.files.version import program_version
 
 # What computes; another version of these may change a result's last digits.
 _LIBRARIES = (
@@ -52,14 +53,6 @@ class MadeBy:
             "settings": dict(self.settings),
             "libraries": dict(library_versions()),
         }
-
-
-def program_version() -> str:
-    """Return the version of boresight, ``unknown`` when it is not installed."""
-    try:
-        return version("boresight")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 @cache

@@ -13,7 +13,7 @@ import pytest
 
 from pipeline.cli import _ATTACHED, _exit_code, main
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
-from pipeline.files.provenance import program_version
+from pipeline.files.version import program_version
 from pipeline.machine.runner import FailedError
 from stages.catalogue import PIPELINE
 from tests.shared_data import PROJECT_ROOT
@@ -80,6 +80,16 @@ def test_help_groups_the_commands_by_what_they_are_for(boresight: Callable[..., 
 
 def test_the_version_is_told(boresight: Callable[..., Told]) -> None:
     assert boresight("--version").out == f"boresight {program_version()}\n"
+
+
+@pytest.mark.parametrize("asked", ["--version", "--help"])
+def test_version_and_help_do_not_wait_for_what_computes(asked: str) -> None:
+    script = (
+        "import atexit, sys; from pipeline.cli import main; "
+        "atexit.register(lambda: print('loaded', [m for m in ('numpy', 'pydantic') if m in sys.modules])); main()"
+    )
+    told = subprocess.run([sys.executable, "-c", script, asked], capture_output=True, text=True, check=True)
+    assert told.stdout.splitlines()[-1] == "loaded []"
 
 
 @pytest.mark.parametrize(
