@@ -162,7 +162,7 @@ def _report(
     if len(alone) > max(_FEW_UNCONFIRMED, len(items)):
         context.warn(
             f"{len(alone)} places show something in one ring alone or are rather false than real, beside "
-            "{len(items)} defects: glints, splashes or compression are taken for the line. What to do: look "
+            f"{len(items)} defects: glints, splashes or compression are taken for the line. What to do: look "
             "at the unconfirmed ones in the review; record again with less exposure of the laser, a clean "
             "window or less compression"
         )

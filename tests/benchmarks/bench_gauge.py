@@ -22,7 +22,8 @@ def main(runs: int) -> None:
     z = np.array([[d[n] for n in names] for d in drawn])
     for name, values in zip(names, z.T, strict=True):
         inside = np.mean(np.abs(values) < 1.96)
-        print(f"{name:<14} bias {values.mean():+.2f} σ  sd {values.std():.2f}  within 95 % {inside:.3f}")
+        mean = f"{values.mean():+.2f} ± {values.std() / np.sqrt(len(values)):.2f}"
+        print(f"{name:<14} bias {mean} σ  sd {values.std():.2f}  within 95 % {inside:.3f}")
     print(f"all: {np.mean(np.abs(z) < 1.96):.3f} within their 95 % interval")
 
 

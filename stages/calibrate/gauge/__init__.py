@@ -28,5 +28,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "1", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "2", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )

@@ -19,6 +19,8 @@ from stages.calibrate.gauge.state import ENCODER, GaugeParameters, Unknowns
 
 _STEP_S = 1e-3
 _ORIGIN_SIGMA_MM = 1e-3
+# A ring farther than this from where it is expected is an outlier, and its derivatives are of no interest.
+_FARTHEST_PX = 3.0
 
 
 @dataclass(frozen=True)
@@ -53,14 +55,16 @@ def edge_equations(state: Unknowns, edges: Edges) -> Equations:
 
 
 def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
-    """Hold each triangulated ring point to the bore of its section."""
+    """Hold each triangulated ring point to the bore of its section.
+
+    Derivatives are taken where the ring is expected, not where it was measured: taken there they hold the
+    measurement's own noise, and its product with the residual's has a mean, which moves baseline and cone
+    (W. A. Fuller, "Measurement Error Models", 1987, ch. 3).
+    """
+    residual, uv = expected_ring(state, rings)
     T = state.T_pc[rings.frame]
-    xyz_c = state.probe.triangulate(rings.uv)
-    by_pixel, by_parameters = state.probe.triangulate_jacobian(rings.uv)
-    xyz_p = transform(T, xyz_c)
-    radius = np.hypot(xyz_p[:, 0], xyz_p[:, 1])
-    residual = radius - _bore_radius(state, rings)
-    normal = np.stack([xyz_p[:, 0] / radius, xyz_p[:, 1] / radius, 0 * radius], -1)
+    xyz_c, normal, _ = _wall_at(state, T, uv)
+    by_pixel, by_parameters = state.probe.triangulate_jacobian(uv)
     normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
     by_frame = np.zeros((len(residual), 1, BLOCK))
     by_frame[:, 0, :3] = normal
@@ -69,10 +73,33 @@ def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
     by_border = np.zeros((len(residual), at.size))
     by_border[np.arange(len(residual)), at.bore.start + rings.section] = -1
     by_border[:, at.instrument] = np.einsum("mj,mjp->mp", normal_c, by_parameters) @ state.unsure
-    mm_per_px = np.abs(np.einsum("mj,mjk,mk->m", normal_c, by_pixel, rings.outward))
+    mm_per_px = np.abs(_mm_per_px(normal_c, by_pixel, rings))
     return _weighted(
         rings.frame, by_frame, by_border, residual, rings.sigma_px * mm_per_px, wall_cells(rings.wall_mm)
     )
+
+
+def expected_ring(state: Unknowns, rings: BoreRings) -> tuple[Float, Float]:
+    """Return how far (M,) ring points lie off the bore, mm, and where (M, 2) in the image they should be."""
+    T = state.T_pc[rings.frame]
+    _, normal, radius = _wall_at(state, T, rings.uv)
+    residual = radius - _bore_radius(state, rings)
+    normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
+    mm_per_px = _mm_per_px(normal_c, state.probe.triangulate_jacobian(rings.uv)[0], rings)
+    away = np.clip(residual / mm_per_px, -_FARTHEST_PX, _FARTHEST_PX)
+    return residual, rings.uv - away[:, None] * rings.outward
+
+
+def _wall_at(state: Unknowns, T: Float, uv: Float) -> tuple[Float, Float, Float]:
+    """Return wall points (M, 3) in C, directions (M, 3) in P away from the gauge's axis, and radii (M,)."""
+    xyz_c = state.probe.triangulate(uv)
+    xyz_p = transform(T, xyz_c)
+    radius = np.hypot(xyz_p[:, 0], xyz_p[:, 1])
+    return xyz_c, np.stack([xyz_p[:, 0] / radius, xyz_p[:, 1] / radius, 0 * radius], -1), radius
+
+
+def _mm_per_px(normal_c: Float, by_pixel: Float, rings: BoreRings) -> Float:
+    return np.asarray(np.einsum("mj,mjk,mk->m", normal_c, by_pixel, rings.outward))
 
 
 def wall_cells(wall_mm: Float, size_mm: float = 10.0) -> Int:
