@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
@@ -12,6 +14,7 @@ from pipeline.geometry.axis import PipeAxis, axis_through, frames_at
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, vector_from_rotation
 from pipeline.instrument.probe import ImuMount
 from pipeline.recording.base import Imu
+from stages.motion.route.rotation_graph import STRAIGHT_MM, STRAIGHTNESS_RAD
 
 STEP_MM, SPEED_MM_S, RADIUS_MM = 50.0, 150.0, 50.0
 WALK = 1e-4 / np.sqrt(1000.0)
@@ -26,6 +29,11 @@ class Chain:
     T_pc: Float
     axis: PipeAxis
 
+    @property
+    def turn_variance(self) -> Float:
+        """Return the variance (N, 3) of the turns that the camera saw up to each frame."""
+        return np.diagonal(self.seen.covariance, axis1=1, axis2=2)[:, 3:]
+
 
 def curved(*pieces: tuple[float, float, float]) -> PipeAxis:
     """Return an axis of pieces: (length mm, angle rad, azimuth toward which it turns)."""
@@ -37,6 +45,18 @@ def curved(*pieces: tuple[float, float, float]) -> PipeAxis:
             tangent.append(across[:, 2] * length / count)
             across = across @ rotation_from_vector(turn)
     origin = np.concatenate([np.zeros((1, 3)), np.cumsum(tangent, 0)])
+    return axis_through(origin, np.array([1.0, 0.0, 0.0]), 0.0)
+
+
+def bowed(axis: PipeAxis, seed: int) -> PipeAxis:
+    """Return the axis with tubes that lean against its lines as the route's prior has it, smoothly."""
+    step_mm = float(np.diff(axis.distance_mm).mean())
+    smooth = STRAIGHT_MM / (2 * np.sqrt(np.pi) * step_mm)  # the same integral as even leans of STRAIGHT_MM
+    white = np.random.default_rng(seed).standard_normal((len(axis.distance_mm) - 1, 2))
+    lean = gaussian_filter1d(white, smooth, axis=0, mode="wrap") * np.sqrt(2 * np.sqrt(np.pi) * smooth)
+    beside = axis.R_pa[:-1, :, :2] @ (STRAIGHTNESS_RAD * lean)[..., None]
+    way = np.diff(axis.origin_p, axis=0) + step_mm * beside[..., 0]
+    origin = np.concatenate([np.zeros((1, 3)), np.cumsum(way, 0)])
     return axis_through(origin, np.array([1.0, 0.0, 0.0]), 0.0)
 
 
@@ -74,6 +94,14 @@ def chain(
     return Chain(seen, from_parts(R_true, origin), axis)
 
 
+def errors_in_sigma(found: Trajectory, run: Chain, at: Sequence[int]) -> Float:
+    """Return the errors (k, 6) of place in P and turn in C of some frames, in stated σ."""
+    way = found.T_pc[at, :3, 3] - run.T_pc[at, :3, 3]
+    turn = vector_from_rotation(np.swapaxes(run.T_pc[at, :3, :3], 1, 2) @ found.T_pc[at, :3, :3])
+    sigma = np.sqrt(np.diagonal(found.covariance[at], axis1=1, axis2=2))
+    return np.concatenate([way, turn], 1) / sigma
+
+
 def _middle(R: Float) -> Float:
     """Return the rotations (N - 1, 3, 3) halfway from one to the next of (N, 3, 3)."""
     return R[:-1] @ rotation_from_vector(vector_from_rotation(np.swapaxes(R[:-1], 1, 2) @ R[1:]) / 2)
@@ -85,13 +113,18 @@ def drawn_imu(run: Chain, mount: ImuMount, up_p: Float, seed: int = 0, rate_hz: 
     turn = vector_from_rotation(np.swapaxes(run.T_pc[:-1, :3, :3], 1, 2) @ run.T_pc[1:, :3, :3])
     rate = turn / np.diff(time_s)[:, None]
     at = np.arange(time_s[0], time_s[-1] + 1 / rate_hz, 1 / rate_hz)
+    # A reading is the mean over its interval, as a chip's filter makes it.
+    turned = np.concatenate([np.zeros((1, 3)), np.cumsum(turn, 0)])
+    edges = np.append(at - 0.5 / rate_hz, at[-1] + 0.5 / rate_hz)
+    passed = np.stack([np.interp(edges, time_s, turned[:, i]) for i in range(3)], -1)
     place = np.clip(np.searchsorted(time_s, at, "right") - 1, 0, len(rate) - 1)
+    R_pc = run.T_pc[place, :3, :3] @ rotation_from_vector(rate[place] * (at - time_s[place])[:, None])
     n = (len(at), 3)
     walk = np.cumsum(random.standard_normal(n), 0) * mount.gyroscope_random_walk / np.sqrt(rate_hz)
     bias = 0.02 * random.standard_normal(3) + walk
-    gyro = rate[place] @ mount.R_ci + bias
+    gyro = np.diff(passed, axis=0) * rate_hz @ mount.R_ci + bias
     gyro += mount.gyroscope_noise_density * np.sqrt(rate_hz) * random.standard_normal(n)
-    force = np.einsum("nij,i->nj", run.T_pc[place, :3, :3], 9.81 * up_p) @ mount.R_ci
+    force = np.einsum("nij,i->nj", R_pc, 9.81 * up_p) @ mount.R_ci
     force += mount.accelerometer_bias * random.standard_normal(3)
     force += mount.accelerometer_noise_density * np.sqrt(rate_hz) * random.standard_normal(n)
     return Imu(at, gyro, force)

@@ -85,7 +85,7 @@ def estimate_motion(
     joined, loops = close_loops(estimate.joined, passage, features, view, parameters, context.scratch)
     has_encoder = run.encoder is not None
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
-    trajectory = lay_route(trajectory, recording, probe, context)
+    trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     _report(context, estimate, run.texture, trajectory)
     loops.report(context)
@@ -284,7 +284,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "7",
+    "8",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

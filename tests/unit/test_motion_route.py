@@ -9,7 +9,7 @@ from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.instrument.probe import ImuMount
 from pipeline.recording.base import Imu, PipeFacts, PlannedPiece
 from stages.motion.route.laying import lay_route
-from tests.pose_chain import RADIUS_MM, Chain, chain, curved, drawn_imu
+from tests.pose_chain import RADIUS_MM, Chain, bowed, chain, curved, drawn_imu, errors_in_sigma
 from tests.quiet import quiet_context
 
 UP = np.array([0.0, -1.0, 0.0])
@@ -24,7 +24,7 @@ BENT = curved(
 def laid(run: Chain, imu: Imu | None = None, plan=(), mount: ImuMount | None = None, warn=None) -> Trajectory:
     context = replace(quiet_context(), warn=warn) if warn else quiet_context()
     recording = SimpleNamespace(imu=imu, pipe=PipeFacts(2 * RADIUS_MM, plan=plan))
-    return lay_route(run.seen, recording, SimpleNamespace(imu=mount), context)
+    return lay_route(run.seen, run.turn_variance, recording, SimpleNamespace(imu=mount), context)
 
 
 def aside(found: Trajectory, run: Chain) -> np.ndarray:
@@ -118,3 +118,14 @@ def test_short_runs_stay_as_they_are() -> None:
     found = laid(run)
     np.testing.assert_array_equal(found.T_pc, run.seen.T_pc)
     assert [p.kind for p in found.pieces] == ["straight"]
+
+
+def test_sigma_along_the_way_is_true_of_drawn_runs() -> None:
+    """Twice or half the σ fails: `python -m tests.benchmarks.bench_route` counts more runs of more kinds."""
+    z = []
+    for seed in range(4):
+        drift = 1e-5 * np.random.default_rng(seed).standard_normal(2)
+        run = chain(bowed(curved((12e3, 0.0, 0.0)), seed), (drift[0], drift[1]), seed + 7)
+        z.append(errors_in_sigma(laid(run), run, [120, -1]))
+    across_and_turns = np.array(z)[..., [0, 1, 3, 4, 5]]
+    assert 0.6 < np.sqrt(np.mean(across_and_turns**2)) < 1.4

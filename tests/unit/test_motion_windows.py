@@ -14,6 +14,7 @@ from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, t
 from pipeline.machine.scratch import Scratch
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import ObservationStore
+from stages.motion.windows.error_chain import ErrorChain, Link
 from stages.motion.windows.sliding_window import RunEstimate, adjust_run, with_shared_error
 from stages.motion.windows.submap_joining import JoinedRun, join_submaps
 from stages.motion.windows.submaps import (
@@ -218,3 +219,16 @@ def test_matches_share_more_of_their_error_where_they_disagree_by_more() -> None
     assert with_shared_error(usual, 0.14) is usual
     assert with_shared_error(usual, 0.6).match_bias_px == pytest.approx(0.2)
     MotionParameters.model_validate(with_shared_error(usual, 50.0).model_dump())
+
+
+def test_unsure_heading_does_not_become_roll_where_the_way_turns() -> None:
+    """The heading errs by a radian at the second anchor, behind which the way turns by a right angle."""
+    right_angle = np.eye(6)
+    right_angle[3:, 3:] = [[0, 0, -1], [0, 1, 0], [1, 0, 0]]
+    joint = np.zeros((2, 6, 2, 6))
+    joint[1, 3:, 1, 3:] = np.diag([1.0, 0.0, 1e-6])
+    carry = np.stack([np.eye(6), right_angle])
+    links = tuple(Link(np.arange(2) + 2 * n, carry, joint, np.zeros((2, 6, 1))) for n in range(2))
+    chain = ErrorChain(links, np.zeros((6, 6)), np.zeros((1, 1)))
+    assert chain.covariances()[-1, 5, 5] > 0.9, "the control: roll of the poses takes the heading over"
+    np.testing.assert_allclose(chain.turn_variances()[-1], [2.0, 0.0, 2e-6])

@@ -6,12 +6,12 @@ C. Forster et al., "On-manifold preintegration for real-time visual-inertial odo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import accumulate
 
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import rotation_from_vector, vector_from_rotation
 from pipeline.instrument.probe import ImuMount
 from pipeline.machine.stage import Context
@@ -28,6 +28,8 @@ _STILL_S, _STILL_MM, _EASED_S = 2.0, 0.1, 0.3
 """A probe stands that moves by less than 0.1 mm in 2 s; 0.3 s at both ends are left out. Not measured."""
 _LEAST_BIAS_RAD_S = 2e-6
 """Least 1 σ of a bias at rest: the Earth turns by 7e-5 rad/s, and a probe by some degrees on its way."""
+_SCALE_ERROR = 0.01
+"""1 σ of a gyroscope's scale: data sheets of consumer chips state 1 to 3 % at most."""
 _LEAST_FORCE_M_S2 = 0.01
 """Smallest 1 σ of a mean force that is believed: a milligravity."""
 _TURNING, _APART = 3.0, 0.5
@@ -65,15 +67,19 @@ def inertia_at(
             f"the IMU is not used: {refusal}. What to do: check clock (s, as in frames.csv) and units"
         )
         return None
-    R_step = _rotations(imu, mount, time_s)
+    inner = (imu.time_s > time_s[0]) & (imu.time_s < time_s[-1])
+    at = np.unique(np.concatenate([time_s, imu.time_s[inner]]))
+    turned, node = _rotations(imu, mount, at), np.searchsorted(at, time_s)
+    R_step = np.swapaxes(turned[node[:-1]], 1, 2) @ turned[node[1:]]
     step_s = np.diff(time_s)
-    force_c = _mean_forces(imu, time_s) @ mount.R_ci.T
+    force_c = _mean_forces(imu, mount, at, turned, node)
     shown = np.einsum("kij,kj->ki", R_pc, force_c)
     # Second differences leave out gravity, of which vision's rotation is known only slowly: their σ is √6.
     scatter = robust_spread(np.diff(shown, 2, axis=0).ravel()) / np.sqrt(6) if len(shown) > 4 else 0.0
     noise = mount.accelerometer_noise_density / np.sqrt(_MEAN_S)
+    by_scale = _SCALE_ERROR * np.linalg.norm(vector_from_rotation(R_step), axis=1)
     return Inertia(
-        R_step, step_s, mount.gyroscope_noise_density**2 * step_s,
+        R_step, step_s, mount.gyroscope_noise_density**2 * step_s + by_scale**2,
         mount.gyroscope_random_walk**2 * step_s, force_c,
         float(max(scatter, noise, _LEAST_FORCE_M_S2)), mount.accelerometer_bias,
         _rests(imu, mount, time_s, still),
@@ -140,30 +146,22 @@ def _refusal(imu: Imu, time_s: Float) -> str:
     return ""
 
 
-def _rotations(imu: Imu, mount: ImuMount, time_s: Float) -> Float:
-    """Return the rotations (K - 1, 3, 3) in C from each time to the next, rates linear between readings."""
-    inner = (imu.time_s > time_s[0]) & (imu.time_s < time_s[-1])
-    at = np.unique(np.concatenate([time_s, imu.time_s[inner]]))
+def _rotations(imu: Imu, mount: ImuMount, at: Float) -> Float:
+    """Return the rotations (n, 3, 3) in C from the first of ascending times to each, rates linear between."""
     rate = np.stack([np.interp(at, imu.time_s, imu.rate_rad_s[:, i]) for i in range(3)], -1) @ mount.R_ci.T
     small = rotation_from_vector((rate[1:] + rate[:-1]) / 2 * np.diff(at)[:, None])
-    place = np.searchsorted(at, time_s)
-    return np.stack([_product(small[a:b]) for a, b in pairwise(place.tolist())])
+    return np.array(list(accumulate(small, np.matmul, initial=np.eye(3))))
 
 
-def _product(rotation: Float) -> Float:
-    """Return the product (3, 3) of rotations (n, 3, 3) in their order, by halves."""
-    while len(rotation) > 1:
-        odd = rotation[-1:] if len(rotation) % 2 else rotation[:0]
-        even = rotation[: len(rotation) - len(odd)]
-        rotation = np.concatenate([even[::2] @ even[1::2], odd])
-    return np.asarray(rotation[0] if len(rotation) else np.eye(3))
+def _mean_forces(imu: Imu, mount: ImuMount, at: Float, turned: Float, node: Int) -> Float:
+    """Return the mean forces (K, 3) about nodes, in C as it lies there: turned back as the gyroscope says.
 
-
-def _mean_forces(imu: Imu, time_s: Float) -> Float:
-    """Return the mean force (K, 3) in I about each time."""
-    total = np.concatenate([np.zeros((1, 3)), np.cumsum(imu.force_m_s2, 0)])
-    first = np.searchsorted(imu.time_s, time_s - _MEAN_S / 2)
-    last = np.maximum(np.searchsorted(imu.time_s, time_s + _MEAN_S / 2), first + 1)
-    last = np.minimum(last, len(imu.time_s))
-    first = np.minimum(first, last - 1)
-    return np.asarray((total[last] - total[first]) / (last - first)[:, None])
+    ``turned`` (n, 3, 3) are the rotations at times ``at`` (n,), ``node`` (K,) the nodes' places among these.
+    """
+    force = np.stack([np.interp(at, imu.time_s, imu.force_m_s2[:, i]) for i in range(3)], -1) @ mount.R_ci.T
+    still = np.einsum("nij,nj->ni", turned, force)
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(still, 0)])
+    first = np.searchsorted(at, at[node] - _MEAN_S / 2)
+    last = np.searchsorted(at, at[node] + _MEAN_S / 2, "right")
+    mean = (total[last] - total[first]) / (last - first)[:, None]
+    return np.asarray(np.einsum("kij,ki->kj", turned[node], mean))

@@ -33,14 +33,19 @@ _STEEP = 0.3
 """Least share of gravity across the pipe's start for which a 12 o'clock is defined: pipes up to 72° steep."""
 
 
-def lay_route(trajectory: Trajectory, recording: Recording, probe: Probe, context: Context) -> Trajectory:
+def lay_route(
+    trajectory: Trajectory, turn_variance: Float, recording: Recording, probe: Probe, context: Context
+) -> Trajectory:
     """Return the trajectory with its straight lengths and bends, laid as these, plan and IMU say.
+
+    ``turn_variance`` (N, 3), rad², is that of the turns that the camera saw up to each frame, in C, without
+    its drift.
 
     Straightness says nothing over less than half of a tube: without plan and IMU shorter runs stay as they
     are, but for the list of their pieces.
     """
     found = _with_pieces(trajectory)
-    nodes, frame = _nodes(found)
+    nodes, frame = _nodes(found, turn_variance)
     if len(frame) < 3 or not found.pieces:
         return found
     planned = _planned_turns(found.pieces, recording.pipe.plan, context)
@@ -48,9 +53,10 @@ def lay_route(trajectory: Trajectory, recording: Recording, probe: Probe, contex
     way = float(np.ptp(nodes.distance_mm))
     if inertia is not None or planned or way > STRAIGHT_MM:
         rotations = RotationGraph(nodes, inertia, planned).solve()
-        found = relaid(found, nodes.distance_mm, rotations)
-        if rotations.up_p is not None:
-            found = _upright(found, rotations.up_p, rotations.up_sigma_rad, context)
+        is_upright = rotations.up_p is not None and _is_told(rotations, context)
+        found = relaid(found, nodes.distance_mm, rotations.about_up() if is_upright else rotations)
+        if is_upright:
+            found = turned_upright(found, rotations.up_p)
         found = _with_pieces(found)
     _report(found, context)
     return found
@@ -68,7 +74,7 @@ def _with_pieces(trajectory: Trajectory) -> Trajectory:
     return replace(trajectory, pieces=pieces)
 
 
-def _nodes(trajectory: Trajectory) -> tuple[Nodes, Int]:
+def _nodes(trajectory: Trajectory, turn_variance: Float) -> tuple[Nodes, Int]:
     """Return nodes along the way ahead, and the frames (K,) in which the probe first came to them."""
     s = distance_along(trajectory.axis, trajectory.T_pc)
     count = int(np.clip((s.max() - s[0]) / _NODE_MM, 1, _MOST_NODES - 1)) + 1
@@ -76,10 +82,15 @@ def _nodes(trajectory: Trajectory) -> tuple[Nodes, Int]:
     frame = np.unique(np.searchsorted(reached, np.linspace(s[0], s.max(), count)))
     distance = reached[frame]
     at = frames_at(trajectory.axis, distance)[1]
-    own = np.diagonal(trajectory.covariance[frame][:, 3:, 3:], axis1=1, axis2=2)
-    variance = np.maximum(np.diff(own, axis=0), _LEAST_VARIANCE)
+    variance = np.maximum(np.diff(turn_variance[frame], axis=0), _LEAST_VARIANCE)
+    R = trajectory.T_pc[:, :3, :3]
+    # A drift about C's axes, of which C turns on the way: with the last node's axes alone, a roll by 0.3 rad
+    # in 28 m bent a straight pipe by a milliradian.
+    about = np.cumsum((R[1:] + R[:-1]) / 2 * np.diff(s)[:, None, None], 0)[frame[1:] - 1]
+    about = np.diff(about, axis=0, prepend=np.zeros((1, 3, 3)))
+    by_drift = (np.swapaxes(R[frame[1:]], 1, 2) @ about)[:, :, :2]
     length = _length_of(distance, trajectory.pieces)
-    return Nodes(distance, trajectory.T_pc[frame, :3, :3], at[:, :, 2], variance, length), frame
+    return Nodes(distance, R[frame], at[:, :, 2], variance, by_drift, length), frame
 
 
 def _length_of(distance_mm: np.ndarray, pieces: tuple[PipePiece, ...]) -> Int:
@@ -156,16 +167,19 @@ def _believed(
     return found
 
 
-def _upright(trajectory: Trajectory, up_p: np.ndarray, sigma_rad: float, context: Context) -> Trajectory:
+def _is_told(rotations: Rotations, context: Context) -> bool:
+    """Report what gravity says of 12 o'clock and slope; return whether it tells a 12 o'clock."""
+    up_p = rotations.up_p
+    assert up_p is not None
     across = float(np.hypot(up_p[0], up_p[1]))
     if across < _STEEP:
         context.report("12 o'clock", "the pipe is too steep: as the camera at the first frame", "")
-        return trajectory
-    context.report("1 σ of 12 o'clock, by gravity", float(np.degrees(sigma_rad / across)), "°")
+        return False
+    context.report("1 σ of 12 o'clock, by gravity", float(np.degrees(rotations.clock_sigma_rad)), "°")
     context.report(
         "slope of the pipe at its start", float(np.degrees(np.arcsin(np.clip(up_p[2], -1, 1)))), "°"
     )
-    return turned_upright(trajectory, up_p)
+    return True
 
 
 def _report(trajectory: Trajectory, context: Context) -> None:

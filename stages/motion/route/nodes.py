@@ -20,6 +20,9 @@ class Nodes:
         Of the axis.
     variance : (K - 1, 3)
         Of vision's rotation from each node to the next, in C, rad².
+    by_drift : (K - 1, 3, 2)
+        That rotation's derivatives by the camera's drift of heading, mm: the way about C's x and y, as the
+        camera lay on the way.
     length : (K,) int
         Which straight length the node lies in, −1 in a bend.
     """
@@ -28,6 +31,7 @@ class Nodes:
     R_pc: Float
     tangent_p: Float
     variance: Float
+    by_drift: Float
     length: Int
 
 

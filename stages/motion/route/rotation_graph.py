@@ -38,6 +38,8 @@ _CHANCE = 1e-3
 """Chance with which a straight pipe is taken for bent where an IMU is there. A choice."""
 _DIRECTION_SIGMA = 10.0
 """1 σ of a length's direction beforehand: nothing is known."""
+_LEAST_FREE = 10.0
+"""Degrees of freedom below which it is not believed that vision errs by more than it says. A choice."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +55,37 @@ class Rotations:
         The camera's drift of heading about its x and y, rad/mm.
     up_p : (3,) or None
         None without an IMU.
-    up_sigma_rad : float
+    up_covariance : (3, 3)
+    turn_with_up : (3 K, 3)
+        Covariance of the nodes' rotations with ``up_p``.
     """
 
     turn_p: Float
     covariance: Float
     drift: Float
     up_p: Float | None
-    up_sigma_rad: float
+    up_covariance: Float
+    turn_with_up: Float
+
+    @property
+    def clock_sigma_rad(self) -> float:
+        """Return 1 σ of the angle of up about P's z."""
+        by_up = self._clock_by_up()
+        return float(np.sqrt(by_up @ self.up_covariance @ by_up))
+
+    def about_up(self) -> Rotations:
+        """Return them with the errors that they have once P is turned about z until up is its −y."""
+        by_up = self._clock_by_up()
+        about_z = np.tile([0.0, 0.0, 1.0], len(self.turn_p))
+        mixed = np.outer(self.turn_with_up @ by_up, about_z)
+        own = self.clock_sigma_rad**2 * np.outer(about_z, about_z)
+        return replace(self, covariance=self.covariance - mixed - mixed.T + own)
+
+    def _clock_by_up(self) -> Float:
+        """Return the derivative (3,) of the angle of up about z."""
+        assert self.up_p is not None
+        x, y, _ = self.up_p
+        return np.array([-y, x, 0.0]) / (x * x + y * y)
 
 
 @dataclass(frozen=True)
@@ -81,6 +106,11 @@ class _State:
         names = ("turn", "drift", "direction", "bias", "force", "up")
         return {n: np.arange(a, b) for n, a, b in zip(names, ends[:-1], ends[1:], strict=True)}
 
+    @property
+    def size(self) -> int:
+        """Return the number of unknowns."""
+        return sum(len(c) for c in self.columns().values())
+
     def moved(self, step: Float) -> _State:
         """Return the state after a step (S,)."""
         at = self.columns()
@@ -100,14 +130,17 @@ class _Equations:
     def __init__(self, size: int) -> None:
         self.normal, self.right, self.cost = np.zeros((size, size)), np.zeros(size), 0.0
 
-    def add(self, residual: Float, sigma: Float | float, parts: _Parts) -> None:
-        """Add a few equations (m,) with derivatives (m, w), or a factor, by columns (w,)."""
-        columns = np.concatenate([c for c, _ in parts])
-        by = np.concatenate([np.eye(len(residual)) * b if np.ndim(b) == 0 else b for _, b in parts], 1)
-        weight = (1 / np.square(np.broadcast_to(sigma, residual.shape)))[:, None]
-        self.cost += float(weight[:, 0] @ residual**2)
-        self.normal[np.ix_(columns, columns)] += by.T @ (weight * by)
-        self.right[columns] -= (by.T @ (weight * residual[:, None]))[:, 0]
+    def add(self, residual: Float, variance: Float | float, parts: _Parts) -> None:
+        """Add equations (n, m) with derivatives (n, m, w), or a factor of one, by columns (n, w) of each."""
+        size = residual.shape[1]
+        columns = np.concatenate([c for c, _ in parts], 1)
+        whole = [np.eye(size) * b if np.ndim(b) == 0 else b for _, b in parts]
+        by = np.concatenate([np.broadcast_to(b, (len(residual), *b.shape[-2:])) for b in whole], 2)
+        weight = 1 / np.broadcast_to(variance, residual.shape)
+        self.cost += float(np.sum(weight * residual**2))
+        weighted = np.swapaxes(by * weight[..., None], 1, 2)
+        np.add.at(self.normal, (columns[:, :, None], columns[:, None, :]), weighted @ by)
+        np.add.at(self.right, columns, -(weighted @ residual[..., None])[..., 0])
 
 
 @dataclass(frozen=True)
@@ -127,21 +160,19 @@ class RotationGraph:
         if self._is_bent():
             free = replace(self.nodes, length=np.full(len(self.nodes.length), -1))
             return replace(self, nodes=free, planned=()).solve()
-        excess = self._excess(self._minimum())
-        nodes = replace(self.nodes, variance=self.nodes.variance * excess)
-        graph = replace(self, nodes=nodes)
+        excess = self._excess()
+        graph = replace(self, nodes=replace(self.nodes, variance=self.nodes.variance * excess))
         state = graph._minimum()
         factor = cho_factor(graph._equations(state).normal)
         at = state.columns()
-        unit = np.eye(len(factor[0]))
-        covariance = cho_solve(factor, unit[:, at["turn"]])[at["turn"]]
-        if self.inertia is None:
-            return Rotations(state.turn, covariance, state.drift, None, float("nan"))
-        of_up = cho_solve(factor, unit[:, at["up"]])[at["up"]]
+        covariance = cho_solve(factor, np.eye(len(factor[0])))
+        turn, up = at["turn"], at["up"]
         size = float(np.linalg.norm(state.up))
-        across = np.eye(3) - np.outer(state.up, state.up) / size**2
-        sigma = float(np.sqrt(np.trace(across @ of_up @ across) / 2)) / size
-        return Rotations(state.turn, covariance, state.drift, state.up / size, sigma)
+        return Rotations(
+            state.turn, covariance[np.ix_(turn, turn)], state.drift,
+            None if self.inertia is None else state.up / size,
+            covariance[np.ix_(up, up)] / size**2, covariance[np.ix_(turn, up)] / size,
+        )  # fmt: skip
 
     def _is_bent(self) -> bool:
         """Return whether an IMU contradicts that the lengths are straight.
@@ -152,7 +183,7 @@ class RotationGraph:
         if self.inertia is None or not straight.any():
             return False
         free = replace(self, nodes=replace(self.nodes, length=np.full(len(straight), -1)), planned=())
-        excess = free._excess(free._minimum())
+        excess = free._excess()
         cost = [
             replace(g, nodes=replace(g.nodes, variance=g.nodes.variance * excess))._least_cost()
             for g in (self, free)
@@ -179,78 +210,83 @@ class RotationGraph:
         turn = np.broadcast_to(np.eye(3), (count, 3, 3)).copy()
         return _State(turn, np.zeros(2), direction.reshape(-1, 3), np.zeros((count, 3)), np.zeros(3), up)
 
-    def _excess(self, state: _State) -> float:
-        """Return by how much vision's squared errors exceed their variance, at least 1."""
-        error = np.array([self._vision_error(state, k) for k in range(len(self.nodes.variance))])
-        return max(1.0, float(np.mean(error**2 / self.nodes.variance))) if len(error) else 1.0
+    def _excess(self) -> float:
+        """Return by how much vision's squared errors exceed what is left of their variance, at least 1."""
+        state, variance = self._minimum(), self.nodes.variance
+        if not len(variance):
+            return 1.0
+        covariance = cho_solve(cho_factor(self._equations(state).normal), np.eye(state.size))
+        at = state.columns()
+        columns, by = self._vision_parts(state, at)
+        own = covariance[columns[:, :, None], columns[:, None, :]]
+        fitted = np.einsum("kiw,kwv,kiv->ki", by, own, by)
+        free = float(np.sum(1 - np.minimum(fitted / variance, 1.0)))
+        return max(1.0, float(np.sum(self._vision_error(state) ** 2 / variance)) / max(free, _LEAST_FREE))
 
     def _equations(self, state: _State) -> _Equations:
         at = state.columns()
-        out = _Equations(sum(len(c) for c in at.values()))
+        out = _Equations(state.size)
         turn = at["turn"].reshape(-1, 3)
-        out.add(vector_from_rotation(state.turn[0]), _ORIGIN_RAD, [(turn[0], 1.0)])
-        out.add(state.drift, HEADING_DRIFT, [(at["drift"], 1.0)])
-        self._add_vision(out, state, turn, at)
+        out.add(vector_from_rotation(state.turn[:1]), _ORIGIN_RAD**2, [(turn[:1], 1.0)])
+        out.add(state.drift[None], HEADING_DRIFT**2, [(at["drift"][None], 1.0)])
+        out.add(self._vision_error(state), self.nodes.variance, [self._vision_parts(state, at)])
         self._add_lengths(out, state, turn, at)
         self._add_inertia(out, state, turn, at)
         return out
 
-    def _rotation(self, state: _State, k: int) -> Float:
-        return np.asarray(state.turn[k] @ self.nodes.R_pc[k])
+    def _vision_error(self, state: _State) -> Float:
+        seen = np.swapaxes(self.nodes.R_pc[:-1], 1, 2) @ self.nodes.R_pc[1:]
+        R = state.turn @ self.nodes.R_pc
+        error = vector_from_rotation(np.swapaxes(seen, 1, 2) @ np.swapaxes(R[:-1], 1, 2) @ R[1:])
+        return np.asarray(error - self.nodes.by_drift @ state.drift)
 
-    def _vision_error(self, state: _State, k: int) -> Float:
-        seen = self.nodes.R_pc[k].T @ self.nodes.R_pc[k + 1]
-        step = self.nodes.distance_mm[k + 1] - self.nodes.distance_mm[k]
-        error = vector_from_rotation(seen.T @ self._rotation(state, k).T @ self._rotation(state, k + 1))
-        return np.asarray(error - step * np.append(state.drift, 0.0))
-
-    def _add_vision(self, out: _Equations, state: _State, turn: Int, at: dict[str, Int]) -> None:
-        for k, variance in enumerate(self.nodes.variance):
-            to_c = self._rotation(state, k + 1).T
-            step = self.nodes.distance_mm[k + 1] - self.nodes.distance_mm[k]
-            by = [(turn[k + 1], to_c), (turn[k], -to_c), (at["drift"], -step * np.eye(3)[:, :2])]
-            out.add(self._vision_error(state, k), np.sqrt(variance), by)
+    def _vision_parts(self, state: _State, at: dict[str, Int]) -> tuple[Int, Float]:
+        """Return the columns (K - 1, 8) of turns and drift, and vision's derivatives (K - 1, 3, 8)."""
+        turn, to_c = at["turn"].reshape(-1, 3), np.swapaxes(state.turn @ self.nodes.R_pc, 1, 2)[1:]
+        drift = np.broadcast_to(at["drift"], (len(to_c), 2))
+        columns = np.concatenate([turn[1:], turn[:-1], drift], 1)
+        return columns, np.concatenate([to_c, -to_c, -self.nodes.by_drift], 2)
 
     def _add_lengths(self, out: _Equations, state: _State, turn: Int, at: dict[str, Int]) -> None:
         nodes, of_length = self.nodes, at["direction"].reshape(-1, 3)
-        for columns in of_length:
-            out.add(np.zeros(3), _DIRECTION_SIGMA, [(columns, 1.0)])
-        step = np.gradient(nodes.distance_mm)
-        for k in np.flatnonzero(nodes.length >= 0):
-            tangent = state.turn[k] @ nodes.tangent_p[k]
-            sigma = STRAIGHTNESS_RAD * np.sqrt(max(STRAIGHT_MM / step[k], 1.0))
-            by: _Parts = [(turn[k], -skew(tangent)), (of_length[nodes.length[k]], -1.0)]
-            out.add(tangent - state.direction[nodes.length[k]], sigma, by)
+        out.add(np.zeros(of_length.shape), _DIRECTION_SIGMA**2, [(of_length, 1.0)])
+        at_node, step = np.flatnonzero(nodes.length >= 0), np.gradient(nodes.distance_mm)
+        length = nodes.length[at_node]
+        tangent = np.einsum("kij,kj->ki", state.turn[at_node], nodes.tangent_p[at_node])
+        variance = STRAIGHTNESS_RAD**2 * np.maximum(STRAIGHT_MM / step[at_node], 1.0)
+        lean: _Parts = [(turn[at_node], -skew(tangent)), (of_length[length], -1.0)]
+        out.add(tangent - state.direction[length], variance[:, None], lean)
         for plan in self.planned:
             one, other = state.direction[plan.length], state.direction[plan.length + 1]
             cosine = float(one @ other / np.linalg.norm(one) / np.linalg.norm(other))
             sine = max(float(np.sqrt(1 - min(cosine**2, 1.0))), 1e-3)
-            angle = np.array([np.arccos(np.clip(cosine, -1, 1)) - plan.angle_rad])
-            here, there = of_length[plan.length], of_length[plan.length + 1]
-            turns: _Parts = [(here, -other[None] / sine), (there, -one[None] / sine)]
-            out.add(angle, plan.sigma_rad, turns)
+            angle = np.array([[np.arccos(np.clip(cosine, -1, 1)) - plan.angle_rad]])
+            here, there = of_length[[plan.length]], of_length[[plan.length + 1]]
+            turns: _Parts = [(here, -other[None, None] / sine), (there, -one[None, None] / sine)]
+            out.add(angle, plan.sigma_rad**2, turns)
 
     def _add_inertia(self, out: _Equations, state: _State, turn: Int, at: dict[str, Int]) -> None:
         inertia, bias = self.inertia, at["bias"].reshape(-1, 3)
         if inertia is None:
             for name in ("bias", "force", "up"):  # nothing depends on them
-                out.add(np.zeros(len(at[name])), 1.0, [(at[name], 1.0)])
+                out.add(np.zeros((1, len(at[name]))), 1.0, [(at[name][None], 1.0)])
             return
-        out.add(state.bias[0], _BIAS_RAD_S, [(bias[0], 1.0)])
-        out.add(state.force, inertia.force_bias_sigma, [(at["force"], 1.0)])
+        force, up = at["force"][None], at["up"][None]
+        out.add(state.bias[:1], _BIAS_RAD_S**2, [(bias[:1], 1.0)])
+        out.add(state.force[None], inertia.force_bias_sigma**2, [(force, 1.0)])
         size = float(np.linalg.norm(state.up))
-        out.add(np.array([size - STANDARD_GRAVITY]), _GRAVITY_SIGMA, [(at["up"], state.up[None] / size)])
-        for k, step_s in enumerate(inertia.step_s):
-            here, there = self._rotation(state, k), self._rotation(state, k + 1)
-            error = vector_from_rotation(inertia.R_step[k].T @ here.T @ there) + step_s * state.bias[k]
-            by: _Parts = [(turn[k + 1], there.T), (turn[k], -there.T), (bias[k], step_s)]
-            out.add(error, np.sqrt(inertia.step_variance[k]), by)
-            change = state.bias[k + 1] - state.bias[k]
-            out.add(change, np.sqrt(inertia.walk_variance[k]), [(bias[k + 1], 1.0), (bias[k], -1.0)])
+        out.add(np.array([[size - STANDARD_GRAVITY]]), _GRAVITY_SIGMA**2, [(up, state.up[None, None] / size)])
+        R = state.turn @ self.nodes.R_pc
+        back, step_s = np.swapaxes(R, 1, 2), inertia.step_s[:, None]
+        error = vector_from_rotation(np.swapaxes(inertia.R_step, 1, 2) @ back[:-1] @ R[1:])
+        by: _Parts = [(turn[1:], back[1:]), (turn[:-1], -back[1:]), (bias[:-1], step_s[:, None] * np.eye(3))]
+        out.add(error + step_s * state.bias[:-1], inertia.step_variance[:, None], by)
+        walk = np.diff(state.bias, axis=0)
+        out.add(walk, inertia.walk_variance[:, None], [(bias[1:], 1.0), (bias[:-1], -1.0)])
         for rest in inertia.rests:
             shift = state.bias[rest.node] - rest.rate_c
-            out.add(shift, rest.sigma_rad_s, [(bias[rest.node], 1.0)])
-        for k, force in enumerate(inertia.force_c):
-            shown = self._rotation(state, k) @ (force - state.force)
-            by = [(turn[k], -skew(shown)), (at["force"], -self._rotation(state, k)), (at["up"], -1.0)]
-            out.add(shown - state.up, inertia.force_sigma, by)
+            out.add(shift[None], rest.sigma_rad_s**2, [(bias[[rest.node]], 1.0)])
+        shown = np.einsum("kij,kj->ki", R, inertia.force_c - state.force)
+        each = np.ones((len(R), 1), np.int64)
+        by = [(turn, -skew(shown)), (force * each, -R), (up * each, -1.0)]
+        out.add(shown - state.up, inertia.force_sigma**2, by)

@@ -102,6 +102,20 @@ class ErrorChain:
             anchor = own[-1]
         return np.concatenate(found)
 
+    def turn_variances(self) -> Float:
+        """Return the variance (K, 3) of turns in C gathered up to each frame, the shared parameters given.
+
+        It grows along the run and is that of turns seen one after the other: where the way is curved, what
+        was unsure of the heading at its start does not become roll here.
+        """
+        before, found = np.zeros(3), []
+        for link in self.links:
+            each = np.arange(len(link.at))
+            own = np.diagonal(link.joint[each, :, each], axis1=1, axis2=2)[:, 3:]
+            found.append(before + np.maximum.accumulate(np.maximum(own, 0.0), axis=0))
+            before = found[-1][-1]
+        return np.concatenate(found)
+
     def covariances_with(self, sums: ErrorSums) -> Iterator[Float]:
         """Yield the covariance (k, 6, C) of each window's errors with C sums of errors.
 

@@ -76,6 +76,11 @@ class JoinedRun:
     shared: SharedParameters
     distance_sigma_mm: float
 
+    @property
+    def turn_variance(self) -> Float:
+        """Return the variance (N, 3) of rotations gathered up to every frame: `ErrorChain.turn_variances`."""
+        return interpolated(np.arange(len(self.T_pc)), self.chain.at, self.chain.turn_variances())
+
 
 def join_submaps(submaps: Sequence[Submap], shared: SharedParameters) -> JoinedRun:
     """Place every window on the one before it.
