@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -216,18 +216,18 @@ def examine_gauge(
     """Return what a gauge run's rings, fiducials, motion and line profile say."""
     recording, run, without = frames.applied_to(recording), fiducials.run, parameters.without
     missing, problem = _profile_problem(profile), fiducials.problem
-    geometry, travel = None, None
+    geometry, travel, light = None, None, _known_light(profile, without)
     if run is not None:
         try:
-            library = _of_geometry(library_without(without), profile.evidence)
-            geometry = examine(run, library, probe, without, progress=context.progress)
+            library = _of_geometry(library_without(without), light)
+            geometry = examine(run, library, probe, progress=context.progress)
             travel = gauge_travel(recording, run, geometry.searched.found.state)
             missing += travel.shortcomings
         except UnusableError as error:
             problem = error.problem
     if problem:
         missing += (f"Rings and fiducials of the gauge run tell nothing: {problem}.",)
-    return Seen(recording.name, geometry, travel, profile.evidence, missing)
+    return Seen(recording.name, geometry, travel, light, missing)
 
 
 def examine_field(
@@ -243,14 +243,20 @@ def examine_field(
 ) -> Seen:
     """Return what an inspection's rings, texture, motion and line profile say."""
     recording = frames.applied_to(recording)
-    run = motion.run(recording, probe, rings)
+    run, light = motion.run(recording, probe, rings), _known_light(profile, parameters.without)
     if run is None:
         found = FieldEvidence(None, nothing_said(recording, motion.problem))
     else:
-        library = _of_geometry(library_without(parameters.without), profile.evidence)
+        library = _of_geometry(library_without(parameters.without), light)
         found = field_evidence(run, library, context.progress)
     missing = (*_profile_problem(profile), *found.channel.shortcomings)
-    return Seen(recording.name, None, found.travel, profile.evidence, missing, found)
+    return Seen(recording.name, None, found.travel, light, missing, found)
+
+
+def _known_light(profile: LineProfile, without: Collection[str]) -> ProfileEvidence | None:
+    """Return what the line's light says to one who does not know some effects."""
+    evidence = profile.evidence
+    return evidence.without(without) if evidence is not None and without else evidence
 
 
 def _profile_problem(profile: LineProfile) -> tuple[str, ...]:
@@ -284,8 +290,8 @@ FREE_MOTION = Stage(
     "free_motion", "1", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "1", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "2", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "1", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "2", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,6 +75,8 @@ class Claim:
         As far as it was measured.
     agreements : tuple of Agreement
         Second predictions of the same physics that tell enough.
+    unknown : frozenset of str
+        Effects that are not known to who claims it.
     counted : bool
         Whether names were counted on pictures like these; if not, past cases bear nothing out.
     """
@@ -88,6 +90,16 @@ class Claim:
     location: Location
     agreements: tuple[Agreement, ...] = ()
     counted: bool = True
+    unknown: frozenset[str] = frozenset()
+
+    @property
+    def like_it(self) -> tuple[str, ...]:
+        """Effects that the catalogue calls like it, those not known left out."""
+        return tuple(n for n in effect(self.name).alike if n not in self.unknown)
+
+    def not_knowing(self, names: Collection[str]) -> Claim:
+        """Return the claim of one who does not know some effects."""
+        return replace(self, alike=tuple(n for n in self.alike if n not in names), unknown=frozenset(names))
 
     @property
     def of_gauge_alone(self) -> bool:

@@ -24,6 +24,7 @@ from stages.diagnose.result import (
 
 _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
+_UNKNOWN = "a cause that the library does not have, such as {}"
 _AGAIN = (
     "To see what the pattern goes with, record the gauge again: rolled by 90° (probe or gauge), at another "
     "speed (time), after warming up (drift)."
@@ -39,13 +40,14 @@ def composed(
     """
     examined = gauge.geometry if gauge is not None else None
     every = claims_of(field, gauge)
+    known = [c.not_knowing(without) for c in every if c.name not in without]
     unexplained = _unexplained_profile(field, gauge)
-    said = _said(examined, every, without, bool(unexplained))
+    said = _said(examined, known, len(known) < len(every), bool(unexplained))
     asked = said.members if said.members else [e.name for e in said.effects]
     location = _location(examined, every, asked) or (_IN_PROFILE if unexplained else None)
     identifiable = " ".join(s for s in (_identifiable(said, examined), *unexplained) if s)
     partly = said.verdict is Verdict.PARTLY
-    return Diagnosis(
+    found = Diagnosis(
         recording=field.name if field is not None else "",
         gauge=gauge.name if gauge is not None else "",
         verdict=said.verdict,
@@ -63,6 +65,7 @@ def composed(
         ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
         remainder=Remainder(_of_rest(said), None, said.members, identifiable) if partly else None,
     )
+    return found.not_knowing(without)
 
 
 @dataclass(frozen=True)
@@ -78,14 +81,11 @@ def _of_rest(said: _Said) -> Verdict:
     return Verdict.CLASS if said.members else Verdict.UNEXPLAINED
 
 
-def _said(
-    examined: Examined | None, every: Sequence[Claim], without: Collection[str], unexplained: bool
-) -> _Said:
+def _said(examined: Examined | None, known: Sequence[Claim], unnamed: bool, unexplained: bool) -> _Said:
     """Return what rings and fiducials, and then the claims beyond them, come to.
 
     What is sure is named, whatever is left beside it; what is left is a class, or unexplained.
     """
-    known = [c for c in every if c.name not in without]
     rings = verdict_of_rings(examined, bool(known))
     of_rings = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(known, of_rings)
@@ -94,7 +94,7 @@ def _said(
     if rings in (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED):
         unsure = [e.name for e in of_rings if e not in certain]
         doubted += [*(of_gauge.members(examined) if unsure and examined is not None else ()), *unsure]
-    nameless = unexplained or len(known) < len(every) or _is_nameless(examined, rings)
+    nameless = unexplained or unnamed or _is_nameless(examined, rings)
     if certain and not doubted and not nameless:
         return _Said(Verdict.NAMED, certain, ())
     if certain:
@@ -144,7 +144,7 @@ def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
 def _rivals(claim: Claim) -> tuple[str, ...]:
     """Return what else may have made a claim; where its parts disagree, all that is known to be like it."""
     disagree = any(not a.confirmation.agrees for a in claim.agreements)
-    return (*claim.alike, *(effect(claim.name).alike if disagree else ()))
+    return (*claim.alike, *(claim.like_it if disagree else ()))
 
 
 def _is_sure(claim: Claim) -> bool:
@@ -162,7 +162,8 @@ def _next(said: _Said, asked: Sequence[str]) -> str:
 def _identifiable(said: _Said, examined: Examined | None) -> str:
     """Return what is determined all the same: the size each cause would have, or an empirical formula."""
     if said.verdict is Verdict.CLASS:
-        return "; or ".join(e.statement for e in said.effects)
+        unknown = of_gauge.unknown_rivals(examined)[:1] if examined is not None else ()
+        return "; or ".join([*(e.statement for e in said.effects), *(_UNKNOWN.format(f) for f in unknown)])
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
     return of_gauge.formula(examined) if nameless and examined is not None else ""
 

@@ -110,6 +110,7 @@ def diagnose(
     context.progress(0, _STEPS)
     found = composed(of_field, of_gauge, probe, without)
     found = with_field(found, of_field, of_gauge, probe, library_without(without))
+    found = found.not_knowing(without)
     context.progress(1, _STEPS)
     examined = of_gauge.geometry if of_gauge is not None else None
     seen = compared(run, run_corrected, examined, gauge, correction)
@@ -171,7 +172,7 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "1", DiagnosisParameters, diagnose,
+    "diagnosis", "2", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what bears it out",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

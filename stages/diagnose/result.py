@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -264,6 +264,22 @@ class Diagnosis:
     wall_picture: WallPicture | None = None
     notes: tuple[str, ...] = field(default=())
     remainder: Remainder | None = None
+
+    def not_knowing(self, names: Collection[str]) -> Diagnosis:
+        """Return the answer of one who does not know some effects: without them in any class."""
+        if not names:
+            return self
+        members = tuple(n for n in self.members if n not in names)
+        groups = (tuple(n for n in group if n not in names) for group in self.inseparable)
+        left = self.remainder
+        if left is not None:
+            left = replace(left, members=tuple(n for n in left.members if n not in names))
+        nameless = self.verdict is Verdict.CLASS and not members
+        return replace(
+            self, verdict=Verdict.UNEXPLAINED if nameless else self.verdict,
+            members=members, remainder=left, inseparable=tuple(g for g in groups if len(g) > 1),
+            record_next=record_next(members) if self.members else self.record_next,
+        )  # fmt: skip
 
 
 def to_json(found: Diagnosis) -> dict[str, object]:

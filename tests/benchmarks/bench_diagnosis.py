@@ -132,7 +132,7 @@ def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
     geometry, travel = None, None
     missing: tuple[str, ...] = ()
     try:
-        geometry = examine(simulated.measured, of_positions(without(left_out)), stated, left_out)
+        geometry = examine(simulated.measured, of_positions(without(left_out)), stated)
         travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
     except UnusableError as error:
         missing = (str(error),)

@@ -1,13 +1,9 @@
 """Classes of effects that one kind of recording cannot split, and what to record next."""
 
-from types import SimpleNamespace
-from typing import Any, cast
-
 import pytest
 
 from pipeline.physics.catalogue import CLASSES, EFFECTS
-from stages.diagnose.gauge.examine import with_untested
-from stages.diagnose.result import alike, class_of, classes_of, record_next
+from stages.diagnose.result import Diagnosis, Verdict, alike, class_of, classes_of, record_next
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -39,10 +35,11 @@ def test_what_to_record_next_names_each_recording_once():
     )
 
 
-def test_what_looks_alike_and_has_no_model_is_not_excluded():
-    term = SimpleNamespace(model=SimpleNamespace(law="dome_axial"))
-    seen = cast(Any, SimpleNamespace(best=SimpleNamespace(library_terms=(term,)), unsplit=(("baseline",),)))
-    assert with_untested(seen, ("focal_scale", "laser_tilt")) == (("baseline", "focal_scale"),)
-    assert with_untested(seen, ()) == (("baseline",),)
-    unnamed = cast(Any, SimpleNamespace(best=SimpleNamespace(library_terms=()), unsplit=()))
-    assert with_untested(unnamed, ("focal_scale",)) == ()
+def test_an_effect_that_is_not_known_is_in_no_class():
+    pair = ("laser_cone", "focal_scale")
+    both = Diagnosis("", "", Verdict.CLASS, 0.0, members=pair, inseparable=(pair,))
+    left = both.not_knowing(("focal_scale",))
+    assert (left.verdict, left.members, left.inseparable) == (Verdict.CLASS, ("laser_cone",), ())
+    assert "focal_scale" not in left.record_next
+    assert both.not_knowing(pair).verdict is Verdict.UNEXPLAINED
+    assert both.not_knowing(()) is both

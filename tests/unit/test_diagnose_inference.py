@@ -19,10 +19,11 @@ from stages.diagnose.gauge.elimination import (
     eliminate_globals,
     eliminate_poses,
 )
-from stages.diagnose.gauge.feasible import APART, expected_gain
-from stages.diagnose.gauge.formula import joint_p
+from stages.diagnose.gauge.feasible import expected_gain
+from stages.diagnose.gauge.formula import APART, joint_p, rival_patterns
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
-from stages.diagnose.result import Confirmation, Verdict
+from stages.diagnose.result import Confirmation, FitQuality, Verdict
 
 FRAMES, GLOBALS = 9, 5
 TILT, CONE = LIBRARY["laser_tilt"], LIBRARY["laser_cone"]
@@ -200,11 +201,12 @@ AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
 def examined(
     shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
     left: float = 0.5, pattern_order: int = 2, unsplit: tuple[str, ...] = (),
-    confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),),
+    confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),), heldout: float = 0.11,
+    unknown: tuple[str, ...] = (), other_order: int = 3,
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
-    orders = (*([1] * len(shifts_px)), *([pattern_order] * len(patterns_px)))
+    orders = (*[1, other_order][: len(shifts_px)], *([pattern_order] * len(patterns_px)))
     terms = tuple(
         SimpleNamespace(model=law, shift_px=s, order=m)
         for s, m in zip((*shifts_px, *patterns_px), orders, strict=True)
@@ -212,9 +214,15 @@ def examined(
     library = terms[: len(shifts_px)]
     fit = SimpleNamespace(terms=terms)
     best = SimpleNamespace(named=bool(library) and not patterns_px, library_terms=library, fit=fit)
-    verdicts = SimpleNamespace(adequacy=left, chance_of=lambda name: chance)
+    verdicts = SimpleNamespace(
+        adequacy=left, chance_of=lambda name: chance, unknown=(unknown,) * len(library)
+    )
     each = (unsplit, *[()] * (len(library) - 1)) if library else ()
-    return cast(Any, SimpleNamespace(best=best, verdicts=verdicts, confirmed=confirmed, unsplit=each))
+    quality = FitQuality("px", 1.0, 0.1, 1.0, heldout, 0.1)
+    return cast(
+        Any,
+        SimpleNamespace(best=best, verdicts=verdicts, confirmed=confirmed, unsplit=each, quality=quality),
+    )
 
 
 @pytest.mark.parametrize(
@@ -227,7 +235,11 @@ def examined(
         (examined(patterns_px=(0.5,), pattern_order=1), Verdict.UNEXPLAINED),
         (examined(patterns_px=(0.5,), chance=0.98), Verdict.UNEXPLAINED),
         (examined((1.0, 1.0), unsplit=("principal_point",), confirmed=((AGREES,),) * 2), Verdict.PARTLY),
+        (examined((1.0, 1.0), other_order=1, confirmed=((AGREES,),) * 2), Verdict.CLASS),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
+        (examined(heldout=0.2), Verdict.CLASS),
+        (examined(unknown=("image outward",)), Verdict.UNEXPLAINED),
+        (examined(unknown=("image outward",), unsplit=("focal_scale",)), Verdict.CLASS),
         (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),
         (examined((1.0, 1.0), confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.PARTLY),
         (examined(confirmed=((),)), Verdict.CLASS),
@@ -239,3 +251,34 @@ def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(se
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     monkeypatch.setattr(answer, "pattern_of", lambda term: ("laser", "static", term.order))
     assert answer.verdict_of(seen) is verdict
+
+
+def names_and_patterns(scale_of_cone: float, share: float, measured: float) -> Evidence:
+    """Return evidence of a cone, 1 as measured, and of all patterns; two are like the cone.
+
+    The first is the cone but for a hundredth; the image's scale leaves ``share`` of the cone's information.
+    ``measured`` is how much of the cone's score the image's scale has.
+    """
+    patterns = [Column(m.name, a.name, shape) for m, shape in VOCABULARY for a in m.amplitudes]
+    columns = (Column("laser_cone", CONE.amplitudes[0].name), *patterns)
+    information = np.eye(len(columns))
+    line = columns.index(Column("generic_line_0_2", "cosine", (0.0,)))
+    image = columns.index(Column("generic_outward_0_1", "cosine", (0.0,)))
+    for at, left in ((line, 0.01), (image, share)):
+        information[0, at] = information[at, 0] = np.sqrt(1 - left)
+    information[line, image] = information[image, line] = np.sqrt(0.99 * (1 - share))
+    information *= scale_of_cone
+    right = np.zeros(len(columns))
+    right[[0, line, image]] = scale_of_cone * np.array([1.0, np.sqrt(0.99), measured])
+    return Evidence(columns, information, right, information, 0.0, 1e4)
+
+
+@pytest.mark.parametrize(
+    ("strength", "measured", "rivals"),
+    [(1000.0, 0.7, ()), (20.0, 0.7, ("image",)), (1000.0, 0.999, ("image",))],
+)
+def test_a_pattern_without_a_cause_is_a_rival_until_it_is_beaten(strength, measured, rivals):
+    about = names_and_patterns(strength, 0.5, measured)
+    terms = [Term(CONE, (), np.array([1.0]))]
+    (found,) = rival_patterns(about, terms, Stated((), np.zeros((0, 0))), 1.0)
+    assert tuple(words.split()[0] for words in found) == rivals

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from itertools import chain
 
@@ -17,6 +18,10 @@ from stages.diagnose.gauge.search import shift_px
 from stages.diagnose.inference import SURE
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Picture, Verdict
 
+# What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Debt:
+# data/debts.md.
+_MOST_OF_FLOOR = 1.25
+
 
 def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     """Return the effects of the likeliest hypothesis with sizes and chances."""
@@ -30,26 +35,44 @@ def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
 def sure(examined: Examined) -> tuple[bool, ...]:
     """Return for each effect of the likeliest hypothesis whether its name is sure, whatever else is left.
 
-    It must be as likely as a name has to be, told from all that is like it, and confirmed. Beside patterns
-    for what is left it must move rings or fiducials by more than they do, else it may make up for their
-    error; and none of them may have its harmonic and its course, else they may make up for a wrong law.
+    It must be as likely as a name has to be, told from all that is like it and from every pattern without a
+    cause, and confirmed; what was held out must fit to about the noise. Beside patterns for what is left it
+    must move rings or fiducials by more than they do, else it may make up for their error; and nothing else
+    that was found may have its harmonic and its course, else the two may make up for one law that the library
+    does not have.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None or verdicts.adequacy < ADEQUATE:
         return ()
+    if not _fits(examined):
+        return (False,) * len(best.library_terms)
+    unknown = verdicts.unknown or ((),) * len(best.library_terms)
     patterns = best.fit.terms[len(best.library_terms) :]
     left = [shift_px(best.fit, t) for t in patterns]
-    like = {pattern_of(t)[1:] for t in patterns}
-    each = zip(best.library_terms, examined.unsplit, examined.confirmed, strict=True)
+    like = Counter(pattern_of(t)[1:] for t in best.fit.terms)
+    each = zip(best.library_terms, examined.unsplit, unknown, examined.confirmed, strict=False)
     return tuple(
         verdicts.chance_of(term.model.law) > SURE
         and not alike
+        and not patterns_alike
         and bool(confirmed)
         and all(c.agrees for c in confirmed)
         and (not left or shift_px(best.fit, term) > max(left))
-        and pattern_of(term)[1:] not in like
-        for term, alike, confirmed in each
+        and like[pattern_of(term)[1:]] == 1
+        for term, alike, patterns_alike, confirmed in each
     )
+
+
+def _fits(examined: Examined) -> bool:
+    """Return whether what had no say in the fit is predicted to about the noise, where that was tried."""
+    quality = examined.quality
+    return quality is None or not quality.heldout_after > _MOST_OF_FLOOR * quality.noise_floor
+
+
+def unknown_rivals(examined: Examined) -> tuple[str, ...]:
+    """Return the patterns without a cause that may as well be in place of an effect of the likeliest."""
+    verdicts = examined.verdicts
+    return tuple(dict.fromkeys(chain(*verdicts.unknown))) if verdicts is not None else ()
 
 
 def beyond_line(examined: Examined) -> tuple[bool, ...]:
@@ -137,4 +160,6 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.NAMED if best.named else Verdict.PARTLY
     if any(sure(examined)):
         return Verdict.PARTLY
-    return Verdict.CLASS if best.named else Verdict.UNEXPLAINED
+    # A class of effects would leave out what nobody knows.
+    known = any(examined.unsplit) or not unknown_rivals(examined)
+    return Verdict.CLASS if best.named and known else Verdict.UNEXPLAINED

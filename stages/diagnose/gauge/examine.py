@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
@@ -30,7 +30,7 @@ from stages.diagnose.gauge.judge import Judged, Regime, Verdicts, judge, judged_
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
 from stages.diagnose.inference import Stated, stated_belief
-from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location, class_of
+from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
 # A gauge is straight and round, so that effects of the pipe's own shape are not tested.
 OF_A_PIPE = frozenset({"ovality", "pipe_bend"})
@@ -163,12 +163,10 @@ class Examined:
 
 
 def examine(
-    run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe, without: Collection[str] = (),
+    run: MeasuredRun, library: Mapping[str, EffectModel], probe: Probe,
     courses: tuple[CourseKind, ...] = SEARCHED, progress: Progress = unheard,
 ) -> Examined:  # fmt: skip
     """Search a gauge run for left-out effects, each law also with each of ``courses``.
-
-    What is known to look like an effect ``without`` whose model the library has to do is not told from it.
 
     Raises
     ------
@@ -193,8 +191,7 @@ def examine(
             seen = Examined(searched, None, (), table, groups, patterns_p=beyond)
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))
-            judged = _judged(replace(seen, verdicts=judge(searched, coursed, stated)), coursed, stated)
-            return replace(judged, unsplit=with_untested(judged, without))
+            return _judged(replace(seen, verdicts=judge(searched, coursed, stated)), coursed, stated)
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
 
@@ -202,15 +199,6 @@ def examine(
 def _watched(run: GaugeRun, done: int, progress: Progress) -> GaugeRun:
     """Return the run for the part of the examination after so many others."""
     return replace(run, watch=partial(progress, done, _PARTS))
-
-
-def with_untested(judged: Examined, without: Collection[str]) -> tuple[tuple[str, ...], ...]:
-    """Return what each term is not told apart from, and what of its class there is no model of."""
-    terms = judged.best.library_terms if judged.best is not None else ()
-    return tuple(
-        (*names, *(mate for mate in class_of(t.model.law) if mate in without))
-        for t, names in zip(terms, judged.unsplit, strict=True)
-    )
 
 
 def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:

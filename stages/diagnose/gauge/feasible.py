@@ -16,14 +16,13 @@ from pipeline.physics.course import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.gauge.fit import Fit, evidence
+from stages.diagnose.gauge.formula import APART
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import span
 from stages.diagnose.inference import Evidence, Stated, eliminated, instrument_places, places_of
 from stages.diagnose.result import Feasible
 
 _SIGMAS = 5.0
-# Twice the logarithm of the expected Bayes factor (1000 to 1) from which two effects count as told apart.
-APART = 14.0
 _NEAR = 0.5
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from pipeline.arrays import Int
+from pipeline.arrays import Float, Int
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import SWINGS
@@ -20,6 +20,7 @@ from stages.diagnose.gauge.run import GaugeRun, Term, linearise
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan
 from stages.diagnose.inference import (
     DEGREES,
+    SURE,
     Evidence,
     Score,
     Stated,
@@ -38,6 +39,12 @@ _SAME = 0.02
 # A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
+# Twice the logarithm of the expected Bayes factor (1000 to 1) from which two causes count as told apart, and
+# of the measured odds from which one of two that are as likely beforehand is sure.
+APART, _BEATEN = 14.0, float(2 * np.log(SURE / (1 - SURE)))
+# A pattern of which a law leaves less than this share of the information is the law's own. Debt:
+# data/debts.md.
+_OWN_PATTERN = 0.05
 # Directions with less information than this share of the best one are left out of the test of adequacy.
 # Debt: data/debts.md.
 _WEAK = 1e-3
@@ -69,7 +76,8 @@ def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
 def patterns_p(run: GaugeRun, nothing: Fit, stated: Stated) -> float:
     """Return the chance of what patterns and swings without a cause take up when nothing is hidden."""
     swinging = min((s.p_value for s in swings(run, nothing, stated)), default=1.0) * len(SWINGS)
-    return float(min(2 * min(adequacy(run, nothing, stated), swinging), 1.0))
+    left = adequacy(evidence(run, nothing, VOCABULARY)[0], nothing.terms, stated)
+    return float(min(2 * min(left, swinging), 1.0))
 
 
 def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
@@ -88,13 +96,62 @@ def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
     return bool(np.linalg.norm(left) < _SAME * np.linalg.norm(pattern))
 
 
-def adequacy(run: GaugeRun, found: Fit, stated: Stated) -> float:
-    """Return the chance that what a fit leaves is noise: of the worst single pattern and of all together."""
-    about = evidence(run, found, VOCABULARY)[0]
-    given = _places(about, [(t.model, t.shape) for t in found.terms])
+def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
+    """Return the chance that what terms leave is noise: of the worst single pattern and of all together.
+
+    ``about`` is the evidence over the terms and `VOCABULARY`.
+    """
+    given = _places(about, [(t.model, t.shape) for t in terms])
     each = [_score(about, stated, m, s, given) for m, s in VOCABULARY]
     single = min((s.p_value for s in each if s is not None), default=1.0) * len(VOCABULARY)
     return float(min(2 * min(single, joint_p(about, stated, given)), 1.0))
+
+
+def rival_patterns(
+    about: Evidence, terms: Sequence[Term], stated: Stated, alike: float
+) -> tuple[tuple[str, ...], ...]:
+    """Return for each term the formulas of patterns that may as well be in its place.
+
+    They stand for causes that the library does not know. A pattern is excluded where the term is expected to
+    beat it, at the size found, and does beat it. The one that the term itself makes is no rival; where it
+    makes two just as well, nobody knows what moves.
+
+    Parameters
+    ----------
+    about : Evidence
+        Over the terms and `VOCABULARY`.
+    alike : float
+        How many measurements that err alike count as one.
+    """
+    fair = about.deflated(alike)
+    own = [(t.model, t.shape) for t in terms]
+    out = []
+    for k, term in enumerate(terms):
+        block, others = _places(fair, own[k : k + 1]), _places(fair, own[:k] + own[k + 1 :])
+        alone = score(fair, stated, block, others)
+        tried = [
+            (m.formula(s), _left_beside(fair, stated, term.amplitude, block, others, places), rival.gain)
+            for m, s in VOCABULARY
+            if (rival := score(fair, stated, places := places_of(fair, m, s), others)) is not None
+            and not np.isin(places, np.concatenate([block, others])).any()
+        ]
+        whole = _left_beside(fair, stated, term.amplitude, block, others, block[:0])
+        likest = min(tried, key=lambda t: t[1], default=("", 0.0, 0.0))
+        own_pattern = likest[0] if likest[1] < _OWN_PATTERN * whole else ""
+        out.append(tuple(
+            words
+            for words, left, gain in tried
+            if words != own_pattern and (left < APART or alone is None or alone.gain - gain < _BEATEN)
+        ))  # fmt: skip
+    return tuple(out)
+
+
+def _left_beside(
+    about: Evidence, stated: Stated, amplitude: Float, block: Int, others: Int, rival: Int
+) -> float:
+    """Return by how much χ² is expected to prefer an effect over a rival's columns, others being free."""
+    free = np.concatenate([instrument_places(about), others, rival]).astype(np.int64)
+    return float(amplitude @ eliminated(about, stated, block, free)[0] @ amplitude)
 
 
 def joint_p(about: Evidence, stated: Stated, given: Int) -> float:

@@ -14,7 +14,7 @@ from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import DECOYS, Nameless
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.formula import adequacy, empirical, says_the_same
+from stages.diagnose.gauge.formula import adequacy, empirical, rival_patterns, says_the_same
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import refined, scan, span
 from stages.diagnose.gauge.search import LEAST_SHARE, Search, refits, shift_px
@@ -103,6 +103,8 @@ class Verdicts:
         The empirical formula, whether it is the likeliest or not.
     alike : float
         How many measurements that err alike count as one.
+    unknown : tuple of tuple of str
+        For each effect of the likeliest, the patterns without a cause that may as well be in its place.
     """
 
     regimes: tuple[Regime, ...]
@@ -111,6 +113,7 @@ class Verdicts:
     adequacy: float
     formula: Judged
     alike: float
+    unknown: tuple[tuple[str, ...], ...] = ()
 
     def chance_of(self, law: str) -> float:
         """Return the chance that a law is among the causes, with whatever course."""
@@ -166,8 +169,9 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     weight = np.where(allowed, np.exp(-0.5 * behind), 0.0)
     order = np.lexsort((total_surprise, -weight))
     ranked = tuple(judged[k] for k in order)
-    left = adequacy(run, ranked[0].fit, stated)
-    return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike)
+    about, terms = evidence(run, ranked[0].fit, VOCABULARY)[0], ranked[0].fit.terms
+    left, rivals = adequacy(about, terms, stated), rival_patterns(about, terms, stated, alike)
+    return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike, rivals)
 
 
 def _with_patterns(searched: Search, stated: Stated) -> list[Fit]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,7 @@ from stages.diagnose.profile.sensor import locking_finding, pattern_finding
 from stages.diagnose.profile.width import blur_finding
 
 _LEAST_BLOCKS = 4
+_NAMELESS = "The line's light shows what no known effect explains."
 _SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
 Test = Callable[[Cells], tuple[Finding, ...]]
 _HALVES = ("first half of the frames", "second half of the frames")
@@ -136,6 +137,21 @@ class ProfileEvidence:
         """Return the evidence with the finding of one effect replaced."""
         findings = tuple(finding if f.effect == finding.effect else f for f in self.findings)
         return replace(self, findings=findings)
+
+    def without(self, names: Collection[str]) -> ProfileEvidence:
+        """Return the evidence as it is to one who does not know some effects.
+
+        What was found and only they would explain is unexplained.
+        """
+        left = {f.effect for f in self.found} - set(names)
+        out = []
+        for f in self.findings:
+            alike = tuple(n for n in f.alike if n not in names)
+            if f.effect not in names:
+                out.append(replace(f, alike=alike))
+            elif f.found and self.unexplained is None and not left & set(alike):
+                out.append(replace(f, effect=UNEXPLAINED, alike=(), statement=_NAMELESS, sizes=()))
+        return replace(self, findings=tuple(out))
 
     def of(self, effect: str) -> Finding:
         """Return the finding of an effect.
