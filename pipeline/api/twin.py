@@ -120,6 +120,7 @@ def twin_document(found: Twin, tried: DiagnosisTried) -> dict[str, Any]:
         "chi2_wall_camera_noise_alone": _known(found.chi2_camera),
         "stray_light_in_dark": found.stray,
         "seen": found.seen,
+        "chi2_by_brightness": _figures(found.by_level),
         "cannot_tell": [*tried.cannot_tell, *found.cannot_tell],
     }
 
@@ -149,7 +150,8 @@ def write_twin(found: Twin, tried: DiagnosisTried, made_by: MadeBy, folder: Path
     document = twin_document(found, tried) | {"made_by": made_by.document()}
     (folder / "twin.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
     views = [_shown(v) for v in found.views]
-    page = page_template("twin").render(d=document, views=views)
+    maps = [{"name": m.name, "picture": _picture(m.picture)} for m in found.maps]
+    page = page_template("twin").render(d=document, views=views, maps=maps)
     (folder / "twin.html").write_text(page, "utf-8")
 
 

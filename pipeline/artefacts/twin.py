@@ -43,7 +43,7 @@ class Mismatch:
     channel : str
         ``intensity`` or ``line``.
     fixed_to : str
-        ``image``, ``wall``, ``time`` or ``line``.
+        ``image``, ``wall``, ``time``, ``line`` or ``rows``; ``image or wall`` where both may be.
     place : tuple of NamedFigure
         Where: pixels, distance and azimuth, or frames.
     parameters : tuple of NamedFigure
@@ -91,6 +91,22 @@ class TwinView:
 
 
 @dataclass(frozen=True)
+class TwinMap:
+    """A map of recorded less re-rendered brightness of blocks, mean over frames.
+
+    Attributes
+    ----------
+    name : str
+        ``image``, or ``wall``: rows along distance, columns around the pipe from azimuth 0.
+    picture : (h, w) uint8
+        128 + 16 z, z by the spread of the map itself; 0 where too few frames show it.
+    """
+
+    name: str
+    picture: Byte
+
+
+@dataclass(frozen=True)
 class Twin:
     """Recorded frames beside the same frames re-rendered.
 
@@ -118,6 +134,9 @@ class Twin:
     cannot_tell : tuple of str
         What the recording does not tell.
     views : tuple of TwinView
+    maps : tuple of TwinMap
+    by_level : tuple of NamedFigure
+        χ² per pixel of lit wall by its brightness, grey levels above black; 1 σ that of as many pixels.
     """
 
     frame: Int
@@ -133,6 +152,8 @@ class Twin:
     seen: float
     cannot_tell: tuple[str, ...]
     views: tuple[TwinView, ...]
+    maps: tuple[TwinMap, ...] = ()
+    by_level: tuple[NamedFigure, ...] = ()
 
 
 @dataclass(frozen=True)

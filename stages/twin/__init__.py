@@ -18,6 +18,7 @@ from pipeline.recording.checked_frames import CheckedFrames
 from stages.twin.compare import Comparison, block_ratios, exposure_of
 from stages.twin.locate import ImagePlace, full_size, places_in_image
 from stages.twin.name import Exposures, cannot_tell, dirt, flicker, noise_figures, of_line, state_figures
+from stages.twin.reference import BlocksOfFrames, in_image, maps_of, unnamed
 from stages.twin.render import render_frame
 from stages.twin.scene import Scene, scene_of
 from stages.twin.state import PhotometricState, Sampled, estimate_state, sample_frames
@@ -116,7 +117,7 @@ def compare_with_twin(
     gain, state = cleaned.gain_map, replace(cleaned, gain_map=None)
     exposures, comparison = Exposures(), Comparison()
     light = dict(zip(frames.frame.tolist(), frames.illumination.tolist(), strict=True))
-    dirty = dirt(places, state.outside.shape)
+    dirty, blocks = dirt(places, state.outside.shape), BlocksOfFrames(scene.surface.mean_radius_mm)
     for done, (frame, image) in enumerate(recording.read(compared, "grey")):
         context.progress(done, len(compared))
         if image is None:
@@ -129,18 +130,25 @@ def compare_with_twin(
         after = render_frame(scene, cleaned, frame, kind) if gain is not None else before
         exposure = exposure_of(above, after)
         exposures.add(frame, kind, exposure, above, after)
+        if kind == Illumination.LED:
+            blocks.add(above, before, state.noise.white - state.noise.black.value)
         after = after.brighter(float(np.exp(exposure)), state.noise)
         dirty.add(above, before, after)
         comparison.add(frame, kind, above, before, after, state.noise)
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
-    found: tuple[Mismatch, ...] = (*flicker(exposures, state), *dirty.accepted(), *of_line(state, rings))
+    samples = blocks.samples()
+    found: tuple[Mismatch, ...] = (
+        *flicker(exposures, state), *dirty.accepted(in_image(samples, places)), *unnamed(samples),
+        *of_line(state, rings),
+    )  # fmt: skip
     _report(comparison, found, context)
     return Twin(
         np.array([v.frame for v in comparison.views]), frames.withheld is not None,
         noise_figures(state.noise), state_figures(state), comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
+        maps_of(samples), comparison.levels(),
     )  # fmt: skip
 
 
@@ -192,7 +200,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "3",
+    "4",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
-from pipeline.artefacts.twin import RegionFit, TwinView
+from pipeline.artefacts.twin import NamedFigure, RegionFit, TwinView
 from pipeline.recording.base import Illumination
 from stages.twin.noise import CameraNoise
 from stages.twin.render import Region, TwinFrame
 
 BLOCK_PX = 8
 """Side of the blocks in which a difference is looked for that stays in one place of the image."""
+_LEVELS = (0, 10, 20, 40, 80, 120, 160, 200)
 _FULL_SCALE, _STRAY = 255.0, 5.0
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
@@ -38,6 +39,8 @@ class Comparison:
     seen, view : float
         Pixels whose wall is known, and all within the view, in lit frames.
     views : list of TwinView
+    by_level : (2, L)
+        Of lit wall: pixels, and squares of z, by the brightness of the twin.
     """
 
     pixels: Float = field(default_factory=lambda: np.zeros(len(Region)))
@@ -52,6 +55,7 @@ class Comparison:
     seen: float = 0.0
     view: float = 0.0
     views: list[TwinView] = field(default_factory=list)
+    by_level: Float = field(default_factory=lambda: np.zeros((2, len(_LEVELS))))
 
     def add(
         self, frame: int, light: Illumination, above_black: Float32, before: TwinFrame, after: TwinFrame,
@@ -74,6 +78,8 @@ class Comparison:
             self.camera += float((square / noise.variance(after.level[wall])).sum())
             self.noise += float(after.variance[wall].sum(dtype=float))
             self.lit += float(wall.sum())
+            level = np.digitize(after.level[wall], _LEVELS[1:])
+            self.by_level += [np.bincount(level, w, len(_LEVELS)) for w in (None, z[wall] ** 2)]
             self.seen += float(size.sum() - size[Region.UNSEEN] - size[Region.DARK])
             self.view += float(size.sum() - size[Region.DARK])
         counted = [int(r) for r in _COUNTED]
@@ -92,6 +98,14 @@ class Comparison:
             )
             for r in Region
             if r != Region.UNSEEN
+        )
+
+    def levels(self) -> tuple[NamedFigure, ...]:
+        """Return χ² per pixel of lit wall by brightness."""
+        return tuple(
+            NamedFigure(f"from {low}", square / count, float(np.sqrt(2 / count)))
+            for low, count, square in zip(_LEVELS, *self.by_level.tolist(), strict=True)
+            if count
         )
 
     def _mean(self, total: Float, region: Region) -> float:

@@ -21,6 +21,10 @@ _LEAST_FLICKER = 0.01
 _DIM_SECTOR = 0.5
 """A sector of the laser is dim below this share of the usual power; the wall's reflectance changes less."""
 _CLIPPED = 0.05
+_NOT_TOLD = (
+    "as far as frames show it; whether the image or the wall is so cannot be told. What to do: record once "
+    "more with the probe rolled"
+)
 
 
 @dataclass
@@ -92,12 +96,15 @@ class Dirt:
                 total[k] += float((rest**2 / twin.variance.ravel()[use]).sum(dtype=float))
             self.pixels[k] += len(use)
 
-    def accepted(self) -> tuple[Mismatch, ...]:
-        """Return the places with which compared frames fit better; the others are withdrawn."""
+    def accepted(self, fixed_to: tuple[str, ...]) -> tuple[Mismatch, ...]:
+        """Return the places with which compared frames fit better and that stay in the image in all of them.
+
+        The others are withdrawn. ``fixed_to`` says of each place what it is fixed to.
+        """
         return tuple(
-            _dirt(p, self.before[k] / self.pixels[k], self.after[k] / self.pixels[k])
+            _dirt(p, self.before[k] / self.pixels[k], self.after[k] / self.pixels[k], fixed_to[k])
             for k, p in enumerate(self.places)
-            if self.pixels[k] and self.after[k] < self.before[k]
+            if self.pixels[k] and self.after[k] < self.before[k] and "image" in fixed_to[k]
         )
 
 
@@ -109,17 +116,17 @@ def dirt(places: tuple[ImagePlace, ...], shape: tuple[int, ...]) -> Dirt:
     return Dirt(places, index, before, after, pixels)
 
 
-def _dirt(place: ImagePlace, before: float, after: float) -> Mismatch:
-    way = "darker" if place.change < 0 else "brighter"
+def _dirt(place: ImagePlace, before: float, after: float, fixed_to: str) -> Mismatch:
+    sure, way = fixed_to == "image", "darker" if place.change < 0 else "brighter"
     where = tuple(
         NamedFigure(name, value, place.radius_px / 2, "px")
         for name, value in (("u_px", place.u_px), ("v_px", place.v_px), ("radius_px", place.radius_px))
     )
     return Mismatch(
-        "window_dirt" if place.change < 0 else "", "intensity", "image", where,
+        "window_dirt" if sure and place.change < 0 else "", "intensity", fixed_to, where,
         (NamedFigure("change", place.change, place.sd, "relative"),), place.probability, before, after,
         f"About ({place.u_px:.0f}, {place.v_px:.0f}) the image is {100 * abs(place.change):.0f} % {way} "
-        "in all frames: dust, a droplet or dirt on the window or the lens.",
+        + ("in all frames: dust, a droplet or dirt on the window or the lens." if sure else _NOT_TOLD),
     )  # fmt: skip
 
 

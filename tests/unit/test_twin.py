@@ -18,9 +18,10 @@ from stages.texture.surface import WallSurface
 from stages.texture.views import clear_of
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
-from stages.twin.locate import full_size, places_in_image
+from stages.twin.locate import ImagePlace, full_size, places_in_image
 from stages.twin.name import dirt
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
+from stages.twin.reference import BlockSamples, in_image, unnamed
 from stages.twin.render import Region, TwinFrame
 from stages.twin.sight import wall_seen
 
@@ -132,6 +133,47 @@ def _level():
     return np.tile(np.linspace(40, 160, 160, dtype=np.float32), (120, 1))
 
 
+def _samples(change, frames=8, still=False):
+    """Blocks of a camera that moves by two blocks a frame; ``change`` of frame, row, column, wall row."""
+    random = np.random.default_rng(6)
+    frame, row, column = (a.ravel() for a in np.mgrid[0:frames, 0:40, 0:60])
+    along = row + (0 if still else 2 * frame)
+    value = 0.01 * random.standard_normal(len(frame)) + change(frame, row, column, along)
+    return BlockSamples(value, frame, row, column, along, column, 100.0, 2.5)
+
+
+def _near(a, b, c, d):
+    return 0.2 * (np.hypot(a - b, c - d) < 2.5)
+
+
+def test_what_stays_in_the_image_on_the_wall_and_in_rows_is_told_apart():
+    place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
+    on_window = _samples(lambda f, r, c, s: _near(r, 20, c, 20))
+    assert in_image(on_window, place) == ("image",)
+    assert unnamed(on_window) == ()
+    on_wall = _samples(lambda f, r, c, s: _near(s, 24, c, 20))
+    assert in_image(on_wall, place) != ("image",)
+    (region,) = unnamed(on_wall)
+    assert region.fixed_to == "wall"
+    assert region.place[0].value == pytest.approx(100 + 24.5 * 2.5, abs=1.5)
+    assert region.parameters[0].value == pytest.approx(0.2, abs=0.03)
+    (bands,) = unnamed(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 3 + 2.1 * f)))
+    assert (bands.name, bands.fixed_to) == ("banding", "rows")
+
+
+def test_what_stands_still_cannot_be_told_apart():
+    place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
+    still = _samples(lambda f, r, c, s: _near(r, 20, c, 20), still=True)
+    assert in_image(still, place) == ("image or wall",)
+
+
+def test_noise_is_fixed_to_nothing():
+    place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
+    noise = _samples(lambda f, r, c, s: 0.0)
+    assert unnamed(noise) == ()
+    assert in_image(noise, place) == ("",)
+
+
 def test_exposure_and_blocks_are_relative_to_the_twin():
     level, random = _level(), np.random.default_rng(1)
     recorded = (1.1 * level + 2 * random.standard_normal(level.shape)).astype(np.float32)
@@ -185,7 +227,8 @@ def test_dirt_that_frames_do_not_bear_out_is_withdrawn():
     for recorded, accepted in ((dirty, 1), (level, 0)):
         count = dirt(places, level.shape)
         count.add(recorded, _frame(level), _frame(dirty))
-        assert len(count.accepted()) == accepted
+        assert len(count.accepted(("image",))) == accepted
+        assert not count.accepted(("wall",))
 
 
 def _twin():
