@@ -86,7 +86,8 @@ def test_the_version_is_told(boresight: Callable[..., Told]) -> None:
 def test_version_and_help_do_not_wait_for_what_computes(asked: str) -> None:
     script = (
         "import atexit, sys; from pipeline.cli import main; "
-        "atexit.register(lambda: print('loaded', [m for m in ('numpy', 'pydantic') if m in sys.modules])); main()"
+        "atexit.register(lambda: print('loaded', [m for m in ('numpy', 'pydantic') if m in sys.modules])); "
+        "main()"
     )
     told = subprocess.run([sys.executable, "-c", script, asked], capture_output=True, text=True, check=True)
     assert told.stdout.splitlines()[-1] == "loaded []"
