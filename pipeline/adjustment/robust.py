@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 from pipeline.arrays import Float, Float32, Int
 
@@ -27,6 +26,8 @@ MAD_TO_SIGMA = 1.4826
 
 def cluster_sums(scores: Float, cluster: Int) -> Float:
     """Return the sums (C, K) of scores (M, K) over the clusters, by ascending number of ``cluster`` (M,)."""
+    from scipy.sparse import csr_matrix  # loaded where it is needed: a spread alone does without
+
     place = np.unique(cluster, return_inverse=True)[1]
     count = int(place.max(initial=-1)) + 1
     member = csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(count, len(place)))

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float, read_only
-
-_STEPS, _NEAR_MM = 6, 1e-7
 
 
 @dataclass(frozen=True)
@@ -74,9 +70,13 @@ def frames_at(axis: PipeAxis, distance_mm: Float) -> tuple[Float, Float]:
 
     Linear between the axis' points and straight beyond its ends.
     """
+    from pipeline.geometry import (
+        axis_kernels,
+    )  # Numba takes a second to load: who only reads an axis need not wait
+
     s = np.asarray(distance_mm, float)
     origin, rotation = np.empty((s.size, 3)), np.empty((s.size, 3, 3))
-    _frames(*_compiled(axis), read_only(s.ravel()), origin, rotation)
+    axis_kernels.frames(*_compiled(axis), read_only(s.ravel()), origin, rotation)
     return origin.reshape(*s.shape, 3), rotation.reshape(*s.shape, 3, 3)
 
 
@@ -94,10 +94,12 @@ def to_pipe(axis: PipeAxis, xyz_p: Float) -> tuple[Float, Float, Float]:
     The section is the one whose plane holds the point, found by fixed-point steps from the nearest axis
     point; this converges where the radius of curvature exceeds the point's distance from the axis.
     """
+    from pipeline.geometry import axis_kernels
+
     p = np.asarray(xyz_p, float)
     s = np.array(_nearest(axis, p), float).ravel()
     psi, radius = np.empty_like(s), np.empty_like(s)
-    _locate(*_compiled(axis), read_only(p.reshape(-1, 3)), s, psi, radius)
+    axis_kernels.locate(*_compiled(axis), read_only(p.reshape(-1, 3)), s, psi, radius)
     shape = p.shape[:-1]
     return s.reshape(shape), psi.reshape(shape), radius.reshape(shape)
 
@@ -112,6 +114,8 @@ def _nearest(axis: PipeAxis, p: Float) -> Float:
     if len(axis.distance_mm) == 2:
         tangent = axis.R_pa[0, :, 2]
         return np.asarray(axis.distance_mm[0] + (p - axis.origin_p[0]) @ tangent)
+    from scipy.spatial import cKDTree
+
     flat = np.where(np.isfinite(p), p, 0.0).reshape(-1, 3)
     index = cKDTree(axis.origin_p).query(flat)[1]
     return np.asarray(axis.distance_mm[index].reshape(p.shape[:-1]))
@@ -120,58 +124,3 @@ def _nearest(axis: PipeAxis, p: Float) -> Float:
 def _compiled(axis: PipeAxis) -> tuple[Float, Float, Float]:
     """Return the axis as compiled functions take it: of one kind, so that they are compiled once."""
     return read_only(axis.distance_mm), read_only(axis.origin_p), read_only(axis.R_pa)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _frames(distance, origin, rotation, s, out_origin, out_rotation):  # type: ignore[no-untyped-def]
-    """Write the axis' point and section frame at every distance ``s`` (N,)."""
-    for n in range(len(s)):
-        section_frame(distance, origin, rotation, s[n], out_origin[n], out_rotation[n])
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def section_frame(distance, origin, rotation, s, o, m):  # type: ignore[no-untyped-def]
-    """Write point ``o`` (3,) and frame ``m`` (3, 3): z is kept, x made square to it."""
-    k = min(max(np.searchsorted(distance, s) - 1, 0), len(distance) - 2)
-    span = distance[k + 1] - distance[k]
-    w = (s - distance[k]) / span
-    inside = min(max(w, 0.0), 1.0) if w == w else w
-    for i in range(3):
-        o[i] = origin[k, i] + inside * (origin[k + 1, i] - origin[k, i])
-        m[i, 0] = (1 - inside) * rotation[k, i, 0] + inside * rotation[k + 1, i, 0]
-        m[i, 2] = (1 - inside) * rotation[k, i, 2] + inside * rotation[k + 1, i, 2]
-    _normalise(m, 2)
-    along = m[0, 0] * m[0, 2] + m[1, 0] * m[1, 2] + m[2, 0] * m[2, 2]
-    for i in range(3):
-        m[i, 0] -= along * m[i, 2]
-    _normalise(m, 0)
-    m[0, 1] = m[1, 2] * m[2, 0] - m[2, 2] * m[1, 0]
-    m[1, 1] = m[2, 2] * m[0, 0] - m[0, 2] * m[2, 0]
-    m[2, 1] = m[0, 2] * m[1, 0] - m[1, 2] * m[0, 0]
-    for i in range(3):
-        o[i] += (w - inside) * span * m[i, 2]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _normalise(m, column):  # type: ignore[no-untyped-def]
-    length = np.sqrt(m[0, column] ** 2 + m[1, column] ** 2 + m[2, column] ** 2)
-    for i in range(3):
-        m[i, column] /= length
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _locate(distance, origin, rotation, p, s, psi, radius):  # type: ignore[no-untyped-def]
-    """Improve distances ``s`` (N,) of points (N, 3) in place; write their azimuths and radii."""
-    o, m = np.empty(3), np.empty((3, 3))
-    for n in range(len(s)):
-        x, y = 0.0, 0.0
-        for _ in range(_STEPS):
-            section_frame(distance, origin, rotation, s[n], o, m)
-            dx, dy, dz = p[n, 0] - o[0], p[n, 1] - o[1], p[n, 2] - o[2]
-            x = m[0, 0] * dx + m[1, 0] * dy + m[2, 0] * dz
-            y = m[0, 1] * dx + m[1, 1] * dy + m[2, 1] * dz
-            ahead = m[0, 2] * dx + m[1, 2] * dy + m[2, 2] * dz
-            s[n] += ahead
-            if not abs(ahead) > _NEAR_MM:
-                break
-        psi[n], radius[n] = np.arctan2(y, x), np.hypot(x, y)

@@ -14,6 +14,7 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.json_file import parse_json, read_json
+from pipeline.pages.run_words import figure_name, stage_title
 from pipeline.review.cautions import cautions, labels
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.replay import GONE, Finding, covered
@@ -82,8 +83,10 @@ def run_document(files: RunFiles) -> dict[str, Any]:
     pipe = files.pipe()
     return {
         "name": record["recording"]["name"],
-        "metrics": record["metrics"],
-        "numbers": [{"stage": s["name"], "numbers": s["numbers"]} for s in record["stages"]],
+        "metrics": _named(record["metrics"]),
+        "numbers": [
+            {"stage": stage_title(s["name"]), "numbers": _named(s["numbers"])} for s in record["stages"]
+        ],
         "warnings": [*record["reader_warnings"], *record.get("warnings", ())],
         "program": record["program"],
         "inputs": record["input_sha256"],
@@ -100,6 +103,10 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "diagnosis": _diagnosis(files),
         "version": files.version,
     }
+
+
+def _named(numbers: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [n | {"name": figure_name(n["name"])} for n in numbers]
 
 
 def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:

@@ -70,8 +70,8 @@ class StretchedModel:
         with _as_written(self.file):
             return tuple(self._stretch(p) for p in self._primitives)
 
-    def stretch(self, number: int) -> bytes:
-        """Return one primitive with its materials and pictures as binary glTF.
+    def stretch(self, number: int, is_photo_alone: bool = False) -> bytes:
+        """Return one primitive with its materials and pictures, or with the photo alone, as binary glTF.
 
         Raises
         ------
@@ -81,7 +81,8 @@ class StretchedModel:
         if not 0 <= number < len(self._primitives):
             raise InputError("model", f"there is no stretch {number}")
         with _as_written(self.file):
-            return _packed(*_alone(self.document, self._primitives[number], self.binary))
+            most = 1 if is_photo_alone else None
+            return _packed(*_alone(self.document, self._primitives[number], self.binary, most))
 
     @property
     def _primitives(self) -> list[Json]:
@@ -153,9 +154,9 @@ def _as_written(file: Path) -> Iterator[None]:
         ) from error
 
 
-def _alone(document: Json, primitive: Json, binary: Byte) -> tuple[Json, bytes]:
-    """Return a document with one primitive and nothing that it does not use, and its buffer."""
-    mappings = primitive["extensions"][_VARIANTS]["mappings"]
+def _alone(document: Json, primitive: Json, binary: Byte, most: int | None) -> tuple[Json, bytes]:
+    """Return a document with one primitive, its first variants and nothing else, and its buffer."""
+    mappings = primitive["extensions"][_VARIANTS]["mappings"][:most]
     materials = [m["material"] for m in mappings]
     images = [_image_of(document, document["materials"][m]) for m in materials]
     used = [*primitive["attributes"].values(), primitive["indices"]]

@@ -145,7 +145,8 @@ class ReviewApp:
         return JSONResponse(documents.model_document(model_of(self.review.files)))
 
     def _stretch(self, request: Request, _: bytes) -> Response:
-        part = model_of(self.review.files).stretch(request.path_params["stretch"])
+        # The page paints its own colours: the pictures of errors need not be sent.
+        part = model_of(self.review.files).stretch(request.path_params["stretch"], is_photo_alone=True)
         return Response(part, media_type="model/gltf-binary")
 
     def _run(self, _: Request, __: bytes) -> Response:

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
-from pipeline.geometry.axis import section_frame
+from pipeline.geometry.axis_kernels import section_frame
 from pipeline.geometry.rigid import inverse, transform
 from stages.texture.surface import WallSurface
 

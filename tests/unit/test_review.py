@@ -1,5 +1,7 @@
 """The review: what is decided is kept, undone and refused as it should be; strangers are turned away."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +15,7 @@ from pipeline.review.decisions.ledger import Ledger, StaleError
 from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, covered, replay
 from pipeline.review.documents import b31g, strength
 from pipeline.review.measuring import OutlineGauge, readings
+from tests.shared_data import PROJECT_ROOT
 
 SQUARE = ((48.0, 0.1), (52.0, 0.1), (52.0, 0.2), (48.0, 0.2))
 SIZE = Measured(48, 52, 3, 4, 4, 5, 1.0, 0.1)
@@ -131,3 +134,12 @@ def test_strength_falls_from_sound_pipe_to_the_barlow_pressure_of_what_is_left()
     assert strength(-1, 10, 100, 6, 240) is None
     shallow, deep = (strength(d, 50, 100, 6, 240) for d in (1.0, 3.0))
     assert shallow.b31g_mpa > deep.b31g_mpa > 0
+
+
+def test_a_review_of_one_run_starts_without_what_only_runs_need() -> None:
+    """Stages, Numba and SciPy take longer to load than all the rest."""
+    told = "import sys, pipeline.commands.review as _; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", told], cwd=PROJECT_ROOT, capture_output=True, text=True, check=True
+    )
+    assert not {"stages", "numba", "scipy", "matplotlib"} & set(loaded.stdout.split())

@@ -14,6 +14,7 @@ from pipeline.export.report.summary import RunSummary
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.outcome import WARNING, Number, State, state_word
 from pipeline.pages import notation
+from pipeline.pages.run_words import SAMPLE_REASONS, figure_name, stage_title
 
 NOT_CALIBRATED = (
     "The instrument's numbers are only stated, not calibrated on a gauge: diameters rest on them, "
@@ -129,18 +130,7 @@ def _counted(found: tuple[Defect, ...]) -> str:
     return ", ".join(words)
 
 
-REASONS = {
-    RingValidity.VALID: "used",
-    RingValidity.NO_LINE: "no laser line there",
-    RingValidity.LOW_CONTRAST: "line too faint",
-    RingValidity.SATURATED: "saturated",
-    RingValidity.GLINT: "glint",
-    RingValidity.GHOST: "second reflection",
-    RingValidity.OUTLIER: "off the neighbouring line",
-    RingValidity.OUT_OF_VIEW: "outside the picture",
-    RingValidity.WIDTH: "line of implausible width",
-    RingValidity.FRAME_REJECTED: "its whole frame was rejected",
-}
+REASONS = {v: SAMPLE_REASONS[v.name.lower()] for v in RingValidity}
 _SHOWN = 24
 
 
@@ -184,7 +174,9 @@ def _samples(rings: RingSamples | None) -> Table | None:
 
 def _rejections(summary: RunSummary) -> Table | None:
     rejected = [(stage, n) for stage, n in summary.numbers if n.name.startswith("rejected")]
-    rows = tuple((stage, n.name.removeprefix("rejected").strip(": "), _value(n)) for stage, n in rejected)
+    rows = tuple(
+        (stage_title(s), n.name.removeprefix("rejected").strip(": "), _value(n)) for s, n in rejected
+    )
     return Table("Not used, by stage and reason", ("stage", "reason", "count"), rows) if rows else None
 
 
@@ -201,7 +193,7 @@ def _events(summary: RunSummary) -> Table | None:
 
 def _numbers(summary: RunSummary) -> Table | None:
     told = [(s, n) for s, n in summary.numbers if n.name != WARNING and not n.name.startswith("rejected")]
-    rows = tuple((stage, n.name, _value(n)) for stage, n in told)
+    rows = tuple((stage_title(stage), figure_name(n.name), _value(n)) for stage, n in told)
     return Table("What the stages measured", ("stage", "quantity", "value"), rows) if rows else None
 
 

@@ -24,6 +24,7 @@ _METRICS = ("inspected length", "wall seen", "median 1 sigma of the radius", "mo
 def report_content(review: Review, state: State) -> dict[str, Any]:
     """Return all that the papers tell: ``findings`` as rows of numbers with their words beside, and texts."""
     run, seal, rows = run_document(review.files), review.seal(state), findings_table(review, state)
+    record = review.files.record()
     edited = {row["id"] for row in rows if row["edited"]}
     said = {str(d["id"]): d["statement"] for d in run["defects"] if str(d["id"]) not in edited}
     facts = state.described.model_dump(exclude={"do"})
@@ -37,8 +38,8 @@ def report_content(review: Review, state: State) -> dict[str, Any]:
         "warnings": run["warnings"],
         "run": _run_rows(review, state, run),
         "summary": _summary(rows),
-        "metrics": {m["name"]: m["value"] for m in run["metrics"] if m["name"] in _METRICS},
-        "instrument": _instrument(review.files.record()["probe"]["calibrated_from"]),
+        "metrics": {m["name"]: m["value"] for m in record["metrics"] if m["name"] in _METRICS},
+        "instrument": _instrument(record["probe"]["calibrated_from"]),
         "diagnosis": _diagnosis(run["diagnosis"]),
         "strength_assumptions": ASSUMPTIONS,
         "assumed": state.assumed.model_dump(exclude={"do"}),
@@ -60,7 +61,7 @@ def _run_rows(review: Review, state: State, run: dict[str, Any]) -> list[list[st
         ("Mean diameter", notation.measured(*mean_diameter(review.files.artefact(Wall).radius_map))),
         ("Inspected", f"{first:.1f}–{last:.1f} mm"),
         ("Wall seen", metrics.get("wall seen", "")),
-        ("1 σ of the radius, median", metrics.get("median 1 sigma of the radius", "")),
+        ("1 σ of the radius, median", metrics.get("median 1 σ of the radius", "")),
         ("Wall thickness, given", _given(state.assumed.wall_thickness_mm, "mm")),
         ("Yield strength, given", _given(state.assumed.yield_mpa, "MPa")),
     ]

@@ -186,3 +186,20 @@ def test_wall_loss_is_a_layer_in_percent(page: Tab) -> None:
     assert f"{100 * high / 5:.2f} %" in page.page.locator("#view-flat .legend").inner_text()
     page.until("boresight.model.parts.every((p) => p.mesh.material.name.startsWith('wall_loss 0'))")
     page.js("boresight.session.show('photo')")
+
+
+def test_the_slower_the_machine_the_less_is_drawn_while_the_view_moves(page: Tab) -> None:
+    """A picture that took a second is no rest: what is wanted at once after it is still a movement."""
+    told = page.js("""(() => {
+      const { pace } = boresight.model, own = pace.sharpen, told = [];
+      pace.sharpen = (...how) => told.push(how);
+      for (const [asked, drawn] of [[0, 1], [2, 1001], [9001, 9002]]) {
+        pace.ask(1e6 + asked);
+        pace.step(1e6 + drawn);
+      }
+      pace.sharpen = own;
+      return told; })()""")
+    assert len(told) == 1, "the first picture and the one after a rest are drawn whole"
+    ((sharpness, is_moving),) = told
+    assert is_moving
+    assert sharpness <= 0.6

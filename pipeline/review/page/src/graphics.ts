@@ -9,23 +9,26 @@ const [WANTED_STEP_MS, LONGEST_STEP_MS, REST_MS, LEAST_SHARPNESS] = [17, 250, 30
 /** Draws less sharply while the view moves, where it would stutter otherwise, and sharply again when it rests. */
 export class Pace {
   private sharpness = 1;
-  private drawnAt = 0;
+  private drawnAt = -Infinity;
+  private askedAt = 0;
   private resting = 0;
 
   /** `sharpen` takes the share of the pixels each way and whether the view moves. */
   constructor(private readonly sharpen: (sharpness: number, isMoving: boolean) => void, private readonly draw: () => void) {}
 
-  /** A picture is about to be drawn. */
+  /** A picture is wanted. */
+  ask(now: number): void { this.askedAt = now; }
+
+  /** A picture is about to be drawn. The view moves if it was wanted soon after the last one, however long that one took to draw. */
   step(now: number): void {
-    const took = now - this.drawnAt;
-    const isMoving = took < LONGEST_STEP_MS && this.drawnAt > 0;
+    const took = now - this.drawnAt, isMoving = this.askedAt - this.drawnAt < LONGEST_STEP_MS;
     this.drawnAt = now;
-    if (isMoving && took > 1.5 * WANTED_STEP_MS) this.sharpness = Math.max(LEAST_SHARPNESS, this.sharpness * 0.85);
+    if (isMoving && took > 1.5 * WANTED_STEP_MS) this.sharpness = Math.max(LEAST_SHARPNESS, this.sharpness * Math.min(0.85, Math.max(0.5, Math.sqrt(WANTED_STEP_MS / took))));
     if (isMoving && took < 1.1 * WANTED_STEP_MS) this.sharpness = Math.min(1, this.sharpness * 1.02);
     window.clearTimeout(this.resting);
     if (!isMoving) return;
     this.sharpen(this.sharpness, true);
-    this.resting = window.setTimeout(() => { this.sharpen(1, false); this.drawnAt = 0; this.draw(); }, REST_MS);
+    this.resting = window.setTimeout(() => { this.sharpen(1, false); this.drawnAt = -Infinity; this.draw(); }, REST_MS);
   }
 }
 

@@ -30,6 +30,7 @@ export class Marks {
   private readonly end = element("span", { class: "mark end" });
   private labels: Label[] = [];
   private casings: LineSegments2[] = [];
+  private readonly scratch = { forward: new THREE.Vector3(), away: new THREE.Vector3(), seen: new THREE.Vector3() }; // used in every picture
   private at = NaN;
   private isInside = true;
 
@@ -68,13 +69,14 @@ export class Marks {
 
   /** Bring the words to where their places are seen. */
   follow(camera: THREE.PerspectiveCamera, width: number, height: number, spot: Point): void {
-    const forward = camera.getWorldDirection(new THREE.Vector3());
+    const { forward, away, seen } = this.scratch;
+    camera.getWorldDirection(forward);
     for (const { at, root, outward } of this.labels) {
-      const away = at.clone().sub(camera.position);
-      const seen = at.clone().project(camera);
+      away.copy(at).sub(camera.position);
+      seen.copy(at).project(camera);
       const isHidden = away.dot(forward) <= 0 || Math.abs(seen.x) > 1 || Math.abs(seen.y) > 1
         || (this.isInside ? away.length() > NEAR_RADII * this.session.run.radius_mm * MM : outward !== null && outward.dot(away) > 0);
-      root.hidden = isHidden;
+      if (root.hidden !== isHidden) root.hidden = isHidden;
       if (!isHidden) root.style.transform = `translate(${(((seen.x + 1) / 2) * width).toFixed(0)}px, ${(((1 - seen.y) / 2) * height).toFixed(0)}px)`;
     }
     this.measure(camera, height, forward, spot);

@@ -272,6 +272,7 @@ export class ModelView {
     }
     if (this.asked || !this.renderer) return;
     this.asked = true;
+    this.pace.ask(performance.now());
     requestAnimationFrame((now) => {
       this.asked = false;
       this.pace.step(now);

@@ -69,10 +69,13 @@ async function picture(address: string): Promise<HTMLImageElement> {
   return image;
 }
 
-/** What `byPlace` needs of vertices: from their distances and azimuths, those of the picture's edges. */
-export function placesOf(at: Point[], [from, to]: Point, azimuth: number): THREE.Float32BufferAttribute {
-  const out = new Float32Array(3 * at.length);
-  at.forEach(([s, a], k) => out.set([Math.cos(a - azimuth), Math.sin(a - azimuth), (s - from) / (to - from)], 3 * k));
+/** What `byPlace` needs of vertices: from their distances and azimuths in turn, those of the picture's edges. */
+export function placesOf(at: Float64Array, [from, to]: Point, azimuth: number): THREE.Float32BufferAttribute {
+  const out = new Float32Array((3 * at.length) / 2);
+  for (let k = 0; 2 * k < at.length; k++) {
+    const a = at[2 * k + 1]! - azimuth;
+    out[3 * k] = Math.cos(a); out[3 * k + 1] = Math.sin(a); out[3 * k + 2] = (at[2 * k]! - from) / (to - from);
+  }
   return new THREE.Float32BufferAttribute(out, 3);
 }
 

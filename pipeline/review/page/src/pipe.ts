@@ -43,6 +43,28 @@ export class Pipe {
     return { distance, azimuth: Math.atan2(v, u), radius, outward };
   }
 
+  /** The same of many points (x, y, z in turn, in units of `mm`): distance and azimuth in turn, and how far each lies off a radius. */
+  locate(points: ArrayLike<number>, mm: number, radius: number): { at: Float64Array; away: Float32Array } {
+    const count = points.length / 3, at = new Float64Array(2 * count), away = new Float32Array(3 * count), { steps } = this;
+    const d = Float64Array.from(this.axis.distance_mm), last = d[steps - 1]!, [o, ex, ey] = [this.axis.origin_p, this.axis.x_p, this.axis.y_p].map((v) => Float64Array.from(v.flat())) as [Float64Array, Float64Array, Float64Array];
+    const [cx, cy, cz] = [0, 1, 2].map((n) => o[3 * (steps - 1) + n]! - o[n]!) as Vector, whole = cx * cx + cy * cy + cz * cz;
+    for (let i = 0; i < count; i++) {
+      const x = points[3 * i]! / mm, y = points[3 * i + 1]! / mm, z = points[3 * i + 2]! / mm;
+      let s = d[0]! + (((x - o[0]!) * cx + (y - o[1]!) * cy + (z - o[2]!) * cz) / whole) * (last - d[0]!);
+      for (let turn = 0; ; turn++) {
+        const k = Math.max(0, Math.min(steps - 2, Math.floor(((s - d[0]!) / (last - d[0]!)) * (steps - 1)))), j = 3 * k;
+        const gx = o[j + 3]! - o[j]!, gy = o[j + 4]! - o[j + 1]!, gz = o[j + 5]! - o[j + 2]!, t = (s - d[k]!) / (d[k + 1]! - d[k]!);
+        const ax = x - o[j]! - t * gx, ay = y - o[j + 1]! - t * gy, az = z - o[j + 2]! - t * gz;
+        if (turn < 3) { s += (ax * gx + ay * gy + az * gz) / Math.sqrt(gx * gx + gy * gy + gz * gz); continue; }
+        const u = ax * ex[j]! + ay * ex[j + 1]! + az * ex[j + 2]!, v = ax * ey[j]! + ay * ey[j + 1]! + az * ey[j + 2]!, r = Math.sqrt(u * u + v * v);
+        at[2 * i] = s; at[2 * i + 1] = Math.atan2(v, u);
+        for (let n = 0; n < 3; n++) away[3 * i + n] = ((u * ex[j + n]! + v * ey[j + n]!) / r) * (r - radius) * mm;
+        break;
+      }
+    }
+    return { at, away };
+  }
+
   private first(p: Vector): number {
     const from = this.axis.origin_p[0] as Vector, to = this.axis.origin_p[this.steps - 1] as Vector;
     const chord = less(to, from);

@@ -32,7 +32,7 @@ export function qualityPage(session: Session): HTMLElement {
 }
 
 function rows(numbers: Quantity[]): HTMLElement[] {
-  const shown = (v: number | string | null) => (v === null ? "–" : typeof v === "number" ? String(Number(v.toPrecision(5))) : v);
+  const shown = (v: number | string | null) => (v === null ? "–" : typeof v === "number" ? String(Number.isInteger(v) ? v : Number(v.toPrecision(5))) : v);
   return numbers.map((n) => element("tr", {}, element("th", { scope: "row" }, n.name), element("td", {}, `${shown(n.value)} ${n.unit}`.trim())));
 }
 

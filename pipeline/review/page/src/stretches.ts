@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
 import type { Lamp } from "./lamp";
 import { byPlace, placesOf, Strip } from "./painted";
-import type { Pipe, Vector } from "./pipe";
+import type { Pipe } from "./pipe";
 import type { Session } from "./session";
 import { thinned } from "./thinned";
 import type { Point, Stretch } from "./types";
@@ -23,7 +23,7 @@ const AT_ONCE = 2;
 const THINNED_RADII = 0.08;
 
 interface Part {
-  mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material>; at: Point[]; span: Point;
+  mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material>; at: Float64Array; span: Point;
   painted: { strip: Strip; material: THREE.Material } | null; wanted: string; all: number; lights: Record<Light, THREE.Material>;
 }
 
@@ -111,12 +111,18 @@ export class Stretches {
     for (const { mesh } of this.parts) (mesh.material as THREE.Material).clippingPlanes = planes;
   }
 
+  /** What should be there, nearest first; stretches follow each other, so that those near are found from the nearest outward. */
   private wanted(): number[] {
-    const ahead = this.at + this.session.run.radius_mm;
-    const off = (k: number) => Math.max(this.list[k]!.from_mm - ahead, ahead - this.list[k]!.to_mm, 0);
-    const near = [...this.list.keys()].sort((a, b) => off(a) - off(b));
-    let sum = 0;
-    return near.filter((k, rank) => (sum += this.list[k]!.triangles) <= MOST_TRIANGLES || !rank);
+    const ahead = this.at + this.session.run.radius_mm, { list } = this, out: number[] = [];
+    const off = (k: number) => { const s = list[k]; return s ? Math.max(s.from_mm - ahead, ahead - s.to_mm, 0) : Infinity; };
+    let [low, high] = [0, list.length]; // the first that begins beyond
+    while (low < high) { const middle = (low + high) >> 1; if (list[middle]!.from_mm > ahead) high = middle; else low = middle + 1; }
+    for (let [before, after, sum] = [low - 1, low, 0]; out.length < list.length;) {
+      const k = off(before) <= off(after) ? before-- : after++;
+      if ((sum += list[k]!.triangles) > MOST_TRIANGLES && out.length) break;
+      out.push(k);
+    }
+    return out;
   }
 
   private async load(k: number): Promise<void> {
@@ -179,11 +185,10 @@ export class Stretches {
       material.side = THREE.DoubleSide;
       material.clippingPlanes = [];
     }
-    const at = this.coordinates(mesh), places = at.map(([s, a]) => [s, a] as Point);
-    const part: Part = {
-      mesh, variants, lights, painted: null, wanted: "", at: places, span: spanOf(at), all: mesh.geometry.index!.count, away: this.away(at, mesh),
-      base: Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array),
-    };
+    const base = Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array);
+    // Vertices are stored in the pipe's own frame, only the node above turns them.
+    const { at, away } = this.pipe.locate(base, MM, this.session.run.radius_mm);
+    const part: Part = { mesh, variants, lights, painted: null, wanted: "", at, span: spanOf(at), all: mesh.geometry.index!.count, away, base };
     if (this.isPlain) this.addThinned(part);
     if (this.gain !== 1) shape(part, this.gain);
     return part;
@@ -199,26 +204,12 @@ export class Stretches {
     geometry.setIndex(new THREE.BufferAttribute(both, 1));
     this.range(part);
   }
-
-  /** Distance, azimuth and radius of each vertex; vertices are stored in the pipe's own frame, only the node above turns them. */
-  private coordinates(mesh: THREE.Mesh): [number, number, number, Vector][] {
-    const base = (mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array;
-    return Array.from({ length: base.length / 3 }, (_, k) => {
-      const at = this.pipe.coordinates([base[3 * k]! / MM, base[3 * k + 1]! / MM, base[3 * k + 2]! / MM]);
-      return [at.distance, at.azimuth, at.radius, at.outward];
-    });
-  }
-
-  /** How far each vertex lies off the round pipe, as a vector. */
-  private away(at: [number, number, number, Vector][], mesh: THREE.Mesh): Float32Array {
-    const away = new Float32Array((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array.length);
-    at.forEach(([, , radius, outward], k) => away.set(outward.map((n) => n * (radius - this.session.run.radius_mm) * MM), 3 * k));
-    return away;
-  }
 }
 
-function spanOf(at: [number, number, number, Vector][]): Point {
-  return at.reduce<Point>(([low, high], [s]) => [Math.min(low, s), Math.max(high, s)], [Infinity, -Infinity]);
+function spanOf(at: Float64Array): Point {
+  let [low, high] = [Infinity, -Infinity];
+  for (let k = 0; k < at.length; k += 2) { low = Math.min(low, at[k]!); high = Math.max(high, at[k]!); }
+  return [low, high];
 }
 
 function shape({ mesh, base, away }: Part, gain: number): void {

@@ -2,10 +2,10 @@
 import type { Point } from "./types";
 
 /**
- * Triangles between the first vertices of cells of distance and azimuth; `at` gives each vertex's place and `cell` the
- * sizes in mm and rad. Vertices at the edges of the skin stay, so that parts still meet.
+ * Triangles between the first vertices of cells of distance and azimuth; `at` gives each vertex's distance and azimuth in turn
+ * and `cell` the sizes in mm and rad. Vertices at the edges of the skin stay, so that parts still meet.
  */
-export function thinned(index: ArrayLike<number>, at: Point[], cell: Point): Uint32Array {
+export function thinned(index: ArrayLike<number>, at: Float64Array, cell: Point): Uint32Array {
   const stands = standIns(index, at, cell);
   const out = new Uint32Array(index.length);
   let n = 0;
@@ -18,20 +18,22 @@ export function thinned(index: ArrayLike<number>, at: Point[], cell: Point): Uin
 }
 
 /** For each vertex the one that stands for it: the first of its cell, or itself at an edge. */
-function standIns(index: ArrayLike<number>, at: Point[], cell: Point): Uint32Array {
+function standIns(index: ArrayLike<number>, at: Float64Array, cell: Point): Uint32Array {
   // Around an inner vertex each neighbour follows one triangle's corner and precedes another's: the differences cancel.
-  const open = new Float64Array(at.length);
+  const open = new Float64Array(at.length / 2);
   for (let k = 0; k < index.length; k += 3) {
     const [a, b, c] = [index[k]!, index[k + 1]!, index[k + 2]!];
     open[a]! += b - c; open[b]! += c - a; open[c]! += a - b;
   }
-  const first = new Map<number, number>();
   const across = Math.ceil((2 * Math.PI) / cell[1]) + 2;
-  return Uint32Array.from(at, ([s, a], k) => {
-    if (open[k]) return k;
-    const key = Math.floor(s / cell[0]) * across + Math.floor((a + Math.PI) / cell[1]);
-    const there = first.get(key);
-    if (there === undefined) first.set(key, k);
-    return there ?? k;
-  });
+  const key = (k: number) => Math.floor(at[2 * k]! / cell[0]) * across + Math.floor((at[2 * k + 1]! + Math.PI) / cell[1]);
+  let [least, most] = [Infinity, -Infinity];
+  for (let k = 0; k < open.length; k++) { const n = key(k); least = Math.min(least, n); most = Math.max(most, n); }
+  const first = new Int32Array(open.length ? most - least + 1 : 0).fill(-1), out = new Uint32Array(open.length);
+  for (let k = 0; k < open.length; k++) {
+    const n = key(k) - least;
+    if (!open[k] && first[n]! < 0) first[n] = k;
+    out[k] = open[k] ? k : first[n]!;
+  }
+  return out;
 }
