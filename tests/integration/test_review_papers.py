@@ -23,6 +23,7 @@ from pipeline.artefacts.measured import Wall
 from pipeline.pages import notation
 from pipeline.review.decisions import actions as do
 from pipeline.review.decisions.replay import Finding
+from pipeline.review.papers.content import report_content
 from pipeline.review.papers.exchange import EN_COLUMNS, EN_HEADER, PACP_COLUMNS, POF_COLUMNS
 from pipeline.review.papers.pictures import canvas_of
 from pipeline.review.papers.report import PAPERS, paper_of
@@ -387,3 +388,12 @@ def test_shown_values_are_plain(papers: dict[str, bytes]) -> None:
     for text in json.dumps(data["run"]), json.dumps(data["summary"]):
         assert "nan" not in text.lower()
         assert "None" not in text
+
+
+def test_nothing_half_empty_where_no_wall_thickness_is_known(sample: Path, tmp_path: Path) -> None:
+    shutil.copytree(sample, tmp_path / "run")
+    review = open_review(RunFiles(tmp_path / "run"))
+    unknown = do.Assume(wall_thickness_mm=None, yield_mpa=None)
+    told = report_content(review, review.act(unknown, "Ada", review.state().revision))
+    assert not told["has_loss"]
+    assert told["strength_assumptions"] == ""
