@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import read_only
-from pipeline.geometry import axis as module
+from pipeline.geometry import axis_kernels as module
 from pipeline.geometry.axis import PipeAxis, distance_along, frames_at, from_pipe, to_pipe
 
 
