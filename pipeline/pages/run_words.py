@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 STAGES = {
     "premises": "Recording checked", "rings": "Laser line in the frames", "triangulate": "Points of the wall",
@@ -21,7 +22,7 @@ _LAYERS = {
     "deviation": "deviation from the fitted pipe", "deviation_nominal": "deviation from the nominal diameter",
     "uncertainty": "1 σ of the radius", "misalignment": "radius error if misalignment were ignored",
 }  # fmt: skip
-_PLAIN = (
+_PLAIN: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], str]], ...] = (
     (re.compile(r"^overlay (\w+): range$"), lambda m: f"{_LAYERS.get(m[1], m[1])}: value of the last colour"),
     (re.compile(r"^overlay (\w+): beyond the range$"),
      lambda m: f"{_LAYERS.get(m[1], m[1])}: share beyond the last colour"),
