@@ -55,7 +55,7 @@ def lay_route(
         rotations = RotationGraph(nodes, inertia, planned).solve()
         is_upright = rotations.up_p is not None and _is_told(rotations, context)
         found = relaid(found, nodes.distance_mm, rotations.about_up() if is_upright else rotations)
-        if is_upright:
+        if is_upright and rotations.up_p is not None:
             found = turned_upright(found, rotations.up_p)
         found = _with_pieces(found)
     _report(found, context)

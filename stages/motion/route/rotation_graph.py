@@ -85,7 +85,7 @@ class Rotations:
         """Return the derivative (3,) of the angle of up about z."""
         assert self.up_p is not None
         x, y, _ = self.up_p
-        return np.array([-y, x, 0.0]) / (x * x + y * y)
+        return np.asarray(np.array([-y, x, 0.0]) / (x * x + y * y))
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class _Equations:
         """Add equations (n, m) with derivatives (n, m, w), or a factor of one, by columns (n, w) of each."""
         size = residual.shape[1]
         columns = np.concatenate([c for c, _ in parts], 1)
-        whole = [np.eye(size) * b if np.ndim(b) == 0 else b for _, b in parts]
+        whole = [np.eye(size) * b if np.ndim(b) == 0 else np.asarray(b) for _, b in parts]
         by = np.concatenate([np.broadcast_to(b, (len(residual), *b.shape[-2:])) for b in whole], 2)
         weight = 1 / np.broadcast_to(variance, residual.shape)
         self.cost += float(np.sum(weight * residual**2))
