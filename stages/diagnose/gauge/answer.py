@@ -20,7 +20,7 @@ from stages.diagnose.result import Candidate, Confirmation, EffectFound, Picture
 
 # What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Debt:
 # data/debts.md.
-_MOST_OF_FLOOR = 1.25
+_MOST_OF_FLOOR = 1.5
 
 
 def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
