@@ -17,6 +17,8 @@ from tests.synthetic_wall import wall_of
 
 RADIUS = 50.0
 BASELINE = 22.0
+_KEPT_POSES = 24
+_IN_VIEW = {}
 
 
 @dataclass(frozen=True)
@@ -84,14 +86,25 @@ def led_light(probe, T_pc, xyz_p):
     return total
 
 
+def _wall_in_view(probe, T_pc):
+    """Return polar angle, LED light and reflectance per pixel; those of the last poses are kept."""
+    key = repr(probe.camera), repr(probe.lighting), T_pc.tobytes()
+    if key not in _IN_VIEW:
+        xyz = wall_hits(probe, T_pc)
+        psi = np.arctan2(xyz[..., 1], xyz[..., 0])
+        xyz_c = (xyz - T_pc[:3, 3]) @ T_pc[:3, :3]
+        theta = np.arctan2(np.hypot(xyz_c[..., 0], xyz_c[..., 1]), xyz_c[..., 2])
+        while len(_IN_VIEW) >= _KEPT_POSES:
+            del _IN_VIEW[next(iter(_IN_VIEW))]
+        _IN_VIEW[key] = theta, led_light(probe, T_pc, xyz), reflectance(xyz[..., 2], psi)
+    return _IN_VIEW[key]
+
+
 def draw(probe, T_pc, *, exposure=1.0, vignetting=0.0, laser=False):
     """Return the image (H, W, 3) uint8; with ``vignetting`` the image loses light as cos^n of θ / 2."""
-    xyz = wall_hits(probe, T_pc)
-    psi = np.arctan2(xyz[..., 1], xyz[..., 0])
-    xyz_c = (xyz - T_pc[:3, 3]) @ T_pc[:3, :3]
-    theta = np.arctan2(np.hypot(xyz_c[..., 0], xyz_c[..., 1]), xyz_c[..., 2])
-    light = led_light(probe, T_pc, xyz) * np.cos(theta / 2) ** vignetting
-    image = reflectance(xyz[..., 2], psi) * (light * 1.8e5 * exposure)[..., None]
+    theta, led, colour = _wall_in_view(probe, T_pc)
+    light = led * np.cos(theta / 2) ** vignetting
+    image = colour * (light * 1.8e5 * exposure)[..., None]
     if laser:
         across = (theta - np.arctan2(RADIUS, BASELINE)) * probe.camera.focal_px[0]
         image[..., 1] += 250 * np.exp(-0.5 * (across / 0.8) ** 2)
