@@ -103,7 +103,7 @@ class BlockSamples:
 
 def _sigmas(of_frames: Float) -> float:
     sd = float(np.std(of_frames, ddof=1)) / np.sqrt(len(of_frames))
-    return float(of_frames.mean()) / max(sd, 1e-12)
+    return float(np.mean(of_frames) / max(sd, 1e-12))
 
 
 @dataclass
@@ -118,8 +118,8 @@ class BlocksOfFrames:
         ratio = block_ratios(above, twin, white)
         middle = (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2
         rows, columns = ratio.shape
-        place = [a[middle][:rows, :columns] for a in (twin.distance_mm, twin.azimuth_rad)]
-        self.parts.append((ratio, *place))
+        distance, azimuth = (a[middle][:rows, :columns] for a in (twin.distance_mm, twin.azimuth_rad))
+        self.parts.append((ratio, distance, azimuth))
 
     def samples(self) -> BlockSamples | None:
         """Return all blocks; None where there are none."""

@@ -181,4 +181,4 @@ def _place_error(left: list[_LeftOver], noise: CameraNoise) -> Float:
 def slope_squared(level: Float32) -> Float32:
     """Return the squared slope, per px, of grey levels (H, W); 0 where a neighbour is unknown."""
     down, right = np.gradient(level)
-    return np.nan_to_num(down**2 + right**2)
+    return np.asarray(np.nan_to_num(down**2 + right**2), np.float32)

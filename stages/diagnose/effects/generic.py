@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, ImagePoints, Shape
 from stages.diagnose.effects.kinds import cosine
 from stages.diagnose.effects.nameless import Nameless, growth, two_parts
 
@@ -160,7 +160,7 @@ GENERIC: tuple[GenericTerm, ...] = tuple(
 )
 
 
-def _vocabulary() -> tuple[tuple[EffectModel, Shape], ...]:
+def _vocabulary() -> tuple[tuple[Nameless, Shape], ...]:
     courses = {Moves.LINE: (STEADY, WITH_TIME, WITH_SPEED), Moves.OUTWARD: (STEADY, WITH_TIME)}
     moving = [(t, course) for t in GENERIC for course in courses.get(t.moves, (STEADY,))]
     wall = [(_term(Moves.WALL, m, 0), course) for m in (1, 2, 3, 4) for course in (STEADY, WITH_DISTANCE)]
@@ -168,4 +168,4 @@ def _vocabulary() -> tuple[tuple[EffectModel, Shape], ...]:
 
 
 # The patterns that an empirical formula is made of, in (r, ψ, t, s, speed, row).
-VOCABULARY: tuple[tuple[EffectModel, Shape], ...] = _vocabulary()
+VOCABULARY: tuple[tuple[Nameless, Shape], ...] = _vocabulary()
