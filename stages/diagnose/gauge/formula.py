@@ -14,7 +14,7 @@ from scipy import stats
 from pipeline.arrays import Float, Int
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
-from stages.diagnose.effects.nameless import SWINGS
+from stages.diagnose.effects.nameless import SWINGS, Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term, linearise
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan
@@ -110,7 +110,7 @@ def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
 def rival_patterns(
     about: Evidence, terms: Sequence[Term], stated: Stated, alike: float
 ) -> tuple[tuple[str, ...], ...]:
-    """Return for each term the formulas of patterns that may as well be in its place.
+    """Return for each effect among the terms the formulas of patterns that may as well be in its place.
 
     They stand for causes that the library does not know. A pattern is excluded where the term is expected to
     beat it, at the size found, and does beat it. The one that the term itself makes is no rival; where it
@@ -127,6 +127,8 @@ def rival_patterns(
     own = [(t.model, t.shape) for t in terms]
     out = []
     for k, term in enumerate(terms):
+        if isinstance(term.model, Nameless):
+            continue
         block, others = _places(fair, own[k : k + 1]), _places(fair, own[:k] + own[k + 1 :])
         alone = score(fair, stated, block, others)
         tried = [
