@@ -17,6 +17,8 @@ BLOCK_PX = 8
 """Side of the blocks in which a difference is looked for that stays in one place of the image."""
 _LEVELS = (0, 10, 20, 40, 80, 120, 160, 200)
 _FULL_SCALE, _STRAY = 255.0, 5.0
+_SILENT = 0.92
+"""Share of pixels at one grey level from which noise is less than that of rounding, 1/√12: erf(√1.5)."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
 
@@ -36,6 +38,8 @@ class Comparison:
         Dark pixels that are brighter than their twin by more than five σ.
     clipped : bool
         Whether black is so low that the noise of dark pixels is cut off.
+    still : float
+        Dark pixels that are at black to the grey level.
     seen, view : float
         Pixels whose wall is known, and all within the view, in lit frames.
     views : list of TwinView
@@ -52,6 +56,7 @@ class Comparison:
     camera: float = 0.0
     stray: float = 0.0
     clipped: bool = False
+    still: float = 0.0
     seen: float = 0.0
     view: float = 0.0
     views: list[TwinView] = field(default_factory=list)
@@ -70,7 +75,9 @@ class Comparison:
         after_sum = np.bincount(region.ravel(), (z**2).ravel(), len(Region))
         self.after += after_sum
         self.clipped = noise.clips_black
-        self.stray += float((z[region == Region.DARK] > _STRAY).sum())
+        dark = region == Region.DARK
+        self.stray += float((z[dark] > _STRAY).sum())
+        self.still += float((np.abs(above_black[dark]) < 0.5).sum())
         wall = region == Region.WALL
         if light != Illumination.LASER:
             square = (above_black - after.level)[wall].astype(float) ** 2
@@ -90,7 +97,7 @@ class Comparison:
         """Return χ² per pixel by region; NaN where pixels are counted and not compared.
 
         At the edge of the view a pixel is part wall, part mask, and no photo says how much. Of dark pixels
-        the noise is not known where it is cut off at black.
+        the noise is not known where it is cut off at black, or where a codec has swallowed it.
         """
         return tuple(
             RegionFit(
@@ -109,7 +116,8 @@ class Comparison:
         )
 
     def _mean(self, total: Float, region: Region) -> float:
-        left_out = region == Region.EDGE or (region == Region.DARK and self.clipped)
+        silent = self.clipped or self.still > _SILENT * self.pixels[Region.DARK]
+        left_out = region == Region.EDGE or (region == Region.DARK and silent)
         compared = self.pixels[region] and not left_out
         return float(total[region] / self.pixels[region]) if compared else float("nan")
 

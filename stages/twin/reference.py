@@ -13,7 +13,7 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import norm, t
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
@@ -221,12 +221,15 @@ def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
         return ()
     mean, _ = _map(samples, "rows", (int(samples.frame.max()) + 1, int(samples.row.max()) + 1))
     size = float(np.nanstd(mean))
+    frames = np.unique(samples.frame)
+    chance = float(t.sf(_sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
+    sd = float(np.nanstd(np.nanstd(mean, axis=1))) / np.sqrt(len(frames))
     if size < _LEAST_OF_ROWS:
         return ()
     nan = float("nan")
     return (
         Mismatch(
-            "banding", "intensity", "rows", (), (NamedFigure("change", size, size / 10, "relative"),), 0.0,
+            "banding", "intensity", "rows", (), (NamedFigure("change", size, sd, "relative"),), chance,
             nan, nan,
             f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as of lamps "
             "that flicker within a frame of a rolling shutter.",
