@@ -99,7 +99,7 @@ _Assignments = Annotated[
 
 def _tell_version(wanted: bool) -> None:
     if wanted:
-        from pipeline.files.version import program_version
+        from pipeline.files.installed import program_version
 
         typer.echo(f"boresight {program_version()}")
         raise typer.Exit

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView
 from stages.calibrate.boards.detect import grid
 

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import scipy.io
 
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView, rms
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
 from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve

@@ -17,9 +17,9 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
-from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Selection
+from pipeline.machine.run_folder import Exporter
 from pipeline.recording.base import FrameTable, PipeFacts, Planes, Recording
 from tests.toy_stages import TOYS, write_numbers, write_page
 

@@ -18,10 +18,9 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource, read_with_source
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.display import Display
-from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import RunOutcome
 from pipeline.machine.plan import Plan, Selection, Source, make_plan
-from pipeline.machine.run_folder import RunFolder, claimed, logged
+from pipeline.machine.run_folder import Exporter, RunFolder, claimed, logged
 from pipeline.machine.runner import Runner
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Stage, of_role, plain
@@ -30,7 +29,7 @@ from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
 from pipeline.recording.decoded_once import decoded_once
 from pipeline.recording.input_file import content_key
-from pipeline.system.stopping import stop_wish
+from pipeline.system.processes import stop_wish
 
 Kind = TypeVar("Kind")
 

@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 
 from pipeline.api.job import Job, probe_source, result_of, run_job
-from pipeline.api.opened import Run, open_run
+from pipeline.api.run import Run, open_run
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import RingSamples, Trajectory, WallTexture
 from pipeline.artefacts.measured import Wall as MeasuredWall
 from pipeline.errors import InputError
 from pipeline.files.codec import digest
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection, Source
@@ -29,8 +29,8 @@ from pipeline.review.run_files import RunFiles
 from pipeline.simulator.build import plain_truth
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.scene import Scene, scene_from
+from pipeline.simulator.wall.build import MeasuredPipe, write_measured
 from pipeline.simulator.wall.grid import Wall, WallGrid
-from pipeline.simulator.wall.measured import MeasuredPipe, write_measured
 from stages.texture.surface import wall_surface
 from stages.twin import PHOTOMETRY, Photometry
 from stages.twin.reflectance import LUMA_BGR

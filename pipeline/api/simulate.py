@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 from pipeline.api.diagnosis.switches import switches_of
 from pipeline.api.like import MEASURED, Changed, scene_like
-from pipeline.files.shipped import PRIORS, SCENES, file_or_shipped
+from pipeline.files.installed import PRIORS, SCENES, file_or_shipped
 from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.premises import Premise
 from pipeline.simulator.prior import draw_pair, read_prior

@@ -20,9 +20,9 @@ from pipeline.errors import InputError
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import Display, SilentDisplay
-from pipeline.machine.exporter import Exporter
 from pipeline.machine.plan import Selection
 from pipeline.machine.reproduce import check_inputs_unchanged, read_run_record
+from pipeline.machine.run_folder import Exporter
 from pipeline.pages import page_template
 from stages.catalogue import PIPELINE
 from stages.texture import TEXTURE

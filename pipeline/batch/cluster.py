@@ -13,9 +13,9 @@ import dask
 from distributed import Client, LocalCluster, as_completed
 from pydantic import Field, TypeAdapter, ValidationError
 
-from pipeline.batch.runs import BatchOutcome, Work, run_one
+from pipeline.batch import BatchOutcome, Work, run_one
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.configuration import CLUSTER
 from pipeline.machine.stage import Parameters
 

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from pipeline.batch import BatchOutcome, Work, find_recordings, write_summary
 from pipeline.batch.cluster import Cluster, LocalWorkers, RunningScheduler, outcomes, read_cluster, workers
-from pipeline.batch.runs import BatchOutcome, Work, find_recordings, write_summary
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named
 from pipeline.machine.configuration import resolve

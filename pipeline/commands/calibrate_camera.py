@@ -22,7 +22,7 @@ from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.calibration import CalibrationReport
 from pipeline.instrument.camera.formats import WRITTEN, read_camera, write_camera
 from pipeline.machine.configuration import resolve
-from pipeline.machine.exporter import Exporter
+from pipeline.machine.run_folder import Exporter
 from stages.calibrate.boards import BOARDS, CAMERA, CameraFile, Target, list_pictures
 from stages.calibrate.boards.detect import Board, Charuco, Chessboard
 

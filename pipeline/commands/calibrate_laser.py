@@ -17,13 +17,13 @@ from pipeline.commands.calibrate_camera import BoardKind, describe_board
 from pipeline.commands.working import Assignments, ConfigFile, worked
 from pipeline.files.disk import require_writable
 from pipeline.files.provenance import MadeBy
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.machine.configuration import resolve
-from pipeline.machine.exporter import Exporter
+from pipeline.machine.run_folder import Exporter
 from pipeline.recording.input_file import input_file
 from stages.calibrate.boards import BOARDS, CameraFile, Target, list_pictures
 from stages.calibrate.laser import LASER_PLANE, LaserCalibration

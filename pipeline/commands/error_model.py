@@ -19,7 +19,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from rich.console import Console
 
 from pipeline.files.disk import written_together
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.misalignment import (
     MisalignedScan,

@@ -15,7 +15,7 @@ from pipeline.follow import Snapshot, snapshots, write_live_page
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.run_folder import claimed, logged
 from pipeline.machine.stage import Context
-from pipeline.system.stopping import stop_wish
+from pipeline.system.processes import stop_wish
 from stages.preview import PreliminarySection, preliminary_sections
 from stages.rings import RingParameters
 

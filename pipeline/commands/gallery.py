@@ -21,8 +21,7 @@ from pipeline.pages import page_template
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.effect import Channel
 from pipeline.simulator.effects.switch import parse_switches, typical_switch
-from pipeline.simulator.gallery.exhibit import WINDOW_PX, Exhibit, exhibit, unrolled
-from pipeline.simulator.gallery.likeness import STATES, Likeness, likenesses
+from pipeline.simulator.gallery import STATES, WINDOW_PX, Exhibit, Likeness, exhibit, likenesses, unrolled
 from pipeline.simulator.gallery.scenes import Course, surroundings
 from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, Check
 from pipeline.simulator.laws.closed_form import lever_of

@@ -23,8 +23,8 @@ from pipeline.commands.prove_cases import (
 )
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable, written_together
+from pipeline.files.installed import PRIORS, file_or_shipped
 from pipeline.files.provenance import MadeBy
-from pipeline.files.shipped import PRIORS, file_or_shipped
 from pipeline.pages import page_template
 from stages.diagnose.drill.cases import find_cases
 from stages.diagnose.drill.figures import Figure, figures

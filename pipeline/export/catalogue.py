@@ -9,7 +9,7 @@ from pipeline.export.pictures import write_overlays, write_unrolled
 from pipeline.export.report.write import write_report_page
 from pipeline.export.tables import write_defects, write_sections, write_trajectory
 from pipeline.export.tileset import write_tileset
-from pipeline.machine.exporter import Exporter
+from pipeline.machine.run_folder import Exporter
 
 EXPORTERS = (
     Exporter("rings.zarr", write_rings),

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from pipeline.files.codec import Json
 from pipeline.files.disk import disk_errors_named, replace_json
+from pipeline.files.installed import program_version
 from pipeline.files.provenance import library_versions
-from pipeline.files.version import program_version
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.machine.plan import Plan

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from types import MappingProxyType
 
 from pipeline.files.codec import Json, canonical
-from pipeline.files.version import program_version
+from pipeline.files.installed import program_version
 
 # What computes; another version of these may change a result's last digits.
 _LIBRARIES = (

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.errors import InputError
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 
 # Half a degree apart: the largest of a first harmonic is met within 1e-5 of it.

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 
 

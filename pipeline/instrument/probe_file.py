@@ -19,8 +19,8 @@ import yaml
 
 from pipeline.arrays import Float
 from pipeline.files.codec import Json
+from pipeline.files.json_yaml import Section, read_yaml
 from pipeline.files.provenance import MadeBy
-from pipeline.files.yaml_file import Section, read_yaml
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import ImuMount, Lighting, Probe, Shutter

@@ -18,7 +18,7 @@ from pydantic.fields import FieldInfo
 
 from pipeline.errors import InputError
 from pipeline.files.codec import Json
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.stage import Parameters, Stage
 
 # The section that says where a batch is worked on: of no stage, read by `pipeline.batch.cluster`.

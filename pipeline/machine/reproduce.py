@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import InputError
-from pipeline.files.json_file import read_json
-from pipeline.machine.exporter import Exporter, published_files
-from pipeline.machine.run_folder import RunFolder
+from pipeline.files.json_yaml import read_json
+from pipeline.machine.run_folder import Exporter, RunFolder, published_files
 
 _RECORD = "run.json"
 # Bear the time they were made at; what they show is in the other files.

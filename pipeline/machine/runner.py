@@ -14,10 +14,9 @@ import numpy as np
 from pipeline.errors import BoresightError, Cancelled, InputError
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.display import Display
-from pipeline.machine.exporter import Exporter, Writer, published_key, withdraw
 from pipeline.machine.outcome import WARNING, Number, Results, RunOutcome, StageOutcome, State
 from pipeline.machine.plan import Plan, Selection, Step
-from pipeline.machine.run_folder import RunFolder
+from pipeline.machine.run_folder import Exporter, RunFolder, Writer, published_key, withdraw
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, plain
 from pipeline.machine.store import Provenance, Store, Stored

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.files.codec import CodecError, Json, canonical, decode, encode
 from pipeline.files.disk import FileRecord, disk_errors_named, remove, replace_json, sync_folder, write_synced
-from pipeline.files.json_file import read_json
+from pipeline.files.json_yaml import read_json
 from pipeline.machine.outcome import Number
 
 _FORMAT = 1

@@ -31,7 +31,7 @@ import numpy as np
 
 from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.recording.bag_file import BAG_ERRORS, Bag, RosBag, bag_files, open_mcap
 from pipeline.recording.bag_topics import (
     ENCODINGS,

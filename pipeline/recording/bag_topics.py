@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Float, Image, Int
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import Section
+from pipeline.files.json_yaml import Section
 from pipeline.recording.bag_file import Bag
 from pipeline.recording.base import Encoder, FrameTable, Illumination, Imu, Planes
 from pipeline.recording.checks import refuse_backward

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import Section
+from pipeline.files.json_yaml import Section
 from pipeline.recording.base import BoreSection, Fiducials, InspectionFacts, Marker, PipeFacts, PlannedPiece
 
 COMMON_KEYS = ("name", "kind", "frame_rate", "probe", "pipe", "inspection")

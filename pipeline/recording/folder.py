@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import Section, read_yaml
+from pipeline.files.json_yaml import Section, read_yaml
 from pipeline.recording.base import Encoder, FrameTable, Imu, Recording
 from pipeline.recording.checks import common_frames, encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe, inside, optional_file, required_file

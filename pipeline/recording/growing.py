@@ -17,7 +17,7 @@ import numpy as np
 
 from pipeline.arrays import Int
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import Section
+from pipeline.files.json_yaml import Section
 from pipeline.recording import open_recording
 from pipeline.recording.base import Encoder, FrameTable, Recording
 from pipeline.recording.description import inside, required_file

@@ -21,7 +21,7 @@ from pipeline.arrays import Byte
 from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import InputError
 from pipeline.files.disk import FileStamp, stamp_of
-from pipeline.files.json_file import parse_json
+from pipeline.files.json_yaml import parse_json
 from pipeline.geometry.axis import PipeAxis, to_pipe
 from pipeline.review.run_files import RunFiles
 

@@ -16,7 +16,7 @@ from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
 from pipeline.files.codec import digest, is_digest_of
 from pipeline.files.disk import FileStamp, stamp_of
-from pipeline.files.json_file import parse_json, read_json
+from pipeline.files.json_yaml import parse_json, read_json
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.run_folder import RunFolder

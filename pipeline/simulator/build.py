@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.files.yaml_file import Section
+from pipeline.files.json_yaml import Section
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import probe_from
 from pipeline.recording.base import FrameTable
@@ -26,9 +26,8 @@ from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.motion import Motion, Odometer, motion_of, motion_through
 from pipeline.simulator.scene import LightScene, Scene, SensorScene
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.build import build_wall, facts_of
+from pipeline.simulator.wall.build import build_wall, facts_of, read_measured
 from pipeline.simulator.wall.grid import Wall
-from pipeline.simulator.wall.measured import read_measured
 
 # Number of the random stream of the instrument's draw; the wall's streams hash their purpose (`Seeds`).
 _INSTRUMENT_STREAM = 1

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import exponnorm
 
 from pipeline.arrays import Float
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Shutter
 from pipeline.simulator.window import Window

@@ -12,11 +12,10 @@ import numpy as np
 from pydantic import Field, Strict, ValidationError, model_validator
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.stage import Parameters
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import COURSES, Course, CourseKind
-from pipeline.physics.effect import Quantity
+from pipeline.physics.effect import COURSES, Course, CourseKind, Quantity
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.scene import Scene, read_scene, scene_from
 

@@ -10,7 +10,7 @@ import yaml
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.stage import Parameters
 from pipeline.simulator.wall.description import Pipe
 

@@ -19,11 +19,11 @@ import numpy as np
 import yaml
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.simulator.scene import Scene, write_scene
 from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.wall.albedo import markers_of
 from pipeline.simulator.wall.description import Defect, Pipe, Weld
-from pipeline.simulator.wall.fiducials import markers_of
 from pipeline.simulator.wall.grid import Wall
 
 # Quality of the stored albedo: it is looked at, not computed with.

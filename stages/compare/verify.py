@@ -1,4 +1,4 @@
-"""The stages of a verification: a wall against a known bore, another map of it, or a mesh or cloud."""
+"""How accurate a run is: its differences from a reference, point by point, and their figures."""
 
 from __future__ import annotations
 
@@ -8,19 +8,166 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from pipeline.adjustment.robust import spread_about_median
+from pipeline.arrays import Float
 from pipeline.artefacts.wall_map import WallMap
+from pipeline.errors import UnusableError
+from pipeline.geometry.rigid import transform
 from pipeline.machine.stage import Context, Of, Parameters, Stage
 from stages.compare.reference import ReferenceSurface, WallPoints
-from stages.compare.registration.by_points import PointsPose, register_points
-from stages.compare.registration.by_radius import Alignment, align_maps
-from stages.compare.verification import (
-    Accuracy,
-    Differences,
-    accuracy,
-    bore_differences,
-    map_differences,
-    surface_differences,
+from stages.compare.registration.by_points import NearestPoints, PointsPose, register_points
+from stages.compare.registration.by_radius import (
+    Alignment,
+    align_maps,
+    cells_around,
+    looked_up,
+    pose_design,
+    samples_of,
 )
+
+# Half the width of the 95 % interval of a normal distribution, in σ.
+_NORMAL_95 = 1.959964
+# With fewer points a 95th percentile rests on five of them.
+_LEAST_POINTS = 100
+
+
+@dataclass(frozen=True)
+class Differences:
+    """Run minus reference, positive where the run's radius is larger.
+
+    Attributes
+    ----------
+    distance_mm, azimuth_rad : (N,)
+        Of the run.
+    error_mm, sigma_mm, sigma_random_mm : (N,)
+        Differences, and 1 σ of them: with the instrument's part, and without it.
+    """
+
+    distance_mm: Float
+    azimuth_rad: Float
+    error_mm: Float
+    sigma_mm: Float
+    sigma_random_mm: Float
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """The figures of a certificate, mm; shares from 0 to 1.
+
+    Attributes
+    ----------
+    points : int
+    bias_mm, median_mm, rms_mm, mad_sigma_mm, p95_mm, max_mm : float
+        Mean, median, root mean square, robust σ about the median, 95th percentile and largest size.
+    within_95, within_95_random : float
+        Share of differences inside their 95 % interval, with the total and with the random σ; NaN where no
+        σ is stated.
+    """
+
+    points: int
+    bias_mm: float
+    median_mm: float
+    rms_mm: float
+    mad_sigma_mm: float
+    p95_mm: float
+    max_mm: float
+    within_95: float
+    within_95_random: float
+
+
+def accuracy(differences: Differences) -> Accuracy:
+    """Return the figures of differences.
+
+    Raises
+    ------
+    UnusableError
+        If fewer than 100 points could be compared.
+    """
+    error = differences.error_mm
+    if len(error) < _LEAST_POINTS:
+        raise UnusableError(
+            "verify", f"only {len(error)} points of the run lie on the reference",
+            limit=f"at least {_LEAST_POINTS}",
+            hint="check that both show the same stretch of pipe, and --max-shift-mm",
+        )  # fmt: skip
+    spread = spread_about_median(error)
+    return Accuracy(
+        len(error),
+        float(error.mean()),
+        float(np.median(error)),
+        float(np.sqrt(np.mean(error**2))),
+        float(spread),
+        float(np.percentile(np.abs(error), 95)),
+        float(np.abs(error).max()),
+        _inside(error, differences.sigma_mm),
+        _inside(error, differences.sigma_random_mm),
+    )
+
+
+def wall_coverage(wall: WallMap) -> float:
+    """Return the measured share of the map between its first and last seen station."""
+    seen = np.isfinite(wall.radius_mm)
+    station = np.flatnonzero(seen.any(1))
+    return float(seen[station[0] : station[-1] + 1].mean())
+
+
+def bore_differences(wall: WallMap, diameter_mm: float, tolerance_mm: float) -> Differences:
+    """Return the differences of a wall from a known bore; the tolerance is a uniform ± of its radius."""
+    known = np.isfinite(wall.radius_mm)
+    station, azimuth = np.nonzero(known)
+    bore = tolerance_mm**2 / 3
+    return Differences(
+        wall.distance_mm[station],
+        wall.azimuth_rad[azimuth],
+        wall.radius_mm[known] - diameter_mm / 2,
+        np.sqrt(wall.sigma_mm[known] ** 2 + bore),
+        np.sqrt(wall.sigma_random_mm[known] ** 2 + bore),
+    )
+
+
+def map_differences(run: WallMap, reference: WallMap, alignment: Alignment) -> Differences:
+    """Return run minus aligned reference for every cell of the run that lies on it."""
+    samples = samples_of(run, run.radius_mm.size)
+    error = samples.radius_mm - looked_up(reference.radius_mm, reference, samples, alignment.placement)
+    error = error - pose_design(samples) @ np.array(alignment.pose_mm)
+    on = np.isfinite(error)
+    known = np.isfinite(run.radius_mm)
+
+    cell, weight = cells_around(reference, samples, alignment.placement)
+    # the random part of neighbouring cells averages in the interpolation, the instrument's does not
+    its_random = np.sum(weight**2 * reference.sigma_random_mm[cell] ** 2, 0)[on]
+    shared = np.maximum(reference.sigma_mm**2 - reference.sigma_random_mm**2, 0.0)
+    its_shared = np.sum(weight * shared[cell], 0)[on]
+    return Differences(
+        samples.middle_mm + samples.offset_mm[on],
+        samples.azimuth_rad[on],
+        error[on],
+        np.sqrt(run.sigma_mm[known][on] ** 2 + its_random + its_shared),
+        np.sqrt(run.sigma_random_mm[known][on] ** 2 + its_random),
+    )
+
+
+def surface_differences(
+    points: WallPoints, reference: ReferenceSurface, pose: PointsPose, reach_mm: float
+) -> Differences:
+    """Return the distances of the run's points from the reference along its outward normals.
+
+    The reference is in mm. Points farther than ``reach_mm`` from it do not lie on it and are left out.
+    """
+    xyz, outward = transform(pose.T_rp, points.xyz_p), points.outward_p @ pose.T_rp[:3, :3].T
+    closest = NearestPoints(reference)(xyz)
+    away = xyz - closest
+    error = np.sum(away * outward, -1)
+    on = np.linalg.norm(away, axis=-1) <= reach_mm
+    sigma = points.sigma_mm[on]
+    return Differences(points.distance_mm[on], points.azimuth_rad[on], error[on], sigma, sigma)
+
+
+def _inside(error: Float, sigma: Float) -> float:
+    if not np.all(sigma > 0):
+        return float("nan")
+    return float(np.mean(np.abs(error) < _NORMAL_95 * sigma))
+
 
 _UNITS_MM = {"mm": 1.0, "m": 1000.0}
 

@@ -13,7 +13,7 @@ from pipeline.arrays import Float, Int
 from pipeline.errors import InputError
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.physics.catalogue import EFFECTS, effect
-from pipeline.physics.course import Course
+from pipeline.physics.effect import Course
 from pipeline.recording.base import Recording
 from pipeline.recording.checked_frames import CheckedFrames
 from pipeline.simulator.effects import switch_on

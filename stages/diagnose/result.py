@@ -92,7 +92,7 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class CourseFound:
-    """How an effect's size changes: a kind of `pipeline.physics.course`, and its numbers."""
+    """How an effect's size changes: a kind of `pipeline.physics.effect`, and its numbers."""
 
     kind: str
     parameters: dict[str, Value]

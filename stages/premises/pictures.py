@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32, Image
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording

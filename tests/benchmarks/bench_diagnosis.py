@@ -24,7 +24,7 @@ from scipy.stats import kstest
 from pipeline.errors import BoresightError, UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import Course, CourseKind
+from pipeline.physics.effect import Course, CourseKind
 from pipeline.simulator.effects.switch import Switch, switches_from_mapping
 from pipeline.simulator.prior import Prior, draw_pair, read_prior
 from pipeline.simulator.scene import Scene

@@ -28,10 +28,9 @@ import numpy as np
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.produce import Order, Places, produce
-from pipeline.simulator.render import Renderer, renderer_of
+from pipeline.simulator.render import Renderer, Shot, renderer_of, view_of
 from pipeline.simulator.scene import read_scene
 from pipeline.simulator.sensor import through_lens
-from pipeline.simulator.shot import Shot, view_of
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.view import View
 from pipeline.simulator.wall_light import lamps_of

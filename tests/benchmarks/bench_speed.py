@@ -27,7 +27,7 @@ import av
 
 from pipeline.api.job import run_job
 from pipeline.api.run import configuration, prepare
-from pipeline.files.yaml_file import read_yaml
+from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection
 from tests.benchmarks.bench_long_run import ROOT, Progress

@@ -23,7 +23,7 @@ import numpy as np
 from pipeline.adjustment.robust import robust_spread
 from pipeline.api.diagnosis.switches import moves_line, switches_of
 from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
-from pipeline.api.opened import open_run
+from pipeline.api.run import open_run
 from pipeline.api.run import run as run_recording
 from pipeline.api.simulate import simulate_like
 from pipeline.artefacts.measured import RingSamples
@@ -33,7 +33,7 @@ from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection
 from pipeline.machine.stage import of_role
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import Course, CourseKind
+from pipeline.physics.effect import Course, CourseKind
 from pipeline.recording import open_recording
 from pipeline.recording.checked_frames import CheckedFrames
 from pipeline.simulator.effects.switch import Switch

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingValidity
 from pipeline.geometry.rigid import rotation_from_vector
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import ImagePoints

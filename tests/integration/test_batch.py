@@ -11,8 +11,8 @@ import time
 import pytest
 from typer.testing import CliRunner
 
+from pipeline.batch import BatchOutcome, Work, find_recordings, outcome_of, write_summary
 from pipeline.batch.cluster import LocalWorkers, RunningScheduler, outcomes, workers
-from pipeline.batch.runs import BatchOutcome, Work, find_recordings, outcome_of, write_summary
 from pipeline.cli import app
 from pipeline.errors import InputError
 from tests.bad_recordings import cut_sample

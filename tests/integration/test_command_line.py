@@ -13,7 +13,7 @@ import pytest
 
 from pipeline.cli import _ATTACHED, _exit_code, main
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
-from pipeline.files.version import program_version
+from pipeline.files.installed import program_version
 from pipeline.machine.runner import FailedError
 from stages.catalogue import PIPELINE
 from tests.shared_data import PROJECT_ROOT

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects.switch import parse_switches
 from pipeline.simulator.scene import read_scene
 from stages.diagnose.effects.generic import GENERIC, STEADY

@@ -13,8 +13,7 @@ from pipeline.commands import gallery as command
 from pipeline.commands.gallery import gallery_page
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.switch import Switch, typical_switch
-from pipeline.simulator.gallery.exhibit import Exhibit, exhibit
-from pipeline.simulator.gallery.likeness import likenesses
+from pipeline.simulator.gallery import Exhibit, exhibit, likenesses
 from pipeline.simulator.gallery.scenes import moment_s, scene_pair
 from pipeline.simulator.laws.bench import harmonic
 from pipeline.simulator.laws.closed_form import LAWS

@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from pipeline.cli import app
-from pipeline.commands.prove_geometry import wall_errors
+from pipeline.commands.prove_cases import wall_errors
 from pipeline.errors import InputError
 from pipeline.simulator.truth_files import seal_truth
 from stages.diagnose.drill.cases import Case

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.instrument.camera.base import Camera, invert_increasing
+from pipeline.instrument.camera import Camera, invert_increasing
 from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from tests.unit.camera_samples import (
     BEYOND_90,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.physics.course import COURSES, Course, CourseKind
+from pipeline.physics.effect import COURSES, Course, CourseKind
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch, parse_switches, switches_from_mapping
 from pipeline.simulator.laws.bench import bench_truth

@@ -9,7 +9,6 @@ import pytest
 from pipeline.errors import InputError
 from pipeline.instrument.budget.combine import error_budget, parameter_names
 from pipeline.instrument.budget.design import baseline_study, dominant_rows, tolerances
-from pipeline.instrument.budget.disturbance import Disturbance
 from pipeline.instrument.budget.monte_carlo import monte_carlo
 from pipeline.instrument.budget.scan import (
     LinePhotometry,
@@ -21,7 +20,7 @@ from pipeline.instrument.budget.scan import (
     radius_error,
     radius_jacobian,
 )
-from pipeline.instrument.budget.sources import Kind, typical_probe
+from pipeline.instrument.budget.sources import Disturbance, Kind, typical_probe
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 
 PROBE = typical_probe()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.files import json_file, yaml_file
+from pipeline.files.json_yaml import LARGEST_JSON_BYTES, LARGEST_YAML_BYTES
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.camera.mapping import LARGEST_SIDE_PX
 from pipeline.instrument.probe_file import read_probe
@@ -33,9 +33,9 @@ from tests.truth_run import true_axis
 
 MIB = 1 << 20
 STATED = {
-    "YAML": f"{yaml_file.LARGEST_BYTES // 1_000_000} MB",
+    "YAML": f"{LARGEST_YAML_BYTES // 1_000_000} MB",
     "tables": f"{tables.LARGEST_BYTES // MIB} MiB",
-    "JSON": f"{json_file.LARGEST_BYTES // MIB} MiB",
+    "JSON": f"{LARGEST_JSON_BYTES // MIB} MiB",
     "arrays": f"{reference.LARGEST_UNPACKED_BYTES >> 30} GiB",
     "pictures": f"{LARGEST_SIDE_PX} px",
     "model": f"{model_stretches._LARGEST_DOCUMENT // MIB} MiB",

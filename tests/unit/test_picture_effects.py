@@ -7,14 +7,13 @@ import pytest
 
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.picture import PICTURE_EFFECTS
-from pipeline.simulator.bounce import glow_of_lamps, ring_to_ring
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueSensor
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import exposed, through_lens, with_dark_signal
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall_light import lamps_of
+from pipeline.simulator.wall_light import glow_of_lamps, lamps_of, ring_to_ring
 from tests.unit.simulated_pipe import small_truth
 
 LASER, LED = 0, 1

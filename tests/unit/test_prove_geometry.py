@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
-from pipeline.commands import prove_geometry
-from pipeline.commands.prove_geometry import wall_errors
-from pipeline.files.yaml_file import Section
+from pipeline.commands import prove_cases
+from pipeline.commands.prove_cases import wall_errors
+from pipeline.files.json_yaml import Section
 from pipeline.instrument.probe_file import probe_from, write_probe
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.exact import exact_rings
@@ -49,8 +49,8 @@ def concealed():
 def errors(concealed, folder, monkeypatch, changes):
     """Return the wall errors when the diagnosis writes a probe with ``changes`` to the sheet."""
     scene, _, rings = concealed
-    monkeypatch.setattr(prove_geometry, "open_recording", lambda path: path)
-    monkeypatch.setattr(prove_geometry, "measured_rings", lambda *_: rings)
+    monkeypatch.setattr(prove_cases, "open_recording", lambda path: path)
+    monkeypatch.setattr(prove_cases, "measured_rings", lambda *_: rings)
     (folder / "truth" / "a-field").mkdir(parents=True)
     write_scene(scene, folder / "truth" / "a-field" / "truth_scene.yaml")
     stated = probe_from(

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import parse_yaml
+from pipeline.files.json_yaml import parse_yaml
 from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 
 relaxed = settings(

@@ -12,9 +12,8 @@ import pytest
 from pipeline.commands.reproduce import reproduce
 from pipeline.errors import InputError
 from pipeline.files.disk import record_of
-from pipeline.machine.exporter import Exporter
 from pipeline.machine.reproduce import Agreement, check_inputs_unchanged, compare_runs, read_run_record
-from pipeline.machine.run_folder import RunFolder
+from pipeline.machine.run_folder import Exporter, RunFolder
 
 RECORD = {
     "recording": {"path": "recording"},

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.files.shipped import PARAMETERS, PRIORS, SCENES, file_or_shipped, shipped_names
+from pipeline.files.installed import PARAMETERS, PRIORS, SCENES, file_or_shipped, shipped_names
 from pipeline.simulator.prior import read_prior
 from pipeline.simulator.scene import read_scene
 from tests.shared_data import PROJECT_ROOT

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.simulator.render import renderer_of
-from pipeline.simulator.shot import mean_grey, picture, scenery_of, still
+from pipeline.simulator.render import mean_grey, picture, renderer_of, scenery_of, still
 from tests.unit.simulated_pipe import small_truth, with_sensor
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.geometry.axis import PipeAxis, frames_at
-from pipeline.simulator.render import renderer_of
-from pipeline.simulator.shot import view_of
+from pipeline.simulator.render import renderer_of, view_of
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.build import bent_axis
 from pipeline.simulator.wall.description import Bend

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.machine.source_code import source_digest
+from pipeline.machine.plan import source_digest
 
 PACKAGE = {
     "__init__.py": "",

@@ -19,7 +19,7 @@ from pipeline.system.native import open3d
 from stages.compare.reference import read_surface, read_wall_map, read_wall_points
 from stages.compare.registration.by_points import register_points
 from stages.compare.registration.by_radius import align_maps
-from stages.compare.verification import (
+from stages.compare.verify import (
     accuracy,
     bore_differences,
     map_differences,

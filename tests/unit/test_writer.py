@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.machine.exporter import Exporter, Writer
-from pipeline.machine.run_folder import claimed
+from pipeline.machine.run_folder import Exporter, Writer, claimed
 
 GATE = threading.Event()
 LOGGER = logging.getLogger("test")

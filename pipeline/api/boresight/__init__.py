@@ -13,9 +13,9 @@ What is wrong with an input is told by an `InputError`, what a recording cannot 
 """
 
 try:
-    from pipeline.api.opened import MissingPackageError, Run, open_run
+    from pipeline.api.run import MissingPackageError, Run, open_run
 except ModuleNotFoundError as error:
-    if error.name not in ("pipeline.api", "pipeline.api.opened"):
+    if error.name not in ("pipeline.api", "pipeline.api.run"):
         raise
     import pipeline
 
@@ -29,7 +29,7 @@ from pipeline.api.run import run
 from pipeline.api.simulate import Simulated, simulate, simulate_like, simulate_pairs
 from pipeline.api.twin import twin
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
-from pipeline.files.shipped import PARAMETERS, PRIORS, SCENES, shipped_names
+from pipeline.files.installed import PARAMETERS, PRIORS, SCENES, shipped_names
 from stages.diagnose.drill.answer import Answer
 
 __all__ = [

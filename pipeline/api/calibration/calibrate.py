@@ -8,14 +8,14 @@ from pathlib import Path
 
 from pipeline.api.job import open_job, result_of, run_job
 from pipeline.files.disk import require_writable
+from pipeline.files.installed import PARAMETERS, file_or_shipped
 from pipeline.files.provenance import MadeBy
-from pipeline.files.shipped import PARAMETERS, file_or_shipped
 from pipeline.instrument.probe_file import write_probe
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import Display, SilentDisplay
-from pipeline.machine.exporter import Exporter
 from pipeline.machine.outcome import warnings_of
 from pipeline.machine.plan import Selection
+from pipeline.machine.run_folder import Exporter
 from stages.calibrate.gauge import GAUGE, GaugeCalibration, require_gauge
 from stages.premises import PREMISES
 from stages.rings import RINGS

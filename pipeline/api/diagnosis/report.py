@@ -7,21 +7,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 
 from pipeline.api.diagnosis.apply import GeometryChange, consequence
-from pipeline.api.diagnosis.figures import (
-    azimuth_figure,
-    candidates_figure,
-    frames_figure,
-    image_figure,
-    simulated_figure,
-    wall_figure,
-)
+from pipeline.arrays import Float
 from pipeline.files.disk import replace_text
 from pipeline.pages import page_template
+from pipeline.pages.figure import rendered, tidy
 from stages.diagnose.compared import OnImage
 from stages.diagnose.resimulate import Resimulated
-from stages.diagnose.result import Diagnosis, Verdict, to_json
+from stages.diagnose.result import Candidate, Diagnosis, Picture, Verdict, WallPicture, to_json
 
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
@@ -90,3 +87,143 @@ def _pictures(found: Diagnosis, shown: Shown) -> dict[str, str]:
     if found.candidates:
         made["candidates"] = candidates_figure(found.candidates)
     return {name: base64.b64encode(png).decode("ascii") for name, png in made.items()}
+
+
+_SHOWN = 10
+_QUANTILE = 98.0
+_UM = 1000.0
+_LONGEST_PX = 60.0
+_ACCENT, _MUTED = "#0a5ea8", "#9aa7b4"
+
+
+def frames_figure(picture: Picture) -> bytes:
+    """Return the ring's residual over azimuth and frame, before and after, on one scale."""
+    extent = (float(picture.frame[0]) - 0.5, float(picture.frame[-1]) + 0.5, -180.0, 180.0)
+    return _pair(picture.before_mm.T, picture.after_mm.T, extent, "frame", "azimuth in C, °")
+
+
+def wall_figure(picture: WallPicture) -> bytes:
+    """Return the residual on the unrolled wall, before and after, on one scale."""
+    extent = (float(picture.distance_mm[0]), float(picture.distance_mm[-1]), -180.0, 180.0)
+    return _pair(picture.before_mm.T, picture.after_mm.T, extent, "distance, mm", "azimuth in P, °")
+
+
+def azimuth_figure(picture: Picture) -> bytes:
+    """Return the residual's mean over all frames against azimuth, with its scatter, before and after."""
+    figure = Figure(figsize=(9.6, 3.2), layout="constrained")
+    axes = figure.subplots()
+    degrees = np.degrees(picture.azimuth_rad)
+    for values, colour, name in (
+        (picture.before_mm, "#b04a00", "before"),
+        (picture.after_mm, _ACCENT, "after"),
+    ):
+        middle, low, high = _quantiles(_UM * values)
+        axes.fill_between(degrees, low, high, color=colour, alpha=0.2, lw=0)
+        axes.plot(degrees, middle, color=colour, label=name)
+    axes.axhline(0, color="#5b6875", lw=0.8)
+    axes.set(
+        xlabel="azimuth in C, °", ylabel="residual radius, µm", xlim=(-180, 180), xticks=range(-180, 181, 45)
+    )
+    tidy(axes)
+    return rendered(figure)
+
+
+def image_figure(shown: OnImage) -> bytes:
+    """Return the residual on the image, before and after, drawn outward so many times as large."""
+    figure = Figure(figsize=(9.6, 5.0), layout="constrained")
+    both = figure.subplots(1, 2, sharex=True, sharey=True)
+    limit = max(float(np.percentile(np.abs(shown.before_px), _QUANTILE)), 0.05)
+    longer = _LONGEST_PX / limit
+    centre = (shown.uv_before.min(0) + shown.uv_before.max(0)) / 2
+    for axes, uv, off, title in zip(
+        both, (shown.uv_before, shown.uv_after), (shown.before_px, shown.after_px), ("Before", "After"),
+        strict=True,
+    ):  # fmt: skip
+        axes.imshow(255 - shown.grey, cmap="gray", vmin=0, vmax=255)
+        away = uv - centre
+        tip = uv + longer * off[:, None] * away / np.linalg.norm(away, axis=1)[:, None]
+        ends = np.stack([uv, tip], 1)
+        lines = LineCollection(list(ends), cmap="RdBu_r", norm=Normalize(-limit, limit), linewidths=1.6)
+        lines.set_array(off)
+        axes.add_collection(lines)
+        axes.set(xlabel="u, px")
+        axes.set_title(f"{title}, frame {shown.frame}, ×{longer:.0f}", fontsize=11, loc="left")
+    reach = 1.15 * float(np.max(np.abs(shown.uv_before - centre))) + _LONGEST_PX
+    both[0].set(
+        xlim=(centre[0] - reach, centre[0] + reach),
+        ylim=(centre[1] + reach, centre[1] - reach),
+        ylabel="v, px",
+    )
+    figure.colorbar(lines, ax=both, label="ring farther out than texture has it, px")
+    return rendered(figure)
+
+
+def simulated_figure(simulated: Resimulated) -> bytes:
+    """Return measured less simulated rings of the held-out frames, without and with what was found."""
+    figure = Figure(figsize=(9.6, 3.6), layout="constrained")
+    both = figure.subplots(1, 2, sharex=True)
+    order = np.argsort(simulated.azimuth_rad)
+    degrees = np.degrees(simulated.azimuth_rad[order])
+    for axes, off, title in zip(
+        both, (simulated.without_px, simulated.with_px), ("Stated instrument", "With what was found"),
+        strict=True,
+    ):  # fmt: skip
+        axes.axhspan(-simulated.floor_px, simulated.floor_px, color="#e0a030", alpha=0.35, lw=0)
+        axes.scatter(degrees, off[order], s=4, color=_ACCENT, lw=0)
+        rms = float(np.sqrt(np.mean(off**2)))
+        axes.set_title(f"{title}: {rms:.3f} px r.m.s.", fontsize=11, loc="left")
+        axes.set(xlabel="azimuth in the image, °", xlim=(-180, 180), xticks=range(-180, 181, 90))
+        axes.grid(alpha=0.3)
+        axes.spines[["top", "right"]].set_visible(False)
+    both[0].set_ylabel("measured − simulated ring, px")
+    return rendered(figure)
+
+
+def candidates_figure(candidates: tuple[Candidate, ...]) -> bytes:
+    """Return what each explanation gains on held-out regimes, the best first."""
+    best = sorted(candidates, key=lambda c: c.heldout_gain, reverse=True)[:_SHOWN]
+    figure = Figure(figsize=(9.6, 0.7 + 0.34 * len(best)), layout="constrained")
+    axes = figure.subplots()
+    place = np.arange(len(best))
+    axes.barh(place - 0.18, [c.gain for c in best], 0.34, color=_MUTED, label="on all measurements")
+    axes.barh(place + 0.18, [c.heldout_gain for c in best], 0.34, color=_ACCENT, label="on held-out regimes")
+    axes.set_yticks(place, [" + ".join(c.names) or "nothing left out" for c in best])
+    axes.invert_yaxis()
+    axes.set(xlabel="drop of χ² against the stated instrument (square-root scale)")
+    axes.set_xscale("function", functions=(_signed_root, _signed_square))
+    tidy(axes)
+    return rendered(figure)
+
+
+def _pair(before: Float, after: Float, extent: tuple[float, float, float, float], x: str, y: str) -> bytes:
+    figure = Figure(figsize=(9.6, 5.2), layout="constrained")
+    both = figure.subplots(2, 1, sharex=True)
+    seen = np.abs(before[np.isfinite(before)])
+    limit = max(float(np.percentile(seen, _QUANTILE)) if len(seen) else 0.0, 1e-3) * _UM
+    for axes, values, title in zip(both, (before, after), ("Before", "After"), strict=True):
+        image = axes.imshow(
+            _UM * values, cmap="RdBu_r", vmin=-limit, vmax=limit, extent=extent, origin="lower",
+            aspect="auto", interpolation="nearest",
+        )  # fmt: skip
+        axes.set_facecolor("#808080")
+        axes.set(ylabel=y, yticks=range(-180, 181, 90))
+        axes.set_title(title, fontsize=11, loc="left")
+    both[1].set_xlabel(x)
+    figure.colorbar(image, ax=both, label="residual radius, µm (grey: not measured)")
+    return rendered(figure)
+
+
+def _quantiles(values: Float) -> tuple[Float, Float, Float]:
+    """Return the median and the middle two thirds (A,) over frames; NaN where nothing was seen."""
+    seen = np.isfinite(values).any(0)
+    out = np.full((3, values.shape[1]), np.nan)
+    out[:, seen] = np.nanpercentile(values[:, seen], [50, 16, 84], axis=0)
+    return out[0], out[1], out[2]
+
+
+def _signed_root(values: Float) -> Float:
+    return np.asarray(np.sign(values) * np.sqrt(np.abs(values)))
+
+
+def _signed_square(values: Float) -> Float:
+    return np.asarray(np.sign(values) * np.square(values))

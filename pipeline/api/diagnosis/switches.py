@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import ALL_EFFECTS
-from pipeline.physics.course import CONSTANTLY, COURSES, Course, CourseKind
+from pipeline.physics.effect import CONSTANTLY, COURSES, Course, CourseKind
 from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.drill.answer import NamedEffect, Value, read_answer
 

@@ -12,7 +12,7 @@ from pipeline.api.diagnosis.switches import Switches, moves_line, switches_of
 from pipeline.api.job import Job, result_of, run_job
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure
 from pipeline.errors import InputError
-from pipeline.files.json_file import read_json
+from pipeline.files.json_yaml import read_json
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import Display
 from pipeline.machine.plan import Selection

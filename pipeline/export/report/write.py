@@ -18,7 +18,7 @@ from pipeline.export.report.pictures import Gallery, gallery
 from pipeline.export.report.summary import RunSummary
 from pipeline.export.report.tables import cards, tables, verdict
 from pipeline.files.codec import digest
-from pipeline.files.version import program_version
+from pipeline.files.installed import program_version
 from pipeline.instrument.probe import Probe
 from pipeline.machine.outcome import Results, warnings_of
 from pipeline.pages import notation

@@ -10,7 +10,6 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.errors import InputError
-from pipeline.instrument.budget.disturbance import DISTURBANCE_NAMES
 from pipeline.instrument.budget.scan import (
     LinePhotometry,
     Pose,
@@ -22,6 +21,7 @@ from pipeline.instrument.budget.scan import (
     without_centre,
 )
 from pipeline.instrument.budget.sources import (
+    DISTURBANCE_NAMES,
     RANDOM_SOURCES,
     Kind,
     Source,

@@ -11,9 +11,8 @@ from scipy.stats import qmc
 
 from pipeline.arrays import Float
 from pipeline.instrument.budget.combine import Budget, Row, parameter_names
-from pipeline.instrument.budget.disturbance import Disturbance
 from pipeline.instrument.budget.scan import Pose, RingScan, radius_error
-from pipeline.instrument.budget.sources import Kind
+from pipeline.instrument.budget.sources import Disturbance, Kind
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.errors import InputError
-from pipeline.instrument.budget.disturbance import Disturbance, observe, observe_jacobian
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.budget.sources import Disturbance, observe, observe_jacobian
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.misalignment import fit_circle, in_image, sheet_on_wall
 from pipeline.instrument.probe import Probe

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.arrays import Bool, Float
-from pipeline.instrument.camera.base import (
+from pipeline.instrument.camera import (
     Projection,
     ProjectionJacobian,
     Rays,

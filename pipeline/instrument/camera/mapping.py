@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from pipeline.files.yaml_file import Section
-from pipeline.instrument.camera.base import Camera
+from pipeline.files.json_yaml import Section
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.plumb_bob import Pinhole, Unified
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.arrays import Bool, Float
-from pipeline.instrument.camera.base import (
+from pipeline.instrument.camera import (
     Projection,
     ProjectionJacobian,
     Rays,

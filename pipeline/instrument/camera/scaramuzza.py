@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from pipeline.arrays import Float
-from pipeline.instrument.camera.base import invert_increasing, smallest_positive_root
+from pipeline.instrument.camera import invert_increasing, smallest_positive_root
 from pipeline.instrument.camera.fisheye import Polar, RadialCamera
 
 # Nodes of the table that an inversion starts from; Newton's steps do the rest.

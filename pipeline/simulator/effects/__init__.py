@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import ALL_EFFECTS
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects import camera, laser, photometric, picture, pose, window
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueInstrument

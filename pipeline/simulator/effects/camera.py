@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from pipeline.errors import InputError
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.truth import SceneTruth, cartesian, with_camera
 

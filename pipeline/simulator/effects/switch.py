@@ -22,8 +22,7 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import CONSTANTLY, COURSES, Course, CourseKind
-from pipeline.physics.effect import Effect, Quantity
+from pipeline.physics.effect import CONSTANTLY, COURSES, Course, CourseKind, Effect, Quantity
 
 _COURSE = "~"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"

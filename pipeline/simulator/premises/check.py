@@ -12,8 +12,7 @@ from pipeline.arrays import Bool, Float, Image
 from pipeline.recording.base import Illumination
 from pipeline.recording.folder import open_folder
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.premises import Premise, require
-from pipeline.simulator.premises.effect import effect_premises
+from pipeline.simulator.premises import Premise, effect_premises, require
 from pipeline.simulator.render import Renderer
 from pipeline.simulator.truth import SceneTruth
 

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Float, Float32, Int
-from pipeline.simulator.wall.defects import imprint, reach_mm
-from pipeline.simulator.wall.description import Bend, Branch, Joint, Pipe, Weld
+from pipeline.simulator.wall.description import Bend, Branch, Joint, Pipe, Weld, imprint, reach_mm
 from pipeline.simulator.wall.grid import Grid, grid_over, window
 from pipeline.simulator.wall.noise import Seeds, above_share, field
 

@@ -19,7 +19,7 @@ from pipeline.adjustment.marginal import ArrowEquations, covariance_of
 from pipeline.adjustment.robust import cluster_covariance
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, skew
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView
 
 POSE = 6

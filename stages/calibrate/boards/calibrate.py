@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.errors import UnusableError
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView, CalibrationReport, ModelScore
 from pipeline.machine.stage import Context
 from stages.calibrate.boards.bundle import Estimate

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.arrays import Bool, Float
 from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import rotation_from_vector, skew
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import (
     BoardSurvey,
     BoardView,

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from pipeline.arrays import Float
 from pipeline.errors import UnusableError
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView, CameraCalibration
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
 from pipeline.machine.stage import Parameters

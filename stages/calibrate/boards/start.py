@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.plumb_bob import Pinhole, Unified

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import rotation_from_vector
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardSurvey, BoardView
 from stages.calibrate.boards.bundle import (
     FLAT,

@@ -15,7 +15,7 @@ from scipy.special import erf
 
 from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import inverse, transform
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import GaugeParameters
 

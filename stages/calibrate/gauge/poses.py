@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, skew, transform
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Recording
 from stages.calibrate.gauge.edges import Sighting

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import inverse, transform
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.recording.base import Illumination, Recording
 from stages.calibrate.gauge.edges import Sighting, detect, detector
 from stages.calibrate.gauge.geometry import Gauge, gauge_of

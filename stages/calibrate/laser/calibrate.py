@@ -16,7 +16,7 @@ from pipeline.adjustment.robust import cluster_sums, robust_spread
 from pipeline.arrays import Float, Image, Int
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import transform
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView, rms
 from pipeline.instrument.laser import NAME, LaserPlane
 from pipeline.machine.stage import Context

@@ -16,7 +16,7 @@ from pydantic import Field
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.geometry.rigid import transform
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.machine.stage import Parameters
 
 _MOST_CANDIDATES, _DRAWS = 4000, 400

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from pipeline.errors import InputError
-from pipeline.files.json_file import read_json
+from pipeline.files.json_yaml import read_json
 
 Verdict = Literal["consistent", "named", "partly", "class", "unexplained", "not_identifiable"]
 # JSON has no NaN: a number that is not known is written as null.

@@ -17,7 +17,7 @@ from pipeline.arrays import Float, Int
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 
 Shape = tuple[float, ...]
 _STEP_RAD = 1e-5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.kinds import Directed, Drifting, Scalar, along_x_and_y, one
 from stages.diagnose.effects.laser import Baseline

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import Course, CourseKind
+from pipeline.physics.effect import Course, CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 
 # Laws of parts that a knock, heat or play can move during a recording, each with its shapes.

@@ -10,8 +10,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import CourseKind
-from pipeline.physics.effect import Quantity
+from pipeline.physics.effect import CourseKind, Quantity
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
 
 

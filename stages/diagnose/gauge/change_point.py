@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.pages import notation
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import TELLING, same
 from stages.diagnose.effects.base import Shape
 from stages.diagnose.gauge.change_point import change_time

@@ -15,7 +15,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Progress, unheard
 from pipeline.physics.catalogue import EFFECTS
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses

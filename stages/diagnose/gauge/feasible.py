@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.arrays import Float, Int
 from pipeline.physics.catalogue import effect
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.gauge.fit import Fit, evidence

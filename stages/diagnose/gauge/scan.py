@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.course import CourseKind
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.gauge.change_point import retimed
 from stages.diagnose.gauge.fit import Fit, evidence, fit

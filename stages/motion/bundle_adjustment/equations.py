@@ -12,7 +12,7 @@ from pipeline.adjustment.motion_priors import LOOSE, smooth_motion_rows
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, robust_spread
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import inverse, transform
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.system.threads import in_threads
 from stages.motion.bundle_adjustment import residuals

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.errors import InputError
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.formats import kalibr, ocamcalib, opencv
 from pipeline.instrument.camera.formats.document import NATIVE_FORMAT, CameraDocument, CameraFormat
 

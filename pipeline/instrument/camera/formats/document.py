@@ -14,8 +14,8 @@ from pathlib import Path
 import yaml
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import LARGEST_BYTES, Section, parse_yaml
-from pipeline.instrument.camera.base import Camera
+from pipeline.files.json_yaml import LARGEST_YAML_BYTES, Section, parse_yaml
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.mapping import camera_from_mapping, camera_to_mapping
 
 
@@ -36,8 +36,8 @@ class CameraDocument:
             When it is absent, a folder, too large or not text.
         """
         try:
-            if path.stat().st_size > LARGEST_BYTES:
-                raise InputError(path, f"is larger than {LARGEST_BYTES} bytes", expected="a camera file")
+            if path.stat().st_size > LARGEST_YAML_BYTES:
+                raise InputError(path, f"is larger than {LARGEST_YAML_BYTES} bytes", expected="a camera file")
             return CameraDocument(path, path.read_text("utf-8-sig"))
         except OSError as error:
             raise InputError(path, f"cannot be read ({error.strerror})", expected="a camera file") from error

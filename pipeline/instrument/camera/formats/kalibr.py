@@ -12,8 +12,8 @@ from pathlib import Path
 import yaml
 
 from pipeline.errors import InputError
-from pipeline.files.yaml_file import Section
-from pipeline.instrument.camera.base import Camera
+from pipeline.files.json_yaml import Section
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat, cannot_hold
 from pipeline.instrument.camera.mapping import image_size, positive, side

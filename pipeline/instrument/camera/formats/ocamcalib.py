@@ -15,7 +15,7 @@ from numpy.polynomial import polynomial
 
 from pipeline.arrays import Float
 from pipeline.errors import InputError
-from pipeline.instrument.camera.base import Camera
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat, cannot_hold
 from pipeline.instrument.camera.mapping import LARGEST_SIDE_PX
 from pipeline.instrument.camera.scaramuzza import Scaramuzza, scaramuzza_problem

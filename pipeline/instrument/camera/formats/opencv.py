@@ -7,8 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from pipeline.files.yaml_file import Section
-from pipeline.instrument.camera.base import Camera
+from pipeline.files.json_yaml import Section
+from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.formats.document import CameraDocument, CameraFormat, cannot_hold
 from pipeline.instrument.camera.mapping import number_list, positive, side

@@ -1,11 +1,24 @@
-"""Files that come with the program, in ``configs``: found by name, in a checkout and in a wheel alike."""
+"""What is installed: the program's version, and the files of ``configs`` that come with it.
+
+Nothing that computes is imported, so that ``boresight --version`` answers at once.
+"""
 
 from __future__ import annotations
 
+from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 
 from pipeline.errors import InputError
+
+
+def program_version() -> str:
+    """Return the version of boresight, ``unknown`` when it is not installed."""
+    try:
+        return version("boresight")
+    except PackageNotFoundError:
+        return "unknown"
+
 
 # In a checkout `pipeline/configs` is a link to the folder `configs`; a wheel holds the files themselves.
 _CONFIGS = Path(str(files("pipeline"))) / "configs"

@@ -1,8 +1,9 @@
-"""Strict reading of small YAML files: safe tags only, no duplicate keys, every complaint with its key."""
+"""JSON and YAML files: read up to a size, checked key by key, refused by file and key."""
 
 from __future__ import annotations
 
 import difflib
+import json
 import math
 import sys
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -14,7 +15,35 @@ import yaml
 
 from pipeline.errors import InputError
 
-LARGEST_BYTES = 1_000_000
+# No larger than what boresight itself writes of the longest run.
+LARGEST_JSON_BYTES = 256 << 20
+
+
+def read_json(file: Path) -> Any:
+    """Return what a JSON file holds.
+
+    Raises
+    ------
+    OSError
+        When it cannot be read.
+    ValueError
+        When it is too large, not UTF-8, not JSON, or nested too deeply.
+    """
+    size = file.stat().st_size
+    if size > LARGEST_JSON_BYTES:
+        raise ValueError(f"it is {size} bytes long, more than {LARGEST_JSON_BYTES}")
+    return parse_json(file.read_text("utf-8"))
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Return what a JSON text holds; raises ValueError when it is not JSON or nested too deeply."""
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
+LARGEST_YAML_BYTES = 1_000_000
 # Likeness of two keys, of 1, from which one is taken for the other misspelt; frames and frame_rate have 0.63.
 _MISSPELT = 0.8
 
@@ -29,9 +58,9 @@ def read_yaml(file: Path) -> Section:
     """
     try:
         size = file.stat().st_size
-        if size > LARGEST_BYTES:
+        if size > LARGEST_YAML_BYTES:
             raise InputError(
-                file, f"is {size} bytes long", expected=f"a YAML file of at most {LARGEST_BYTES} bytes"
+                file, f"is {size} bytes long", expected=f"a YAML file of at most {LARGEST_YAML_BYTES} bytes"
             )
         text = file.read_text("utf-8")
     except OSError as error:
