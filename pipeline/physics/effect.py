@@ -1,4 +1,4 @@
-"""One known physical effect as the catalogue describes it, and its course: constant, step, ramp, with speed."""
+"""One known physical effect as the catalogue describes it, and the course that its size follows."""
 
 from __future__ import annotations
 
