@@ -34,7 +34,7 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("order of the steps", ("stages.catalogue",)),
     ("files for people", ("pipeline.export",)),
     ("review", ("pipeline.review",)),
-    ("many runs, growing runs", ("pipeline.batch", "pipeline.follow")),
+    ("many runs", ("pipeline.batch",)),
     ("public face", ("pipeline.api",)),
     ("commands", ("pipeline.commands",)),
     ("command line", ("pipeline.cli",)),

@@ -8,7 +8,7 @@ from pipeline.artefacts.comparison import OutlinedFinding
 from pipeline.artefacts.findings import DefectKind
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.wall_map import WallMap
-from stages.compare.changes import changes, put_together
+from stages.compare import changes, put_together
 from stages.compare.growth import Resolution
 from stages.compare.paired import PairedWalls
 from stages.compare.registration.by_marks import RegisterParameters, register

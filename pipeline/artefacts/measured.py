@@ -14,7 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.artefacts.wall_map import WallMap
+from pipeline.artefacts.wall_map import FixedToProbe, WallMap
 from pipeline.geometry.axis import PipeAxis
 
 
@@ -230,49 +230,6 @@ class PointCloud:
     distance_mm: Float32
     azimuth_rad: Float32
     frame: Int
-
-
-@dataclass(frozen=True)
-class FixedPlace:
-    """A place of the image at which the line departs from the ring while the wall goes by.
-
-    Attributes
-    ----------
-    azimuth_rad, width_rad : float
-        Where in the image it departs most, and how far it reaches around.
-    departure_mm : float
-        The largest departure, positive into the wall.
-    length_mm : float
-        Length of pipe over which it stays.
-    frame_from, frame_to : int
-    on_probe : bool
-        True where the probe rolled and the place did not follow the wall; false where a groove or ridge along
-        the pipe would look alike.
-    """
-
-    azimuth_rad: float
-    width_rad: float
-    departure_mm: float
-    length_mm: float
-    frame_from: int
-    frame_to: int
-    on_probe: bool
-
-
-@dataclass(frozen=True)
-class FixedToProbe:
-    """What stays at one place of the image, and so does not belong to the wall, or may not.
-
-    Attributes
-    ----------
-    departure_mm : (S, A) float32
-        By how much the line departs, without sign, on the cells of the radius map that were seen there; 0
-        elsewhere.
-    places : tuple of FixedPlace
-    """
-
-    departure_mm: Float32
-    places: tuple[FixedPlace, ...]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Float, Float32
 
 # float32 in a run's own map, float64 in a reference.
 Real = NDArray[Any]
@@ -66,6 +66,49 @@ class WallMap:
         """Return radius, its σ, and its random σ at a point; NaN where nothing was seen."""
         at = self.row(distance_mm), self.column(azimuth_rad)
         return float(self.radius_mm[at]), float(self.sigma_mm[at]), float(self.sigma_random_mm[at])
+
+
+@dataclass(frozen=True)
+class FixedPlace:
+    """A place of the image at which the line departs from the ring while the wall goes by.
+
+    Attributes
+    ----------
+    azimuth_rad, width_rad : float
+        Where in the image it departs most, and how far it reaches around.
+    departure_mm : float
+        The largest departure, positive into the wall.
+    length_mm : float
+        Length of pipe over which it stays.
+    frame_from, frame_to : int
+    on_probe : bool
+        True where the probe rolled and the place did not follow the wall; false where a groove or ridge along
+        the pipe would look alike.
+    """
+
+    azimuth_rad: float
+    width_rad: float
+    departure_mm: float
+    length_mm: float
+    frame_from: int
+    frame_to: int
+    on_probe: bool
+
+
+@dataclass(frozen=True)
+class FixedToProbe:
+    """What stays at one place of the image, and so does not belong to the wall, or may not.
+
+    Attributes
+    ----------
+    departure_mm : (S, A) float32
+        By how much the line departs, without sign, on the cells of the radius map that were seen there; 0
+        elsewhere.
+    places : tuple of FixedPlace
+    """
+
+    departure_mm: Float32
+    places: tuple[FixedPlace, ...]
 
 
 def cells_within(polygon: Float, shape: tuple[int, int]) -> Bool:

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.api.calibration import calibrate as calibration
+from pipeline.api import calibrate as calibration
 from pipeline.commands.working import Assignments, ConfigFile, print_warnings
 from pipeline.machine.display import ProgressDisplay
 from stages.calibrate.gauge import GaugeCalibration

@@ -21,8 +21,8 @@ from rich.table import Table
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.files.disk import written_together
-from pipeline.instrument.budget.combine import Budget
-from pipeline.instrument.budget.combine import error_budget as analytic_budget
+from pipeline.instrument.budget import Budget
+from pipeline.instrument.budget import error_budget as analytic_budget
 from pipeline.instrument.budget.design import (
     BaselineStudy,
     Tolerance,

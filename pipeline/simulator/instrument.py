@@ -6,7 +6,6 @@ Light is counted in full scales of the sensor: 1 is the light at which a pixel c
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 from scipy.stats import exponnorm
@@ -17,6 +16,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Shutter
 from pipeline.simulator.window import Window
 
+Bgr = tuple[float, float, float]
 # An exponentially modified Gaussian has a skewness below 2 (a pure exponential); 1.9 leaves a normal part.
 _LARGEST_SKEWNESS = 1.9
 
@@ -45,10 +45,9 @@ class LineProfile:
 
     def density(self, height_mm: Float) -> Float:
         """Return the density (...), 1/mm, at heights (...)."""
-        line = self._line(np.asarray(height_mm, float))
-        if not self.copy_relative:
-            return line
-        return line + self.copy_relative * self._line(np.asarray(height_mm, float) - self.copy_mm)
+        height = np.asarray(height_mm, float)
+        copy = self.copy_relative * self._line(height - self.copy_mm) if self.copy_relative else 0.0
+        return self._line(height) + copy
 
     def reach_mm(self) -> tuple[float, float]:
         """Return heights outside which the density is below 10⁻⁶ of the peak."""
@@ -74,15 +73,11 @@ class LineProfile:
     def _own(self, height_mm: Float) -> Float:
         tau = self._exponential_mm()
         if abs(tau) < 1e-3 * self.sigma_mm:
-            return np.asarray(
-                np.exp(-0.5 * (height_mm / self.sigma_mm) ** 2) / (self.sigma_mm * np.sqrt(2 * np.pi))
-            )
+            bell = np.exp(-0.5 * (height_mm / self.sigma_mm) ** 2)
+            return np.asarray(bell / (self.sigma_mm * np.sqrt(2 * np.pi)))
         normal = float(np.sqrt(self.sigma_mm**2 - tau**2))
         signed = np.sign(tau) * height_mm
         return np.asarray(exponnorm.pdf(signed, abs(tau) / normal, loc=-abs(tau), scale=normal))
-
-
-Bgr = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -302,10 +297,3 @@ class TrueInstrument:
     sensor: TrueSensor = TrueSensor()
     shutter: Shutter = field(default_factory=Shutter)
     flicker: Flicker = Flicker()
-
-
-class Change(Protocol):
-    """What happens to the instrument with time: a drift, a rocking."""
-
-    def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
-        """Return the instrument as it is at ``time_s`` given what it would be without this change."""

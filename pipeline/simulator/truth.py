@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
-from pipeline.simulator.instrument import Change, TrueInstrument
+from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.motion import Motion, Odometer
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.wall.grid import Wall
+
+
+class Change(Protocol):
+    """What happens to the instrument with time: a drift, a rocking."""
+
+    def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
+        """Return the instrument as it is at ``time_s`` given what it would be without this change."""
 
 
 @dataclass(frozen=True)

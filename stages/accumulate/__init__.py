@@ -7,13 +7,12 @@ from pydantic import Field
 
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import (
-    FixedPlace,
-    FixedToProbe,
     RingPoints,
     RingSamples,
     Trajectory,
     Wall,
 )
+from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage

@@ -17,7 +17,7 @@ from scipy.ndimage import label
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import FixedPlace, FixedToProbe
+from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.machine.scratch import Scratch
 from stages.accumulate.grid import MapGrid
 from stages.accumulate.survey import RingSurvey

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
-from pipeline.artefacts.measured import FixedToProbe, PointCloud, RadiusMap, Wall
+from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
+from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
 from stages.accumulate.grid import MapGrid, gridded, rings_on_columns

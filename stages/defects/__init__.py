@@ -23,7 +23,8 @@ from scipy.special import ndtri
 from pipeline.arrays import Float
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
-from pipeline.artefacts.measured import FixedToProbe, RingSamples, Wall, WallTexture
+from pipeline.artefacts.measured import RingSamples, Wall, WallTexture
+from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording

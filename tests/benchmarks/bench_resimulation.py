@@ -25,10 +25,10 @@ import numpy as np
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Image, Int
 from pipeline.recording import open_recording
-from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.scene import LightScene
 from pipeline.simulator.truth import SceneTruth
+from tests.exact_rings import exact_rings
 from tests.resimulation import fitted_probe, truth_of_recording, with_probe
 from tests.resimulation_compare import lights_of, line_radii, matched, psnr_db
 from tests.shared_data import shared

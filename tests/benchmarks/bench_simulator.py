@@ -26,7 +26,6 @@ import cv2
 import numpy as np
 
 from pipeline.simulator.build import build_truth
-from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.produce import Order, Places, produce
 from pipeline.simulator.render import Renderer, Shot, renderer_of, view_of
 from pipeline.simulator.scene import read_scene
@@ -35,6 +34,7 @@ from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.view import View
 from pipeline.simulator.wall_light import lamps_of
 from pipeline.simulator.wall_tiles import add_wall
+from tests.exact_rings import exact_rings
 from tests.simulated import SCENES
 
 _AZIMUTHS, _REACH_PX, _STEP_PX = 360, 12.0, 0.05

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.api.calibration.calibrate import STAGES, calibrate
+from pipeline.api.calibrate import STAGES, calibrate
 from pipeline.errors import InputError
 from pipeline.instrument.probe_file import read_probe, read_with_source
 from pipeline.machine.configuration import resolve

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from pipeline.api.calibration import calibrate as calibrating
+from pipeline.api import calibrate as calibrating
 from pipeline.api.diagnosis import diagnose as diagnosing
 from pipeline.cli import app
 from pipeline.commands import calibrate_camera as calibrating_camera

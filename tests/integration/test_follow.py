@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.commands.follow import new_sections, restarted
+from pipeline.commands.follow import Snapshot, new_sections, restarted, snapshots
 from pipeline.errors import Cancelled, InputError
-from pipeline.follow import Snapshot, snapshots
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from stages.preview import preliminary_sections

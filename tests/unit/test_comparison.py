@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.artefacts.comparison import FAMILY_ERROR, Fate
 from pipeline.errors import UnusableError
-from stages.compare.changes import changes, holm, put_together
+from stages.compare import changes, holm, put_together
 from stages.compare.paired import PairedWalls
 from stages.compare.registration.by_marks import register
 from tests.two_walls import (

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.instrument.budget.combine import error_budget, parameter_names
+from pipeline.instrument.budget import error_budget, parameter_names
 from pipeline.instrument.budget.design import baseline_study, dominant_rows, tolerances
 from pipeline.instrument.budget.monte_carlo import monte_carlo
 from pipeline.instrument.budget.scan import (

@@ -8,12 +8,12 @@ from pipeline.physics.catalogue import effect
 from pipeline.simulator.build import plain_truth
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch
-from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.prior import read_prior
 from stages.calibrate.gauge.geometry import gauge_of
 from stages.diagnose.effects.library import without
 from tests.benchmarks.bench_diagnosis import PRIOR, Mode, drawn, of_positions
 from tests.benchmarks.ring_level import Eye, Noise, ring_level_run, seen_at, traced_ring
+from tests.exact_rings import exact_rings
 
 AZIMUTH = np.linspace(-np.pi, np.pi, 24, endpoint=False)
 OUTWARD = np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)], -1)

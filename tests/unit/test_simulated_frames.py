@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.simulator.exact import exact_rings
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import through_lens
+from tests.exact_rings import exact_rings
 from tests.unit.simulated_pipe import small_truth, with_sensor
 
 AZIMUTHS = 180

@@ -23,7 +23,7 @@ except ModuleNotFoundError as error:
         f"another package named pipeline hides boresight's own: {list(pipeline.__path__)}. "
         "Install boresight in an environment without it."
     ) from error
-from pipeline.api.calibration.calibrate import Calibration, calibrate
+from pipeline.api.calibrate import Calibration, calibrate
 from pipeline.api.diagnosis.diagnose import DiagnosisFolder, diagnose, open_diagnosis
 from pipeline.api.run import run
 from pipeline.api.simulate import Simulated, simulate, simulate_like, simulate_pairs

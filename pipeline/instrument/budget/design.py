@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.errors import InputError
-from pipeline.instrument.budget.combine import Budget, Row, error_budget
+from pipeline.instrument.budget import Budget, Row, error_budget
 from pipeline.instrument.budget.scan import LinePhotometry, Pose, RingScan, at_baseline
 from pipeline.instrument.budget.sources import Kind
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from pipeline.arrays import Float
-from pipeline.instrument.budget.combine import Budget, Row, parameter_names
+from pipeline.instrument.budget import Budget, Row, parameter_names
 from pipeline.instrument.budget.scan import Pose, RingScan, radius_error
 from pipeline.instrument.budget.sources import Disturbance, Kind
 

@@ -69,7 +69,7 @@ class Coursed:
         return cls(replace(scene, changes=()), switch)
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
-        """See `pipeline.simulator.instrument.Change`."""
+        """See `pipeline.simulator.truth.Change`."""
         start = float(self.scene.frames.time_s[0])
         before, here, after = self.scene.motion.distance_mm.at(time_s + _STEP_S * np.array([-1.0, 0.0, 1.0]))
         part = self.switch.course.factor(time_s - start, here, (after - before) / (2 * _STEP_S))

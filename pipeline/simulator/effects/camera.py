@@ -31,7 +31,7 @@ class BaselineDrift:
     warming: Warming
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
-        """See `pipeline.simulator.instrument.Change`."""
+        """See `pipeline.simulator.truth.Change`."""
         sheet = instrument.laser.sheet
         grown = replace(sheet, baseline_mm=sheet.baseline_mm + self.drift_mm * self.warming.share(time_s))
         return replace(instrument, laser=replace(instrument.laser, sheet=grown))
@@ -45,7 +45,7 @@ class FocalDrift:
     warming: Warming
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
-        """See `pipeline.simulator.instrument.Change`."""
+        """See `pipeline.simulator.truth.Change`."""
         model = magnified(instrument.camera.model, self.relative * self.warming.share(time_s))
         return replace(instrument, camera=replace(instrument.camera, model=model))
 
@@ -59,7 +59,7 @@ class CentreDrift:
     warming: Warming
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
-        """See `pipeline.simulator.instrument.Change`."""
+        """See `pipeline.simulator.truth.Change`."""
         gone = self.shift_px * self.warming.share(time_s)
         model = shifted(instrument.camera.model, gone, self.direction_deg)
         return replace(instrument, camera=replace(instrument.camera, model=model))

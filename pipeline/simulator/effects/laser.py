@@ -25,7 +25,7 @@ class Rocking:
     start_s: float
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
-        """See `pipeline.simulator.instrument.Change`."""
+        """See `pipeline.simulator.truth.Change`."""
         phase = 2 * math.pi * self.frequency_hz * (time_s - self.start_s)
         sheet = tilted(instrument.laser.sheet, self.amplitude_rad * math.sin(phase), self.direction_deg)
         return replace(instrument, laser=replace(instrument.laser, sheet=sheet))

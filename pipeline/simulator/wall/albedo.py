@@ -1,4 +1,7 @@
-"""The wall's reflectance: texture or a photograph, stains, and traces of defects and welds."""
+"""The wall's reflectance: texture or a photograph, stains, traces of defects and welds, and ArUco markers.
+
+Markers are painted with columns along +azimuth and rows along +distance, in a white zone.
+"""
 
 from __future__ import annotations
 

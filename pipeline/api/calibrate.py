@@ -102,7 +102,7 @@ def calibrate(
 def write_calibration(result: GaugeCalibration, made_by: MadeBy, folder: Path) -> None:
     """Write probe.yaml, calibration.json and calibration.html."""
     # matplotlib takes a second to load, for which a refusal need not wait
-    from pipeline.api.calibration.report import write_report
+    from pipeline.api.calibration_report import write_report
 
     write_probe(result.probe, folder / "probe.yaml", made_by)
     write_report(result, made_by, folder)
