@@ -19,6 +19,10 @@ from stages.motion.route.rotation_graph import STRAIGHT_MM, STRAIGHTNESS_RAD
 STEP_MM, SPEED_MM_S, RADIUS_MM = 50.0, 150.0, 50.0
 WALK = 1e-4 / np.sqrt(1000.0)
 """1 σ of vision's heading, rad/√mm: 0.1 mrad after a metre, 1 mrad after a hundred."""
+SCALE = 1e-3
+"""1 σ of the scale of distance: an encoder's wheel worn by a thousandth."""
+RESPONSE = 0.01
+"""1 σ of a gyroscope's scales and of what an axis shows of turns about another, as consumer chips have."""
 
 
 @dataclass(frozen=True)
@@ -82,14 +86,14 @@ def chain(
         R_seen.append(R_seen[-1] @ turn @ off)
     R = np.array(R_seen)
     way = np.einsum("kij,kj->ki", _middle(R) @ np.swapaxes(_middle(R_true), 1, 2), np.diff(origin, axis=0))
-    place = np.concatenate([np.zeros((1, 3)), np.cumsum(way, 0)])
+    place = np.concatenate([np.zeros((1, 3)), np.cumsum(way, 0)]) * (1 + SCALE * random.standard_normal())
     covariance = np.zeros((len(s), 6, 6))
     covariance[:, [3, 4, 5], [3, 4, 5]] = (WALK**2 * (s - s[0]))[:, None]
-    covariance[:, 2, 2] = (1e-4 * (s - s[0])) ** 2
+    covariance[:, :3, :3] = SCALE**2 * place[:, :, None] * place[:, None, :]
     seen_axis = axis_through(place[np.append(True, np.diff(s) > 0)], np.array([1.0, 0.0, 0.0]), 0.0)
     seen = Trajectory(
         np.arange(len(s)), time_s, from_parts(R, place), covariance, seen_axis, RADIUS_MM,
-        1.0, 0.0, 0.0, (), distance_sigma_mm=1e-4 * float(s[-1]),
+        1.0, 0.0, 0.0, (), distance_sigma_mm=SCALE * float(s[-1]),
     )  # fmt: skip
     return Chain(seen, from_parts(R_true, origin), axis)
 
@@ -122,7 +126,8 @@ def drawn_imu(run: Chain, mount: ImuMount, up_p: Float, seed: int = 0, rate_hz: 
     n = (len(at), 3)
     walk = np.cumsum(random.standard_normal(n), 0) * mount.gyroscope_random_walk / np.sqrt(rate_hz)
     bias = 0.02 * random.standard_normal(3) + walk
-    gyro = np.diff(passed, axis=0) * rate_hz @ mount.R_ci + bias
+    response = np.eye(3) + RESPONSE * random.standard_normal((3, 3))
+    gyro = np.diff(passed, axis=0) * rate_hz @ mount.R_ci @ response + bias
     gyro += mount.gyroscope_noise_density * np.sqrt(rate_hz) * random.standard_normal(n)
     force = np.einsum("nij,i->nj", R_pc, 9.81 * up_p) @ mount.R_ci
     force += mount.accelerometer_bias * random.standard_normal(3)

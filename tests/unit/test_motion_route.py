@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import Trajectory
+from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.instrument.probe import ImuMount
 from pipeline.recording.base import Imu, PipeFacts, PlannedPiece
@@ -120,12 +121,16 @@ def test_short_runs_stay_as_they_are() -> None:
     assert [p.kind for p in found.pieces] == ["straight"]
 
 
-def test_sigma_along_the_way_is_true_of_drawn_runs() -> None:
+STRETCH = curved((12e3, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(("axis", "has_imu"), [(STRETCH, False), (BENT, True)])
+def test_sigma_along_the_way_is_true_of_drawn_runs(axis: PipeAxis, has_imu: bool) -> None:
     """Twice or half the σ fails: `python -m tests.benchmarks.bench_route` counts more runs of more kinds."""
     z = []
     for seed in range(4):
         drift = 1e-5 * np.random.default_rng(seed).standard_normal(2)
-        run = chain(bowed(curved((12e3, 0.0, 0.0)), seed), (drift[0], drift[1]), seed + 7)
-        z.append(errors_in_sigma(laid(run), run, [120, -1]))
-    across_and_turns = np.array(z)[..., [0, 1, 3, 4, 5]]
-    assert 0.6 < np.sqrt(np.mean(across_and_turns**2)) < 1.4
+        run = chain(bowed(axis, seed), (drift[0], drift[1]), seed + 7, rest_s=20.0 * has_imu)
+        found = laid(run, drawn_imu(run, MOUNT, UP, seed) if has_imu else None, mount=MOUNT)
+        z.append(errors_in_sigma(found, run, [len(run.T_pc) // 2, -1]))
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.4

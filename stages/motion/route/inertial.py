@@ -28,8 +28,9 @@ _STILL_S, _STILL_MM, _EASED_S = 2.0, 0.1, 0.3
 """A probe stands that moves by less than 0.1 mm in 2 s; 0.3 s at both ends are left out. Not measured."""
 _LEAST_BIAS_RAD_S = 2e-6
 """Least 1 σ of a bias at rest: the Earth turns by 7e-5 rad/s, and a probe by some degrees on its way."""
-_SCALE_ERROR = 0.01
-"""1 σ of a gyroscope's scale: data sheets of consumer chips state 1 to 3 % at most."""
+_RESPONSE_ERROR = 0.01
+"""1 σ of a gyroscope's scale, and of what it shows of a turn about another axis: data sheets of consumer
+chips state 1 to 3 % and 1 to 2 %. The same all the way, so that bends that the camera sees tell them."""
 _LEAST_FORCE_M_S2 = 0.01
 """Smallest 1 σ of a mean force that is believed: a milligravity."""
 _TURNING, _APART = 3.0, 0.5
@@ -69,19 +70,23 @@ def inertia_at(
         return None
     inner = (imu.time_s > time_s[0]) & (imu.time_s < time_s[-1])
     at = np.unique(np.concatenate([time_s, imu.time_s[inner]]))
-    turned, node = _rotations(imu, mount, at), np.searchsorted(at, time_s)
+    bias_c = _usual_bias(imu, mount, time_s, R_pc)
+    turned, node = _rotations(imu, mount, at, bias_c), np.searchsorted(at, time_s)
+    back = np.swapaxes(turned[node[1:]], 1, 2)
     R_step = np.swapaxes(turned[node[:-1]], 1, 2) @ turned[node[1:]]
+    # Bias turns in C as it lies at each moment, and the rest of the step turns on from there.
+    passed = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(turned[1:] * np.diff(at)[:, None, None], 0)])
+    by_bias = back @ (passed[node[1:]] - passed[node[:-1]])
     step_s = np.diff(time_s)
     force_c = _mean_forces(imu, mount, at, turned, node)
     shown = np.einsum("kij,kj->ki", R_pc, force_c)
     # Second differences leave out gravity, of which vision's rotation is known only slowly: their σ is √6.
     scatter = robust_spread(np.diff(shown, 2, axis=0).ravel()) / np.sqrt(6) if len(shown) > 4 else 0.0
     noise = mount.accelerometer_noise_density / np.sqrt(_MEAN_S)
-    by_scale = _SCALE_ERROR * np.linalg.norm(vector_from_rotation(R_step), axis=1)
     return Inertia(
-        R_step, step_s, mount.gyroscope_noise_density**2 * step_s + by_scale**2,
+        R_step, by_bias, bias_c, step_s, mount.gyroscope_noise_density**2 * step_s,
         mount.gyroscope_random_walk**2 * step_s, force_c,
-        float(max(scatter, noise, _LEAST_FORCE_M_S2)), mount.accelerometer_bias,
+        float(max(scatter, noise, _LEAST_FORCE_M_S2)), mount.accelerometer_bias, _RESPONSE_ERROR,
         _rests(imu, mount, time_s, still),
     )  # fmt: skip
 
@@ -146,9 +151,20 @@ def _refusal(imu: Imu, time_s: Float) -> str:
     return ""
 
 
-def _rotations(imu: Imu, mount: ImuMount, at: Float) -> Float:
+def _usual_bias(imu: Imu, mount: ImuMount, time_s: Float, R_pc: Float) -> Float:
+    """Return by how much (3,) the gyroscope usually turns more than the camera, rad/s in C."""
+    passed = np.concatenate(
+        [np.zeros((1, 3)), np.cumsum(imu.rate_rad_s[1:] * np.diff(imu.time_s)[:, None], 0)]
+    )
+    told = np.diff(np.stack([np.interp(time_s, imu.time_s, passed[:, i]) for i in range(3)], -1), axis=0)
+    seen = vector_from_rotation(np.swapaxes(R_pc[:-1], 1, 2) @ R_pc[1:])
+    return np.asarray(np.median((told @ mount.R_ci.T - seen) / np.diff(time_s)[:, None], axis=0))
+
+
+def _rotations(imu: Imu, mount: ImuMount, at: Float, bias_c: Float) -> Float:
     """Return the rotations (n, 3, 3) in C from the first of ascending times to each, rates linear between."""
     rate = np.stack([np.interp(at, imu.time_s, imu.rate_rad_s[:, i]) for i in range(3)], -1) @ mount.R_ci.T
+    rate = rate - bias_c
     small = rotation_from_vector((rate[1:] + rate[:-1]) / 2 * np.diff(at)[:, None])
     return np.array(list(accumulate(small, np.matmul, initial=np.eye(3))))
 

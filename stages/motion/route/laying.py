@@ -15,8 +15,8 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import PlannedPiece, Recording
 from stages.motion.route.alignment import HEADING_DRIFT, find_pieces
 from stages.motion.route.inertial import contradicts, inertia_at, still_spans
-from stages.motion.route.nodes import Inertia, Nodes, PlannedTurn
-from stages.motion.route.rotation_graph import STRAIGHT_MM, RotationGraph, Rotations
+from stages.motion.route.nodes import Inertia, Nodes, PlannedTurn, Rotations
+from stages.motion.route.rotation_graph import STRAIGHT_MM, RotationGraph
 
 _MOST_NODES = 120
 """Nodes at most: the graph is solved densely, and a way between two is 0.8 % of the run."""
@@ -253,7 +253,8 @@ def _carried(old: PipeAxis, new: PipeAxis, s: Float, turn: Float, T_pc: Float) -
 def _covariance(trajectory: Trajectory, s: Float, distance_mm: Float, rotations: Rotations) -> Float:
     """Return the poses' covariance (N, 6, 6).
 
-    Across the pipe a place errs by the turns before it, times the way since; along it as it did before.
+    Across the pipe a place errs by the turns before it, times the way since. Along it errs as it did before,
+    in proportion to the way: behind a bend the lengths before it err across. What is beyond that is random.
     """
     count, node = len(distance_mm), frames_at(trajectory.axis, distance_mm)
     step = np.diff(node[0], axis=0)
@@ -266,9 +267,14 @@ def _covariance(trajectory: Trajectory, s: Float, distance_mm: Float, rotations:
     turned = by_turn @ rotations.covariance
     whole = (turned @ by_turn.T, turned, rotations.covariance)
     place, mixed, turning = (np.einsum("kikj->kij", m.reshape(count, 3, count, 3)) for m in whole)
-    tangent = node[1][:, :, 2]
+    tangent, way = node[1][:, :, 2], node[0] - node[0][0]
     along = np.einsum("ki,kij,kj->k", tangent, at[:, :3, :3], tangent)
-    place = place + along[:, None, None] * tangent[:, :, None] * tangent[:, None, :]
+    ahead = np.sum(tangent * way, axis=1) ** 2
+    scale = float(along.sum() / max(ahead.sum(), 1e-9))
+    rest = np.maximum(along - scale * ahead, 0.0)[:, None, None]
+    place = (
+        place + scale * way[:, :, None] * way[:, None, :] + rest * tangent[:, :, None] * tangent[:, None, :]
+    )
     own = np.block([[place, mixed], [np.swapaxes(mixed, 1, 2), turning]])
     right = np.clip(np.searchsorted(distance_mm, s), 1, count - 1)
     share = np.clip((s - distance_mm[right - 1]) / np.diff(distance_mm)[right - 1], 0, 1)[:, None, None]

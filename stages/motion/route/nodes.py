@@ -1,8 +1,10 @@
-"""What is known of a run's rotation at nodes along its axis: by vision, by an IMU, by a plan."""
+"""A run's rotation at nodes along its axis: what vision, an IMU and a plan say of it, and the answer."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pipeline.arrays import Float, Int
 
@@ -51,7 +53,11 @@ class Inertia:
     Attributes
     ----------
     R_step : (K - 1, 3, 3)
-        Rotation from node to node by the gyroscope, as if it had no bias.
+        Rotation from node to node by the gyroscope, `bias_c` taken off its readings.
+    by_bias : (K - 1, 3, 3)
+        By how much that rotation, as a vector in C at its end, shrinks with more bias, s.
+    bias_c : (3,)
+        Rough bias, rad/s: what the gyroscope usually turns more than the camera.
     step_s : (K - 1,)
     step_variance, walk_variance : (K - 1,)
         Of that rotation, rad², and of the change of the bias, rad²/s².
@@ -59,16 +65,22 @@ class Inertia:
         Mean specific force about each node, m/s².
     force_sigma, force_bias_sigma : float
         1 σ of its changing and of its constant error, m/s².
+    response_sigma : float
+        1 σ of each element of what the gyroscope adds to a turn: of its scales and of what one axis shows of
+        another's turn.
     rests : tuple of Rest
     """
 
     R_step: Float
+    by_bias: Float
+    bias_c: Float
     step_s: Float
     step_variance: Float
     walk_variance: Float
     force_c: Float
     force_sigma: float
     force_bias_sigma: float
+    response_sigma: float
     rests: tuple[Rest, ...] = ()
 
 
@@ -79,3 +91,49 @@ class PlannedTurn:
     length: int
     angle_rad: float
     sigma_rad: float
+
+
+@dataclass(frozen=True)
+class Rotations:
+    """The answer: rotations of the run in P at the nodes, and which way is up.
+
+    Attributes
+    ----------
+    turn_p : (K, 3, 3)
+    covariance : (3 K, 3 K)
+        Of the nodes' rotations as rotation vectors in P.
+    drift : (2,)
+        The camera's drift of heading about its x and y, rad/mm.
+    up_p : (3,) or None
+        None without an IMU.
+    up_covariance : (3, 3)
+    turn_with_up : (3 K, 3)
+        Covariance of the nodes' rotations with ``up_p``.
+    """
+
+    turn_p: Float
+    covariance: Float
+    drift: Float
+    up_p: Float | None
+    up_covariance: Float
+    turn_with_up: Float
+
+    @property
+    def clock_sigma_rad(self) -> float:
+        """Return 1 σ of the angle of up about P's z."""
+        by_up = self._clock_by_up()
+        return float(np.sqrt(by_up @ self.up_covariance @ by_up))
+
+    def about_up(self) -> Rotations:
+        """Return them with the errors that they have once P is turned about z until up is its −y."""
+        by_up = self._clock_by_up()
+        about_z = np.tile([0.0, 0.0, 1.0], len(self.turn_p))
+        mixed = np.outer(self.turn_with_up @ by_up, about_z)
+        own = self.clock_sigma_rad**2 * np.outer(about_z, about_z)
+        return replace(self, covariance=self.covariance - mixed - mixed.T + own)
+
+    def _clock_by_up(self) -> Float:
+        """Return the derivative (3,) of the angle of up about z."""
+        assert self.up_p is not None
+        x, y, _ = self.up_p
+        return np.asarray(np.array([-y, x, 0.0]) / (x * x + y * y))

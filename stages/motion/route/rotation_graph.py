@@ -16,7 +16,7 @@ from scipy.special import chdtri
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import rotation_from_vector, skew, vector_from_rotation
 from stages.motion.route.alignment import HEADING_DRIFT
-from stages.motion.route.nodes import Inertia, Nodes, PlannedTurn
+from stages.motion.route.nodes import Inertia, Nodes, PlannedTurn, Rotations
 
 _Parts = list[tuple[Int, Float | float]]
 
@@ -43,67 +43,26 @@ _LEAST_FREE = 10.0
 
 
 @dataclass(frozen=True)
-class Rotations:
-    """The answer: rotations of the run in P at the nodes, and which way is up.
-
-    Attributes
-    ----------
-    turn_p : (K, 3, 3)
-    covariance : (3 K, 3 K)
-        Of the nodes' rotations as rotation vectors in P.
-    drift : (2,)
-        The camera's drift of heading about its x and y, rad/mm.
-    up_p : (3,) or None
-        None without an IMU.
-    up_covariance : (3, 3)
-    turn_with_up : (3 K, 3)
-        Covariance of the nodes' rotations with ``up_p``.
-    """
-
-    turn_p: Float
-    covariance: Float
-    drift: Float
-    up_p: Float | None
-    up_covariance: Float
-    turn_with_up: Float
-
-    @property
-    def clock_sigma_rad(self) -> float:
-        """Return 1 σ of the angle of up about P's z."""
-        by_up = self._clock_by_up()
-        return float(np.sqrt(by_up @ self.up_covariance @ by_up))
-
-    def about_up(self) -> Rotations:
-        """Return them with the errors that they have once P is turned about z until up is its −y."""
-        by_up = self._clock_by_up()
-        about_z = np.tile([0.0, 0.0, 1.0], len(self.turn_p))
-        mixed = np.outer(self.turn_with_up @ by_up, about_z)
-        own = self.clock_sigma_rad**2 * np.outer(about_z, about_z)
-        return replace(self, covariance=self.covariance - mixed - mixed.T + own)
-
-    def _clock_by_up(self) -> Float:
-        """Return the derivative (3,) of the angle of up about z."""
-        assert self.up_p is not None
-        x, y, _ = self.up_p
-        return np.asarray(np.array([-y, x, 0.0]) / (x * x + y * y))
-
-
-@dataclass(frozen=True)
 class _State:
-    """Unknowns: rotations (K, 3, 3), drift (2,), directions (L, 3), biases (K, 3), force (3,), up (3,)."""
+    """Unknowns.
+
+    Rotations (K, 3, 3), drift (2,), directions (L, 3), biases beyond the rough one (K, 3), what the gyroscope
+    adds of a turn (3, 3), the accelerometer's constant error (3,), up (3,).
+    """
 
     turn: Float
     drift: Float
     direction: Float
     bias: Float
+    response: Float
     force: Float
     up: Float
 
     def columns(self) -> dict[str, Int]:
         """Return the columns of each unknown's step."""
-        sizes = [self.turn.shape[0] * 3, 2, self.direction.size, self.bias.size, 3, 3]
+        sizes = [self.turn.shape[0] * 3, 2, self.direction.size, self.bias.size, 9, 3, 3]
         ends = np.cumsum([0, *sizes])
-        names = ("turn", "drift", "direction", "bias", "force", "up")
+        names = ("turn", "drift", "direction", "bias", "response", "force", "up")
         return {n: np.arange(a, b) for n, a, b in zip(names, ends[:-1], ends[1:], strict=True)}
 
     @property
@@ -119,6 +78,7 @@ class _State:
             self.drift + step[at["drift"]],
             self.direction + step[at["direction"]].reshape(-1, 3),
             self.bias + step[at["bias"]].reshape(-1, 3),
+            self.response + step[at["response"]].reshape(3, 3),
             self.force + step[at["force"]],
             self.up + step[at["up"]],
         )
@@ -208,7 +168,15 @@ class RotationGraph:
         if self.inertia is not None:
             up = nodes.R_pc[0] @ self.inertia.force_c[0]
         turn = np.broadcast_to(np.eye(3), (count, 3, 3)).copy()
-        return _State(turn, np.zeros(2), direction.reshape(-1, 3), np.zeros((count, 3)), np.zeros(3), up)
+        return _State(
+            turn,
+            np.zeros(2),
+            direction.reshape(-1, 3),
+            np.zeros((count, 3)),
+            np.zeros((3, 3)),
+            np.zeros(3),
+            up,
+        )
 
     def _excess(self) -> float:
         """Return by how much vision's squared errors exceed what is left of their variance, at least 1."""
@@ -268,7 +236,7 @@ class RotationGraph:
     def _add_inertia(self, out: _Equations, state: _State, turn: Int, at: dict[str, Int]) -> None:
         inertia, bias = self.inertia, at["bias"].reshape(-1, 3)
         if inertia is None:
-            for name in ("bias", "force", "up"):  # nothing depends on them
+            for name in ("bias", "response", "force", "up"):  # nothing depends on them
                 out.add(np.zeros((1, len(at[name]))), 1.0, [(at[name][None], 1.0)])
             return
         force, up = at["force"][None], at["up"][None]
@@ -277,14 +245,20 @@ class RotationGraph:
         size = float(np.linalg.norm(state.up))
         out.add(np.array([[size - STANDARD_GRAVITY]]), _GRAVITY_SIGMA**2, [(up, state.up[None, None] / size)])
         R = state.turn @ self.nodes.R_pc
-        back, step_s = np.swapaxes(R, 1, 2), inertia.step_s[:, None]
+        back, rate = np.swapaxes(R, 1, 2), vector_from_rotation(inertia.R_step) / inertia.step_s[:, None]
         error = vector_from_rotation(np.swapaxes(inertia.R_step, 1, 2) @ back[:-1] @ R[1:])
-        by: _Parts = [(turn[1:], back[1:]), (turn[:-1], -back[1:]), (bias[:-1], step_s[:, None] * np.eye(3))]
-        out.add(error + step_s * state.bias[:-1], inertia.step_variance[:, None], by)
+        false_rate = state.bias[:-1] + rate @ state.response.T
+        error = error + np.einsum("kij,kj->ki", inertia.by_bias, false_rate)
+        response = np.broadcast_to(at["response"], (len(rate), 9))
+        out.add(state.response.reshape(1, 9), inertia.response_sigma**2, [(response[:1], 1.0)])
+        by_response = np.einsum("kij,kl->kijl", inertia.by_bias, rate).reshape(-1, 3, 9)
+        by: _Parts = [(turn[1:], back[1:]), (turn[:-1], -back[1:])]
+        by += [(bias[:-1], inertia.by_bias), (response, by_response)]
+        out.add(error, inertia.step_variance[:, None], by)
         walk = np.diff(state.bias, axis=0)
         out.add(walk, inertia.walk_variance[:, None], [(bias[1:], 1.0), (bias[:-1], -1.0)])
         for rest in inertia.rests:
-            shift = state.bias[rest.node] - rest.rate_c
+            shift = inertia.bias_c + state.bias[rest.node] - rest.rate_c
             out.add(shift[None], rest.sigma_rad_s**2, [(bias[[rest.node]], 1.0)])
         shown = np.einsum("kij,kj->ki", R, inertia.force_c - state.force)
         each = np.ones((len(R), 1), np.int64)
