@@ -25,11 +25,10 @@ from stages.diagnose.field.evidence import FieldEvidence, field_evidence, nothin
 from stages.diagnose.field.run import FieldRun, field_run
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
-from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
+from stages.diagnose.travel.evidence import PLACED_SIGMA_MM, TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_poses
 from stages.motion import EncoderReadings, Equations, Measurements, MotionParameters, State
 
-_PLACEMENT_SIGMA_MM = 0.05
 _MOST_OF_RING = 0.5
 # What motion against encoder tells better than rings and fiducials do.
 TRAVEL_EFFECTS = frozenset(
@@ -37,7 +36,9 @@ TRAVEL_EFFECTS = frozenset(
 )
 
 
-def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> TravelEvidence:
+def gauge_travel(
+    recording: Recording, run: MeasuredRun, state: Unknowns, without: Collection[str] = ()
+) -> TravelEvidence:
     """Return what motion and encoder of a gauge run say.
 
     Only frames with fiducials count: these place the camera to a few µm, so that the encoder, loosely
@@ -49,16 +50,19 @@ def gauge_travel(recording: Recording, run: MeasuredRun, state: Unknowns) -> Tra
         The measured run.
     state
         The adjusted state, as of `stages.diagnose.gauge.search.prepare`.
+    without
+        Effects that are not known.
     """
     fiducials = recording.pipe.fiducials
     # Markers of one row were put there together and err alike: rows count, not markers.
     places = np.unique([round(m.distance_mm, 1) for m in fiducials.markers]) if fiducials else np.zeros(1)
     spread = float(np.sqrt(np.sum((places - places.mean()) ** 2)))
-    sight = sight_of_poses(recording, state.T_pc, run.posed, _PLACEMENT_SIGMA_MM / max(spread, 1.0))
+    sight = sight_of_poses(recording, state.T_pc, run.posed, PLACED_SIGMA_MM / max(spread, 1.0))
     span = slice(int(run.posed[0]), int(run.posed[-1]) + 1)
     return travel_evidence(
-        "gauge", recording, sight, state.T_pc[span], state.stated.encoder_scale_sigma, _shown(run)[span]
-    )
+        "gauge", recording, sight, state.T_pc[span], state.stated.encoder_scale_sigma, _shown(run)[span],
+        without,
+    )  # fmt: skip
 
 
 def _shown(run: MeasuredRun) -> Bool:
@@ -221,7 +225,7 @@ def examine_gauge(
         try:
             library = _of_geometry(library_without(without), light)
             geometry = examine(run, library, probe, progress=context.progress)
-            travel = gauge_travel(recording, run, geometry.searched.found.state)
+            travel = gauge_travel(recording, run, geometry.searched.found.state, without)
             missing += travel.shortcomings
         except UnusableError as error:
             problem = error.problem
@@ -245,11 +249,11 @@ def examine_field(
     recording = frames.applied_to(recording)
     run, light = motion.run(recording, probe, rings), _known_light(profile, parameters.without)
     if run is None:
-        found = FieldEvidence(None, nothing_said(recording, motion.problem))
+        found = nothing_said(recording, motion.problem)
     else:
         library = _of_geometry(library_without(parameters.without), light)
-        found = field_evidence(run, library, context.progress)
-    missing = (*_profile_problem(profile), *found.channel.shortcomings)
+        found = field_evidence(run, library, parameters.without, context.progress)
+    missing = (*_profile_problem(profile), *found.shortcomings)
     return Seen(recording.name, None, found.travel, light, missing, found)
 
 
@@ -290,8 +294,8 @@ FREE_MOTION = Stage(
     "free_motion", "1", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "2", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "3", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "2", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "3", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

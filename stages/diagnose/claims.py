@@ -15,9 +15,9 @@ from stages.diagnose.channels import Seen
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import EffectFound, Location, Value
-from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
+from stages.diagnose.travel.steps import StepFound
 
 # Below this chance, motion against encoder shows an effect: of 300 recordings without any, with three smooth
 # effects each, a hundredth of one would.

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.arrays import Byte, Float
 from pipeline.recording.base import Recording
-from stages.diagnose.correct import Correction
+from stages.diagnose.channels import Seen
+from stages.diagnose.correct import ENCODER_EFFECTS, Correction
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.field.run import FieldRun
@@ -22,7 +24,8 @@ from stages.diagnose.residual import (
     rings_against_texture,
     wall_distances_mm,
 )
-from stages.diagnose.result import Diagnosis, FitQuality, Picture, WallPicture
+from stages.diagnose.result import Diagnosis, FitQuality, Picture, ReadingPicture, WallPicture
+from stages.diagnose.travel.model import TravelFit
 
 Linear = tuple[tuple[EffectModel, Shape, Float], ...]
 
@@ -85,6 +88,32 @@ def with_pictures(found: Diagnosis, seen: Compared | None) -> Diagnosis:
         found, fit=seen.fit, ring_picture=Picture(frames, azimuths_rad(), *over_frames),
         wall_picture=WallPicture(distance, azimuths_rad(), *over_wall),
     )  # fmt: skip
+
+
+def with_readings(found: Diagnosis, recordings: Sequence[Seen | None]) -> Diagnosis:
+    """Return the answer with readings against pictures in place of rings, if all of it is of the encoder.
+
+    Of several recordings it is the one in which that makes the most difference.
+    """
+    names = {e.name for e in found.effects}
+    fits = [s.travel.fit for s in recordings if s is not None and s.travel is not None and s.travel.fit]
+    if not names or not names <= ENCODER_EFFECTS or not fits:
+        return found
+    best = max(fits, key=lambda f: _rms(f.stated_mm) / _rms(f.whitened.residual))
+    shown = ReadingPicture(best.sight.time_s, best.stated_mm, best.whitened.residual)
+    return replace(found, fit=_of_readings(best), ring_picture=None, wall_picture=None, reading_picture=shown)
+
+
+def _of_readings(fit: TravelFit) -> FitQuality:
+    """Return how far readings are from pictures; held out is each picture, which all the others predict."""
+    before, (missed, sigma) = _rms(fit.stated_mm), fit.left_out_mm
+    return FitQuality(
+        "mm of the reading", before, _rms(fit.whitened.residual), before, _rms(missed), _rms(sigma)
+    )
+
+
+def _rms(values: Float) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _of_gauge(gauge: Recording, examined: Examined) -> GaugeResiduals:

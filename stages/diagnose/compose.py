@@ -23,7 +23,7 @@ from stages.diagnose.result import (
 )
 
 _SAME_FREQUENCY_HZ = 0.15
-_IN_PROFILE = Location(str(Channel.PROFILE), None, None)
+_IN_PROFILE, _IN_MOTION = (Location(str(c), None, None) for c in (Channel.PROFILE, Channel.MOTION))
 _UNKNOWN = "a cause that the library does not have, such as {}"
 _AGAIN = (
     "To see what the pattern goes with, record the gauge again: rolled by 90° (probe or gauge), at another "
@@ -41,11 +41,13 @@ def composed(
     examined = gauge.geometry if gauge is not None else None
     every = claims_of(field, gauge)
     known = [c.not_knowing(without) for c in every if c.name not in without]
-    unexplained = _unexplained_profile(field, gauge)
-    said = _said(examined, known, len(known) < len(every), bool(unexplained))
+    of_profile, of_travel = _unexplained_profile(field, gauge), _unexplained_travel(field, gauge)
+    unnamed = len(known) < len(every) or bool(of_travel)
+    said = _said(examined, known, unnamed, bool(of_profile))
     asked = said.members if said.members else [e.name for e in said.effects]
-    location = _location(examined, every, asked) or (_IN_PROFILE if unexplained else None)
-    identifiable = " ".join(s for s in (_identifiable(said, examined), *unexplained) if s)
+    nameless = _IN_PROFILE if of_profile else _IN_MOTION if of_travel else None
+    location = _location(examined, every, asked) or nameless
+    identifiable = " ".join(s for s in (_identifiable(said, examined), *of_profile, *of_travel) if s)
     partly = said.verdict is Verdict.PARTLY
     found = Diagnosis(
         recording=field.name if field is not None else "",
@@ -203,6 +205,12 @@ def _unexplained_profile(*recordings: Seen | None) -> tuple[str, ...]:
     return tuple(f"{name}: {p.unexplained.statement}" for name, p in profiles if p.unexplained is not None)
 
 
+def _unexplained_travel(*recordings: Seen | None) -> tuple[str, ...]:
+    """Return sentences on what is between motion and encoder and no effect of the encoder explains."""
+    travels = [(s.name, s.travel) for s in recordings if s is not None and s.travel is not None]
+    return tuple(f"{name}: {t.unexplained}" for name, t in travels if t.unexplained)
+
+
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:
     """Return the least chance of all channels, counted as often as channels were looked at."""
     each = []
@@ -212,7 +220,7 @@ def _global_p(field: Seen | None, gauge: Seen | None) -> float:
         if seen.geometry is not None:
             each.append(seen.geometry.global_p)
         if seen.travel is not None:
-            each.append(min((a.p_value for a in seen.travel.anomalies), default=1.0))
+            each.append(seen.travel.least_p)
         if seen.profile is not None:
             each.append(min((f.p_value for f in seen.profile.findings), default=1.0))
     return float(min(min(each) * len(each), 1.0)) if each else 1.0

@@ -32,6 +32,7 @@ _OF_ENCODER = {
     "encoder_scale": "relative", "encoder_slip": "slip_mm", "encoder_backlash": "backlash_mm",
     "time_offset": "delay_s",
 }  # fmt: skip
+ENCODER_EFFECTS = frozenset(_OF_ENCODER)
 _ROUNDS = 3
 _OF_CAMERA = frozenset({"principal_point", "focal_scale", "pixel_aspect", "radial_distortion"})
 

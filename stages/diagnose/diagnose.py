@@ -21,7 +21,7 @@ from stages.diagnose.channels import (
     FreeMotion,
     Seen,
 )
-from stages.diagnose.compared import OnImage, compared, image_of, with_pictures
+from stages.diagnose.compared import OnImage, compared, image_of, with_pictures, with_readings
 from stages.diagnose.compose import composed
 from stages.diagnose.correct import (
     CORRECTED_MOTION,
@@ -105,8 +105,8 @@ def diagnose(
         run_corrected = corrected_motion.run(run, correction)
     if gauge and gauge_frames:
         gauge = gauge_frames.applied_to(gauge)
-    of_field, of_gauge = _by_correction(of_field, of_gauge, run_corrected, correction, probe)
     without = parameters.without
+    of_field, of_gauge = _by_correction(of_field, of_gauge, run_corrected, correction, probe, without)
     context.progress(0, _STEPS)
     found = composed(of_field, of_gauge, probe, without)
     found = with_field(found, of_field, of_gauge, probe, library_without(without))
@@ -114,11 +114,11 @@ def diagnose(
     context.progress(1, _STEPS)
     examined = of_gauge.geometry if of_gauge is not None else None
     seen = compared(run, run_corrected, examined, gauge, correction)
-    found = with_pictures(found, seen)
+    found = with_readings(with_pictures(found, seen), (of_field, of_gauge))
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
     simulated = resimulation.simulated if resimulation is not None else None
-    image = image_of(seen, field, gauge)
+    image = image_of(seen, field, gauge) if found.ring_picture is not None else None
     if correction is None or not (correction.put_in or correction.unsaid) or not _worse(found.fit):
         return Diagnosed(found, correction.probe if correction is not None else probe, simulated, image)
     return Diagnosed(replace(found, notes=(*found.notes, _NOT_CORRECTED)), probe, simulated, image)
@@ -130,11 +130,12 @@ def _by_correction(
     corrected: FieldRun | None,
     correction: Correction | None,
     probe: Probe,
+    without: Sequence[str],
 ) -> tuple[Seen | None, Seen | None]:
     """Return what field and gauge say, less what the correction of the probe explains or forbids."""
     if field is not None and corrected is not None:
         # The scale of the way seen is the instrument's: what is wrong with that is not the encoder's.
-        field = _with_travel(field, travel_of_run(corrected, "field with the corrected probe"))
+        field = _with_travel(field, travel_of_run(corrected, "field with the corrected probe", without))
     if field is not None and correction is not None and correction.unsaid:
         field = _without_scale(field, correction.unsaid)
     sheet = sheet_by_rings(gauge, correction, probe)
@@ -172,7 +173,7 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "2", DiagnosisParameters, diagnose,
+    "diagnosis", "3", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what bears it out",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

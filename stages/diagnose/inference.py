@@ -15,7 +15,6 @@ from scipy import stats
 from pipeline.adjustment.marginal import covariance_of, log_determinant, marginalised
 from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
-from pipeline.physics.effect import Channel
 from stages.diagnose.effects.base import EffectModel, Shape
 
 # Scores are sums over so many independent cells that χ² has heavier tails: those of F.
@@ -110,51 +109,6 @@ def total(parts: Sequence[Evidence]) -> Evidence:
         float(sum(e.misfit for e in each)),
         float(sum(e.cells for e in each)),
     )
-
-
-@dataclass(frozen=True)
-class Anomaly:
-    """Something a channel shows that the stated instrument does not, tested on its own (no column for it).
-
-    Attributes
-    ----------
-    channel : Channel
-    p_value : float
-        Calibrated: uniform when nothing is hidden.
-    statement : str
-    frames : (2,)
-        First and last frame in which it shows.
-    explained_by : tuple of str
-        Effects of the catalogue that would show like this; empty when none is known.
-    """
-
-    channel: Channel
-    p_value: float
-    statement: str
-    frames: tuple[int, int]
-    explained_by: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class ChannelEvidence:
-    """All that one channel of one recording says.
-
-    Attributes
-    ----------
-    source : str
-        Such as ``gauge``, ``profile of the gauge`` or ``field``.
-    channel : Channel
-    whole : Evidence
-    anomalies : tuple of Anomaly
-    shortcomings : tuple of str
-        What this recording cannot tell, and why.
-    """
-
-    source: str
-    channel: Channel
-    whole: Evidence
-    anomalies: tuple[Anomaly, ...] = ()
-    shortcomings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

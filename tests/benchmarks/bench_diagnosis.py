@@ -30,6 +30,7 @@ from pipeline.simulator.prior import Prior, draw_pair, read_prior
 from pipeline.simulator.scene import Scene
 from stages.diagnose.channels import TRAVEL_EFFECTS, Seen, gauge_travel
 from stages.diagnose.compose import composed
+from stages.diagnose.document import to_json
 from stages.diagnose.drill.answer import Answer, Concealed
 from stages.diagnose.drill.figures import figures
 from stages.diagnose.drill.score import Trial
@@ -39,7 +40,6 @@ from stages.diagnose.effects.library import LIBRARY, without
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.scan import scan
 from stages.diagnose.inference import stated_belief
-from stages.diagnose.result import to_json
 from stages.diagnose.travel.evidence import TravelEvidence
 from tests.benchmarks.ring_level import Noise, ring_level_run
 
@@ -133,7 +133,8 @@ def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
     missing: tuple[str, ...] = ()
     try:
         geometry = examine(simulated.measured, of_positions(without(left_out)), stated)
-        travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
+        state = geometry.searched.found.state
+        travel = gauge_travel(simulated.recording, simulated.measured, state, left_out)
     except UnusableError as error:
         missing = (str(error),)
     seen = Seen(simulated.recording.name, geometry, travel, None, missing)

@@ -19,9 +19,9 @@ from stages.diagnose.correct import encoder_effects
 from stages.diagnose.profile.evidence import Condition, ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
 from stages.diagnose.result import Confirmation, Diagnosis, Verdict
-from stages.diagnose.travel.events import StepFound
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
+from stages.diagnose.travel.steps import StepFound
 from tests.shared_data import PROJECT_ROOT
 
 AGREES = Agreement(Confirmation("first half: 0.02", "second half: 0.02", True), 30.0)
@@ -39,7 +39,7 @@ def real_probe() -> Probe:
 
 
 def seen(source: str, **shown: object) -> Seen:
-    travel = TravelEvidence(source, (), (), (), (), None, (), ())
+    travel = TravelEvidence(source, (), (), (), (), None, ())
     return Seen("toy", None, replace(travel, **shown), None, ())  # type: ignore[arg-type]
 
 

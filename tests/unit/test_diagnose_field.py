@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from pipeline.physics.effect import Channel
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.answer import _alone, _met, field_answer
 from stages.diagnose.field.confirm import InField
 from stages.diagnose.field.evidence import FieldEvidence
-from stages.diagnose.inference import ChannelEvidence, Column, Evidence, Stated
+from stages.diagnose.inference import Column, Evidence, Stated
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
 
 NOTHING_STATED = Stated((), np.zeros((0, 0)))
@@ -27,7 +26,7 @@ def field_with(signal):
     right = patterns.T @ signal / SIGMA**2
     misfit, cells = float(signal @ signal) / SIGMA**2, 400.0
     whole = Evidence(tuple(columns), information, right, information, misfit, cells)
-    return FieldEvidence(None, ChannelEvidence("field", Channel.RING, whole))
+    return FieldEvidence(None, whole)
 
 
 def test_noise_shows_nothing():

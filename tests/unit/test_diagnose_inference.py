@@ -20,7 +20,7 @@ from stages.diagnose.gauge.elimination import (
     eliminate_poses,
 )
 from stages.diagnose.gauge.feasible import expected_gain
-from stages.diagnose.gauge.formula import APART, joint_p, rival_patterns
+from stages.diagnose.gauge.formula import APART, Rival, joint_p, rival_patterns
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
 from stages.diagnose.result import Confirmation, FitQuality, Verdict
@@ -202,7 +202,7 @@ def examined(
     shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
     left: float = 0.5, pattern_order: int = 2, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),), heldout: float = 0.11,
-    unknown: tuple[str, ...] = (), other_order: int = 3,
+    unknown: float = 0.0, other_order: int = 3,
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
@@ -215,7 +215,9 @@ def examined(
     fit = SimpleNamespace(terms=terms)
     best = SimpleNamespace(named=bool(library) and not patterns_px, library_terms=library, fit=fit)
     verdicts = SimpleNamespace(
-        adequacy=left, chance_of=lambda name: chance, unknown=(unknown,) * len(library)
+        adequacy=left,
+        chance_of=lambda name: chance / (1 + unknown),
+        unknown=((Rival("image outward", unknown),),) * len(library),
     )
     each = (unsplit, *[()] * (len(library) - 1)) if library else ()
     quality = FitQuality("px", 1.0, 0.1, 1.0, heldout, 0.1)
@@ -238,8 +240,8 @@ def examined(
         (examined((1.0, 1.0), other_order=1, confirmed=((AGREES,),) * 2), Verdict.CLASS),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
         (examined(heldout=0.2), Verdict.CLASS),
-        (examined(unknown=("image outward",)), Verdict.UNEXPLAINED),
-        (examined(unknown=("image outward",), unsplit=("focal_scale",)), Verdict.CLASS),
+        (examined(unknown=0.5), Verdict.UNEXPLAINED),
+        (examined(unknown=0.5, unsplit=("focal_scale",)), Verdict.CLASS),
         (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),
         (examined((1.0, 1.0), confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.PARTLY),
         (examined(confirmed=((),)), Verdict.CLASS),
@@ -274,11 +276,14 @@ def names_and_patterns(scale_of_cone: float, share: float, measured: float) -> E
 
 
 @pytest.mark.parametrize(
-    ("strength", "measured", "rivals"),
-    [(1000.0, 0.7, ()), (20.0, 0.7, ("image",)), (1000.0, 0.999, ("image",))],
+    ("strength", "measured", "likely"),
+    [(1000.0, 0.7, {}), (20.0, 1.1, {"image": 0.286}), (1000.0, 0.999, {"image": 0.0129})],
 )
-def test_a_pattern_without_a_cause_is_a_rival_until_it_is_beaten(strength, measured, rivals):
+def test_a_pattern_without_a_cause_has_odds_by_likelihood_and_prior(strength, measured, likely):
     about = names_and_patterns(strength, 0.5, measured)
     terms = [Term(CONE, (), np.array([1.0]))]
-    (found,) = rival_patterns(about, terms, Stated((), np.zeros((0, 0))), 1.0)
-    assert tuple(words.split()[0] for words in found) == rivals
+    (found,) = rival_patterns(about, terms, Stated((), np.zeros((0, 0))), 1.0, (0.035,))
+    odds = {r.formula.split()[0]: r.odds for r in found[::-1] if r.odds > 1e-3}
+    own = 0.035 * np.exp(-0.005 * strength)
+    assert odds.pop("δr", 0.0) == pytest.approx(own if own > 1e-3 else 0.0)
+    assert odds == pytest.approx(likely, rel=0.02)

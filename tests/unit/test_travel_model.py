@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from stages.diagnose.travel.events import with_events
-from stages.diagnose.travel.evidence import TravelEstimate, _estimates
-from stages.diagnose.travel.model import DELAY, PLAY, SCALE
+from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _unexplained
+from stages.diagnose.travel.model import EventKind
 from stages.diagnose.travel.sight import quantum_mm, readings_at
+from stages.diagnose.travel.solve import DELAY, PLAY, SCALE
 from tests.travel_cases import read, seen
 
 STATED = 0.002
@@ -99,3 +100,27 @@ def test_a_delay_that_no_encoder_has_is_no_find() -> None:
 
     assert p_value(-0.9) < 1e-3
     assert p_value(-1.7) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "fault", "size", "column"),
+    [("encoder_scale", "scale", 0.02, SCALE), ("encoder_backlash", "play_mm", 2.0, PLAY)],
+)
+def test_what_is_not_known_is_neither_fitted_nor_taken_for_noise(name, fault, size, column):
+    placed = replace(seen(np.random.default_rng(6), drift_mm=0.0), placed=True)
+    faulty, left = read(**{fault: size}), {}
+    for without in ((), (name, "time_offset", "encoder_slip")):
+        fit = with_events(placed, faulty, without)
+        left[without] = _unexplained(fit, quantum_mm(faulty))
+    assert list(map(bool, left.values())) == [False, True]
+    assert fit.values[column] == 0.0
+    assert not np.isfinite(fit.sigma[column])
+    assert all(e.kind is not EventKind.STEP for e in fit.events)
+
+
+def test_a_picture_is_missed_by_its_noise_when_all_others_predict_it():
+    fit = with_events(seen(np.random.default_rng(7)), read(scale=0.01))
+    missed, sigma = fit.left_out_mm
+    assert len(missed) == len(fit.sight.time_s)
+    assert 0.7 < np.sqrt(np.mean((missed / sigma) ** 2)) < 1.3
+    assert np.sqrt(np.mean(fit.stated_mm**2)) > 10 * np.sqrt(np.mean(missed**2))

@@ -28,9 +28,10 @@ from pipeline.machine.stage import Stage
 from pipeline.review.run_files import RunFiles
 from stages.catalogue import PIPELINE
 from stages.diagnose.diagnose import Diagnosed, diagnosis_stages
+from stages.diagnose.document import to_json
 from stages.diagnose.drill.answer import Answer, read_answer
 from stages.diagnose.drill.cases import ANSWER
-from stages.diagnose.result import Diagnosis, to_json
+from stages.diagnose.result import Diagnosis
 
 
 @dataclass(frozen=True)
@@ -218,6 +219,9 @@ def _arrays(found: Diagnosis) -> dict[str, NDArray[Any]]:
         p = found.ring_picture
         out |= {"frame": p.frame, "azimuth_c_rad": p.azimuth_rad}
         out |= {"before_mm": p.before_mm, "after_mm": p.after_mm}
+    if found.reading_picture is not None:
+        r = found.reading_picture
+        out |= {"reading_time_s": r.time_s, "reading_before_mm": r.before_mm, "reading_after_mm": r.after_mm}
     if found.wall_picture is not None:
         w = found.wall_picture
         out |= {"wall_distance_mm": w.distance_mm, "wall_azimuth_p_rad": w.azimuth_rad}

@@ -17,8 +17,9 @@ from pipeline.files.disk import replace_text
 from pipeline.pages import page_template
 from pipeline.pages.figure import rendered, tidy
 from stages.diagnose.compared import OnImage
+from stages.diagnose.document import to_json
 from stages.diagnose.resimulate import Resimulated
-from stages.diagnose.result import Candidate, Diagnosis, Picture, Verdict, WallPicture, to_json
+from stages.diagnose.result import Candidate, Diagnosis, Picture, ReadingPicture, Verdict, WallPicture
 
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
@@ -78,6 +79,8 @@ def _pictures(found: Diagnosis, shown: Shown) -> dict[str, str]:
     if found.ring_picture is not None:
         made["frames"] = frames_figure(found.ring_picture)
         made["azimuth"] = azimuth_figure(found.ring_picture)
+    if found.reading_picture is not None:
+        made["reading"] = reading_figure(found.reading_picture)
     if found.wall_picture is not None:
         made["wall"] = wall_figure(found.wall_picture)
     if shown.image is not None:
@@ -93,7 +96,7 @@ _SHOWN = 10
 _QUANTILE = 98.0
 _UM = 1000.0
 _LONGEST_PX = 60.0
-_ACCENT, _MUTED = "#0a5ea8", "#9aa7b4"
+_ACCENT, _BEFORE, _MUTED = "#0a5ea8", "#b04a00", "#9aa7b4"
 
 
 def frames_figure(picture: Picture) -> bytes:
@@ -114,7 +117,7 @@ def azimuth_figure(picture: Picture) -> bytes:
     axes = figure.subplots()
     degrees = np.degrees(picture.azimuth_rad)
     for values, colour, name in (
-        (picture.before_mm, "#b04a00", "before"),
+        (picture.before_mm, _BEFORE, "before"),
         (picture.after_mm, _ACCENT, "after"),
     ):
         middle, low, high = _quantiles(_UM * values)
@@ -124,6 +127,18 @@ def azimuth_figure(picture: Picture) -> bytes:
     axes.set(
         xlabel="azimuth in C, °", ylabel="residual radius, µm", xlim=(-180, 180), xticks=range(-180, 181, 45)
     )
+    tidy(axes)
+    return rendered(figure)
+
+
+def reading_figure(picture: ReadingPicture) -> bytes:
+    """Return by how much the encoder's reading is off over time, before and after."""
+    figure = Figure(figsize=(9.6, 3.2), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(picture.time_s, picture.before_mm, color=_BEFORE, label="before")
+    axes.plot(picture.time_s, picture.after_mm, color=_ACCENT, label="after")
+    axes.axhline(0, color="#5b6875", lw=0.8)
+    axes.set(xlabel="time, s", ylabel="reading − pictures, mm")
     tidy(axes)
     return rendered(figure)
 

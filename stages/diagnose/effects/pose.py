@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from pipeline.arrays import Float
@@ -120,15 +121,20 @@ class EncoderBacklash(Scalar):
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
         """Return −(b/2) sgn v, coming over while the play is taken up."""
         half = abs(float(amplitude[0])) / 2
-        lag = np.zeros(len(travel.distance_mm))
-        steps = np.diff(travel.distance_mm)
-        moving = steps[np.nonzero(steps)]
-        behind = -half * float(np.sign(moving[0])) if moving.size else 0.0
-        lag[:1] = behind
-        for k, step in enumerate(steps):
-            behind = min(max(behind - step, -half), half)
-            lag[k + 1] = behind
-        return np.asarray(np.sign(amplitude[0]) * lag)
+        return np.asarray(np.sign(amplitude[0]) * _lag(np.diff(travel.distance_mm, prepend=0.0), half))
+
+
+@numba.njit(cache=True, nogil=True)
+def _lag(steps, half):  # type: ignore[no-untyped-def]
+    """Return (N,) by how much a reading is behind; the way's step before the first reading does not count."""
+    lag = np.zeros(len(steps))
+    moving = np.flatnonzero(steps[1:])
+    behind = -half * np.sign(steps[moving[0] + 1]) if len(moving) else 0.0
+    lag[:1] = behind
+    for k in range(1, len(steps)):
+        behind = min(max(behind - steps[k], -half), half)
+        lag[k] = behind
+    return lag
 
 
 class TimeOffset(Scalar):

@@ -86,7 +86,7 @@ class FieldAnswer:
 
 def field_answer(found: FieldEvidence, library: Mapping[str, EffectModel], stated: Stated) -> FieldAnswer:
     """Return what the field's rings and texture show beyond the stated instrument's uncertainty."""
-    scores = scores_of(found.channel.whole, library, stated)
+    scores = scores_of(found.whole, library, stated)
     p_value = min((s.p_value for s in scores), default=1.0) * max(len(scores), 1)
     if p_value > DETECTED:
         return FieldAnswer(min(p_value, 1.0), ())

@@ -102,7 +102,7 @@ def met_in_field(
 
 
 def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: Stated) -> Score | None:
-    whole: Evidence | None = found.channel.whole
+    whole: Evidence | None = found.whole
     assert whole is not None
     place = places_of(whole, model, shape)
     if not len(place):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,14 +11,13 @@ from pipeline.arrays import Float, Int
 from pipeline.files.codec import NOT_STORED
 from pipeline.geometry.axis import to_pipe
 from pipeline.machine.stage import Progress, unheard
-from pipeline.physics.effect import Channel
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.kinds import Periodic
 from stages.diagnose.field.reduce import evidence_of, reduced
 from stages.diagnose.field.run import FieldRun, ring_points
 from stages.diagnose.field.system import OWN, Asked, field_system
-from stages.diagnose.inference import ChannelEvidence, Evidence
+from stages.diagnose.inference import Evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_trajectory
 
@@ -31,20 +30,6 @@ _SHORTEST_MM = 40.0
 _LOST_SHARE = 0.25
 _LEAST_OFFSET_MM = 0.5
 _LEAST_ROLL_RAD = np.radians(5.0)
-
-
-def nothing_said(recording: Recording, problem: str) -> ChannelEvidence:
-    """Return empty evidence of a recording whose motion rings and texture do not determine, and why."""
-    lit = len(recording.frames.of(Illumination.LED, Illumination.BOTH))
-    why = problem or "its equations leave the motion open"
-    sentences = [f"The field recording tells nothing of the instrument by itself: {why}."]
-    if not lit:
-        sentences.append(
-            "No frame of the field shows the wall's texture, so nothing but the rings places the probe."
-        )
-    sentences.append("A pose that only the ring gives takes up what the sheet or the lens do to it.")
-    none = Evidence((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), 0.0, 0.0)
-    return ChannelEvidence("field", Channel.RING, none, shortcomings=tuple(sentences))
 
 
 def shortcomings_of(run: FieldRun) -> tuple[str, ...]:
@@ -125,15 +110,18 @@ class FieldEvidence:
     ----------
     travel : TravelEvidence or None
         Motion against encoder, and lines in the motion.
-    channel : ChannelEvidence
-        Evidence of rings and texture together, with the travel's anomalies and all shortcomings.
+    whole : Evidence
+        Of rings and texture together.
+    shortcomings : tuple of str
+        What this recording cannot tell, and why.
     run : FieldRun or None
         None when rings and texture alone do not determine the motion. It is not stored with the evidence:
         a stage of its own holds it.
     """
 
     travel: TravelEvidence | None
-    channel: ChannelEvidence
+    whole: Evidence
+    shortcomings: tuple[str, ...] = ()
     run: FieldRun | None = field(default=None, metadata=NOT_STORED)
 
     def about(self, asked: Asked) -> Evidence | None:
@@ -143,25 +131,38 @@ class FieldEvidence:
         return _evidence(self.run, asked, _slips(self.run, self.travel))
 
 
+def nothing_said(recording: Recording, problem: str) -> FieldEvidence:
+    """Return empty evidence of a recording whose motion rings and texture do not determine, and why."""
+    lit = len(recording.frames.of(Illumination.LED, Illumination.BOTH))
+    why = problem or "its equations leave the motion open"
+    sentences = [f"The field recording tells nothing of the instrument by itself: {why}."]
+    if not lit:
+        sentences.append(
+            "No frame of the field shows the wall's texture, so nothing but the rings places the probe."
+        )
+    sentences.append("A pose that only the ring gives takes up what the sheet or the lens do to it.")
+    none = Evidence((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), 0.0, 0.0)
+    return FieldEvidence(None, none, tuple(sentences))
+
+
 def field_evidence(
-    run: FieldRun, library: Mapping[str, EffectModel], progress: Progress = unheard
-) -> FieldEvidence:
-    """Return what a field recording says of every effect whose columns it can have.
+    run: FieldRun, library: Mapping[str, EffectModel], without: Collection[str] = (),
+    progress: Progress = unheard,
+) -> FieldEvidence:  # fmt: skip
+    """Return what a field recording says of every effect whose columns it can have, some not known.
 
     Poses, landmarks, the pipe's radius, ovality and axis, errors of matching and the encoder's creep are
     eliminated; the stated instrument's parameters stay as columns, without prior.
     """
-    travel = travel_of_run(run)
+    travel = travel_of_run(run, without=without)
     asked, slips = asked_of(library, run, travel), _slips(run, travel)
     progress(0, 1)
     try:
         whole = _evidence(run, asked, slips)
     except np.linalg.LinAlgError:
-        return FieldEvidence(travel, nothing_said(run.recording, ""), run)
+        return replace(nothing_said(run.recording, ""), travel=travel, run=run)
     missing = (*(travel.shortcomings if travel else ()), *shortcomings_of(run))
-    anomalies = travel.anomalies if travel else ()
-    channel = ChannelEvidence("field", Channel.RING, whole, anomalies, missing)
-    return FieldEvidence(travel, channel, run)
+    return FieldEvidence(travel, whole, missing, run)
 
 
 def asked_of(
@@ -185,15 +186,21 @@ def asked_of(
     return out
 
 
-def travel_of_run(run: FieldRun, source: str = "field") -> TravelEvidence | None:
-    """Return what the run's motion and encoder say; None where no frame shows the way."""
+def travel_of_run(
+    run: FieldRun, source: str = "field", without: Collection[str] = ()
+) -> TravelEvidence | None:
+    """Return what the run's motion and encoder say to one who does not know some effects.
+
+    None where no frame shows the way.
+    """
     sight = sight_of_trajectory(run.recording, run.trajectory)
     if not len(sight.frame):
         return None
     first, last = np.searchsorted(run.trajectory.frame, sight.frame[[0, -1]])
     return travel_evidence(
-        source, run.recording, sight, run.trajectory.T_pc[first : last + 1], run.probe.encoder_scale_sigma
-    )
+        source, run.recording, sight, run.trajectory.T_pc[first : last + 1], run.probe.encoder_scale_sigma,
+        without=without,
+    )  # fmt: skip
 
 
 def _slips(run: FieldRun, travel: TravelEvidence | None) -> Int:

@@ -46,20 +46,18 @@ def sure(examined: Examined) -> tuple[bool, ...]:
         return ()
     if not _fits(examined):
         return (False,) * len(best.library_terms)
-    unknown = verdicts.unknown or ((),) * len(best.library_terms)
     patterns = best.fit.terms[len(best.library_terms) :]
     left = [shift_px(best.fit, t) for t in patterns]
     like = Counter(pattern_of(t)[1:] for t in best.fit.terms)
-    each = zip(best.library_terms, examined.unsplit, unknown, examined.confirmed, strict=False)
+    each = zip(best.library_terms, examined.unsplit, examined.confirmed, strict=False)
     return tuple(
         verdicts.chance_of(term.model.law) > SURE
         and not alike
-        and not patterns_alike
         and bool(confirmed)
         and all(c.agrees for c in confirmed)
         and (not left or shift_px(best.fit, term) > max(left))
         and like[pattern_of(term)[1:]] == 1
-        for term, alike, patterns_alike, confirmed in each
+        for term, alike, confirmed in each
     )
 
 
@@ -70,9 +68,10 @@ def _fits(examined: Examined) -> bool:
 
 
 def unknown_rivals(examined: Examined) -> tuple[str, ...]:
-    """Return the patterns without a cause that may as well be in place of an effect of the likeliest."""
-    verdicts = examined.verdicts
-    return tuple(dict.fromkeys(chain(*verdicts.unknown))) if verdicts is not None else ()
+    """Return the patterns without a cause that leave a name of the likeliest unsure, the likeliest first."""
+    each = chain(*examined.verdicts.unknown) if examined.verdicts is not None else ()
+    doubted = sorted((r for r in each if r.odds > 1 - SURE), key=lambda r: -r.odds)
+    return tuple(dict.fromkeys(r.formula for r in doubted))
 
 
 def beyond_line(examined: Examined) -> tuple[bool, ...]:

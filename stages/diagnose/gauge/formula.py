@@ -7,20 +7,20 @@ from which poses and the stated instrument have been taken out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Int
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
-from stages.diagnose.effects.nameless import SWINGS, Nameless
+from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term, linearise
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan
 from stages.diagnose.inference import (
     DEGREES,
-    SURE,
     Evidence,
     Score,
     Stated,
@@ -39,12 +39,10 @@ _SAME = 0.02
 # A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
-# Twice the logarithm of the expected Bayes factor (1000 to 1) from which two causes count as told apart, and
-# of the measured odds from which one of two that are as likely beforehand is sure.
-APART, _BEATEN = 14.0, float(2 * np.log(SURE / (1 - SURE)))
-# A pattern of which a law leaves less than this share of the information is the law's own. Debt:
-# data/debts.md.
-_OWN_PATTERN = 0.05
+# Twice the logarithm of the expected Bayes factor (1000 to 1) from which two causes count as told apart.
+APART = 14.0
+# Odds below which a pattern without a cause changes no answer; logarithm of odds that are as good as sure.
+_SHOWN, _MOST = 1e-6, 100.0
 # Directions with less information than this share of the best one are left out of the test of adequacy.
 # Debt: data/debts.md.
 _WEAK = 1e-3
@@ -107,53 +105,49 @@ def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
     return float(min(2 * min(single, joint_p(about, stated, given)), 1.0))
 
 
-def rival_patterns(
-    about: Evidence, terms: Sequence[Term], stated: Stated, alike: float
-) -> tuple[tuple[str, ...], ...]:
-    """Return for each effect among the terms the formulas of patterns that may as well be in its place.
+@dataclass(frozen=True)
+class Rival:
+    """A pattern without a cause in a named effect's place: its formula, and its odds against the effect."""
 
-    They stand for causes that the library does not know. A pattern is excluded where the term is expected to
-    beat it, at the size found, and does beat it. The one that the term itself makes is no rival; where it
-    makes two just as well, nobody knows what moves.
+    formula: str
+    odds: float
+
+
+def rival_patterns(
+    about: Evidence, terms: Sequence[Term], stated: Stated, believed: float, beforehand: Sequence[float]
+) -> tuple[tuple[Rival, ...], ...]:
+    """Return for each effect among the terms the patterns that may be in its place, the likeliest first.
+
+    They stand for causes that the library does not know. What the effect and a pattern each take up of the
+    measurements, the other terms and the instrument being free, is their likelihood.
 
     Parameters
     ----------
     about : Evidence
         Over the terms and `VOCABULARY`.
-    alike : float
-        How many measurements that err alike count as one.
+    believed : float
+        What a difference of χ² is divided by before it is believed.
+    beforehand : sequence of float
+        For each effect, the odds of a single pattern against it before anything was measured.
     """
-    fair = about.deflated(alike)
     own = [(t.model, t.shape) for t in terms]
     out = []
-    for k, term in enumerate(terms):
-        if isinstance(term.model, Nameless):
-            continue
-        block, others = _places(fair, own[k : k + 1]), _places(fair, own[:k] + own[k + 1 :])
-        alone = score(fair, stated, block, others)
-        tried = [
-            (m.formula(s), _left_beside(fair, stated, term.amplitude, block, others, places), rival.gain)
-            for m, s in VOCABULARY
-            if (rival := score(fair, stated, places := places_of(fair, m, s), others)) is not None
-            and not np.isin(places, np.concatenate([block, others])).any()
+    for k, odds in enumerate(beforehand):
+        others = _places(about, own[:k] + own[k + 1 :])
+        alone = score(about, stated, _places(about, own[k : k + 1]), others)
+        gain = alone.gain if alone is not None else 0.0
+        found = [
+            Rival(model.formula(shape), odds * _likelihood((tried.gain - gain) / believed))
+            for model, shape in VOCABULARY
+            if (tried := _score(about, stated, model, shape, others)) is not None
         ]
-        whole = _left_beside(fair, stated, term.amplitude, block, others, block[:0])
-        likest = min(tried, key=lambda t: t[1], default=("", 0.0, 0.0))
-        own_pattern = likest[0] if likest[1] < _OWN_PATTERN * whole else ""
-        out.append(tuple(
-            words
-            for words, left, gain in tried
-            if words != own_pattern and (left < APART or alone is None or alone.gain - gain < _BEATEN)
-        ))  # fmt: skip
+        out.append(tuple(sorted((r for r in found if r.odds > _SHOWN), key=lambda r: -r.odds)))
     return tuple(out)
 
 
-def _left_beside(
-    about: Evidence, stated: Stated, amplitude: Float, block: Int, others: Int, rival: Int
-) -> float:
-    """Return by how much χ² is expected to prefer an effect over a rival's columns, others being free."""
-    free = np.concatenate([instrument_places(about), others, rival]).astype(np.int64)
-    return float(amplitude @ eliminated(about, stated, block, free)[0] @ amplitude)
+def _likelihood(gain: float) -> float:
+    """Return the ratio of likelihoods for a difference of χ², within what numbers hold."""
+    return float(np.exp(min(gain / 2, _MOST)))
 
 
 def joint_p(about: Evidence, stated: Stated, given: Int) -> float:

@@ -14,7 +14,7 @@ from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import DECOYS, Nameless
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.formula import adequacy, empirical, rival_patterns, says_the_same
+from stages.diagnose.gauge.formula import Rival, adequacy, empirical, rival_patterns, says_the_same
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import refined, scan, span
 from stages.diagnose.gauge.search import LEAST_SHARE, Search, refits, shift_px
@@ -103,8 +103,8 @@ class Verdicts:
         The empirical formula, whether it is the likeliest or not.
     alike : float
         How many measurements that err alike count as one.
-    unknown : tuple of tuple of str
-        For each effect of the likeliest, the patterns without a cause that may as well be in its place.
+    unknown : tuple of tuple of Rival
+        For each effect of the likeliest, the patterns without a cause that may be in its place.
     """
 
     regimes: tuple[Regime, ...]
@@ -113,17 +113,23 @@ class Verdicts:
     adequacy: float
     formula: Judged
     alike: float
-    unknown: tuple[tuple[str, ...], ...] = ()
+    unknown: tuple[tuple[Rival, ...], ...] = ()
 
     def chance_of(self, law: str) -> float:
         """Return the chance that a law is among the causes, with whatever course."""
+        named = zip(self.judged[0].library_terms, self.unknown, strict=True) if self.unknown else ()
+        against = [r.odds for term, rivals in named if term.model.law == law for r in rivals]
+        return self._listed(law) / (1 + sum(against))
+
+    def _listed(self, law: str) -> float:
+        """Return the chance of a law among the hypotheses that were fitted."""
         return float(sum(p for p, j in zip(self.probability, self.judged, strict=True) if law in j.laws))
 
     def chance_of_course(self, model: EffectModel) -> float:
         """Return the chance of an effect's course if its law is among the causes."""
         pairs = zip(self.probability, self.judged, strict=True)
         both = sum(p for p, j in pairs if model.name in j.names)
-        return float(min(both / max(self.chance_of(model.law), 1e-300), 1.0))
+        return float(min(both / max(self._listed(model.law), 1e-300), 1.0))
 
 
 def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
@@ -170,7 +176,9 @@ def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) 
     order = np.lexsort((total_surprise, -weight))
     ranked = tuple(judged[k] for k in order)
     about, terms = evidence(run, ranked[0].fit, VOCABULARY)[0], ranked[0].fit.terms
-    left, rivals = adequacy(about, terms, stated), rival_patterns(about, terms, stated, alike)
+    left = adequacy(about, terms, stated)
+    odds = [_NAMELESS / len(VOCABULARY) / _chance(run, t, laws) for t in ranked[0].library_terms]
+    rivals = rival_patterns(about, terms, stated, alike * _TEMPERED, odds)
     return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike, rivals)
 
 
@@ -202,17 +210,17 @@ def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_s
 
 def beforehand(run: GaugeRun, found: Fit, effects: int) -> float:
     """Return −2 ln of a hypothesis' chance beforehand: how many others there are like it, shapes included."""
-    chance = 1.0
-    nameless = sum(isinstance(t.model, Nameless) for t in found.terms)
-    if nameless:
-        chance *= _NAMELESS
-    for t in found.terms:
-        if (t.model, t.shape) in VOCABULARY:
-            chance /= len(VOCABULARY)
-            continue
-        courses = len(SEARCHED) if isinstance(t.model, Coursed) else 1
-        chance /= effects * courses * max(len(t.model.shapes(*span(run))) / _PEAK, 1.0)
+    nameless = any(isinstance(t.model, Nameless) for t in found.terms)
+    chance = np.prod([_chance(run, t, effects) for t in found.terms]) * (_NAMELESS if nameless else 1.0)
     return float(-2 * np.log(chance))
+
+
+def _chance(run: GaugeRun, term: Term, effects: int) -> float:
+    """Return the chance of a term beforehand, among its own kind."""
+    if (term.model, term.shape) in VOCABULARY:
+        return 1 / len(VOCABULARY)
+    courses = len(SEARCHED) if isinstance(term.model, Coursed) else 1
+    return 1 / (effects * courses * max(len(term.model.shapes(*span(run))) / _PEAK, 1.0))
 
 
 def judged_of(

@@ -2,173 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
-from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
-from stages.diagnose.agreement import Agreement, Part, agreement
-from stages.diagnose.travel.model import (
-    Event,
-    EventKind,
-    TravelFit,
-    candidate_columns,
-    fitted,
-    moment,
-)
-from stages.diagnose.travel.sight import Sight, readings_at
+from stages.diagnose.travel.model import Event, EventKind, TravelFit, candidate_columns, fitted
+from stages.diagnose.travel.sight import Sight
 
 # So many steps and stray pictures are taken up, one after the other.
 _MOST = 16
 _ENTERS = 1e-4
 # A step needs pictures on both of its sides, else it is one stray picture.
 _SIDE = 3
-# Explanations whose χ² differs by less than this (3 σ squared) are both kept.
-_APART = 9.0
-# So many neighbouring frames may be lost without a trace in the time stamps; error of a stamp, frames.
-# Debt: data/debts.md.
-_UNNOTICED = 2
-_WITHIN, _TIMING = 3.0, 0.03
 # Prior of how long a wheel slips: evenly between the time of a few readings, as over a bead, and this, as in
-# mud or grease. What creeps for longer is held by the noise's random walk.
+# mud or grease. What creeps for longer is held by the noise's random walk. Debt: data/debts.md.
 SHORTEST_S, LONGEST_S = 0.03, 0.5
-# Least number of readings around a slip that its speed is taken from. Debt: data/debts.md.
-_AROUND = 8
-# Least number of other moments that tell how far a reading's own motion imitates a slip.
-_LEAST_OTHERS = 20
-_TAIL = 2.275
+_SLIP = "encoder_slip"
 
 
-def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: float) -> Agreement | None:
-    """Return whether the reading jumps by what it keeps on gaining on the pictures; None when it cannot tell.
+def with_events(sight: Sight, encoder: Encoder, without: tuple[str, ...] = ()) -> TravelFit:
+    """Return the fit with the events that the readings ask for, the strongest first.
 
-    Parameters
-    ----------
-    at
-        Reading after which it would jump.
-    lasting_mm, sigma_mm
-        By how much the reading is ahead of the pictures after the moment, and 1 σ.
+    Effects ``without`` which it is fitted are not known: what they do is left to others, and to the noise.
     """
-    return _told_by_reading(lasting_mm, sigma_mm, *reading_jump(encoder, at))
-
-
-def _told_by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: float) -> Agreement | None:
-    """Return whether the reading's own jump, with 1 σ, is what it keeps on gaining on the pictures."""
-    if not np.isfinite(sigma):
-        return None
-    lasting = Part(
-        "what the reading has gained on the pictures ever since",
-        f"{lasting_mm:+.3f} mm (± {sigma_mm:.2g} mm)", np.array([lasting_mm]),
-    )  # fmt: skip
-    alone = Part(
-        "jump of the reading against its own motion", f"{jump:+.3f} mm (± {sigma:.2g} mm)", np.array([jump])
-    )
-    own = np.array([[sigma_mm**2]]), np.array([[sigma**2]])
-    return agreement(lasting, alone, own, own[0] + own[1])
-
-
-def reading_jump(encoder: Encoder, at: int) -> tuple[float, float]:
-    """Return what the reading gains around a moment beyond its own speed before and after, mm, and 1 σ.
-
-    NaN too close to the ends.
-    """
-    step = np.diff(encoder.distance_mm)
-    rate = float(np.median(np.diff(encoder.time_s)))
-    width = 2 * max(int(np.ceil(SHORTEST_S / rate / 2)), 1) - 1
-    weight = np.full(width + 2 * _AROUND, -width / (2 * _AROUND))
-    weight[_AROUND : _AROUND + width] = 1.0
-    return _filtered(step, weight, at - len(weight) // 2)
-
-
-def _filtered(step: Float, weight: Float, first: int) -> tuple[float, float]:
-    """Return the weighted sum of the steps from ``first`` on, and 1 σ.
-
-    1 σ is a quarter of the range that holds the same sum at 95.4 % of all other moments, turns and bursts
-    included. NaN where the steps do not reach, or there are too few other moments.
-    """
-    if not 0 <= first <= len(step) - len(weight):
-        return float("nan"), float("nan")
-    gained = np.correlate(step, weight, mode="valid")
-    others = np.delete(gained, slice(max(first - len(weight) + 1, 0), first + len(weight)))
-    if len(others) < _LEAST_OTHERS:
-        return float("nan"), float("nan")
-    low, high = np.percentile(others, [_TAIL, 100 - _TAIL])
-    return float(gained[first]), float(high - low) / 4
-
-
-def course_of_reading(fit: TravelFit, place_in_list: int, encoder: Encoder) -> Agreement | None:
-    """Return whether the reading's own motion shows a slip that lasts, as pictures and readings together do.
-
-    How the slip goes on from picture to picture is taken from both; how large it is, from the reading alone,
-    as what is not motion at an even acceleration. None when it cannot tell.
-    """
-    event, sight = fit.events[place_in_list], fit.sight
-    gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
-    course = np.pad(_course(fit, place_in_list), event.during)
-    even = np.vander(np.linspace(-1, 1, len(course)), 2)
-    weight = course - even @ np.linalg.lstsq(even, course, rcond=None)[0]
-    step = np.diff(readings_at(encoder, sight.time_s))
-    first = event.place - event.during - 1 - event.during
-    jump, jump_sigma = _filtered(step, weight * gain_mm / float(weight @ course), first)
-    return _told_by_reading(gain_mm, sigma, jump, jump_sigma)
-
-
-def _course(fit: TravelFit, place_in_list: int) -> Float:
-    """Return what the reading gains from picture to picture while an event lasts, (during + 1,) mm."""
-    event = fit.events[place_in_list]
-    gained = fit.difference_mm - fit.columns[:, 1:4] @ fit.values[1:4]
-    return np.diff(gained[event.place - event.during - 1 : event.place + 1])
-
-
-@dataclass(frozen=True)
-class StepFound:
-    """A step of the reading.
-
-    Attributes
-    ----------
-    place : int
-        Index in the `Sight` of the first picture after it.
-    time_s, time_sigma_s : float
-        When, and 1 σ.
-    gain_mm, sigma_mm : float
-    p_value : float
-        Over all moments at which it might have come.
-    rivals : tuple of EventKind
-        What explains it as well.
-    missing_s : float
-        Time of missing pictures that would explain it.
-    lasting_s : float
-        How long it takes, as of a wheel that slips evenly.
-    agreements : tuple of Agreement
-        What the reading alone says of it.
-    """
-
-    place: int
-    time_s: float
-    time_sigma_s: float
-    gain_mm: float
-    sigma_mm: float
-    p_value: float
-    rivals: tuple[EventKind, ...]
-    missing_s: float
-    lasting_s: float = SHORTEST_S
-    agreements: tuple[Agreement, ...] = ()
-
-
-def with_events(sight: Sight, encoder: Encoder) -> TravelFit:
-    """Return the fit with the events that the readings ask for, the strongest first."""
-    fit = fitted(sight, encoder, (), None)
+    fit = fitted(sight, encoder, (), None, without)
     for _ in range(_MOST):
         event, score, count = _strongest(fit)
         if chance(score, count, len(sight.time_s)) > _ENTERS:
             break
-        fit = fitted(sight, encoder, _joined(sight, (*fit.events, event)), None)
+        fit = fitted(sight, encoder, _joined(sight, (*fit.events, event)), None, without)
     fit = _without_needless(fit, encoder)
     wider = tuple(_with_its_ends(sight, e) for e in fit.events)
-    return fit if wider == fit.events else fitted(sight, encoder, wider, None)
+    return fit if wider == fit.events else fitted(sight, encoder, wider, None, without)
 
 
 def _with_its_ends(sight: Sight, event: Event) -> Event:
@@ -213,15 +78,8 @@ def _without_needless(fit: TravelFit, encoder: Encoder) -> TravelFit:
         least = int(np.argmin(fit.event_z2))
         if chance(fit.event_z2[least], 2 * len(fit.sight.time_s), len(fit.sight.time_s)) <= _ENTERS:
             break
-        fit = fitted(fit.sight, encoder, fit.events[:least] + fit.events[least + 1 :], None)
+        fit = fitted(fit.sight, encoder, fit.events[:least] + fit.events[least + 1 :], None, fit.without)
     return fit
-
-
-def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
-    """Return the steps among the fit's events, each judged with the others in place."""
-    return tuple(
-        _judged(fit, k, encoder) for k, event in enumerate(fit.events) if event.kind is not EventKind.OUTLIER
-    )
 
 
 def chance(score: float, count: int, measurements: int) -> float:
@@ -237,7 +95,8 @@ def _strongest(fit: TravelFit) -> tuple[Event, float, int]:
     sight = fit.sight
     speed = np.gradient(sight.distance_mm, sight.time_s)
     best, score, count = Event(EventKind.STEP, 0), 0.0, 0
-    for kind in (EventKind.STEP, EventKind.OUTLIER):
+    known = (EventKind.STEP,) if _SLIP not in fit.without else ()
+    for kind in (*known, EventKind.OUTLIER):
         gain = fit.whitened.gain(candidate_columns(sight, kind, speed))[1]
         if kind is EventKind.STEP:
             gain[:_SIDE], gain[len(gain) - _SIDE + 1 :] = 0.0, 0.0
@@ -245,73 +104,3 @@ def _strongest(fit: TravelFit) -> tuple[Event, float, int]:
         if gain.max(initial=0.0) > score:
             best, score = Event(kind, int(np.argmax(gain))), float(gain.max())
     return best, score, count
-
-
-def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
-    event, sight = fit.events[place_in_list], fit.sight
-    gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
-    rivals, missing_s = _rivals(fit, place_in_list, encoder)
-    # Somewhere between two pictures; where the reading itself jumps, as long as a short slip lasts.
-    within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
-    if event.during:
-        time_s, lasting_s = _middle_and_duration(fit, place_in_list)
-        again, jumps_s = course_of_reading(fit, place_in_list, encoder), within_s
-    else:
-        k, lasting_s, jumps_s = moment(sight, encoder, event.place), SHORTEST_S, SHORTEST_S
-        time_s = float(encoder.time_s[k] + encoder.time_s[k + 1]) / 2
-        again = jump_of_reading(encoder, k, gain_mm, sigma)
-    if again is not None and again.confirmation.agrees:
-        # Errors of pictures cannot make the encoder's reading jump.
-        rivals, within_s = (), jumps_s
-    count = len(sight.time_s)
-    z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
-    return StepFound(
-        event.place, time_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
-        missing_s, lasting_s, () if again is None else (again,),
-    )  # fmt: skip
-
-
-def _middle_and_duration(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
-    """Return when a slip that lasts has its middle, and the duration of an even one of the same spread, s."""
-    event, time_s = fit.events[place_in_list], fit.sight.time_s
-    around = time_s[event.place - event.during - 1 : event.place + 1]
-    course, middle = _course(fit, place_in_list), around[:-1] + np.diff(around) / 2
-    share = course / course.sum()
-    mean = float(np.clip(share @ middle, around[0], around[-1]))
-    # Within a gap between pictures the slip spreads evenly, as its course takes it to do.
-    spread = float(share @ (middle - mean) ** 2) + float(np.median(np.diff(around))) ** 2 / 12
-    return mean, float(np.clip(np.sqrt(12 * max(spread, 0.0)), SHORTEST_S, np.ptp(around)))
-
-
-def _rivals(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[tuple[EventKind, ...], float]:
-    """Return what explains a step as well, and the time of missing pictures that would."""
-    event, sight = fit.events[place_in_list], fit.sight
-    if event.during:
-        # Pictures that drift for a while look the same, but for the reading's own motion. Fiducials do not
-        # drift.
-        return () if sight.placed else (EventKind.OUTLIER,), 0.0
-    others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
-    without = fitted(sight, encoder, others, fit.noise)
-    # The step itself does not count as speed.
-    speed = median_filter(np.gradient(sight.distance_mm, sight.time_s), 5)
-    score, size = {}, {}
-    for kind in EventKind:
-        value, gain = without.whitened.gain(candidate_columns(sight, kind, speed))
-        near = slice(max(event.place - 2, 0), event.place + 3)
-        size[kind], score[kind] = float(value[near][np.argmax(gain[near])]), float(gain[near].max())
-    sigma = float(fit.sigma[4 + place_in_list])
-    rivals = tuple(
-        k
-        for k in EventKind
-        if k is not event.kind
-        and score[k] > score[event.kind] - _APART
-        and (k is not EventKind.LOST_TIME or _whole_frames(sight, size[k], sigma, speed[event.place]))
-    )
-    return rivals, size[EventKind.LOST_TIME]
-
-
-def _whole_frames(sight: Sight, missing_s: float, sigma_mm: float, speed_mm_s: float) -> bool:
-    """Return whether a time is that of one or two frames, which a camera may lose or write twice."""
-    frames = missing_s / sight.frame_time_s
-    sigma = _WITHIN * sigma_mm / max(abs(speed_mm_s), 1e-9) / sight.frame_time_s
-    return 0 < abs(round(frames)) <= _UNNOTICED and abs(frames - round(frames)) < sigma + _TIMING

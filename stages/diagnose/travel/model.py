@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
-from stages.diagnose.travel.noise import (
-    DriftNoise,
-    Whitened,
-    estimated_noise,
-    robust_coefficients,
-    whitened_fit,
-)
-from stages.diagnose.travel.sight import Sight, lag_mm, quantum_mm, readings_at, turns_between
+from stages.diagnose.travel.noise import DriftNoise, Whitened, estimated_noise, whitened_fit
+from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
+from stages.diagnose.travel.solve import SCALE, Asked, nearest_start, refined, simplest, starts
 
-OFFSET, SCALE, DELAY, PLAY = range(4)
-SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
-_ROUNDS = 6
-_LONGEST_S = 1.0
 _AROUND = 10
-# The search for delay and play: points a side, finest step, tries of the play, rounds; speeds that differ by
-# less than this share tell nothing of a delay.
-_SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
-_WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
-# χ² of one number exceeds 19.5 by chance once in 10⁵; 23 leaves a margin for noise that is not quite normal.
-_FAR_BETTER = 23.0
+# Share of the usual information that a picture must add to what others tell of it.
+_TOLD = 1e-6
 
 
 class EventKind(StrEnum):
@@ -75,6 +61,8 @@ class TravelFit:
         What each value adds to reading − sight, per unit.
     told_apart : bool
         Whether delay or play is there, and the other does not explain it nearly as well.
+    without : tuple of str
+        Effects that are not known to who fits.
     """
 
     sight: Sight
@@ -86,11 +74,27 @@ class TravelFit:
     whitened: Whitened
     columns: Float
     told_apart: bool
+    without: tuple[str, ...] = ()
 
     @property
     def sigma(self) -> Float:
         """(4 + E + D,) 1 σ of the values."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0)))
+
+    @property
+    def stated_mm(self) -> Float:
+        """(N,) reading − sight with nothing but the offset taken out."""
+        return self.difference_mm - float(np.mean(self.difference_mm))
+
+    @property
+    def left_out_mm(self) -> tuple[Float, Float]:
+        """(K,) by how much pictures are missed when all the others predict them, and 1 σ of that.
+
+        Pictures that an event leaves free are none of them.
+        """
+        own = np.diag(self.whitened.projector)
+        told = own > _TOLD * np.max(own)
+        return self.whitened.weighted[told] / own[told], own[told] ** -0.5
 
     @property
     def event_z2(self) -> Float:
@@ -99,23 +103,27 @@ class TravelFit:
         return np.asarray((self.values[own] / self.sigma[own]) ** 2)
 
 
-def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: DriftNoise | None) -> TravelFit:
+def fitted(
+    sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: DriftNoise | None,
+    without: tuple[str, ...] = (),
+) -> TravelFit:  # fmt: skip
     """Fit offset, scale, delay, play and given events; the noise is measured unless given.
 
     The delay moves the time at which the encoder is read, so that kinks of the motion do no harm; it and the
-    play are found by least absolute deviations first, which unknown events do not disturb.
+    play are found by least absolute deviations first, which unknown events do not disturb. What the effects
+    ``without`` which it is fitted do to a reading is taken for nothing.
     """
-    steady = _without_steps(sight, encoder, events)
     speed = np.gradient(sight.distance_mm, sight.time_s)
-    searched = _nearest_start(sight, steady, events, speed)
-    ends = [_refined(sight, steady, events, speed, start, held) for held, start in _starts(*searched)]
+    steady = _without_steps(sight, encoder, events)
+    asked = Asked(sight, steady, speed, event_columns(sight, events, speed), without)
+    ends = [refined(asked, start, held) for held, start in starts(asked, *nearest_start(asked))]
     if noise is None:
         richest = ends[-1]
         noise = estimated_noise(
             richest.difference_mm, richest.columns, sight.path_mm, quantum_mm(encoder) / np.sqrt(12)
         )
     covariance_mm = noise.covariance(sight.path_mm)
-    end, told_apart = _simplest(ends, covariance_mm)
+    end, told_apart = simplest(ends, covariance_mm)
     whitened = whitened_fit(end.difference_mm, end.columns, covariance_mm)
     values = end.values(covariance_mm)
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
@@ -125,115 +133,9 @@ def fitted(sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: Dri
     covariance[SCALE, SCALE] += sight.scale_sigma**2
     values[4 : 4 + len(events)] += [_gain(encoder, sight, e) for e in events]
     return TravelFit(
-        sight, events, values, covariance, noise, plain - np.median(plain), whitened, end.columns, told_apart
-    )
-
-
-@dataclass(frozen=True)
-class _End:
-    """Where a fit came to: reading − sight (N,), columns (N, 4 + E) there, and which are held at 0."""
-
-    held: tuple[int, ...]
-    difference_mm: Float
-    columns: Float
-
-    def values(self, covariance_mm: Float) -> Float:
-        """Return (4 + E,) the values; 0 of what is held, and of what this motion does not tell."""
-        free = _free(self.columns, self.held)
-        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
-        out = np.zeros(self.columns.shape[1])
-        out[free] = np.where(np.isfinite(np.diag(fit.covariance)), fit.estimate, 0.0)
-        return out
-
-    def misfit(self, covariance_mm: Float) -> float:
-        """Return χ² of what is left."""
-        free = _free(self.columns, self.held)
-        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
-        return float(fit.residual @ fit.weighted)
-
-
-def _free(columns: Float, held: tuple[int, ...]) -> Int:
-    return np.setdiff1d(np.arange(columns.shape[1]), held)
-
-
-def _starts(delay_s: float, play_mm: float) -> list[tuple[tuple[int, ...], tuple[float, float]]]:
-    """Return what is held at 0 and from where the rest starts: neither, each alone, and last of all both."""
-    return [
-        ((DELAY, PLAY), (0.0, 0.0)),
-        ((PLAY,), (0.0, 0.0)), ((PLAY,), (delay_s, 0.0)),
-        ((DELAY,), (0.0, 0.0)), ((DELAY,), (0.0, play_mm)),
-        ((), (0.0, 0.0)), ((), (delay_s, play_mm)),
-    ]  # fmt: skip
-
-
-def _simplest(ends: Sequence[_End], covariance_mm: Float) -> tuple[_End, bool]:
-    """Return the simplest solution that no other beats by far, and whether delay and play are told apart.
-
-    Delay and play can imitate or cancel each other, so that each is kept only where it improves the fit much.
-    """
-    cost = [e.misfit(covariance_mm) + _FAR_BETTER * (2 - len(e.held)) for e in ends]
-    best = int(np.argmin(cost))
-    held = ends[best].held
-    rivals = [c for c, e in zip(cost, ends, strict=True) if len(e.held) == 1 and e.held != held]
-    return ends[best], len(held) == 0 or (len(held) == 1 and min(rivals) > cost[best] + _FAR_BETTER)
-
-
-def _refined(
-    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float,
-    start: tuple[float, float], held: tuple[int, ...],
-) -> _End:  # fmt: skip
-    """Return where a fit comes to from a delay and a play, some columns being held at 0."""
-    delay_s, play_mm = start
-    of_events = event_columns(sight, events, speed)
-    for _ in range(_ROUNDS):
-        reading = readings_at(steady, sight.time_s + delay_s)
-        smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
-        columns = np.concatenate([smooth, of_events], 1)
-        # The effect already applied to the reading is added back, so that every round gives whole values.
-        difference = reading - sight.distance_mm + columns[:, DELAY] * delay_s + off
-        found, free = np.zeros(columns.shape[1]), _free(columns, held)
-        found[free] = robust_coefficients(difference, columns[:, free])
-        delay_s, play_mm = _within(found[DELAY], _LONGEST_S), _within(found[PLAY], _WIDEST_MM)
-    return _End(held, difference, columns)
-
-
-def _nearest_start(
-    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float
-) -> tuple[float, float]:
-    """Return delay and play from which the fit starts, by search: play can look like delay from afar.
-
-    Where the speed changes at once, a delay shows in a few pictures only, and its slope there tells little.
-    """
-    best, play_mm, width = 0.0, 0.0, _LONGEST_S
-    if np.ptp(speed) < _SPEEDS * float(np.max(np.abs(speed), initial=1e-9)):
-        return best, play_mm
-    while width > _FINEST_S:
-        cost = np.inf
-        for delay in best + width * np.linspace(-1, 1, 2 * _SEARCHED + 1):
-            here, play = _misfit_at_delay(sight, steady, events, speed, float(delay))
-            if here < cost:
-                cost, nearest, play_mm = here, float(delay), play
-        best, width = nearest, width / _SEARCHED
-    return best, play_mm
-
-
-def _misfit_at_delay(
-    sight: Sight, steady: Encoder, events: tuple[Event, ...], speed: Float, delay_s: float
-) -> tuple[float, float]:
-    """Return the sum of absolute increments left at a delay, and the play at which they are least."""
-    difference = readings_at(steady, sight.time_s + delay_s) - sight.distance_mm
-    of_events, left, play_mm = event_columns(sight, events, speed), np.inf, 0.0
-    for _ in range(_PLAYS if sight.reverses else 1):
-        smooth, off = _smooth_columns(sight, steady, speed, delay_s, play_mm)
-        columns = np.concatenate([np.delete(smooth, DELAY, 1), of_events], 1)
-        found = robust_coefficients(difference + off, columns, _QUICKLY)
-        left = float(np.sum(np.abs(np.diff(difference + off - columns @ found))))
-        play_mm = _within(found[PLAY - 1], _WIDEST_MM)
-    return left, play_mm
-
-
-def _within(value: float, most: float) -> float:
-    return float(np.clip(value, -most, most))
+        sight, events, values, covariance, noise, plain - np.median(plain), whitened, end.columns, told_apart,
+        without,
+    )  # fmt: skip
 
 
 def moment(sight: Sight, encoder: Encoder, place: int) -> int:
@@ -282,17 +184,3 @@ def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Float:
     after = np.tril(np.ones((count, count)))
     # Frames missing after a moment: pictures are later than their times say, by what the probe then moves.
     return after if kind is EventKind.STEP else -after * speed[:, None]
-
-
-def _smooth_columns(
-    sight: Sight, steady: Encoder, speed: Float, delay_s: float, play_mm: float
-) -> tuple[Float, Float]:
-    """Return (N, 4) columns of offset, scale, delay and play, and what (N,) the play's is off at its size.
-
-    What the play does to a reading is the column times the size less the second.
-    """
-    turns = turns_between(sight, steady, delay_s)
-    low, here, high = (lag_mm(sight, turns, play_mm + step) for step in (-_PLAY_STEP_MM, 0.0, _PLAY_STEP_MM))
-    slope = (high - low) / (2 * _PLAY_STEP_MM)
-    way = sight.distance_mm - sight.distance_mm[0]
-    return np.stack([np.ones(len(speed)), way, -speed, slope], 1), slope * play_mm - here

@@ -12,8 +12,9 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.pages import notation
 from pipeline.physics.catalogue import effect
 from stages.diagnose.agreement import Agreement, Part, agreement
-from stages.diagnose.travel.model import DELAY, PLAY, SCALE, SMOOTH, TravelFit
+from stages.diagnose.travel.model import TravelFit
 from stages.diagnose.travel.noise import whitened_fit
+from stages.diagnose.travel.solve import DELAY, PLAY, SCALE, SMOOTH
 
 
 def second_predictions(fit: TravelFit, column: int, allowed: float = 0.0) -> tuple[Agreement, ...]:

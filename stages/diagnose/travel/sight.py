@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -45,7 +46,7 @@ class Sight:
     frame_time_s: float
     placed: bool = False
 
-    @property
+    @cached_property
     def direction(self) -> Float:
         """(N,) +1 or −1: which way the probe moves, or moved before it stopped."""
         step = np.gradient(self.distance_mm)

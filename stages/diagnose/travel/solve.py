@@ -1,0 +1,154 @@
+"""Offset, scale, delay and play of an encoder by least absolute deviations, from several starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import Float, Int
+from pipeline.recording.base import Encoder
+from stages.diagnose.travel.noise import robust_coefficients, whitened_fit
+from stages.diagnose.travel.sight import Sight, lag_mm, readings_at, turns_between
+
+OFFSET, SCALE, DELAY, PLAY = range(4)
+SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
+_ROUNDS = 6
+_LONGEST_S = 1.0
+# The search for delay and play: points a side, finest step, tries of the play, rounds; speeds that differ by
+# less than this share tell nothing of a delay.
+_SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
+_WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
+# χ² of one number exceeds 19.5 by chance once in 10⁵; 23 leaves a margin for noise that is not quite normal.
+_FAR_BETTER = 23.0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is fitted: readings less their jumps against the way seen (N,), and what events add (N, E + D)."""
+
+    sight: Sight
+    steady: Encoder
+    speed: Float
+    of_events: Float
+    without: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a fit came to: reading − sight (N,), columns (N, 4 + E) there, and which are held at 0."""
+
+    held: tuple[int, ...]
+    difference_mm: Float
+    columns: Float
+
+    def values(self, covariance_mm: Float) -> Float:
+        """Return (4 + E,) the values; 0 of what is held, and of what this motion does not tell."""
+        free = _free(self.columns, self.held)
+        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
+        out = np.zeros(self.columns.shape[1])
+        out[free] = np.where(np.isfinite(np.diag(fit.covariance)), fit.estimate, 0.0)
+        return out
+
+    def misfit(self, covariance_mm: Float) -> float:
+        """Return χ² of what is left."""
+        free = _free(self.columns, self.held)
+        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
+        return float(fit.residual @ fit.weighted)
+
+
+def _free(columns: Float, held: tuple[int, ...]) -> Int:
+    return np.setdiff1d(np.arange(columns.shape[1]), held)
+
+
+def starts(asked: Asked, delay_s: float, play_mm: float) -> list[tuple[tuple[int, ...], tuple[float, float]]]:
+    """Return what is held at 0 and from where the rest starts: neither, each alone, and last of all both."""
+    every = [
+        ((DELAY, PLAY), (0.0, 0.0)),
+        ((PLAY,), (0.0, 0.0)), ((PLAY,), (delay_s, 0.0)),
+        ((DELAY,), (0.0, 0.0)), ((DELAY,), (0.0, play_mm)),
+        ((), (0.0, 0.0)), ((), (delay_s, play_mm)),
+    ]  # fmt: skip
+    unknown = {k for k in (DELAY, PLAY) if SMOOTH[k] in asked.without}
+    return [(held, start) for held, start in every if unknown <= set(held)]
+
+
+def simplest(ends: Sequence[End], covariance_mm: Float) -> tuple[End, bool]:
+    """Return the simplest solution that no other beats by far, and whether delay and play are told apart.
+
+    Delay and play can imitate or cancel each other, so that each is kept only where it improves the fit much.
+    """
+    cost = [e.misfit(covariance_mm) + _FAR_BETTER * (2 - len(e.held)) for e in ends]
+    best = int(np.argmin(cost))
+    held = ends[best].held
+    rivals = [c for c, e in zip(cost, ends, strict=True) if len(e.held) == 1 and e.held != held]
+    return ends[best], len(held) == 0 or (
+        len(held) == 1 and min(rivals, default=np.inf) > cost[best] + _FAR_BETTER
+    )
+
+
+def refined(asked: Asked, start: tuple[float, float], held: tuple[int, ...]) -> End:
+    """Return where a fit comes to from a delay and a play, some columns being held at 0."""
+    delay_s, play_mm = start
+    for _ in range(_ROUNDS):
+        reading = readings_at(asked.steady, asked.sight.time_s + delay_s)
+        smooth, off = _smooth_columns(asked, delay_s, play_mm)
+        columns = np.concatenate([smooth, asked.of_events], 1)
+        # The effect already applied to the reading is added back, so that every round gives whole values.
+        difference = reading - asked.sight.distance_mm + columns[:, DELAY] * delay_s + off
+        found, free = np.zeros(columns.shape[1]), _free(columns, held)
+        found[free] = robust_coefficients(difference, columns[:, free])
+        delay_s, play_mm = _within(found[DELAY], _LONGEST_S), _within(found[PLAY], _WIDEST_MM)
+    return End(held, difference, columns)
+
+
+def nearest_start(asked: Asked) -> tuple[float, float]:
+    """Return delay and play from which the fit starts, by search: play can look like delay from afar.
+
+    Where the speed changes at once, a delay shows in a few pictures only, and its slope there tells little.
+    """
+    best, play_mm, width, speed = 0.0, 0.0, _LONGEST_S, asked.speed
+    if np.ptp(speed) < _SPEEDS * float(np.max(np.abs(speed), initial=1e-9)):
+        return best, play_mm
+    while width > _FINEST_S:
+        cost = np.inf
+        for delay in best + width * np.linspace(-1, 1, 2 * _SEARCHED + 1):
+            here, play = _misfit_at_delay(asked, float(delay))
+            if here < cost:
+                cost, nearest, play_mm = here, float(delay), play
+        best, width = nearest, width / _SEARCHED
+    return best, play_mm
+
+
+def _misfit_at_delay(asked: Asked, delay_s: float) -> tuple[float, float]:
+    """Return the sum of absolute increments left at a delay, and the play at which they are least."""
+    difference = readings_at(asked.steady, asked.sight.time_s + delay_s) - asked.sight.distance_mm
+    left, play_mm = np.inf, 0.0
+    for _ in range(_PLAYS if asked.sight.reverses else 1):
+        smooth, off = _smooth_columns(asked, delay_s, play_mm)
+        columns = np.concatenate([np.delete(smooth, DELAY, 1), asked.of_events], 1)
+        found = robust_coefficients(difference + off, columns, _QUICKLY)
+        left = float(np.sum(np.abs(np.diff(difference + off - columns @ found))))
+        play_mm = _within(found[PLAY - 1], _WIDEST_MM)
+    return left, play_mm
+
+
+def _within(value: float, most: float) -> float:
+    return float(np.clip(value, -most, most))
+
+
+def _smooth_columns(asked: Asked, delay_s: float, play_mm: float) -> tuple[Float, Float]:
+    """Return (N, 4) columns of offset, scale, delay and play, and what (N,) the play's is off at its size.
+
+    What the play does to a reading is the column times the size less the second. Columns of what is not known
+    are 0.
+    """
+    sight = asked.sight
+    turns = turns_between(sight, asked.steady, delay_s)
+    low, here, high = (lag_mm(sight, turns, play_mm + step) for step in (-_PLAY_STEP_MM, 0.0, _PLAY_STEP_MM))
+    slope = (high - low) / (2 * _PLAY_STEP_MM)
+    way = sight.distance_mm - sight.distance_mm[0]
+    columns = np.stack([np.ones(len(way)), way, -asked.speed, slope], 1)
+    columns[:, [name in asked.without for name in SMOOTH]] = 0.0
+    return columns, columns[:, PLAY] * play_mm - here

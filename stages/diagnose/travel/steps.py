@@ -1,0 +1,216 @@
+"""Steps of the reading: when, how large, how long, and what else would explain them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from pipeline.arrays import Float
+from pipeline.recording.base import Encoder
+from stages.diagnose.agreement import Agreement, Part, agreement
+from stages.diagnose.travel.events import SHORTEST_S, chance
+from stages.diagnose.travel.model import EventKind, TravelFit, candidate_columns, fitted, moment
+from stages.diagnose.travel.sight import Sight, readings_at
+
+# Explanations whose χ² differs by less than this (3 σ squared) are both kept.
+_APART = 9.0
+# So many neighbouring frames may be lost without a trace in the time stamps; error of a stamp, frames.
+# Debt: data/debts.md.
+_UNNOTICED = 2
+_WITHIN, _TIMING = 3.0, 0.03
+# Least number of readings around a slip that its speed is taken from. Debt: data/debts.md.
+_AROUND = 8
+# Least number of other moments that tell how far a reading's own motion imitates a slip.
+_LEAST_OTHERS = 20
+_TAIL = 2.275
+
+
+def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: float) -> Agreement | None:
+    """Return whether the reading jumps by what it keeps on gaining on the pictures; None when it cannot tell.
+
+    Parameters
+    ----------
+    at
+        Reading after which it would jump.
+    lasting_mm, sigma_mm
+        By how much the reading is ahead of the pictures after the moment, and 1 σ.
+    """
+    return _told_by_reading(lasting_mm, sigma_mm, *reading_jump(encoder, at))
+
+
+def _told_by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: float) -> Agreement | None:
+    """Return whether the reading's own jump, with 1 σ, is what it keeps on gaining on the pictures."""
+    if not np.isfinite(sigma):
+        return None
+    lasting = Part(
+        "what the reading has gained on the pictures ever since",
+        f"{lasting_mm:+.3f} mm (± {sigma_mm:.2g} mm)", np.array([lasting_mm]),
+    )  # fmt: skip
+    alone = Part(
+        "jump of the reading against its own motion", f"{jump:+.3f} mm (± {sigma:.2g} mm)", np.array([jump])
+    )
+    own = np.array([[sigma_mm**2]]), np.array([[sigma**2]])
+    return agreement(lasting, alone, own, own[0] + own[1])
+
+
+def reading_jump(encoder: Encoder, at: int) -> tuple[float, float]:
+    """Return what the reading gains around a moment beyond its own speed before and after, mm, and 1 σ.
+
+    NaN too close to the ends.
+    """
+    step = np.diff(encoder.distance_mm)
+    rate = float(np.median(np.diff(encoder.time_s)))
+    width = 2 * max(int(np.ceil(SHORTEST_S / rate / 2)), 1) - 1
+    weight = np.full(width + 2 * _AROUND, -width / (2 * _AROUND))
+    weight[_AROUND : _AROUND + width] = 1.0
+    return _filtered(step, weight, at - len(weight) // 2)
+
+
+def _filtered(step: Float, weight: Float, first: int) -> tuple[float, float]:
+    """Return the weighted sum of the steps from ``first`` on, and 1 σ.
+
+    1 σ is a quarter of the range that holds the same sum at 95.4 % of all other moments, turns and bursts
+    included. NaN where the steps do not reach, or there are too few other moments.
+    """
+    if not 0 <= first <= len(step) - len(weight):
+        return float("nan"), float("nan")
+    gained = np.correlate(step, weight, mode="valid")
+    others = np.delete(gained, slice(max(first - len(weight) + 1, 0), first + len(weight)))
+    if len(others) < _LEAST_OTHERS:
+        return float("nan"), float("nan")
+    low, high = np.percentile(others, [_TAIL, 100 - _TAIL])
+    return float(gained[first]), float(high - low) / 4
+
+
+def course_of_reading(fit: TravelFit, place_in_list: int, encoder: Encoder) -> Agreement | None:
+    """Return whether the reading's own motion shows a slip that lasts, as pictures and readings together do.
+
+    How the slip goes on from picture to picture is taken from both; how large it is, from the reading alone,
+    as what is not motion at an even acceleration. None when it cannot tell.
+    """
+    event, sight = fit.events[place_in_list], fit.sight
+    gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
+    course = np.pad(_course(fit, place_in_list), event.during)
+    even = np.vander(np.linspace(-1, 1, len(course)), 2)
+    weight = course - even @ np.linalg.lstsq(even, course, rcond=None)[0]
+    step = np.diff(readings_at(encoder, sight.time_s))
+    first = event.place - event.during - 1 - event.during
+    jump, jump_sigma = _filtered(step, weight * gain_mm / float(weight @ course), first)
+    return _told_by_reading(gain_mm, sigma, jump, jump_sigma)
+
+
+def _course(fit: TravelFit, place_in_list: int) -> Float:
+    """Return what the reading gains from picture to picture while an event lasts, (during + 1,) mm."""
+    event = fit.events[place_in_list]
+    gained = fit.difference_mm - fit.columns[:, 1:4] @ fit.values[1:4]
+    return np.diff(gained[event.place - event.during - 1 : event.place + 1])
+
+
+@dataclass(frozen=True)
+class StepFound:
+    """A step of the reading.
+
+    Attributes
+    ----------
+    place : int
+        Index in the `Sight` of the first picture after it.
+    time_s, time_sigma_s : float
+        When, and 1 σ.
+    gain_mm, sigma_mm : float
+    p_value : float
+        Over all moments at which it might have come.
+    rivals : tuple of EventKind
+        What explains it as well.
+    lasting_s : float
+        How long it takes, as of a wheel that slips evenly.
+    agreements : tuple of Agreement
+        What the reading alone says of it.
+    """
+
+    place: int
+    time_s: float
+    time_sigma_s: float
+    gain_mm: float
+    sigma_mm: float
+    p_value: float
+    rivals: tuple[EventKind, ...]
+    lasting_s: float = SHORTEST_S
+    agreements: tuple[Agreement, ...] = ()
+
+
+def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
+    """Return the steps among the fit's events, each judged with the others in place."""
+    return tuple(
+        _judged(fit, k, encoder) for k, event in enumerate(fit.events) if event.kind is not EventKind.OUTLIER
+    )
+
+
+def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
+    event, sight = fit.events[place_in_list], fit.sight
+    gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
+    rivals = _rivals(fit, place_in_list, encoder)
+    # Somewhere between two pictures; where the reading itself jumps, as long as a short slip lasts.
+    within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
+    if event.during:
+        time_s, lasting_s = _middle_and_duration(fit, place_in_list)
+        again, jumps_s = course_of_reading(fit, place_in_list, encoder), within_s
+    else:
+        k, lasting_s, jumps_s = moment(sight, encoder, event.place), SHORTEST_S, SHORTEST_S
+        time_s = float(encoder.time_s[k] + encoder.time_s[k + 1]) / 2
+        again = jump_of_reading(encoder, k, gain_mm, sigma)
+    if again is not None and again.confirmation.agrees:
+        # Errors of pictures cannot make the encoder's reading jump.
+        rivals, within_s = (), jumps_s
+    count = len(sight.time_s)
+    z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
+    return StepFound(
+        event.place, time_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
+        lasting_s, () if again is None else (again,),
+    )  # fmt: skip
+
+
+def _middle_and_duration(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
+    """Return when a slip that lasts has its middle, and the duration of an even one of the same spread, s."""
+    event, time_s = fit.events[place_in_list], fit.sight.time_s
+    around = time_s[event.place - event.during - 1 : event.place + 1]
+    course, middle = _course(fit, place_in_list), around[:-1] + np.diff(around) / 2
+    share = course / course.sum()
+    mean = float(np.clip(share @ middle, around[0], around[-1]))
+    # Within a gap between pictures the slip spreads evenly, as its course takes it to do.
+    spread = float(share @ (middle - mean) ** 2) + float(np.median(np.diff(around))) ** 2 / 12
+    return mean, float(np.clip(np.sqrt(12 * max(spread, 0.0)), SHORTEST_S, np.ptp(around)))
+
+
+def _rivals(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[EventKind, ...]:
+    """Return what explains a step as well."""
+    event, sight = fit.events[place_in_list], fit.sight
+    if event.during:
+        # Pictures that drift for a while look the same, but for the reading's own motion. Fiducials do not
+        # drift.
+        return () if sight.placed else (EventKind.OUTLIER,)
+    others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
+    rest = fitted(sight, encoder, others, fit.noise, fit.without)
+    # The step itself does not count as speed.
+    speed = median_filter(np.gradient(sight.distance_mm, sight.time_s), 5)
+    score, size = {}, {}
+    for kind in EventKind:
+        value, gain = rest.whitened.gain(candidate_columns(sight, kind, speed))
+        near = slice(max(event.place - 2, 0), event.place + 3)
+        size[kind], score[kind] = float(value[near][np.argmax(gain[near])]), float(gain[near].max())
+    sigma = float(fit.sigma[4 + place_in_list])
+    return tuple(
+        k
+        for k in EventKind
+        if k is not event.kind
+        and score[k] > score[event.kind] - _APART
+        and (k is not EventKind.LOST_TIME or _whole_frames(sight, size[k], sigma, speed[event.place]))
+    )
+
+
+def _whole_frames(sight: Sight, missing_s: float, sigma_mm: float, speed_mm_s: float) -> bool:
+    """Return whether a time is that of one or two frames, which a camera may lose or write twice."""
+    frames = missing_s / sight.frame_time_s
+    sigma = _WITHIN * sigma_mm / max(abs(speed_mm_s), 1e-9) / sight.frame_time_s
+    return 0 < abs(round(frames)) <= _UNNOTICED and abs(frames - round(frames)) < sigma + _TIMING
