@@ -24,7 +24,7 @@ _BOTH = """(async ([frame, distance, azimuth, width, height, isEven]) => {
   marks.group.visible = spot.group.visible = false;
   m.fine.thin(false);
   if (isEven) m.fine.dress("even");
-  scene.background.set(0x00ff00);
+  scene.background = scene.background.clone().set(0x00ff00);
   renderer.render(scene, eye.camera);
   const px = new Uint8Array(4 * width * height);
   gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, px);

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # who wants only this package's words need not wait for what fills templates
+    from jinja2 import Template
 
 
 def page_template(name: str) -> Template:
@@ -15,6 +18,8 @@ def page_template(name: str) -> Template:
     jinja2.TemplateNotFound
         When there is no such template.
     """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     loader = PackageLoader("pipeline.pages", ".")
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True)
     environment.filters |= {

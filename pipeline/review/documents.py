@@ -25,6 +25,8 @@ from pipeline.review.run_files import RunFiles
 from pipeline.review.values import WALL_LOSS, full_range_mm, overlay_of
 
 _LEGEND_STEPS = 64
+# What the page needs of a finding as the run measured it; the rest comes with the state.
+_TOLD = ("id", "statement", "pof_class", "pacp_suggestion", "en13508_suggestion")
 _FLOW_ABOVE_YIELD_MPA = 69.0
 # Beyond this share of the wall neither criterion applies.
 LARGEST_LOSS = 0.8
@@ -96,7 +98,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "distance_mm": [float(overlays.distance_mm[0]), float(overlays.distance_mm[-1])],
         "radius_mm": float(np.median(overlays.reference_radius_mm)),
         "overlays": [*_value_layers(files, overlays)],
-        "defects": parse_json(files.defects_text()),
+        "defects": [{k: d.get(k, "") for k in _TOLD} for d in parse_json(files.defects_text())],
         "unconfirmed": files.unconfirmed(),
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),

@@ -17,18 +17,19 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.arrays import Byte
+from pipeline.arrays import Byte, Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import InputError
 from pipeline.files.disk import FileStamp, stamp_of
 from pipeline.files.json_yaml import parse_json
-from pipeline.geometry.axis import PipeAxis, to_pipe
+from pipeline.geometry.axis import PipeAxis
 from pipeline.review.run_files import RunFiles
 
 Json = dict[str, Any]
 _GLTF, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _LARGEST_DOCUMENT = 256 << 20
 _VARIANTS = "KHR_materials_variants"
+_MOST_STATIONS = 2000  # of an axis: at 100 m one every 5 cm
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,16 @@ class StretchedModel:
             When the file is not as boresight writes it.
         """
         with _as_written(self.file):
-            return tuple(self._stretch(p) for p in self._primitives)
+            accessors, primitives = self.document["accessors"], self._primitives
+            boxes = [accessors[p["attributes"]["POSITION"]] for p in primitives]
+            edges = np.array([[box["min"], box["max"]] for box in boxes], float).reshape(-1, 2, 3)
+            triangles = [int(accessors[p["indices"]]["count"]) // 3 for p in primitives]
+            corners = 1000 * np.stack(
+                [edges[:, list(ends), [0, 1, 2]] for ends in product((0, 1), repeat=3)], 1
+            )
+            along = _distances(self.axis, corners)
+            spans = zip(along.min(1).tolist(), along.max(1).tolist(), triangles, strict=True)
+            return tuple(Stretch(*span) for span in spans)
 
     def stretch(self, number: int, is_photo_alone: bool = False) -> bytes:
         """Return one primitive with its materials and pictures, or with the photo alone, as binary glTF.
@@ -89,15 +99,19 @@ class StretchedModel:
         found: list[Json] = self.document["meshes"][0]["primitives"]
         return found
 
-    def _stretch(self, primitive: Json) -> Stretch:
-        accessors = self.document["accessors"]
-        place = accessors[primitive["attributes"]["POSITION"]]
-        least, most = (np.array(place[edge], float).reshape(3) for edge in ("min", "max"))
-        corners = 1000 * np.array(list(product(*zip(least, most, strict=True))))
-        distance, _, _ = to_pipe(self.axis, corners)
-        return Stretch(
-            float(distance.min()), float(distance.max()), accessors[primitive["indices"]]["count"] // 3
-        )
+
+def _distances(axis: PipeAxis, point_p: Float) -> Float:
+    """Return distances (N, M) of points (N, M, 3) along the axis, near enough to say where a stretch lies.
+
+    `to_pipe` would be exact, but loads SciPy and Numba, for which the first view need not wait.
+    """
+    step = max(len(axis.distance_mm) // _MOST_STATIONS, 1)
+    at, origin, tangent = axis.distance_mm[::step], axis.origin_p[::step], axis.R_pa[::step, :, 2]
+    found = np.empty(point_p.shape[:2])
+    for k, corners in enumerate(point_p):  # one stretch at a time, for memory's sake
+        nearest = np.sum((corners[:, None] - origin) ** 2, axis=2).argmin(1)
+        found[k] = at[nearest] + np.sum((corners - origin[nearest]) * tangent[nearest], axis=1)
+    return found
 
 
 def model_of(files: RunFiles) -> StretchedModel:

@@ -26,7 +26,6 @@ from pipeline.review.flat_tiles import FlatPicture, picture_of
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.measuring import Tool, readings
 from pipeline.review.model_stretches import model_of
-from pipeline.review.quality import quality_document
 from pipeline.review.review import Review
 from pipeline.review.values import Limits
 
@@ -85,6 +84,10 @@ def parsed(kind: type[_Request], body: bytes) -> _Request:
 
 
 _CONFLICT, _REFUSED, _MISSING = 409, 422, 404
+# The page asks for these as soon as it runs: the browser asks already while it reads the page's script.
+_WANTED_FIRST = ", ".join(
+    f"</api/{name}>; rel=preload; as=fetch; crossorigin" for name in ("run", "state", "model")
+)
 Handler = Callable[[Request], Awaitable[Response]]
 
 
@@ -139,7 +142,7 @@ class ReviewApp:
         return handle
 
     async def _index(self, _: Request) -> Response:
-        return FileResponse(self.page / "index.html")
+        return FileResponse(self.page / "index.html", headers={"link": _WANTED_FIRST})
 
     def _model(self, _: Request, __: bytes) -> Response:
         return JSONResponse(documents.model_document(model_of(self.review.files)))
@@ -184,6 +187,8 @@ class ReviewApp:
         return JSONResponse(documents.profile_document(self.review.wall(), *at))
 
     def _quality(self, _: Request, __: bytes) -> Response:
+        from pipeline.review.quality import quality_document  # of a page that few open
+
         return JSONResponse(quality_document(self.review.files, self.review.wall()))
 
     def _sights(self, request: Request, _: bytes) -> Response:

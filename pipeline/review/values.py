@@ -15,6 +15,11 @@ from pipeline.errors import InputError
 from pipeline.review.run_files import RunFiles
 
 WALL_LOSS = "wall_loss"
+# Of what in the radius map a layer is made.
+_STORED = {
+    "deviation": "radius_mm", WALL_LOSS: "radius_mm", "deviation_nominal": "radius_mm",
+    "uncertainty": "sigma_mm", "misalignment": "misalignment_mm",
+}  # fmt: skip
 _LEVELS = 254
 # Rows looked through at a time, for memory's sake.
 _ROWS = 4096
@@ -50,13 +55,6 @@ class Values:
         """Return the level (S, A) of every cell between limits."""
         return np.concatenate([limits.levels(self[a : a + _ROWS]) for a in range(0, len(self), _ROWS)])
 
-    def range_mm(self) -> tuple[float, float]:
-        """Return the smallest and the largest value; 0 where nothing was measured."""
-        parts = (self[a : a + _ROWS] for a in range(0, len(self), _ROWS))
-        ends = [(np.fmin.reduce(p, axis=None), np.fmax.reduce(p, axis=None)) for p in parts]
-        known = [e for e in ends if np.isfinite(e).all()]
-        return float(min((e[0] for e in known), default=0.0)), float(max((e[1] for e in known), default=0.0))
-
 
 @dataclass(frozen=True)
 class Limits:
@@ -80,18 +78,15 @@ def values_of(files: RunFiles, layer: str) -> Values:
     InputError
         When there is none of that name.
     """
-    wall, overlays = files.artefact(Wall).radius_map, files.artefact(Overlays)
-    nothing = np.zeros(len(overlays.azimuth_rad))
-    known: dict[str, tuple[Float32, Float]] = {
-        "deviation": (wall.radius_mm, overlays.reference_radius_mm),
-        WALL_LOSS: (wall.radius_mm, overlays.reference_radius_mm),
-        "deviation_nominal": (wall.radius_mm, nothing + overlays.nominal_radius_mm),
-        "uncertainty": (wall.sigma_mm, nothing),
-        "misalignment": (wall.misalignment_mm, nothing),
-    }
-    if layer not in known:
-        raise InputError("layer", f"there is no {layer[:40]!r} between limits", expected=", ".join(known))
-    return Values(*known[layer])
+    if layer not in _STORED:
+        raise InputError("layer", f"there is no {layer[:40]!r} between limits", expected=", ".join(_STORED))
+    overlays = files.artefact(Overlays)
+    less: dict[str, Float | float] = {
+        "deviation": overlays.reference_radius_mm, WALL_LOSS: overlays.reference_radius_mm,
+        "deviation_nominal": overlays.nominal_radius_mm,
+    }  # fmt: skip
+    taken = np.broadcast_to(less.get(layer, 0.0), overlays.azimuth_rad.shape)
+    return Values(getattr(files.artefact(Wall).radius_map, _STORED[layer]), taken)
 
 
 def overlay_of(overlays: Overlays, layer: str) -> Overlay:
@@ -100,10 +95,18 @@ def overlay_of(overlays: Overlays, layer: str) -> Overlay:
 
 
 def full_range_mm(files: RunFiles, layer: str) -> tuple[float, float]:
-    """Return the smallest and the largest value of a layer."""
-    return _full_range(files, files.version, layer)
+    """Return the smallest and the largest value of a layer; 0 where nothing was measured."""
+    low, high = _column_ends(files, files.version, _STORED[layer])
+    known, less = np.isfinite(low), values_of(files, layer).less
+    if not known.any():
+        return 0.0, 0.0
+    return float((low - less)[known].min()), float((high - less)[known].max())
 
 
-@lru_cache(maxsize=32)
-def _full_range(files: RunFiles, _version: str, layer: str) -> tuple[float, float]:
-    return values_of(files, layer).range_mm()
+@lru_cache(maxsize=8)
+def _column_ends(files: RunFiles, _version: str, stored: str) -> tuple[Float32, Float32]:
+    """Return the smallest and the largest value (A,) of each azimuth; several layers are made of one."""
+    cells: Float32 = getattr(files.artefact(Wall).radius_map, stored)
+    parts = [cells[a : a + _ROWS] for a in range(0, len(cells), _ROWS)]
+    low = np.fmin.reduce([np.fmin.reduce(p, axis=0) for p in parts], axis=0)
+    return low, np.fmax.reduce([np.fmax.reduce(p, axis=0) for p in parts], axis=0)

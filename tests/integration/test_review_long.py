@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from pipeline.review.run_files import RunFiles
 from tests.long_run import write_long_run
 from tests.review_browser import chromium, tab
 from tests.review_server import ReviewServer
+from tests.shared_data import PROJECT_ROOT
 
 LENGTH_MM = 2000.0
 
@@ -48,6 +51,19 @@ def test_stretches_follow_each_other_and_cover_the_pipe(long: Path) -> None:
     assert stretches[-1].to_mm - stretches[0].from_mm == pytest.approx(LENGTH_MM, rel=0.06)
     for k in (0, 7, len(stretches) - 1):
         assert z_span(model, k) == pytest.approx((stretches[k].from_mm, stretches[k].to_mm), abs=0.5)
+
+
+def test_where_stretches_lie_is_told_without_what_only_runs_need(long: Path) -> None:
+    """The first view waits for it: SciPy and Numba would take longer to load than all the rest."""
+    told = (
+        "import sys; from pathlib import Path; from pipeline.review.model_stretches import model_of;"
+        "from pipeline.review.run_files import RunFiles;"
+        "assert len(model_of(RunFiles(Path(sys.argv[1]))).stretches()) > 15; print(*sys.modules)"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", told, str(long)], cwd=PROJECT_ROOT, capture_output=True, text=True, check=True
+    )
+    assert not {"numba", "scipy"} & set(loaded.stdout.split())
 
 
 def test_a_stretch_holds_all_that_it_uses_and_nothing_else(sample: Path) -> None:

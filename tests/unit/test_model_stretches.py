@@ -2,12 +2,15 @@
 
 import json
 import struct
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pipeline.errors import InputError
+from pipeline.geometry.axis import from_pipe, to_pipe
 from pipeline.review.model_stretches import read_model
 from tests.fuzz.targets import TARGETS
 from tests.truth_run import true_axis
@@ -34,6 +37,18 @@ def test_a_good_one_gives_its_stretch(tmp_path: Path) -> None:
     (stretch,) = model.stretches()
     assert (stretch.from_mm, stretch.to_mm, stretch.triangles) == pytest.approx((0, 1000, 1))
     assert model.stretch(0)[:4] == b"glTF"
+
+
+def test_a_stretch_in_a_bend_lies_where_its_corners_do(tmp_path: Path) -> None:
+    """A bend of 300 mm, and a piece of wall 100 mm along it and 40 mm around its axis."""
+    axis, tree = true_axis(1 / 300, 0.4), document()
+    corners = from_pipe(axis, np.array([100.0, 200.0])[:, None], np.linspace(0, 6, 12), np.array(20.0))
+    low, high = (f(corners.reshape(-1, 3), axis=0) / 1000 for f in (np.min, np.max))
+    tree["accessors"][0].update(min=low.tolist(), max=high.tolist())
+    (stretch,) = read_model(written(tmp_path, tree), axis).stretches()
+    box = 1000 * np.array(list(product(*zip(low, high, strict=True))))
+    exact = to_pipe(axis, box)[0]
+    assert (stretch.from_mm, stretch.to_mm) == pytest.approx((exact.min(), exact.max()), abs=1.0)
 
 
 def all_of(file: Path) -> tuple[object, ...]:

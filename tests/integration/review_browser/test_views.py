@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import time
 
 import numpy as np
 import pytest
 
 from pipeline.pages import notation
 from tests.patience import patience
-from tests.review_browser import Tab
+from tests.review_browser import Tab, tab
 
 SPOT = (60.0, -1.2)
 _RADII = """(() => {
@@ -32,8 +33,9 @@ def turned(a: float, b: float) -> float:
 
 
 def told(page: Tab, place: str, old: str) -> str:
-    """Return what a view says once it no longer says ``old``."""
-    page.until(f"document.querySelector('{place} .told').textContent !== {json.dumps(old)}")
+    """Return what a view says once it no longer says ``old`` nor waits for anything."""
+    words = f"document.querySelector('{place} .told').textContent"
+    page.until(f"{words} !== {json.dumps(old)} && !document.querySelector('{place} [aria-busy]')")
     return page.page.locator(f"{place} .told").inner_text()
 
 
@@ -87,6 +89,40 @@ def test_the_lit_frame_is_first_and_the_laser_frame_beside_it(page: Tab) -> None
     lit, laser = page.page.locator(".shots .name").all_inner_texts()
     assert lit.startswith("lit frame")
     assert laser.startswith("laser frame")
+
+
+def test_what_takes_long_is_said_to_be_loading(page: Tab) -> None:
+    """Where a frame lies, and the frame itself, each half a second late."""
+    said = "[...document.querySelectorAll('#view-frame .told, #view-frame .name')].map((e) => e.textContent)"
+    for late in ("**/api/sights*", "**/stand?*", "**/seen.png*", "**/api/frames/*.jpg"):
+        page.page.route(late, lambda route: (time.sleep(0.5), route.continue_()))
+    try:
+        page.js("boresight.session.moveTo([40, 0.8])")
+        page.until(f"{said}.some((t) => t.startsWith('Loading the recorded frames'))")
+        page.until(f"{said}.some((t) => /^lit frame \\d+, loading…$/.test(t))")
+        page.until(f"!{said}.some((t) => /loading/i.test(t))")
+        page.page.check("#alike")
+        page.until(f"{said}.some((t) => t.startsWith('Loading a recorded frame in the model'))")
+        page.until(f"{said}.some((t) => /^lit frame \\d+, loading…$/.test(t))")
+        page.until(f"!{said}.some((t) => /loading/i.test(t))")
+    finally:
+        page.page.uncheck("#alike")
+        page.page.unroute_all(behavior="wait")
+
+
+def test_the_first_view_waits_for_nothing_that_it_does_not_show(context, server) -> None:
+    """Frames and the signature's hash are asked for when a part of the model is seen, not before."""
+    asked: list[str] = []
+    with tab(context, server.origin) as fresh:
+        fresh.page.on("request", lambda request: asked.append(request.url.removeprefix(server.origin)))
+        fresh.open(server.origin + "/", model=True)
+        fresh.until("boresight.session.seal !== null")
+        fresh.until("document.querySelector('.shots img')?.naturalWidth > 0")
+    first = {name: next(k for k, a in enumerate(asked) if a.startswith(f"/api/{name}"))
+             for name in ("run", "state", "model", "model/0", "seal", "sights")}  # fmt: skip
+    assert first["model/0"] < min(first["seal"], first["sights"])
+    script = asked.index("/assets/page.js")
+    assert max(first[name] for name in ("run", "state", "model")) < script + 5, "asked for beside the script"
 
 
 def test_a_click_on_the_section_turns_only(page: Tab) -> None:

@@ -1,7 +1,7 @@
 /** Where the model is seen from: in flight along the pipe, as the camera of a recorded frame, or from outside. */
 import * as THREE from "three";
 import { toModel } from "./graphics";
-import { END_RADII } from "./marks";
+import { NEAR_M } from "./marks";
 import type { Pipe } from "./pipe";
 import type { Session } from "./session";
 import type { Stand } from "./types";
@@ -11,6 +11,8 @@ const MM = 1e-3;
 const OUTSIDE_RADII = 16;
 // The eye stands so far before the spot, in radii.
 const BEFORE_RADII = 1.1;
+// It goes so far before the start of the wall, and no nearer to its end.
+const END_RADII = 0.3;
 const [FOV_INSIDE, FOV_NEAR, FOV_OUTSIDE] = [80, 52, 30];
 export const FOV_STAND = 44;
 const MARGIN = 1.12;
@@ -19,7 +21,7 @@ const ASIDE = 0.5;
 const MOST_PITCH_RAD = 1.3;
 
 export class Eye {
-  readonly camera = new THREE.PerspectiveCamera(FOV_INSIDE, 1, 1e-3, 1000);
+  readonly camera = new THREE.PerspectiveCamera(FOV_INSIDE, 1, NEAR_M, 1000);
   isInside = true;
   flown: number;
   private look = { yaw: 0, pitch: 0 };

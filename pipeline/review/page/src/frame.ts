@@ -5,20 +5,22 @@ import type { Point, Sight } from "./types";
 import { drawn, element } from "./words";
 
 const DELAY_MS = 150;
+const LONG_MS = 200; // what takes longer is told to be loading
 const CLOSE = 4;
 
 export class FrameView {
   readonly root = element("div", { class: "frames" });
   private readonly told = element("p", { class: "told" });
   private timer = 0;
+  private turn = 0;
   private readonly close = element("input", { type: "checkbox", id: "close-up", checked: true });
   private readonly light = element("input", { type: "range", min: "1", max: "8", step: "0.5", value: "1", id: "brighten" });
   private readonly row = element("div", { class: "shots" });
   private readonly alike = element("input", { type: "checkbox", id: "alike" });
   private shots: Shot[] = [];
 
-  /** `sizeOfModel` gives the pixels of the model's picture, which a frame seen alike has too. */
-  constructor(private readonly session: Session, private readonly sizeOfModel: () => Point) {
+  /** `sizeOfModel` gives the pixels of the model's picture, which a frame seen alike has too; frames are asked for after `first`. */
+  constructor(private readonly session: Session, private readonly sizeOfModel: () => Point, private readonly first: Promise<void>) {
     this.root.append(this.row, this.told);
     this.close.addEventListener("change", () => this.zoom());
     this.light.addEventListener("input", () => this.brighten());
@@ -47,31 +49,42 @@ export class FrameView {
   }
 
   private async load(): Promise<void> {
-    const [distance, azimuth] = this.session.cursor;
+    const [distance, azimuth] = this.session.cursor, turn = ++this.turn;
+    const telling = window.setTimeout(() => this.tell(this.alike.checked ? "Loading a recorded frame in the model's view…" : "Loading the recorded frames…"), LONG_MS);
+    this.root.setAttribute("aria-busy", "true");
     try {
+      await this.first;
+      if (turn !== this.turn) return;
       const sights = await this.session.source.sights(distance, azimuth);
+      if (turn !== this.turn) return;
       const lit = this.alike.checked && sights.find((s) => s.illumination !== "laser");
-      if (lit) await this.compare(lit, [distance, azimuth]);
+      if (lit) await this.compare(lit, [distance, azimuth], turn);
       else this.show(sights);
     } catch (error) {
+      if (turn !== this.turn) return;
       this.shots = [];
       this.row.replaceChildren();
-      this.told.textContent = error instanceof Error ? error.message : String(error);
+      this.tell(error instanceof Error ? error.message : String(error));
+    } finally {
+      window.clearTimeout(telling);
+      if (turn === this.turn) this.root.removeAttribute("aria-busy");
     }
   }
 
+  private tell(words: string): void { this.told.textContent = words; }
+
   /** Show a frame and the model from the same place, through the same lens, in the same light. */
-  private async compare(sight: Sight, at: Point): Promise<void> {
-    this.session.standAs(await this.session.source.stand(sight.frame, at));
-    if (!this.session.stand) return;
+  private async compare(sight: Sight, at: Point, turn: number): Promise<void> {
+    const stand = await this.session.source.stand(sight.frame, at);
+    if (turn !== this.turn || !this.alike.checked) return;
+    this.session.standAs(stand);
     const [width, height] = this.sizeOfModel();
-    this.shots.length = 0;
     const shot = new Shot(() => undefined);
     shot.put({ ...sight, spot_px: [width / 2, height / 2], ring_px: [] }, this.session.source.seenFrom(sight.frame, at, FOV_STAND, width, height), () => undefined);
-    this.shots.push(shot);
+    this.shots = [shot];
     this.row.replaceChildren(shot.root);
     this.brighten();
-    this.told.textContent = `Frame ${sight.frame} (${lightOf(sight)}) at ${sight.time_s.toFixed(2)} s, seen as the model is: same place, lens and light.`;
+    this.tell(`Frame ${sight.frame} (${lightOf(sight)}) at ${sight.time_s.toFixed(2)} s, seen as the model is: same place, lens and light.`);
   }
 
   private show(sights: Sight[]): void {
@@ -82,7 +95,7 @@ export class FrameView {
     ordered.forEach((sight, k) => this.shots[k]!.put(sight, this.session.source.frame(sight.frame), () => this.zoom()));
     this.brighten();
     const has = ordered.some((s) => s.ring_px.length);
-    this.told.textContent = `${ordered.map((s) => `Frame ${s.frame} (${lightOf(s)}) at ${s.time_s.toFixed(2)} s`).join(", ")}; spot circled${has ? ", measured laser line dotted" : ""}.`;
+    this.tell(`${ordered.map((s) => `Frame ${s.frame} (${lightOf(s)}) at ${s.time_s.toFixed(2)} s`).join(", ")}; spot circled${has ? ", measured laser line dotted" : ""}.`);
   }
 
   /** Move the spot to what was clicked. */
@@ -90,7 +103,7 @@ export class FrameView {
     try {
       this.session.moveTo(await this.session.source.spot(sight.frame, u, v));
     } catch (error) {
-      this.told.textContent = error instanceof Error ? error.message : String(error);
+      this.tell(error instanceof Error ? error.message : String(error));
     }
   }
 }
@@ -127,7 +140,11 @@ class Shot {
 
   put(sight: Sight, address: string, ready: () => void): void {
     this.sight = sight;
+    const name = `${lightOf(sight)} frame ${sight.frame}`;
+    if (this.image.getAttribute("src") !== address) this.name.textContent = `${name}, loading…`;
+    this.image.onerror = () => { this.name.textContent = `${name} cannot be loaded`; };
     this.image.onload = () => {
+      this.name.textContent = name;
       ready();
       this.marks.setAttribute("viewBox", `0 0 ${this.image.naturalWidth} ${this.image.naturalHeight}`);
       const [u, v] = sight.spot_px;
@@ -138,6 +155,5 @@ class Shot {
     };
     this.image.src = address;
     this.image.alt = `Recorded frame ${sight.frame}, ${lightOf(sight)}, the spot circled`;
-    this.name.textContent = `${lightOf(sight)} frame ${sight.frame}`;
   }
 }

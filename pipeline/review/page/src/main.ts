@@ -25,7 +25,7 @@ async function start(): Promise<void> {
   document.title = `${run.name} · boresight review`;
   const tools = new ToolBar(session);
   const flat = new FlatView(session), model = new ModelView(session);
-  const findings = new FindingsPanel(session), frame = new FrameView(session, () => model.size), section = new SectionView(session);
+  const findings = new FindingsPanel(session), frame = new FrameView(session, () => model.size, model.first), section = new SectionView(session);
   const inspect = element("main", { class: "inspect", id: "inspect" },
     pane("Model", "view-model", model.bar(), model.root),
     pane("Unrolled wall", "view-flat", tools.bar(), tools.root, flat.root, tools.status),
@@ -40,7 +40,7 @@ async function start(): Promise<void> {
   open("Inspect");
   keys(session, { findings, tools, help, open, pages: Object.keys(pages) });
   const look = () => void session.refresh().catch((e: Error) => session.lose(e));
-  look();
+  void model.first.then(look); // the server reads every file of the run for it
   if (!source.readOnly) window.setInterval(() => { if (!document.hidden) look(); }, REFRESH_MS);
   window.boresight = { session, model, flat, words };
   if (findings.order.length) session.select(findings.order[0]!.id);

@@ -13,10 +13,11 @@ const MM = 1e-3;
 // Findings and distances are marked within so many radii of the eye; all of a long pipe would be a crowd.
 const NEAR_RADII = 14, RINGS_AHEAD_RADII = 7, CLOCK_RADII = 1.4;
 const STEP_RAD = 0.06;
-// The eye goes so far before the start of the wall, and no nearer to its end.
-export const END_RADII = 0.3;
 const [WITHIN, AROUND] = [0.985, 1.015]; // radii of marks, seen from inside and from outside
 const BAR_PX: Point = [50, 150];
+// From outside an outline lies this far before the wall, in radii: half its width would sink into a wall seen askew.
+const BEFORE_RADII = 0.15;
+export const NEAR_M = 1e-3; // nothing nearer to the eye is drawn
 
 interface Label { at: THREE.Vector3; root: HTMLElement; outward: THREE.Vector3 | null }
 
@@ -25,7 +26,6 @@ export class Marks {
   readonly group = new THREE.Group();
   private readonly findings = new THREE.Group();
   private readonly rings = new THREE.Group();
-  private readonly ends: THREE.Mesh[];
   private readonly bar = element("div", { class: "scale-bar" }, element("i"), element("span"));
   private readonly end = element("span", { class: "mark end" });
   private labels: Label[] = [];
@@ -35,11 +35,7 @@ export class Marks {
   private isInside = true;
 
   constructor(private readonly session: Session, private readonly pipe: Pipe) {
-    const { run } = session;
-    const [from, to] = run.distance_mm;
-    // The first lies behind the eye where it stands farthest back, or it would hide the wall.
-    this.ends = [this.cap(from - 1.1 * END_RADII * run.radius_mm), this.cap(to)];
-    this.group.add(this.findings, this.rings, ...this.ends);
+    this.group.add(this.findings, this.rings);
     this.layer.append(this.bar);
   }
 
@@ -53,7 +49,6 @@ export class Marks {
     this.labels = [];
     for (const group of [this.findings, this.rings]) clear(group);
     this.casings = [];
-    this.ends.forEach((end) => { end.visible = isInside; });
     const near = NEAR_RADII * this.session.run.radius_mm;
     const seen = this.session.standing.filter((f) => f.size.distance_to_mm > distance - near && f.size.distance_from_mm < distance + near);
     const isChosen = (f: Finding) => f.id === this.session.selected;
@@ -101,7 +96,11 @@ export class Marks {
     if (!place.length) return;
     const geometry = new LineSegmentsGeometry().setPositions(place);
     const [below, above] = ([["#000000", casing], [colour, width]] as [string, number][]).map(([color, linewidth], k) => {
-      const line = new LineSegments2(geometry, new LineMaterial({ color, linewidth, depthTest: !this.isInside, transparent: true }));
+      const material = new LineMaterial({ color, linewidth, depthTest: !this.isInside, depthWrite: false, transparent: true });
+      // Depth as it is drawn goes with 1 / distance: so much less of it is BEFORE_RADII nearer.
+      const nearer = 2 * NEAR_M * BEFORE_RADII * this.session.run.radius_mm * MM;
+      material.vertexShader = material.vertexShader.replace("#include <logdepthbuf_vertex>", `gl_Position.z -= ${nearer.toExponential()} / gl_Position.w;\n#include <logdepthbuf_vertex>`);
+      const line = new LineSegments2(geometry, material);
       line.renderOrder = 2 + k;
       return line;
     }) as [LineSegments2, LineSegments2];
@@ -170,15 +169,6 @@ export class Marks {
 
   private outward(distance: number, azimuth: number): THREE.Vector3 {
     return this.place(distance, azimuth, 1).sub(this.place(distance, azimuth, 0)).normalize();
-  }
-
-  /** Where the measured wall ends, a dark disc, so that an end is not taken for a fault. */
-  private cap(distance: number): THREE.Mesh {
-    const disc = new THREE.Mesh(new THREE.CircleGeometry(1.03 * this.session.run.radius_mm * MM, 48),
-      new THREE.MeshBasicMaterial({ color: 0x46525e, side: THREE.DoubleSide }));
-    disc.position.copy(this.place(distance, 0, 0));
-    disc.lookAt(this.place(distance, 0, 0).add(toModel(this.pipe.at(distance).tangent)));
-    return disc;
   }
 }
 

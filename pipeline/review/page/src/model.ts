@@ -35,6 +35,8 @@ export class ModelView {
   private readonly pace = new Pace((sharpness, isMoving) => this.sharpen(sharpness, isMoving), () => this.draw());
   private readonly pipe: Pipe;
   private readonly scene = new THREE.Scene();
+  private readonly ground = new THREE.Color();
+  private readonly beyond = new THREE.Color(0x46525e); // what is not wall, seen from inside: past its ends, where nothing was measured
   private readonly eye: Eye;
   private readonly rake = new THREE.PointLight(0xffffff, RAKING, 0, 0);
   private readonly marks: Marks;
@@ -47,6 +49,9 @@ export class ModelView {
   private readonly fine: Stretches;
   private readonly coarse: CoarseWall;
   private asked = false;
+  private show!: () => void;
+  /** Kept once a part of the model is seen, or none will be: what the first view can do without waits for it. */
+  readonly first = new Promise<void>((resolve) => { this.show = resolve; });
   private seen = NaN; // where the eye was when stretches were last asked for
 
   constructor(private readonly session: Session) {
@@ -143,16 +148,19 @@ export class ModelView {
   }
 
   private async start(): Promise<void> {
+    const listed = this.fine.start();
+    listed.catch(() => undefined); // told below, where it is waited for
     try {
       this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: !this.isPlain });
       if (this.isPlain) this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     } catch {
       this.told.textContent = "This browser shows no 3D (WebGL is off). Everything else works.";
       this.root.classList.add("blank");
+      this.show();
       return;
     }
     this.renderer.localClippingEnabled = true;
-    this.scene.background = new THREE.Color(getComputedStyle(document.documentElement).getPropertyValue("--ground").trim());
+    this.ground.set(getComputedStyle(document.documentElement).getPropertyValue("--ground").trim());
     this.scene.add(new THREE.AmbientLight(0xffffff, AMBIENT), this.rake, this.marks.group, this.spot.group);
     this.controls = new OrbitControls(this.eye.camera, this.canvas);
     this.controls.addEventListener("change", () => this.draw());
@@ -164,11 +172,12 @@ export class ModelView {
     this.scene.add(this.fine.group, this.coarse.group);
     this.stand();
     try {
-      await this.fine.start();
+      await listed;
       if (!this.fine.isAll) void this.coarse.dress().catch((e: Error) => this.session.say(e.message));
       await this.fine.around(this.eye.distance);
     } catch (error) {
       this.told.textContent = error instanceof Error ? error.message : String(error);
+      this.show();
     }
   }
 
@@ -279,12 +288,14 @@ export class ModelView {
       this.frameTimes.push(now);
       if (this.frameTimes.length > 120) this.frameTimes.shift();
       this.shine();
+      this.scene.background = this.eye.isInside ? this.beyond : this.ground;
       const across = new THREE.Vector3(camera.position.x, camera.position.y, 0);
       if (across.lengthSq() < 1e-12) across.set(1, 0, 0);
       this.plane.normal.copy(across.normalize().negate());
       const planes = this.isCut ? [this.plane] : [];
       this.fine.clip(planes);
       this.renderer!.render(this.scene, camera);
+      if (this.parts.length) this.show();
       this.marks.follow(camera, ...this.size, this.session.cursor);
     });
   }

@@ -25,7 +25,7 @@ export class Spot {
     const { cursor: [distance, azimuth], run } = this.session;
     this.marker.position.copy(toModel(this.pipe.point(distance, azimuth, run.radius_mm * 0.995)).multiplyScalar(MM));
     this.marker.lookAt(toModel(this.pipe.at(distance).origin).multiplyScalar(MM));
-    this.marker.scale.setScalar(run.radius_mm * 0.06 * MM);
+    this.marker.scale.setScalar(run.radius_mm * 0.035 * MM);
   }
 
   /** Show what is being drawn or measured. */

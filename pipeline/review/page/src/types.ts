@@ -7,14 +7,14 @@ export interface Quantity { name: string; value: number | string | null; unit: s
 
 export interface Axis { distance_mm: number[]; origin_p: number[][]; x_p: number[][]; y_p: number[][] }
 
-export interface MeasuredDefect {
-  id: number; kind: string; depth_mm: number | null; depth_sigma_mm: number | null; length_mm: number; width_mm: number;
-  confidence: number; frames: number[]; pof_class: string; pacp_suggestion: string; en13508_suggestion: string;
-  statement: string; clock_from: number; clock_to: number; distance_from_mm: number; distance_to_mm: number;
-}
+/** What the run says of a finding beside its size. */
+export interface MeasuredDefect { id: number; statement: string; pof_class: string; pacp_suggestion: string; en13508_suggestion: string }
 
 /** What one ring alone shows: to be looked at, not counted. */
-export interface Unconfirmed extends MeasuredDefect { outline: Point[]; peak_distance_mm?: number; peak_clock?: number }
+export interface Unconfirmed {
+  kind: string; depth_mm: number | null; depth_sigma_mm: number | null; length_mm: number; width_mm: number; statement: string;
+  clock_from: number; clock_to: number; distance_from_mm: number; distance_to_mm: number; outline: Point[]; peak_distance_mm?: number; peak_clock?: number;
+}
 
 export interface Run {
   name: string; metrics: Quantity[]; numbers: { stage: string; numbers: Quantity[] }[]; warnings: string[];
