@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.commands.review import StagedComparison
+from pipeline.commands.staged_comparison import StagedComparison
 from pipeline.review.compared import RunPair
 from pipeline.review.review import open_review
 from pipeline.review.run_files import RunFiles

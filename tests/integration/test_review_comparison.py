@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from pipeline.artefacts.comparison import Fate
 from pipeline.cli import app
-from pipeline.commands.review import StagedComparison
+from pipeline.commands.staged_comparison import StagedComparison
 from pipeline.review.compared import DIFFERENCE, Compared, run_pair
 from pipeline.review.review import open_review
 from pipeline.review.run_files import RunFiles
