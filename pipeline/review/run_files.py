@@ -32,8 +32,12 @@ _MAKERS: dict[type, str] = {
     CheckedFrames: "premises", Sections: "sections", WallTexture: "texture", RingPoints: "triangulate",
     Defects: "defects",
 }  # fmt: skip
+# What a record holds since version 0.2: a review, a script or a diagnosis asks for any of it.
+_RECORDED = ("probe", "input_sha256", "configuration", "stages", "metrics", "reader_warnings", "warnings")
 _PEAK = ("peak_distance_mm", "peak_clock")  # runs of version 0.1 have none
 _SIZES = tuple(name for name in Measured.__dataclass_fields__ if name not in _PEAK)
+# What to do about a run that an older boresight made.
+_AGAIN = "run it again: boresight run RECORDING -o RUN"
 # What a signature binds: the results and the record of how they came about.
 _BOUND = ("run.json", "defects.json", "radius_map.npz", "unrolled.png", "model.glb", "sections.csv")
 
@@ -71,7 +75,7 @@ class RunFiles:
         Raises
         ------
         InputError
-            When it is missing, broken, or the run is not completed.
+            When it is missing, broken, of an older boresight, or the run is not completed.
         """
         record = self._json("run.json")
         if not isinstance(record, dict) or record.get("format") != 1:
@@ -79,6 +83,10 @@ class RunFiles:
         if record.get("state") != "completed":
             state = record.get("state")
             raise InputError(self.path, f"the run is {state}, not completed", hint="finish it: boresight run")
+        lacking = [part for part in _RECORDED if part not in record]
+        if lacking:
+            problem = f"was written by an older boresight: it lacks {', '.join(lacking)}"
+            raise InputError(self.path / "run.json", problem, hint=_AGAIN)
         return record
 
     def artefact(self, kind: type[_Artefact]) -> _Artefact:
@@ -178,7 +186,8 @@ def _artefact(files: RunFiles, kind: type, _version: str) -> Any:
     stage, key = _MAKERS[kind], files.stage_key(kind)
     found = RunFolder(files.path).store.look(stage, key, kind) if key else None
     if found is None:
-        raise InputError(files.path, f"has no result of stage {stage}", hint="run it again: boresight run")
+        problem = f"holds no result of stage {stage} that this version of boresight can read"
+        raise InputError(files.path, problem, hint=_AGAIN)
     return found
 
 

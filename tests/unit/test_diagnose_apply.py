@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.api.diagnosis.apply import GeometryChange, clock_of, consequence, geometry_change
+from pipeline.api.diagnosis.apply import GeometryChange, consequence, geometry_change
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
 from stages.diagnose.correct import encoder_effects, with_true_readings
 from stages.diagnose.residual import AZIMUTHS, RingResidual, azimuths_rad, wall_distances_mm
@@ -25,11 +25,6 @@ def run(folder, radius, depths):
     ]  # fmt: skip
     (folder / "defects.json").write_text(json.dumps(defects))
     return folder
-
-
-def test_clock_runs_clockwise_from_the_top():
-    # P has x right and y down: 12 o'clock is −y, 3 o'clock +x.
-    assert clock_of(np.array([-np.pi / 2, 0.0, np.pi / 2, np.pi])) == pytest.approx([0, 3, 6, 9])
 
 
 def test_the_radius_change_lies_at_its_clock_and_the_deepest_change_is_told(tmp_path):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.artefacts.findings import Defect, Defects
+from pipeline.artefacts.findings import Defect, Defects, clock_of_azimuth
 
 PIT = Defect(
     id=1, kind="pit", distance_from_mm=10.0, distance_to_mm=14.0, clock_from=3.0, clock_to=3.2,
@@ -30,3 +30,8 @@ def test_the_deepest_is_one_whose_depth_is_known(depth_mm: float, sigma_mm: floa
 def test_none_is_deepest_where_no_depth_is_known() -> None:
     assert Defects((replace(PIT, depth_sigma_mm=1.0),), 0.05, 0.3).deepest is None
     assert Defects((), 0.05, 0.3).deepest is None
+
+
+def test_clock_runs_clockwise_from_the_top() -> None:
+    # P has x right and y down: 12 o'clock is −y, 3 o'clock +x.
+    assert clock_of_azimuth(np.array([-np.pi / 2, 0.0, np.pi / 2, np.pi])) == pytest.approx([0, 3, 6, 9])

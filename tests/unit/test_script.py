@@ -47,6 +47,19 @@ def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
         boresight.open_diagnosis(tmp_path)
 
 
+def test_a_run_of_an_older_boresight_is_refused_by_name(tmp_path):
+    parts = ("probe", "input_sha256", "configuration", "stages", "metrics", "reader_warnings")
+    older = {"format": 1, "state": "completed", **{part: {} for part in parts}}
+    (tmp_path / "run.json").write_text(json.dumps(older))
+    with pytest.raises(
+        boresight.InputError, match=r"run\.json.*older boresight: it lacks warnings"
+    ) as refusal:
+        boresight.open_run(tmp_path)
+    assert "run it again" in refusal.value.hint
+    (tmp_path / "run.json").write_text(json.dumps(older | {"warnings": []}))
+    boresight.open_run(tmp_path)
+
+
 def find_tilt(
     field: Annotated[Recording, Of("field")], probe: Probe, *, parameters: Parameters, context: Context
 ) -> Diagnosed:

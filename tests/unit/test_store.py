@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
@@ -16,7 +18,7 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.files.codec import NOT_STORED, digest, encode, is_digest_of
+from pipeline.files.codec import NOT_STORED, canonical, digest, encode, is_digest_of
 from pipeline.machine.outcome import Number
 from pipeline.machine.stage import Parameters
 from pipeline.machine.store import Provenance, Store
@@ -164,6 +166,22 @@ def test_the_result_of_another_key_or_class_is_discarded(tmp_path: Path) -> None
     assert store.read("grow", KEY[:-1] + "c", Tree) is None
     store.write(tree(), PROVENANCE)
     assert store.read("grow", KEY, Leaf) is None
+
+
+@pytest.mark.parametrize("gone", ["tests.unit.gone:Tree", "tests.unit.test_store:Gone"])
+def test_a_result_whose_class_has_moved_since_is_not_there_and_breaks_nothing(
+    tmp_path: Path, gone: str
+) -> None:
+    store = Store(tmp_path)
+    store.write(tree(), PROVENANCE)
+    file = next(tmp_path.rglob("manifest.json"))
+    older = json.loads(file.read_text().replace(f"{Tree.__module__}:Tree", gone))
+    del older["sha256"]
+    file.write_text(json.dumps(older | {"sha256": hashlib.sha256(canonical(older)).hexdigest()}))
+    assert store.has("grow", KEY), "the control: but for its class it is whole"
+    assert store.look("grow", KEY, Tree) is None
+    assert store.borrow("grow", KEY, Tree) is None
+    assert store.read("grow", KEY, Tree) is None
 
 
 @pytest.mark.parametrize("limit", [0, 100, 5000])

@@ -12,6 +12,7 @@ import numpy as np
 
 from pipeline.api.job import Job, recording_job, run_job
 from pipeline.arrays import Float
+from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.files.codec import digest
 from pipeline.instrument.probe_file import read_with_source
@@ -124,7 +125,7 @@ def _true_field(effects: Sequence[EffectFound], field: Recording) -> Recording:
 def geometry_change(before: Path, after: Path) -> GeometryChange:
     """Return what changes from one run folder to another of the same recording."""
     change, azimuth = _radius_change(before, after)
-    hour = np.round(clock_of(azimuth)).astype(int) % 12
+    hour = np.round(clock_of_azimuth(azimuth)).astype(int) % 12
     mean, largest = np.full(12, np.nan), np.full(12, np.nan)
     for k in range(12):
         here = change[:, hour == k]
@@ -134,11 +135,6 @@ def geometry_change(before: Path, after: Path) -> GeometryChange:
     seen = change[np.isfinite(change)]
     rms = float(np.sqrt(np.mean(seen**2))) if seen.size else float("nan")
     return GeometryChange(mean, largest, rms, _defect_changes(before, after))
-
-
-def clock_of(azimuth_rad: Float) -> Float:
-    """Return clock positions, hours in [0, 12), of azimuths in P."""
-    return np.asarray((np.degrees(azimuth_rad) + 90.0) / 30.0 % 12.0)
 
 
 def consequence(change: GeometryChange) -> str:

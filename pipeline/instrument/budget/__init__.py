@@ -105,9 +105,7 @@ class Budget:
         return next(row for row in self.rows if row.source.name == name)
 
 
-def error_budget(
-    scan: RingScan, given: Mapping[str, float] | None = None, photometry: LinePhotometry | None = None
-) -> Budget:
+def error_budget(scan: RingScan, given: Mapping[str, float] | None = None) -> Budget:
     """Return the analytic budget of a scan.
 
     Parameters
@@ -116,8 +114,6 @@ def error_budget(
         Its probe's covariance gives the stated sources' σ.
     given
         1 σ by source name in the source's unit, in place of what is stated or typical; 0 switches it off.
-    photometry
-        How the line looks; typical when absent.
 
     Raises
     ------
@@ -136,7 +132,7 @@ def error_budget(
         block = _source_covariance(source, sigma)
         covariance = covariance + _embedded(block, names, source.parameters)
         rows.append(_systematic_row(scan, source, sigma, origin, block, jacobian))
-    rows += _random_rows(scan, given, LinePhotometry() if photometry is None else photometry)
+    rows += _random_rows(scan, given)
     return Budget(scan, tuple(rows), covariance)
 
 
@@ -234,8 +230,8 @@ def _systematic_row(
     return Row(source, sigma, origin, shares, block, np.zeros(0))
 
 
-def _random_rows(scan: RingScan, given: Mapping[str, float], photometry: LinePhotometry) -> list[Row]:
-    computed = line_sigma_px(scan, photometry)
+def _random_rows(scan: RingScan, given: Mapping[str, float]) -> list[Row]:
+    computed = line_sigma_px(scan, LinePhotometry())
     per_px = np.abs(np.einsum("ni,ni->n", radius_by_pixel(scan), scan.line_normals))
     left = without_centre(scan, np.eye(scan.azimuths))
     rows = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +11,12 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget import Budget, Row, error_budget
-from pipeline.instrument.budget.scan import LinePhotometry, Pose, RingScan, at_baseline
+from pipeline.instrument.budget.scan import Pose, RingScan, at_baseline
 from pipeline.instrument.budget.sources import Kind
 
-INCH_MM = 25.4
+# 2, 3 and 4 inch.
+_DIAMETERS_MM = (2 * 25.4, 3 * 25.4, 4 * 25.4)
+_BASELINES_MM = range(10, 101, 3)
 
 
 @dataclass(frozen=True)
@@ -65,15 +67,15 @@ class BaselineStudy:
     good_from_mm: float
 
 
-def dominant_rows(budget: Budget, pose: Pose = Pose.KNOWN) -> tuple[tuple[Row, float], ...]:
+def dominant_rows(budget: Budget) -> tuple[tuple[Row, float], ...]:
     """Return the rows by falling share of the summed variance, averaged over azimuth, with the share."""
-    variance = [row.level(pose) ** 2 for row in budget.rows]
+    variance = [row.level(Pose.KNOWN) ** 2 for row in budget.rows]
     whole = max(math.fsum(variance), 1e-300)
     order = np.argsort(variance)[::-1]
     return tuple((budget.rows[i], variance[i] / whole) for i in order)
 
 
-def tolerances(budget: Budget, accuracy_mm: float, pose: Pose = Pose.KNOWN) -> tuple[Tolerance, ...]:
+def tolerances(budget: Budget, accuracy_mm: float) -> tuple[Tolerance, ...]:
     """Return the tolerance of every systematic source of the budget for an accuracy (1 σ, worst azimuth).
 
     Raises
@@ -84,46 +86,36 @@ def tolerances(budget: Budget, accuracy_mm: float, pose: Pose = Pose.KNOWN) -> t
     if not (math.isfinite(accuracy_mm) and accuracy_mm > 0):
         raise InputError("error budget", f"{accuracy_mm} is out of range", place="accuracy_mm",
                          expected="an accuracy above 0 mm")  # fmt: skip
-    felt = [r for r in budget.rows if r.source.kind is Kind.SYSTEMATIC and r.worst(pose) > 1e-9]
+    felt = [r for r in budget.rows if r.source.kind is Kind.SYSTEMATIC and r.worst(Pose.KNOWN) > 1e-9]
     share = 1 / math.sqrt(max(len(felt), 1))
     return tuple(
         Tolerance(r.source.name, r.source.unit, r.sigma, alone, alone * share)
         for r in felt
-        for alone in [r.sigma * accuracy_mm / r.worst(pose)]
+        for alone in [r.sigma * accuracy_mm / r.worst(Pose.KNOWN)]
     )
 
 
 def baseline_study(
     scan: RingScan,
     given: Mapping[str, float] | None = None,
-    photometry: LinePhotometry | None = None,
-    baselines_mm: Sequence[float] = tuple(range(10, 101, 3)),
-    diameters_mm: Sequence[float] = (2 * INCH_MM, 3 * INCH_MM, 4 * INCH_MM),
-    pose: Pose = Pose.KNOWN,
+    baselines_mm: Iterable[float] = _BASELINES_MM,
 ) -> BaselineStudy:
-    """Return the total σ of the radius over baselines and diameters, the instrument's σ unchanged."""
-    sigma = np.full((len(baselines_mm), len(diameters_mm)), np.nan)
-    for i, baseline in enumerate(baselines_mm):
-        for j, diameter in enumerate(diameters_mm):
-            sigma[i, j] = _level(scan, baseline, diameter, given, photometry, pose)
+    """Return the total σ of the radius over baselines, in 2 to 4 inch, the instrument as stated."""
+    at = np.array(list(baselines_mm), float)
+    sigma = np.array([[_level(scan, b, d, given) for d in _DIAMETERS_MM] for b in at])
     seen = np.where(np.isnan(sigma), np.inf, sigma)
-    worst, at = seen.max(1), np.array(baselines_mm, float)
+    worst = seen.max(1)
     good = at[np.flatnonzero(worst <= 1.1 * worst.min())[0]]
     best = at[seen.argmin(0)]
-    return BaselineStudy(at, np.array(diameters_mm), sigma, best, float(at[worst.argmin()]), float(good))
+    return BaselineStudy(at, np.array(_DIAMETERS_MM), sigma, best, float(at[worst.argmin()]), float(good))
 
 
 def _level(
-    scan: RingScan,
-    baseline_mm: float,
-    diameter_mm: float,
-    given: Mapping[str, float] | None,
-    photometry: LinePhotometry | None,
-    pose: Pose,
+    scan: RingScan, baseline_mm: float, diameter_mm: float, given: Mapping[str, float] | None
 ) -> float:
     try:
         moved = replace(at_baseline(scan, baseline_mm), diameter_mm=diameter_mm, azimuths=24)
     except InputError:
         return math.nan
-    total = error_budget(moved, given, photometry).total_mm(None, pose)
+    total = error_budget(moved, given).total_mm(None, Pose.KNOWN)
     return float(np.sqrt(np.mean(total**2)))

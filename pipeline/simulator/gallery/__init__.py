@@ -230,14 +230,18 @@ class Likeness:
     all_bores: float
 
 
-def likenesses(exhibits: Sequence[Exhibit], most: int = 5, least: float = 0.9) -> dict[str, list[Likeness]]:
+# What is alike beyond so many is not listed.
+_MOST_ALIKE = 5
+
+
+def likenesses(exhibits: Sequence[Exhibit], least: float = 0.9) -> dict[str, list[Likeness]]:
     """Return for each effect what looks like it in one bore, first what does so in all three.
 
     Compared are radius errors over azimuth; of effects that leave the radius alone the motion less the
     encoder's reading, or else light, width and skewness of the line. An effect with a direction of its own
     is turned to where it is most alike.
     """
-    return {e.name: _alike(e, exhibits, least)[:most] for e in exhibits}
+    return {e.name: _alike(e, exhibits, least)[:_MOST_ALIKE] for e in exhibits}
 
 
 def _alike(one: Exhibit, exhibits: Sequence[Exhibit], least: float) -> list[Likeness]:
