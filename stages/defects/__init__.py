@@ -5,8 +5,9 @@
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
 4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
-5. What neither a second ring nor the photo confirms, stays at one place of the image, or is rather false than
-real in such footage, is set apart with the reason (`corroborate`, `clutter`, `credibility`).
+5. What neither a second ring nor the photo confirms, stays at one place of the image, lies where the line
+ends, or is rather false than real in such footage, is set apart with the reason (`corroborate`,
+`credibility`).
 6. Kind from named features as a probability, with codes and words (`classify`, `describe`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
@@ -47,8 +48,8 @@ _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
 # Unconfirmed ones as few as these are looked at at once; a reader must know from where on one finding in four
 # is expected to be false.
 _FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
-# Of what stays at one place of the image nothing says that it is rather on the wall than on the probe.
-_ON_PROBE_OR_WALL = 0.5
+# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
+_WALL_OR_NOT = 0.5
 
 
 def find_defects(
@@ -77,7 +78,7 @@ def find_defects(
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
     found = tuple(_measured(measured, regions, scene, wall.fixed, parameters, context))
-    on_wall = [f.evidence for f in found if not (f.all_round or f.evidence.fixed)]
+    on_wall = [f.evidence for f in found if f.evidence.on_wall and not f.all_round]
     credibility = credibility_of(on_wall, clutter, wall.cloud.frame)
     confirmed, unconfirmed = _judged(found, credibility, parameters.min_depth_mm)
     items, alone = _numbered(confirmed, 1), _numbered(unconfirmed, len(confirmed) + 1)
@@ -140,7 +141,7 @@ def _judged(
     unconfirmed: list[Defect] = []
     for f in found:
         real = 1.0 if f.all_round else credibility.probability(f.evidence, f.defect, min_depth_mm)
-        real *= _ON_PROBE_OR_WALL if f.evidence.fixed else 1.0
+        real *= 1.0 if f.evidence.on_wall else _WALL_OR_NOT
         counts = f.all_round or (f.evidence.corroborated and real >= COUNTED)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
         if counts:
@@ -216,5 +217,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "7", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "8", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -3,7 +3,8 @@
 A glint, a splash or a piece of texture taken for the line shows in one ring. A place of the wall shows in
 every ring that crosses it, whichever pass of the probe that ring is of, and often in the photo, which is
 taken under another light. What stays at one place of the image while the wall goes by
-(`stages.accumulate.fixed`) shows in every ring and is no wall.
+(`stages.accumulate.fixed`) shows in every ring and is no wall. Where a cable or water hides the wall the line
+ends, and what lies at its end is as much the end's as the wall's, in every ring.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import label
 
-from pipeline.arrays import Float
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import WallTexture
 from stages.defects.depth import Depth
 from stages.defects.relief import Relief
@@ -30,6 +32,9 @@ _PLACES = 40
 # A finding is what is fixed to the image where that makes up half of its depth in half of its cells. Chosen:
 # a droplet's own finding has it in nine of ten cells, a defect beside one in none.
 _FIXED_SHARE = 0.5
+# A row of a finding lies at the edge of what was seen where it is deepest within the millimetre of a depth's
+# mean. Of a finding beside hidden wall all rows do, of one that merely touches it few: more than half counts.
+_EDGE_MM, _EDGE_SHARE = 1.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -46,17 +51,25 @@ class Evidence:
         Its depth in σ of the wall.
     fixed : bool
         Whether it stays at one place of the image while the wall goes by.
+    edge : bool
+        Whether it is deepest beside hidden wall.
     """
 
     rings: int
     photo: bool
     above_noise: float
     fixed: bool = False
+    edge: bool = False
+
+    @property
+    def on_wall(self) -> bool:
+        """Whether it is the wall's, and not as likely of the probe or of where the line ends."""
+        return not (self.fixed or self.edge)
 
     @property
     def corroborated(self) -> bool:
         """Whether two rings, or one and the photo, show it on the wall."""
-        return not self.fixed and (self.rings >= _LEAST_RINGS or (self.photo and self.rings > 0))
+        return self.on_wall and (self.rings >= _LEAST_RINGS or (self.photo and self.rings > 0))
 
     @property
     def doubt(self) -> str:
@@ -65,6 +78,11 @@ class Evidence:
             return (
                 "It stays at one place of the image while the wall goes by, as something on the window or on "
                 "the probe does: see the warnings of accumulate"
+            )
+        if self.edge:
+            return (
+                "It is deepest where the wall ceases to be seen: the line ends there, and what hides the "
+                "wall may have drawn it aside"
             )
         if not self.corroborated:
             return "No second ring shows it, nor do one ring and the photo"
@@ -87,7 +105,32 @@ def evidence_for(
         not shifted and photo_stands_out(texture, relief, region),
         abs(depth.depth_mm) / relief.typical.sigma_mm,
         _is_fixed(region, surface, fixed_mm),
+        lies_at_edge(region, relief),
     )
+
+
+def lies_at_edge(region: Region, relief: Relief) -> bool:
+    """Whether most of a finding's rows are deepest at the edge of hidden wall that is wider than they are.
+
+    Narrower gaps are the finding's own: a steep flank hides a part of what is behind it.
+    """
+    columns, reach = region.mask.shape[1], int(np.ceil(_EDGE_MM / relief.cell_mm[1]))
+    margin = columns + reach
+    wide = Region(region.row, region.column - margin, np.pad(region.mask, ((0, 0), (margin, margin))), 0.0)
+    height = np.abs(wide.cut(relief.local_mm))
+    rows = np.flatnonzero((wide.mask & np.isfinite(height)).any(1))
+    if region.all_round or not len(rows):
+        return False
+    return float(np.mean([_ends(height[k], wide.mask[k], reach) for k in rows])) > _EDGE_SHARE
+
+
+def _ends(height: Float, inside: Bool, reach: int) -> bool:
+    """Whether a row (n,) is deepest within reach of unseen cells, more of them than it has inside."""
+    shown = inside & np.isfinite(height)
+    deepest = int(np.argmax(np.where(shown, height, -1.0)))
+    runs, _ = label(np.isnan(height))
+    near = runs[max(deepest - reach, 0) : deepest + reach + 1]
+    return any(np.sum(runs == k) > shown.sum() for k in np.unique(near[near > 0]))
 
 
 def _is_fixed(region: Region, surface: Surface, fixed_mm: Float) -> bool:

@@ -20,6 +20,8 @@ _MOST_UNSEEN = 0.02
 # Part of the rings in which an azimuth shows no line, and how far around, from which the sector is named:
 # less than half of the rings leave wall between them, and a degree is a millimetre of a 4 inch pipe.
 _HIDDEN, _HIDDEN_RAD = 0.5, np.radians(1.0)
+# Hidden parts nearer to each other than an hour of the clock have one cause and are told together.
+_ONE_SECTOR_RAD = np.radians(30.0)
 # Wander in line widths. Speckle and texture leave 0.06 to 0.10 in sound recordings, crf 30 makes 0.15: the
 # middle of both.
 _MOST_WANDER = 0.12
@@ -78,15 +80,33 @@ def _warn_of_shares(validity: Byte, context: Context) -> None:
 def _warn_of_sectors(missing: Float, azimuth_rad: Float, context: Context) -> None:
     """Name the sectors in which most rings show no line: ``missing`` is the share of rings (A,)."""
     step = 2 * np.pi / len(azimuth_rad)
+    hidden = np.zeros(len(missing), bool)
     for first, count in _runs_around(missing > _HIDDEN):
-        if count < len(missing) and count * step >= _HIDDEN_RAD:
-            ends = clock_of_azimuth(azimuth_rad[first] + step * np.array([0, count]))
-            context.warn(
-                f"the line is missing between {notation.clock(float(ends[0]))} and "
-                f"{notation.clock(float(ends[1]))} in the picture in most rings: the laser is hidden or weak "
-                "there, or something is on the window. The wall there is not inspected. What to do: clean "
-                "window and laser; record once more with the probe rolled"
-            )
+        if count * step >= _HIDDEN_RAD:
+            hidden[(first + np.arange(count)) % len(missing)] = True
+    for first, count in _runs_around(_without_gaps(hidden, round(_ONE_SECTOR_RAD / step))):
+        part = hidden[(first + np.arange(count)) % len(missing)].mean()
+        ends = clock_of_azimuth(azimuth_rad[first] + step * np.array([0, count]))
+        context.warn(
+            f"the line is missing between {notation.clock(float(ends[0]))} and "
+            f"{notation.clock(float(ends[1]))} in the picture{_in_parts(float(part))} in most rings: the "
+            "laser is hidden or weak there, something is on the window, or text is burnt into the picture. "
+            "The wall there is not inspected. What to do: clean window and laser, switch off the text; "
+            "record once more with the probe rolled"
+        )
+
+
+def _in_parts(share: float) -> str:
+    return f", in {100 * share:.0f} % of this sector," if share < 1 else ""
+
+
+def _without_gaps(mask: Bool, most: int) -> Bool:
+    """Return a mask around the circle with the gaps filled that are no longer than ``most``."""
+    out = mask.copy()
+    for first, count in _runs_around(~mask):
+        if count <= most:
+            out[(first + np.arange(count)) % len(mask)] = True
+    return out
 
 
 def _runs_around(mask: Bool) -> list[tuple[int, int]]:

@@ -31,7 +31,8 @@ from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection
 from pipeline.simulator.scene import Scene, scene_from
 from stages.catalogue import PIPELINE
-from tests.benchmarks.bench_hard_footage import Image, repaint
+from tests.benchmarks.bench_hard_footage import repaint
+from tests.benchmarks.hard_kinds import Image
 from tests.simulated import SCENES, rendered, shipped, smaller
 
 _STAGES = tuple(s for s in PIPELINE if s.name not in ("overlays", "mesh", "sections"))

@@ -1,6 +1,6 @@
 """A finding needs two rings, or one and the photo; what one ring alone shows is set apart."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -49,6 +49,35 @@ def test_one_ring_and_the_photo_are_a_finding():
 def test_rings_that_are_not_sure_of_themselves_do_not_speak_for_a_finding():
     told = found(2, unsure=True)
     assert (len(told.items), len(told.unconfirmed)) == (0, 1)
+
+
+def found_beside_hidden_wall(top, hidden, depth_mm=-1.0, width=8):
+    """Return what is found where 20 rings show a ridge, highest at column ``top``, and others are hidden."""
+    random = np.random.default_rng(6)
+    radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
+    column = np.arange(len(AZIMUTH))
+    radius[20:40] += depth_mm * np.maximum(1 - np.abs(column - top) / width, 0.0)
+    radius[:, hidden] = np.nan
+    wall = wall_of(DISTANCE, AZIMUTH, radius, SIGMA)
+    seen = np.isfinite(wall.cloud.radius_mm)
+    cloud = replace(wall.cloud, **{f.name: getattr(wall.cloud, f.name)[seen] for f in fields(wall.cloud)})
+    recording, wall = bare_recording(2 * RADIUS, None), replace(wall, cloud=cloud)
+    return find_defects(recording, wall, grey_texture(wall), DefectParameters(), quiet_context())
+
+
+def test_what_is_deepest_where_the_line_ends_is_unconfirmed():
+    ends = found_beside_hidden_wall(100, slice(101, 140))
+    assert (len(ends.items), len(ends.unconfirmed)) == (0, 1)
+    assert "ceases to be seen" in ends.unconfirmed[0].statement
+    assert ends.unconfirmed[0].probability <= 0.5
+
+
+@pytest.mark.parametrize(
+    "hidden", [slice(105, 140), slice(100, 102)], ids=["past its top", "of a part of it, by its own flank"]
+)
+def test_a_ridge_whose_top_is_seen_stays_a_finding_beside_hidden_wall(hidden):
+    told = found_beside_hidden_wall(100, hidden)
+    assert (len(told.items), len(told.unconfirmed)) == (1, 0)
 
 
 def rings_with(validity):

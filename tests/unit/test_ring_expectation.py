@@ -54,6 +54,16 @@ def test_what_is_wrong_is_named(rows: slice, columns: slice, reason: RingValidit
     assert text.count("What to do") == 1
 
 
+def test_hidden_parts_near_to_each_other_are_told_together() -> None:
+    rings = spoilt(slice(None), slice(-5, None), RingValidity.NO_LINE)
+    rings.validity[:, 10:15] = RingValidity.GHOST
+    text = told(rings)
+    assert text.count("What to do") == 1
+    assert "between 8:50 and 9:30 in the picture, in 50 % of this sector, in most rings" in text
+    rings.validity[:, 100:105] = RingValidity.GHOST
+    assert told(rings).count("What to do") == 2
+
+
 def test_a_line_that_wanders_is_named() -> None:
     assert "the line wanders by 0.30 px" in told(sound(), 0.3)
 

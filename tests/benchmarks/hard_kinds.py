@@ -1,0 +1,267 @@
+"""Kinds of hard footage: how one picture of a recording is painted over, and which of its files are changed.
+
+A kind of `PAINTED` takes (image (H, W, 3) in grey levels, whether the laser alone lights it, number of the
+frame, random numbers) and returns the picture that is stored; one of `REWRITTEN` changes other files of the
+recording, one of `DAMAGED` the bytes of its video. Sizes are of pictures 1200 px high.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+Image = NDArray[np.float32]
+Paint = Callable[[Image, bool, int, np.random.Generator], Image]
+GREEN = np.array([0.25, 1.0, 0.15], np.float32)
+
+
+def hot_pixels(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """One pixel in 500 white or black, anew in each frame."""
+    struck = random.random(image.shape[:2])
+    image[struck < 0.001] = 255.0
+    image[struck > 0.999] = 0.0
+    return image
+
+
+def static_reflection(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """A bright spot of the laser's colour beside the line, at one place of the image in all frames."""
+    if laser:
+        h, w = image.shape[:2]
+        v, u = np.mgrid[:h, :w]
+        away = ((u - w / 2 - 0.42 * h * 0.95) / 5) ** 2 + ((v - h / 2) / 14) ** 2
+        image += (300 * np.exp(-0.5 * away))[..., None] * GREEN
+    return image
+
+
+def droplet(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """A drop on the window draws what is behind it aside by up to four pixels."""
+    return _drop(image, int(0.1 * len(image)), image.shape[1] // 2 - 45)
+
+
+def sliding_drop(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The same drop slides down the window by half a pixel a frame."""
+    return _drop(image, int(0.1 * len(image)) + k // 2, image.shape[1] // 2 - 45 + k // 8)
+
+
+def _drop(image: Image, top: int, left: int) -> Image:
+    size = 90
+    v, u = np.mgrid[:size, :size].astype(np.float32) - size / 2
+    lens = 4 * np.exp(-((np.hypot(u, v) / 25) ** 2)) / np.maximum(np.hypot(u, v), 1)
+    rows = np.clip(np.rint(v + size / 2 + lens * v), 0, size - 1).astype(int)
+    columns = np.clip(np.rint(u + size / 2 + lens * u), 0, size - 1).astype(int)
+    patch = image[top : top + size, left : left + size].copy()
+    image[top : top + size, left : left + size] = patch[rows, columns]
+    return image
+
+
+def banding(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Exposure that varies by a third over the rows and rolls from frame to frame."""
+    rows = np.arange(len(image)) / 140 + 0.37 * k
+    return image * (1 + 0.33 * np.sin(2 * np.pi * rows))[:, None, None].astype(np.float32)
+
+
+def interlaced(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Every second row is half a pixel aside."""
+    image[1::2] = 0.5 * (image[1::2] + np.roll(image[1::2], 1, axis=1))
+    return image
+
+
+def dim_sector(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The laser is ten times weaker over 40 degrees, and over 10 of these it is not there at all."""
+    if laser:
+        psi = _azimuth(image)
+        image[np.abs(psi - 1.2) < np.radians(20)] *= 0.1
+        image[np.abs(psi - 1.2) < np.radians(5)] *= 0.0
+    return image
+
+
+def second_ring(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """A reflection of the ring, a quarter as bright and 6 % smaller."""
+    return image + 0.25 * _shrunk(image, 0.94) if laser else image
+
+
+def text_overlay(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Date and distance burnt in, white with a black rim, across the ring's upper and lower part."""
+    drawn = np.clip(image, 0, 255).astype(np.uint8)
+    for text, at in (
+        (f"PIPE 7  DN100  2026-11-{k // 60:02d}", (430, 215)),
+        (f"{0.0234 * k:8.2f} m", (640, 1010)),
+    ):
+        for colour, width in (((0, 0, 0), 9), ((255, 255, 255), 3)):
+            cv2.putText(drawn, text, at, cv2.FONT_HERSHEY_SIMPLEX, 1.6, colour, width, cv2.LINE_AA)
+    return drawn.astype(np.float32)
+
+
+def cable(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """A cable at 4 o'clock hides 7 degrees of the wall; the laser draws an arc on it well inside the ring."""
+    psi, away = _azimuth(image), _distance(image)
+    on = np.abs(psi - 0.52) < np.radians(3.5)
+    image[on] = 3.0 if laser else 90.0 + 30 * np.sin(away[on] / 9)[:, None]
+    if laser:
+        image[on] += 180 * np.exp(-0.5 * ((away[on] - 330) / 4) ** 2)[:, None] * GREEN
+    return image
+
+
+def debris(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Six flakes float through the picture; one in the laser's plane glows in its colour."""
+    drawn = np.clip(image, 0, 255).astype(np.uint8)
+    for n in range(6):
+        place = np.array([311.0 * n + 6.1 * k, 197.0 * n + (3.0 + n) * k]) % (image.shape[1], image.shape[0])
+        near = np.linalg.norm(place - np.array(image.shape[1::-1]) / 2)
+        glows = laser and abs(near - 0.34 * len(image)) < 25
+        colour = 220 * GREEN if glows else np.full(3, 2.0 if laser else 170.0)
+        cv2.ellipse(
+            drawn, (tuple(place), (26, 14 + 3 * n), 40.0 * n + 2 * k), colour.tolist(), -1, cv2.LINE_AA
+        )
+    return drawn.astype(np.float32)
+
+
+def black_frames(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Five pictures in a row, and two single ones, are black."""
+    return image * 0 if k in (31, 70, 71, 72, 73, 74, 120) else image
+
+
+def fog(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Mist takes away half of the light and scatters it into a wide glow over a grey veil."""
+    small = cv2.resize(image, None, fx=0.125, fy=0.125, interpolation=cv2.INTER_AREA)
+    glow = cv2.resize(cv2.GaussianBlur(small, (0, 0), 6), image.shape[1::-1])
+    return 0.4 * image + 0.5 * glow + 12
+
+
+def grey_camera(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """A camera without colour."""
+    return np.repeat(image @ np.array([0.114, 0.587, 0.299], np.float32), 3).reshape(image.shape)
+
+
+def standing_water(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Still water at 6 o'clock mirrors what is above it, half as bright."""
+    level = int(0.5 * len(image) + 370)
+    image[level:] = 0.5 * image[level - 1 : 2 * level - len(image) - 1 : -1]
+    return image
+
+
+def shake(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The camera trembles on its mount: every picture is shifted by one pixel or so."""
+    move = np.hstack([np.eye(2), random.normal(0, 0.8, (2, 1))]).astype(np.float32)
+    return np.asarray(cv2.warpAffine(image, move, image.shape[1::-1], flags=cv2.INTER_CUBIC), np.float32)
+
+
+def dark_edges(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Light falls off to a tenth towards the edge."""
+    away = _distance(image)[..., None] / 600
+    return image * np.clip(1 - 0.9 * away**2, 0.1, 1).astype(np.float32)
+
+
+def exposure_pumping(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Automatic exposure swings between a third and one and a half within 40 frames, and is late."""
+    return image * np.float32(0.9 + 0.6 * np.sin(2 * np.pi * k / 40))
+
+
+def fouled_lens(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Grease over a sector of 50 degrees: blurred by five pixels, milky, half as bright."""
+    weight = np.clip((np.radians(25) - np.abs(_azimuth(image) + 2.0)) / 0.1, 0, 1)[..., None]
+    greasy = 0.5 * cv2.GaussianBlur(image, (0, 0), 5) + 8
+    return np.asarray(image + weight * (greasy - image), np.float32)
+
+
+def lamp_out(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Half of the lamps are out: a quarter of the wall is nearly dark."""
+    if laser:
+        return image
+    return image * (0.12 + 0.88 * np.clip(0.5 + np.cos(_azimuth(image) - 1.0), 0, 1))[..., None]
+
+
+def laser_flicker(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The laser's brightness is drawn anew in each frame, and it stays off in one of twelve."""
+    strength = random.uniform(0.15, 1.2) * (random.random() > 1 / 12)
+    return image * np.float32(strength) if laser else image
+
+
+def mirrored(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Left and right are exchanged, and the probe file does not know."""
+    return np.ascontiguousarray(image[:, ::-1])
+
+
+def half_size(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Half as many pixels each way."""
+    return np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def held_still(frames: range) -> Paint:
+    """Return what shows the picture before ``frames`` in all of them."""
+    shown: list[Image] = []
+
+    def paint(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+        if k not in frames:
+            shown[:] = [image]
+        return shown[0]
+
+    return paint
+
+
+def _azimuth(image: Image) -> NDArray[np.float64]:
+    h, w = image.shape[:2]
+    return np.asarray(np.arctan2(*(np.mgrid[:h, :w] - np.array([h, w])[:, None, None] / 2)))
+
+
+def _distance(image: Image) -> NDArray[np.float64]:
+    h, w = image.shape[:2]
+    return np.asarray(np.hypot(*(np.mgrid[:h, :w] - np.array([h, w])[:, None, None] / 2)))
+
+
+def _shrunk(image: Image, factor: float) -> Image:
+    h, w = image.shape[:2]
+    v = np.clip(np.rint((np.arange(h) - h / 2) / factor + h / 2), 0, h - 1).astype(int)
+    u = np.clip(np.rint((np.arange(w) - w / 2) / factor + w / 2), 0, w - 1).astype(int)
+    return image[np.ix_(v, u)]
+
+
+def half_size_probe(folder: Path, random: np.random.Generator) -> None:
+    """State the camera of pictures of half the size."""
+    probe = yaml.safe_load((folder / "probe.yaml").read_text("utf-8"))
+    camera = probe["camera"]
+    camera["image_size"] = [n // 2 for n in camera["image_size"]]
+    camera["focal_px"] = [f / 2 for f in camera["focal_px"]]
+    camera["centre_px"] = [(c + 0.5) / 2 - 0.5 for c in camera["centre_px"]]
+    (folder / "probe.yaml").chmod(0o644)
+    (folder / "probe.yaml").write_text(yaml.safe_dump(probe), "utf-8")
+
+
+def late_stamps(folder: Path, random: np.random.Generator) -> None:
+    """Times are of arrival: late by an exponential part of a period, 0.2 in the mean, never out of order."""
+    head, *rows = (folder / "frames.csv").read_text("utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    times = np.array([float(c[1]) for c in cells])
+    times = np.maximum.accumulate(
+        times + random.exponential(0.2 / 30, len(times)) + 1e-6 * np.arange(len(times))
+    )
+    lines = [f"{c[0]},{t:.6f},{c[2]}" for c, t in zip(cells, times, strict=True)]
+    (folder / "frames.csv").write_text("\n".join([head, *lines]) + "\n", "utf-8")
+
+
+def damaged_stream(video: bytes, random: np.random.Generator) -> bytes:
+    """Twenty bytes in the second third of the video are others, as after a bad copy."""
+    out = bytearray(video)
+    for at in random.integers(len(out) // 3, 2 * len(out) // 3, 20):
+        out[at] ^= 0x55
+    return bytes(out)
+
+
+PAINTED: dict[str, Paint] = {
+    f.__name__.replace("_", "-"): f
+    for f in (
+        hot_pixels, static_reflection, droplet, banding, interlaced, dim_sector, second_ring, sliding_drop,
+        text_overlay, cable, debris, black_frames, fog, grey_camera, standing_water, shake, dark_edges,
+        exposure_pumping, fouled_lens, lamp_out, laser_flicker, mirrored, half_size,
+    )
+}  # fmt: skip
+# Frames whose pictures all are the one before the first of them.
+FROZEN = {"frozen-picture": range(90, 99)}
+REWRITTEN = {"half-size": half_size_probe, "late-stamps": late_stamps}
+DAMAGED = {"damaged-stream": damaged_stream}
+KINDS = sorted({*PAINTED, *FROZEN, *REWRITTEN, *DAMAGED})
