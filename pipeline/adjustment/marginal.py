@@ -14,6 +14,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from pipeline.arrays import Float, Int
 
+# Keeps a logarithm and a quotient finite.
 _SMALLEST = 1e-300
 
 

@@ -1,4 +1,4 @@
-"""Robust spread of residuals, robust losses, and scores of equations that err alike in clusters.
+"""Robust spread, losses and harmonics of rings, and scores of equations that err alike in clusters.
 
 A robust loss gives the weight of an equation and the cost that goes with it.
 The cost of a loss ρ is what its weight minimises when the equations are solved anew: w = ρ′(r) / r.
@@ -22,6 +22,12 @@ from pipeline.arrays import Float, Float32, Int
 
 MAD_TO_SIGMA = 1.4826
 """1/Φ⁻¹(3/4): half of all normal errors are smaller than Φ⁻¹(3/4) σ = 0.67449 σ (Huber 1981, § 5.1)."""
+
+TUKEY = 4.685
+"""Spreads beyond which a residual does not count: 95 % efficiency on normal noise (Beaton & Tukey 1974)."""
+_HARMONICS = 2
+# Means over 1.5° stand for the columns of a row: narrower than the second harmonic by 120 times.
+_SECTORS = 240
 
 
 def cluster_sums(scores: Float, cluster: Int) -> Float:
@@ -78,6 +84,55 @@ def robust_spreads(residual: Float | Float32, axis: int) -> Float:
 def spread_about_median(values: Float | Float32) -> float:
     """Return 1 σ of values about their median: 1.4826 times the median absolute deviation."""
     return robust_spread(values - np.median(values))
+
+
+def basis_of(azimuth_rad: Float) -> Float:
+    """Return (A, 5): 1, cos ψ, sin ψ, cos 2ψ, sin 2ψ."""
+    waves = [f(m * azimuth_rad) for m in range(1, _HARMONICS + 1) for f in (np.cos, np.sin)]
+    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
+
+
+def ring_harmonics(radius: Float, basis: Float) -> Float:
+    """Return the harmonics (S, 5) of rows (S, A) by a redescending fit, so that defects do not pull.
+
+    ``basis`` (A, 5) is that of `basis_of`. NaN for rows seen to less than a half.
+    """
+    radius, basis = _sectors(radius), _sectors(basis.T).T
+    seen = np.isfinite(radius)
+    usable = seen.mean(1) >= 0.5
+    out = np.full((len(radius), basis.shape[1]), np.nan)
+    values, weight = np.where(seen, radius, 0.0)[usable], seen[usable]
+    found = np.zeros((len(values), basis.shape[1]))
+    found[:, 0] = row_median(radius[usable])
+    products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
+    for _ in range(12):
+        residual = np.where(weight, values - found @ basis.T, np.nan)
+        scale = MAD_TO_SIGMA * row_median(np.abs(residual))
+        u = np.nan_to_num(residual / (TUKEY * np.maximum(scale, 1e-6))[:, None], nan=2.0)
+        w = np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
+        normal = (w @ products).reshape(-1, basis.shape[1], basis.shape[1])
+        normal += 1e-6 * np.eye(basis.shape[1])
+        found = np.linalg.solve(normal, ((w * values) @ basis)[..., None])[..., 0]
+    out[usable] = found
+    return out
+
+
+def _sectors(rows: Float) -> Float:
+    """Return the means (S, A / k) of k neighbouring columns; NaN where half of them or more was not seen."""
+    width = next(k for k in range(max(1, rows.shape[1] // _SECTORS), 0, -1) if rows.shape[1] % k == 0)
+    blocks = rows.reshape(len(rows), -1, width)
+    count = np.isfinite(blocks).sum(2)
+    total = np.nan_to_num(blocks).sum(2)
+    return np.asarray(np.where(2 * count > width, total / np.maximum(count, 1), np.nan))
+
+
+def row_median(rows: Float) -> Float:
+    """Return the median (S,) of every row's seen values; faster than NumPy's where values are missing."""
+    ordered = np.sort(rows, 1)
+    count = np.isfinite(ordered).sum(1)
+    low, high = np.maximum(count - 1, 0) // 2, count // 2
+    pair = np.take_along_axis(ordered, np.stack([low, np.minimum(high, rows.shape[1] - 1)], -1), 1)
+    return np.asarray(pair.mean(1))
 
 
 class Loss(Protocol):

@@ -43,6 +43,7 @@ _ROUNDS, _LOOKED_AT = 3, 3
 """Rounds in which the lights are set, since clipping bends them, and frames of each light for it."""
 _LIT = 10.0
 """Grey levels above black from which a pixel tells of a light."""
+# Grey levels above are clipped or nearly so.
 _CLEAR_OF_WHITE = 250.0
 _DEFECT = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth_mm")
 

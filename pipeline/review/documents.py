@@ -27,7 +27,7 @@ from pipeline.review.values import WALL_LOSS, full_range_mm, overlay_of
 _LEGEND_STEPS = 64
 # What the page needs of a finding as the run measured it; the rest comes with the state.
 _TOLD = ("id", "statement", "pof_class", "pacp_suggestion", "en13508_suggestion")
-_FLOW_ABOVE_YIELD_MPA = 69.0
+_FLOW_ABOVE_YIELD_MPA = 69.0  # 10 ksi: flow stress of the modified method of ASME B31G
 # Beyond this share of the wall neither criterion applies.
 LARGEST_LOSS = 0.8
 ASSUMPTIONS = (

@@ -75,9 +75,9 @@ def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
 
 
 REGISTER = Stage(
-    "register", "1", RegisterParameters, register_walls, "Lay an earlier run's wall on a later one's."
+    "register", "2", RegisterParameters, register_walls, "Lay an earlier run's wall on a later one's."
 )
-COMPARE = Stage("compare", "1", CompareParameters, compare_findings, "Tell what became of every finding.")
+COMPARE = Stage("compare", "2", CompareParameters, compare_findings, "Tell what became of every finding.")
 COMPARISON: tuple[Stage, ...] = (REGISTER, COMPARE)
 
 

@@ -10,19 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from pipeline.adjustment.robust import robust_spreads
+from pipeline.adjustment.robust import basis_of, ring_harmonics
 from pipeline.arrays import Byte, Float
 from pipeline.artefacts.comparison import RegisteredWalls, Registration, Value
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.machine.stage import Progress
 
-# A ring's shape is fitted to means over 4°: narrower than its second harmonic by 45 times.
-_SECTORS = 90
-# Rounds of reweighting. Chosen; that they suffice was not measured.
-_ROUNDS = 8
-# 95 % efficiency on normal noise (Beaton & Tukey's biweight).
-_TUKEY = 4.685
-_LEAST_SEEN = 0.5
 # A bound on memory alone.
 _ROWS_AT_ONCE = 512
 # Rows in the middle of what both saw from which the difference's typical σ is taken: a bound on time alone.
@@ -93,8 +86,8 @@ class PairedWalls:
         s = self.now.distance_mm[rows]
         now = np.asarray(self.now.radius_mm[rows], float)
         before, sigma = self._before(s)
-        rings = ring_shape(now - before, self.now.azimuth_rad)
-        basis = _basis(self.now.azimuth_rad)
+        basis = basis_of(self.now.azimuth_rad)
+        rings = ring_harmonics(now - before, basis)
         random = np.hypot(np.asarray(self.now.sigma_random_mm[rows], float), sigma)
         return Stretch(s, now, before + rings @ basis.T, random, 2 * rings[:, 0])
 
@@ -121,51 +114,10 @@ def _between(values: Float, row: Float, column: Float) -> Float:
     return np.asarray(map_coordinates(wide, [row, column], order=1, mode="constant", cval=np.nan))
 
 
-def ring_shape(rows: Float, azimuth_rad: Float) -> Float:
-    """Return (R, 5) mean, cos ψ, sin ψ, cos 2ψ, sin 2ψ of rows (R, A), fitted so that defects do not pull.
-
-    Redescending weights (Beaton & Tukey, Technometrics 16, 1974); NaN for rows seen to less than a half.
-    """
-    values, basis = _sectors(rows), _sectors(_basis(azimuth_rad).T).T
-    seen = np.isfinite(values)
-    usable = seen.mean(1) >= _LEAST_SEEN
-    out = np.full((len(rows), basis.shape[1]), np.nan)
-    if not usable.any():
-        return out
-    y, known = np.where(seen, values, 0.0)[usable], seen[usable]
-    found = np.zeros((len(y), basis.shape[1]))
-    found[:, 0] = np.nanmedian(values[usable], 1)
-    products = (basis[:, :, None] * basis[:, None, :]).reshape(len(basis), -1)
-    for _ in range(_ROUNDS):
-        left = np.where(known, y - found @ basis.T, np.nan)
-        scale = robust_spreads(left, axis=1)
-        u = np.nan_to_num(left / (_TUKEY * np.maximum(scale, 1e-6))[:, None], nan=2.0)
-        weight = np.where(np.abs(u) < 1, (1 - u * u) ** 2, 0.0)
-        normal = (weight @ products).reshape(-1, basis.shape[1], basis.shape[1])
-        normal += 1e-6 * np.eye(basis.shape[1])
-        found = np.linalg.solve(normal, ((weight * y) @ basis)[..., None])[..., 0]
-    out[usable] = found
-    return out
-
-
 def ring_values(rows: Float, azimuth_rad: Float) -> Float:
     """Return the smooth shape (R, A) of rings; NaN for rows seen to less than a half."""
-    return np.asarray(ring_shape(rows, azimuth_rad) @ _basis(azimuth_rad).T)
-
-
-def _basis(azimuth_rad: Float) -> Float:
-    waves = [f(m * azimuth_rad) for m in (1, 2) for f in (np.cos, np.sin)]
-    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
-
-
-def _sectors(rows: Float) -> Float:
-    """Return means of neighbouring columns, about `_SECTORS` of them; NaN where half was not seen."""
-    width = next(k for k in range(max(1, rows.shape[1] // _SECTORS), 0, -1) if rows.shape[1] % k == 0)
-    blocks = rows.reshape(len(rows), -1, width)
-    count = np.isfinite(blocks).sum(2)
-    return np.asarray(
-        np.where(2 * count > width, np.nan_to_num(blocks).sum(2) / np.maximum(count, 1), np.nan)
-    )
+    basis = basis_of(azimuth_rad)
+    return np.asarray(ring_harmonics(rows, basis) @ basis.T)
 
 
 def registered_walls(pair: PairedWalls, is_one_calibration: bool, progress: Progress) -> RegisteredWalls:

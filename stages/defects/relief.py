@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import find_objects, gaussian_filter1d, label
 
-from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spread
+from pipeline.adjustment.robust import MAD_TO_SIGMA, basis_of, ring_harmonics, robust_spread, row_median
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RadiusMap
-from stages.defects.harmonics import basis_of, ring_harmonics, row_median, slow_along
+from stages.defects.harmonics import slow_along
 from stages.defects.parameters import DefectParameters
 from stages.defects.stretch import sample, stretches
 

@@ -93,6 +93,7 @@ def _pictures(found: Diagnosis, shown: Shown) -> dict[str, str]:
 
 
 _SHOWN = 10
+# Arrows and colours end at this percentile, so that a few outliers leave the rest visible; the longest arrow.
 _QUANTILE = 98.0
 _UM = 1000.0
 _LONGEST_PX = 60.0

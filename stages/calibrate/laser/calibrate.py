@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.robust import cluster_sums, robust_spread
+from pipeline.adjustment.robust import TUKEY, cluster_sums, robust_spread
 from pipeline.arrays import Float, Image, Int
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import transform
@@ -27,7 +27,6 @@ from stages.calibrate.boards.start import pose
 from stages.calibrate.laser.line import LaserPlaneParameters, measure_line, patch_around
 from stages.rings.colour import excess_weights, mix
 
-_TUKEY = 4.685
 _MOST_STEPS, _SETTLED = 50, 1e-9
 # A straight line in a picture has two numbers; the plane takes three of all of them.
 _NUMBERS_PER_LINE, _UNKNOWNS = 2, 3
@@ -102,7 +101,7 @@ def _togetherness(gradient: Float, group: Int, inverse: Float, variance: float) 
 
 
 def _tukey(ratio: Float) -> Float:
-    return np.asarray(np.where(ratio < _TUKEY, (1 - (ratio / _TUKEY) ** 2) ** 2, 0.0))
+    return np.asarray(np.where(ratio < TUKEY, (1 - (ratio / TUKEY) ** 2) ** 2, 0.0))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,70 @@
+"""Every constant that decides something says beside it where it comes from, or is listed in data/debts.md."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from tests.shared_data import PROJECT_ROOT
+
+# Units, signs, layouts and bounds on time: nothing that is measured or found depends on them.
+NO_DECISIONS = {
+    "_AZIMUTH", "_BIN_LEVELS", "_BUSY_S", "_INCH_MM", "_LEFT", "_OUTSIDE", "_QUARTER_TURNS", "_REFERENCE_MM",
+    "_SIDES", "_STEP_MM", "_TIME", "_UNITS_MM", "_WAVES", "_WIDTH", "_ZERO", "DIRECTION", "HALF_TURN_ABOUT_X",
+    "WIDTH",
+}  # fmt: skip
+NAME = re.compile(r"_?[A-Z][A-Z0-9_]*")
+
+
+def unexplained(text: str, listed: set[str]) -> Iterator[str]:
+    """Yield constants of a module that hold a decimal number, without a reason beside them or in the list."""
+    lines = text.splitlines()
+    for node in ast.parse(text).body:
+        if not isinstance(node, ast.Assign) or not any(is_decimal(part) for part in ast.walk(node.value)):
+            continue
+        names = {n.id for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)}
+        if all(NAME.fullmatch(n) for n in names) and not names & listed and not is_explained(node, lines):
+            yield f"{node.lineno}: {', '.join(sorted(names))}"
+
+
+def is_decimal(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, float)
+
+
+def is_explained(node: ast.Assign, lines: list[str]) -> bool:
+    """Return whether a comment stands in its lines or above its block, or a text below it."""
+    above = node.lineno - 2
+    while above >= 0 and re.match(r"_?[A-Z][A-Z0-9_]*( = |, )", lines[above]):
+        above -= 1
+    own, below = lines[node.lineno - 1 : node.end_lineno], lines[node.end_lineno or 0 :][:1]
+    return (
+        any("#" in line for line in own)
+        or (above >= 0 and lines[above].startswith("#"))
+        or any(line.startswith('"""') for line in below)
+    )
+
+
+def test_every_decimal_constant_has_its_reason() -> None:
+    debts = (PROJECT_ROOT / "data" / "debts.md").read_text("utf-8")
+    listed = NO_DECISIONS | set(re.findall(r"`(_?[A-Z][A-Z0-9_]*)`", debts))
+    files = [f for package in ("pipeline", "stages") for f in (PROJECT_ROOT / package).rglob("*.py")]
+    found = [
+        f"{f.relative_to(PROJECT_ROOT)}:{c}" for f in files for c in unexplained(f.read_text("utf-8"), listed)
+    ]
+    assert found == [], "write its source beside it, or list it in data/debts.md"
+
+
+def test_a_planted_constant_is_found() -> None:
+    assert list(unexplained("import math\n_LIMIT = 0.3\n", set())) == ["2: _LIMIT"]
+    assert list(unexplained("_A, _B = 1, math.radians(1.2)\n", set())) == ["1: _A, _B"]
+    for text in ("# Chosen.\n_LIMIT = 0.3\n", "_LIMIT = 0.3  # chosen\n", '_LIMIT = 0.3\n"""Chosen."""\n'):
+        assert list(unexplained(text, set())) == []
+    assert list(unexplained("_LIMIT = 0.3\n", {"_LIMIT"})) == []
+
+
+def test_the_list_of_debts_names_files_that_are_there() -> None:
+    rows = [r.split("|") for r in (PROJECT_ROOT / "data" / "debts.md").read_text("utf-8").splitlines()]
+    named = {n for row in rows if len(row) > 4 for n in re.findall(r"`([\w/]+\.py)`", row[2])}
+    there = [str(Path("/") / f.relative_to(PROJECT_ROOT)) for f in PROJECT_ROOT.glob("[ps]*/**/*.py")]
+    assert named > {"claims.py"}
+    assert [n for n in sorted(named) if not any(f.endswith(f"/{n}") for f in there)] == []
