@@ -113,6 +113,7 @@ def twin_document(found: Twin, tried: DiagnosisTried) -> dict[str, Any]:
             for r in found.regions
         },
         "found": [_mismatch(m) for m in (*tried.found, *found.found)],
+        "worst": [_mismatch(m) for m in found.worst],
         "withdrawn": [_mismatch(m) for m in tried.withdrawn],
         "gauge": gauge,
         "psnr_db": _known(found.psnr_db),
@@ -133,7 +134,7 @@ def _gauge(gauge: GaugeTwin) -> dict[str, Any]:
 def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
     plain = asdict(mismatch)
     figures = {"place": _figures(mismatch.place), "parameters": _figures(mismatch.parameters)}
-    chi2 = {name: _known(plain[name]) for name in ("chi2_before", "chi2_after")}
+    chi2 = {name: _known(plain[name]) for name in ("chi2_before", "chi2_after", "probability")}
     return plain | figures | chi2 | {"name": mismatch.name or None}
 
 

@@ -33,6 +33,16 @@ class RegionFit:
 
 
 @dataclass(frozen=True)
+class Look:
+    """Where a difference is best looked at: a frame, and a square of the image of so many px to each side."""
+
+    frame: int
+    u_px: float
+    v_px: float
+    half_px: float
+
+
+@dataclass(frozen=True)
 class Mismatch:
     """A place where recorded and re-rendered frames differ.
 
@@ -53,6 +63,7 @@ class Mismatch:
     chi2_before, chi2_after : float
         Per pixel there, in the compared frames, without and with it.
     statement : str
+    look : Look, optional
     """
 
     name: str
@@ -64,6 +75,7 @@ class Mismatch:
     chi2_before: float
     chi2_after: float
     statement: str
+    look: Look | None = None
 
 
 @dataclass(frozen=True)
@@ -137,6 +149,8 @@ class Twin:
     maps : tuple of TwinMap
     by_level : tuple of NamedFigure
         χ² per pixel of lit wall by its brightness, grey levels above black; 1 σ that of as many pixels.
+    worst : tuple of Mismatch
+        Where lit wall differs most, whether or not it is explained: shown, not judged.
     """
 
     frame: Int
@@ -154,6 +168,7 @@ class Twin:
     views: tuple[TwinView, ...]
     maps: tuple[TwinMap, ...] = ()
     by_level: tuple[NamedFigure, ...] = ()
+    worst: tuple[Mismatch, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
-from pipeline.arrays import Bool, Float32, Int
+from pipeline.arrays import Bool, Float32, Image, Int
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.twin import Mismatch, Twin
 from pipeline.errors import UnusableError
@@ -15,13 +15,16 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checked_frames import CheckedFrames
-from stages.twin.compare import Comparison, block_ratios, exposure_of
-from stages.twin.locate import ImagePlace, full_size, places_in_image
-from stages.twin.name import Exposures, cannot_tell, dirt, flicker, noise_figures, of_line, state_figures
-from stages.twin.reference import BlocksOfFrames, in_image, maps_of, unnamed
-from stages.twin.render import render_frame
+from stages.twin.causes import causes
+from stages.twin.cells import Cells, CellsOfFrames, sectors_of
+from stages.twin.compare import Comparison, block_contrasts, block_ratios, exposure_of
+from stages.twin.locate import LEAST_CONTRAST, ImagePlace, beside, full_size, places_in_image
+from stages.twin.name import cannot_tell, clipped_line, noise_figures, state_figures
+from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image, maps_of, unnamed, worst_places
+from stages.twin.render import Region, render_frame
 from stages.twin.scene import Scene, scene_of
 from stages.twin.state import PhotometricState, Sampled, estimate_state, sample_frames
+from stages.twin.window import WindowPlace
 
 _EVERY = 10
 
@@ -57,12 +60,15 @@ class Photometry:
     state : PhotometricState
         Its ``gain_map`` holds what dirt lets through, where some was found.
     places : tuple of ImagePlace
+    blurred : tuple of ImagePlace
+        Places, none of those, where texture is fainter or stronger.
     blur_px : float
         1 σ of lens and pixel that it holds for.
     """
 
     state: PhotometricState
     places: tuple[ImagePlace, ...]
+    blurred: tuple[ImagePlace, ...]
     blur_px: float
 
 
@@ -78,16 +84,26 @@ def measure_photometry(
     context: Context,
 ) -> Photometry:
     """Estimate camera noise, lamps, laser line, blur and dirt from frames that the run has measured."""
-    _, measured = _split(frames, trajectory, 0)
     scene = scene_of(probe, trajectory, wall, texture, parameters.blur_px)
+    return photometry_of(scene, recording, frames, rings, parameters, context)
+
+
+def photometry_of(
+    scene: Scene, recording: Recording, frames: CheckedFrames, rings: RingSamples,
+    parameters: PhotometryParameters, context: Context,
+) -> Photometry:  # fmt: skip
+    """Return the photometric state of a scene; see `measure_photometry`."""
+    _, measured = _split(frames, scene.trajectory, 0)
     sampled = sample_frames(
         recording, frames.frame[measured], frames.illumination[measured], parameters.sampled
     )
     state = estimate_state(scene, sampled, rings, context)
-    places, gain = places_in_image(_ratios(scene, state, sampled))
+    ratios, contrasts = _blocks(scene, state, sampled)
+    places, gain = places_in_image(ratios)
+    blurred, _ = places_in_image(contrasts, LEAST_CONTRAST)
     if gain is not None:
         state = replace(state, gain_map=full_size(gain, state.outside.shape))
-    return Photometry(state, places, parameters.blur_px)
+    return Photometry(state, places, beside(blurred, places), parameters.blur_px)
 
 
 def compare_with_twin(
@@ -109,38 +125,31 @@ def compare_with_twin(
     UnusableError
         When no frame could be re-rendered.
     """
-    compared, _ = _split(frames, trajectory, parameters.compared)
+    scene = scene_of(probe, trajectory, wall, texture, photometry.blur_px)
+    return compared_with(scene, recording, frames, rings, photometry, parameters, context)
+
+
+def compared_with(
+    scene: Scene, recording: Recording, frames: CheckedFrames, rings: RingSamples, photometry: Photometry,
+    parameters: TwinParameters, context: Context,
+) -> Twin:  # fmt: skip
+    """Return what the frames of a scene show; see `compare_with_twin`."""
+    compared, _ = _split(frames, scene.trajectory, parameters.compared)
     if frames.withheld is None:
         context.warn(_NONE_WITHHELD)
-    scene = scene_of(probe, trajectory, wall, texture, photometry.blur_px)
-    cleaned, places = photometry.state, photometry.places
-    gain, state = cleaned.gain_map, replace(cleaned, gain_map=None)
-    exposures, comparison = Exposures(), Comparison()
     light = dict(zip(frames.frame.tolist(), frames.illumination.tolist(), strict=True))
-    dirty, blocks = dirt(places, state.outside.shape), BlocksOfFrames(scene.surface.mean_radius_mm)
+    sums = Sums(scene, photometry)
     for done, (frame, image) in enumerate(recording.read(compared, "grey")):
         context.progress(done, len(compared))
-        if image is None:
-            continue
-        kind, above = (
-            Illumination(light[frame]),
-            image.astype(np.float32) - np.float32(state.noise.black.value),
-        )
-        before = render_frame(scene, state, frame, kind)
-        after = render_frame(scene, cleaned, frame, kind) if gain is not None else before
-        exposure = exposure_of(above, after)
-        exposures.add(frame, kind, exposure, above, after)
-        if kind == Illumination.LED:
-            blocks.add(above, before, state.noise.white - state.noise.black.value)
-        after = after.brighter(float(np.exp(exposure)), state.noise)
-        dirty.add(above, before, after)
-        comparison.add(frame, kind, above, before, after, state.noise)
+        if image is not None:
+            sums.add(frame, Illumination(light[frame]), image)
+    comparison = sums.comparison
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
-    samples = blocks.samples()
+    state, samples = photometry.state, sums.blocks.samples()
     found: tuple[Mismatch, ...] = (
-        *flicker(exposures, state), *dirty.accepted(in_image(samples, places)), *unnamed(samples),
-        *of_line(state, rings),
+        *causes(*sums.cells(), scene.probe.lighting, scene.ring),
+        *sums.on_window(samples), *unnamed(samples), *clipped_line(rings),
     )  # fmt: skip
     _report(comparison, found, context)
     return Twin(
@@ -148,8 +157,58 @@ def compare_with_twin(
         noise_figures(state.noise), state_figures(state), comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
-        maps_of(samples), comparison.levels(),
+        maps_of(samples), comparison.levels(), worst_places(samples),
     )  # fmt: skip
+
+
+class Sums:
+    """What is kept of the compared frames: χ², blocks, places of dirt, and brightness in sectors."""
+
+    def __init__(self, scene: Scene, photometry: Photometry) -> None:
+        self._scene, self._state = scene, photometry.state
+        self.comparison = Comparison()
+        self.window = [WindowPlace(p) for p in (*photometry.places, *photometry.blurred)]
+        self.blocks = BlocksOfFrames(scene.surface.mean_radius_mm)
+        self.lit, self.line = CellsOfFrames(), CellsOfFrames()
+        self._sector = sectors_of(scene.polar[1])
+
+    def add(self, frame: int, kind: Illumination, image: Image) -> None:
+        """Compare a frame (H, W) with its twin."""
+        noise = self._state.noise
+        above = image.astype(np.float32) - np.float32(noise.black.value)
+        before = render_frame(self._scene, self._state, frame, kind)
+        gain = self._state.gain_map
+        after = before if gain is None else before.brighter(gain, noise)
+        free = above < noise.white - noise.black.value
+        if kind != Illumination.LASER:
+            self.lit.add(frame, above, after, free & (after.region == Region.WALL), self._sector)
+        if kind == Illumination.LASER:
+            self.line.add(frame, above, after, free & (after.region == Region.LINE_CORE), self._sector)
+        if kind == Illumination.LED:
+            self.blocks.add(frame, above, before, noise.white - noise.black.value)
+        exposure = float(np.exp(exposure_of(above, after)))
+        after = after.brighter(exposure, noise)
+        if kind == Illumination.LED and self.window:
+            exposed = before.brighter(exposure, noise)
+            for place in self.window:
+                place.add(frame, above, exposed, free)
+        self.comparison.add(frame, kind, above, before, after, noise)
+
+    def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
+        """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
+        fixed_to = in_image(samples, tuple(w.place for w in self.window))
+        judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
+        return tuple(m for m in judged if m is not None)
+
+    def cells(self) -> tuple[Cells | None, Cells | None]:
+        """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser."""
+        lit, line, state = self.lit.cells(), self.line.cells(), self._state
+        if lit is not None and state.lamp is not None:
+            lit = lit.on(-np.array([[state.lamp.gain.at(f)] for f in lit.frame]))
+        if line is not None and state.line is not None:
+            power = [[state.line.course.at(f)] for f in line.frame]
+            line = line.on(-np.array(power) - state.line.log_power)
+        return lit, line
 
 
 _NONE_WITHHELD = (
@@ -173,14 +232,18 @@ def _split(frames: CheckedFrames, trajectory: Trajectory, most: int) -> tuple[In
     return compared[few], measured
 
 
-def _ratios(scene: Scene, state: PhotometricState, sampled: list[Sampled]) -> list[Float32]:
-    """Return recorded over predicted brightness of blocks of the sampled lit frames."""
+def _blocks(
+    scene: Scene, state: PhotometricState, sampled: list[Sampled]
+) -> tuple[list[Float32], list[Float32]]:
+    """Return recorded over predicted brightness, and texture, of blocks of the sampled lit frames."""
     black = state.noise.black.value
-    return [
-        block_ratios(s.image - black, render_frame(scene, state, s.frame, s.light), state.noise.white - black)
+    made = [
+        [f(s.image - black, twin, state.noise.white - black) for f in (block_ratios, block_contrasts)]
         for s in sampled
         if s.light == Illumination.LED
+        for twin in [render_frame(scene, state, s.frame, s.light)]
     ]
+    return [m[0] for m in made], [m[1] for m in made]
 
 
 def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Context) -> None:
@@ -193,14 +256,14 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "2",
+    "3",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
 )
 TWIN = Stage(
     "twin",
-    "4",
+    "5",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -19,6 +19,8 @@ _LEVELS = (0, 10, 20, 40, 80, 120, 160, 200)
 _FULL_SCALE, _STRAY = 255.0, 5.0
 _SILENT = 0.92
 """Share of pixels at one grey level from which noise is less than that of rounding, 1/√12: erf(√1.5)."""
+_LEAST_TEXTURE = 4.0
+"""Variance of fine texture, grey levels squared, from which its share shows through noise of 576 pixels."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
 
@@ -183,3 +185,22 @@ def block_ratios(above_black: Float32, twin: TwinFrame, white_above_black: float
     above, below = summed(level * above_black), summed(level * level)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(summed(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)
+
+
+def block_contrasts(above_black: Float32, twin: TwinFrame, white_above_black: float) -> Float32:
+    """Return which share of its twin's texture each block shows; NaN without lit wall and texture about."""
+    use = (twin.region == Region.WALL) & (above_black < white_above_black)
+    rows, columns = (n // BLOCK_PX for n in use.shape)
+
+    def about(values: Float32 | Bool) -> Float32:
+        inside = values[: rows * BLOCK_PX, : columns * BLOCK_PX].astype(np.float32)
+        small = cv2.resize(inside, (columns, rows), interpolation=cv2.INTER_AREA)
+        return np.asarray(cv2.blur(small, (3, 3)), np.float32)
+
+    fine = [
+        np.where(use, a - cv2.GaussianBlur(a, (0, 0), BLOCK_PX), np.float32(0))
+        for a in (above_black, np.asarray(twin.level))
+    ]
+    cross, own = about(fine[0] * fine[1]), about(fine[1] ** 2)
+    known = (about(use) > 0.99) & (own > _LEAST_TEXTURE)
+    return np.where(known, cross / np.maximum(own, _LEAST_TEXTURE), np.float32(np.nan)).astype(np.float32)

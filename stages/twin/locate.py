@@ -30,6 +30,10 @@ _LEAST_CHANGE = 0.03
 recordings stays below it."""
 
 
+LEAST_CONTRAST = 0.25
+"""Smallest relative change of texture that counts: poses and radii that err blur it by a tenth or two."""
+
+
 @dataclass(frozen=True)
 class ImagePlace:
     """A place of the image that is darker or brighter than it should be.
@@ -52,8 +56,13 @@ class ImagePlace:
     probability: float
 
 
-def places_in_image(ratios: list[Float32]) -> tuple[tuple[ImagePlace, ...], Float32 | None]:
-    """Return the places, and the gain (rows, columns) of the blocks, 1 elsewhere; None without any."""
+def places_in_image(
+    ratios: list[Float32], least: float = _LEAST_CHANGE
+) -> tuple[tuple[ImagePlace, ...], Float32 | None]:
+    """Return the places, and the gain (rows, columns) of the blocks, 1 elsewhere; None without any.
+
+    ``least`` is the smallest relative change that counts.
+    """
     if len(ratios) < _FEWEST_FRAMES:
         return (), None
     stack = np.stack(ratios)
@@ -64,7 +73,7 @@ def places_in_image(ratios: list[Float32]) -> tuple[tuple[ImagePlace, ...], Floa
     middle[known] = np.nanmedian(stack[:, known], axis=0)
     change = np.where(known, middle / _broad(middle, known) - 1, 0).astype(np.float32)
     spread = _spread_of_rings(change, known)
-    bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, _LEAST_CHANGE)
+    bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, least)
     count, label, _, centre = cv2.connectedComponentsWithStats((np.abs(change) > bound).astype(np.uint8))
     places, gain = [], np.ones_like(change)
     for k in range(1, count):
@@ -75,6 +84,16 @@ def places_in_image(ratios: list[Float32]) -> tuple[tuple[ImagePlace, ...], Floa
         gain[grown & known] = 1 + change[grown & known]
         places.append(_place(inside, centre[k], change, spread, int(known.sum())))
     return tuple(places), gain if places else None
+
+
+def beside(places: tuple[ImagePlace, ...], others: tuple[ImagePlace, ...]) -> tuple[ImagePlace, ...]:
+    """Return the places that do not touch any of others."""
+    apart = 2 * BLOCK_PX
+    return tuple(
+        p
+        for p in places
+        if all(np.hypot(p.u_px - o.u_px, p.v_px - o.v_px) > apart + p.radius_px + o.radius_px for o in others)
+    )
 
 
 def _spread_of_rings(change: Float32, known: Bool) -> Float32:

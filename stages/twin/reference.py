@@ -17,7 +17,8 @@ from scipy.stats import norm, t
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.artefacts.twin import Mismatch, NamedFigure, TwinMap
+from pipeline.artefacts.twin import Look, Mismatch, NamedFigure, TwinMap
+from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX, block_ratios
 from stages.twin.locate import FALSE_ALARM, ImagePlace
 from stages.twin.render import TwinFrame
@@ -29,6 +30,10 @@ _WALL_COLUMNS = 128
 _LEAST_ON_WALL, _LEAST_OF_ROWS = 0.05, 0.01
 """Relative changes that count: at steps of the wall the photo itself errs by a few per cent."""
 _SHOWN = 8.0
+_RING_BLOCKS, _LEAST_SPREAD, _NEAR_BLOCKS = 4, 1e-3, 3
+"""Width of the rings in which blocks are alike, their least relative spread, and what is next to a block."""
+_WORST, _SHOWN_PX = 6, 60.0
+"""Worst places that are shown, and half the side of their thumbnails."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,8 @@ class BlockSamples:
         Of its cell on the wall.
     first_mm, cell_mm : float
         Distance at which the first cell begins, and the side of a cell.
+    number : (F,) int
+        Numbers of the frames.
     """
 
     change: Float
@@ -57,6 +64,7 @@ class BlockSamples:
     around: Int
     first_mm: float
     cell_mm: float
+    number: Int
 
     @cached_property
     def orders(self) -> dict[str, Int]:
@@ -86,6 +94,29 @@ class BlockSamples:
         fall = self.change[use] ** 2 - (self.change[use] - predicted) ** 2
         return np.asarray(np.bincount(self.frame[use], fall, self.frame.max() + 1), float)
 
+    @cached_property
+    def strength(self) -> Float:
+        """(N,) change over the robust spread of the blocks as far from the image's middle."""
+        row, column = (a - a.max() / 2 for a in (self.row, self.column))
+        ring = (np.hypot(row, column) / _RING_BLOCKS).astype(int)
+        spread = np.ones(ring.max() + 1)
+        for k in np.unique(ring):
+            spread[k] = max(spread_about_median(self.change[ring == k]), _LEAST_SPREAD)
+        return np.asarray(self.change / spread[ring])
+
+    def near(self, k: int) -> tuple[Bool, Bool]:
+        """Return which blocks (N,) lie next to one in the image, and which next to it on the wall."""
+        image = np.hypot(self.row - self.row[k], self.column - self.column[k]) < _NEAR_BLOCKS
+        turn = np.abs(self.around - self.around[k])
+        turn = np.minimum(turn, _WALL_COLUMNS - turn)
+        return image, np.hypot(self.along - self.along[k], turn) < _NEAR_BLOCKS
+
+    def look(self, use: Bool, half_px: float) -> Look:
+        """Return where the strongest of blocks (N,) is to be looked at."""
+        k = int(np.argmax(np.where(use, np.abs(self.strength), -1.0)))
+        u, v = ((float(a[k]) + 0.5) * BLOCK_PX for a in (self.column, self.row))
+        return Look(int(self.number[self.frame[k]]), u, v, half_px)
+
     def fixed_to(self, use: Bool) -> str:
         """Return what the blocks in ``use`` (N,) are fixed to; empty where no order predicts them.
 
@@ -96,14 +127,9 @@ class BlockSamples:
             return ""
         found = sorted(((k, self.explained(k, use)[frames]) for k in self.orders), key=lambda e: -e[1].sum())
         (first, best), (second, next_best) = found[:2]
-        if _sigmas(best) < _SURE:
+        if sigmas(best) < _SURE:
             return ""
-        return first if _sigmas(best - next_best) > _SURE else f"{first} or {second}"
-
-
-def _sigmas(of_frames: Float) -> float:
-    sd = float(np.std(of_frames, ddof=1)) / np.sqrt(len(of_frames))
-    return float(np.mean(of_frames) / max(sd, 1e-12))
+        return first if sigmas(best - next_best) > _SURE else f"{first} or {second}"
 
 
 @dataclass
@@ -112,14 +138,16 @@ class BlocksOfFrames:
 
     mean_radius_mm: float
     parts: list[tuple[Float32, Float32, Float32]] = field(default_factory=list)
+    number: list[int] = field(default_factory=list)
 
-    def add(self, above: Float32, twin: TwinFrame, white: float) -> None:
+    def add(self, frame: int, above: Float32, twin: TwinFrame, white: float) -> None:
         """Take a frame whose exposure is its own."""
         ratio = block_ratios(above, twin, white)
         middle = (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2
         rows, columns = ratio.shape
         distance, azimuth = (a[middle][:rows, :columns] for a in (twin.distance_mm, twin.azimuth_rad))
         self.parts.append((ratio, distance, azimuth))
+        self.number.append(frame)
 
     def samples(self) -> BlockSamples | None:
         """Return all blocks; None where there are none."""
@@ -138,7 +166,15 @@ class BlocksOfFrames:
         frame, row, column, along, around = (p.astype(np.int64) for p in place)
         first = int(along.min())
         return BlockSamples(
-            change.astype(float), frame, row, column, along - first, around, first * cell_mm, cell_mm
+            change.astype(float),
+            frame,
+            row,
+            column,
+            along - first,
+            around,
+            first * cell_mm,
+            cell_mm,
+            np.array(self.number),
         )
 
 
@@ -187,11 +223,11 @@ def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
         use = label[samples.along, samples.around] == k
         if len(cells) < _FEWEST_CELLS or samples.fixed_to(use) != "wall":
             continue
-        found.append(_on_wall(cells, mean, sd, int(known.sum()), samples))
+        found.append(_on_wall(cells, mean, sd, int(known.sum()), samples, use))
     return tuple(found)
 
 
-def _on_wall(cells: Int, mean: Float, sd: Float, known: int, samples: BlockSamples) -> Mismatch:
+def _on_wall(cells: Int, mean: Float, sd: Float, known: int, samples: BlockSamples, use: Bool) -> Mismatch:
     cell_mm = samples.cell_mm
     value, spread = (a[tuple(cells.T)] for a in (mean, sd))
     most = int(np.argmax(np.abs(value)))
@@ -211,6 +247,7 @@ def _on_wall(cells: Int, mean: Float, sd: Float, known: int, samples: BlockSampl
         "", "intensity", "wall", place, (size,), chance, nan, nan,
         f"At {distance:.0f} mm, azimuth {azimuth:.0f}°, the wall is {100 * abs(value[most]):.0f} % {way} "
         "than its photo: it shines differently from each side, or lies elsewhere than the radius map says.",
+        samples.look(use, _SHOWN_PX),
     )  # fmt: skip
 
 
@@ -222,7 +259,7 @@ def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
     mean, _ = _map(samples, "rows", (int(samples.frame.max()) + 1, int(samples.row.max()) + 1))
     size = float(np.nanstd(mean))
     frames = np.unique(samples.frame)
-    chance = float(t.sf(_sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
+    chance = float(t.sf(sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
     sd = float(np.nanstd(np.nanstd(mean, axis=1))) / np.sqrt(len(frames))
     if size < _LEAST_OF_ROWS:
         return ()
@@ -233,7 +270,41 @@ def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
             nan, nan,
             f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as of lamps "
             "that flicker within a frame of a rolling shutter.",
+            samples.look(everywhere, 2 * _SHOWN_PX),
         ),
+    )  # fmt: skip
+
+
+def worst_places(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
+    """Return the places where lit wall differs most, whether or not something else explains them."""
+    if samples is None:
+        return ()
+    left, found = np.abs(samples.strength), []
+    for _ in range(_WORST):
+        k = int(np.argmax(left))
+        if left[k] <= 0:
+            break
+        image, wall = samples.near(k)
+        found.append(_worst(samples, k, image, wall))
+        left = np.where(image | wall, 0.0, left)
+    return tuple(found)
+
+
+def _worst(samples: BlockSamples, k: int, image: Bool, wall: Bool) -> Mismatch:
+    at = samples.look(np.arange(len(samples.change)) == k, _SHOWN_PX)
+    fixed = next((w for w, use in (("image", image), ("wall", wall)) if samples.fixed_to(use) == w), "")
+    change, times, nan = float(samples.change[k]), abs(float(samples.strength[k])), float("nan")
+    why = {"image": "It stays there in other frames.", "wall": "It moves with the wall."}.get(
+        fixed, "Other frames do not show it, or too few see this wall."
+    )
+    size = NamedFigure("change", change, abs(change) / max(times, 1e-9), "relative")
+    place = tuple(NamedFigure(n, v, BLOCK_PX / 2, "px") for n, v in (("u_px", at.u_px), ("v_px", at.v_px)))
+    return Mismatch(
+        "", "intensity", fixed, place, (size,), nan, nan, nan,
+        f"In frame {at.frame} at ({at.u_px:.0f}, {at.v_px:.0f}) the wall is {100 * abs(change):.0f} % "
+        f"{'brighter' if change > 0 else 'darker'} than re-rendered, {times:.0f} times what blocks usually "
+        f"differ by there. {why}",
+        at,
     )  # fmt: skip
 
 

@@ -52,10 +52,11 @@ class TwinFrame:
     distance_mm: Float32
     azimuth_rad: Float32
 
-    def brighter(self, factor: float, noise: CameraNoise) -> TwinFrame:
-        """Return the frame with another exposure."""
-        level = np.minimum(np.float32(factor) * self.level, np.float32(noise.white - noise.black.value))
-        beyond = np.float32(factor**2) * (self.variance - noise.variance(self.level))
+    def brighter(self, factor: float | Float32, noise: CameraNoise) -> TwinFrame:
+        """Return the frame with another exposure, or seen through a window that lets pass (H, W)."""
+        scale = np.float32(factor) if isinstance(factor, float) else factor
+        level = np.minimum(scale * self.level, np.float32(noise.white - noise.black.value))
+        beyond = scale**2 * (self.variance - noise.variance(self.level))
         return replace(self, level=level, variance=noise.variance(level) + beyond)
 
 
@@ -107,8 +108,6 @@ def render_frame(
         level[at] += np.nan_to_num(line)
         variance[at] += np.nan_to_num(state.line.variance(near, power))
         distance[at], azimuth[at] = near.distance_mm, near.azimuth_rad
-    if state.gain_map is not None:
-        level *= state.gain_map
     region[state.outside] = Region.DARK
     level[state.outside] = 0.0
     region[state.edge & (region != Region.UNSEEN)] = Region.EDGE

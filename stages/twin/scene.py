@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
+from pipeline.artefacts.twin import Look
 from pipeline.instrument.probe import Lighting, Probe
 from stages.texture.surface import WallSurface, wall_surface
 from stages.texture.views import sheet_distance_mm
@@ -77,6 +78,26 @@ class LineSight:
 
 
 @dataclass(frozen=True)
+class Ring:
+    """Where the image shows the laser's plane: middle and radius, px; radius and distance ahead, mm."""
+
+    centre_px: tuple[float, float]
+    radius_px: float
+    radius_mm: float
+    ahead_mm: float
+
+    def at(self, frame: float, azimuth_rad: float) -> Look:
+        """Return the ring's place at an image azimuth, to look at in a frame."""
+        u, v = self.centre_px
+        away = self.radius_px
+        return Look(int(frame), u + away * np.cos(azimuth_rad), v + away * np.sin(azimuth_rad), away / 4)
+
+    def whole(self, frame: float) -> Look:
+        """Return all of the picture about the ring, to look at in a frame."""
+        return Look(int(frame), *self.centre_px, 1.5 * self.radius_px)
+
+
+@dataclass(frozen=True)
 class Scene:
     """Wall, probe and poses of a run.
 
@@ -109,6 +130,14 @@ class Scene:
         phi = np.arctan2(v - np.float32(centre[1]), u - np.float32(centre[0]))
         full = self._enlarged(theta)
         return full, phi, np.isfinite(full)
+
+    @cached_property
+    def ring(self) -> Ring:
+        """Where a centred probe has the laser line."""
+        camera, radius, ahead = self.probe.camera, self.surface.mean_radius_mm, self.probe.laser.baseline_mm
+        u, v = camera.centre_px
+        at = camera.project(np.array([radius, 0.0, ahead])).uv
+        return Ring((float(u), float(v)), float(np.hypot(at[0] - u, at[1] - v)), radius, ahead)
 
     @cached_property
     def _rays(self) -> Float:

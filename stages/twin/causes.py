@@ -1,0 +1,308 @@
+"""Causes of differences over time and along the laser line, named only if other frames fit better so.
+
+Lit frames: the exposure steps, an LED fails, the light flickers. Frames of the line: the laser's power steps,
+it flickers, a sector of the sheet is dim. What wall, photo and light may leave over without a name is granted
+first: a brightness of every sector that stays (of the line: two harmonics), and a slow drift.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm, t
+
+from pipeline.adjustment.robust import spread_about_median
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from pipeline.instrument.probe import Lighting
+from stages.twin.cells import (
+    SECTORS,
+    Cells,
+    Fitted,
+    Law,
+    drift,
+    fitted,
+    of_sectors,
+    sector_azimuth_rad,
+    sigmas,
+    try_law,
+)
+from stages.twin.locate import FALSE_ALARM
+from stages.twin.scene import Ring, even_light
+
+_FEWEST_FRAMES, _ROUNDS, _BESIDE = 6, 3, 3
+"""Frames that a light needs, causes looked for one after the other, frames that show a step on each side."""
+_SURE = 3.0
+"""σ, from frame to frame, by which one law must fit better than another to be told from it."""
+_LEAST = {"step": 0.02, "flicker": 0.01, "led_dead": 0.2, "laser_sector": 0.25}
+"""Smallest sizes that are named: a photo errs by a per cent or two from frame to frame, and so does the
+wall's reflectance for the laser's colour, by more, from place to place."""
+_LED_AZIMUTHS, _FINE = 24, 5
+_SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (12, 20, 30, 45, 60, 90, 120), (0.3, 0.6, 0.9, 0.97)
+_HALF_SECTORS = 3
+"""Sectors side by side in the same half, when one half of the picture is to foretell the other."""
+
+
+def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring) -> tuple[Mismatch, ...]:
+    """Return what changes over time and along the line, from the cells of compared frames of each light."""
+    found: list[Mismatch] = []
+    steps: dict[str, tuple[Fitted, Cells]] = {}
+    for light, cells in (("LEDs", lit), ("laser", line)):
+        if cells is None or len(cells.frame) < _FEWEST_FRAMES:
+            continue
+        base, laws = _lit_laws(cells, lighting, ring) if light == "LEDs" else _line_laws(cells)
+        chosen, base = _chosen(cells, base, laws)
+        for best, rivals in chosen:
+            if best.law.name == "step":
+                steps[light] = best, cells
+            else:
+                found.append(_mismatch(best, rivals, cells, ring))
+        found += _flicker(cells, base, light, ring)
+    return (*_steps(steps, lit, line, ring), *found)
+
+
+def _lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[Law]]:
+    frames = len(cells.frame)
+    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
+    azimuth = 2 * np.pi * np.arange(_LED_AZIMUTHS) / _LED_AZIMUTHS
+    share = led_share(lighting, azimuth, ring)
+    steps, first = _steps_of(frames)
+    columns = np.log1p(-0.999 * share)[:, None, None] * steps[None, ..., :1]
+    places = np.stack(
+        [np.repeat(azimuth, len(first)), np.tile(first, _LED_AZIMUTHS), np.repeat(share.max(1), len(first))],
+        1,
+    )
+    return base, [
+        Law("step", steps, first[:, None]),
+        Law("led_dead", columns.reshape(-1, frames, SECTORS), places),
+    ]
+
+
+def _line_laws(cells: Cells) -> tuple[Float, list[Law]]:
+    frames, azimuth = len(cells.frame), sector_azimuth_rad()
+    around = [np.ones(SECTORS), *(f(m * azimuth) for m in (1, 2) for f in (np.cos, np.sin))]
+    base = np.concatenate([of_sectors(frames, np.array(around)), drift(frames)])
+    steps, first = _steps_of(frames)
+    patterns, places = _sector_patterns()
+    return base, [
+        Law("step", steps, first[:, None]),
+        Law("laser_sector", of_sectors(frames, patterns), places),
+    ]
+
+
+def _steps_of(frames: int) -> tuple[Float, Float]:
+    """Return columns (C, F, S) of steps, two frames or more on each side, and the first frames after (C,)."""
+    first = np.arange(2, frames - 1)
+    after = (np.arange(frames)[None] >= first[:, None]).astype(float)
+    return np.repeat(after[..., None], SECTORS, 2), first.astype(float)
+
+
+def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:
+    """Return which share (L, S) of the light in each sector comes from an LED at azimuths (L,)."""
+    around = sector_azimuth_rad()
+    point = np.stack(
+        [*(ring.radius_mm * f(around) for f in (np.cos, np.sin)), np.full(SECTORS, ring.ahead_mm)], 1
+    )
+    inward = np.stack([-np.cos(around), -np.sin(around), np.zeros(SECTORS)], 1)
+    whole = even_light(lighting, point, inward)
+    return np.stack([
+        even_light(replace(lighting, leds=1), _turned(point, -a), _turned(inward, -a)) / lighting.leds / whole
+        for a in azimuth_rad
+    ])  # fmt: skip
+
+
+def _turned(vector: Float, angle: float) -> Float:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(vector @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]))
+
+
+def _sector_patterns() -> tuple[Float, Float]:
+    """Return log brightness (C, S) of dim sectors, and middle, width and loss of each (C, 3)."""
+    fine = (np.arange(SECTORS * _FINE) + 0.5) / _FINE * 360 / SECTORS - 180
+    patterns, places = [], []
+    for middle in np.arange(-180.0, 180.0, 180 / SECTORS):
+        away = np.abs((fine - middle + 180) % 360 - 180)
+        for width in _SECTOR_WIDTHS_DEG:
+            shape = np.exp(-np.log(2) * (2 * away / width) ** 8).reshape(SECTORS, _FINE).mean(1)
+            for lost in _SECTOR_LOSSES:
+                patterns.append(np.log1p(-lost * shape))
+                places.append((middle, width, lost))
+    return np.array(patterns), np.array(places)
+
+
+def _chosen(cells: Cells, base: Float, laws: Sequence[Law]) -> tuple[list[tuple[Fitted, list[str]]], Float]:
+    """Return causes one after the other, with those that cannot be told from each, and the base with them."""
+    chosen: list[tuple[Fitted, list[str]]] = []
+    for _ in range(_ROUNDS):
+        tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
+        tries.sort(key=lambda f: -f.fall.sum())
+        best = _by_other_sectors(tries[0], cells, base)
+        size, more = size_of(best), 1.0 if best.law.name == "led_dead" else np.inf
+        if best.probability > FALSE_ALARM or not _LEAST[best.law.name] < size < more + _SURE * _size_sd(best):
+            break
+        if best.law.name == "step" and not _shows_at_once(best, cells):
+            break
+        rivals = [
+            o.law.name
+            for o in tries[1:]
+            if o.probability < FALSE_ALARM and sigmas(best.fall - o.fall) < _SURE
+        ]
+        chosen.append((best, rivals))
+        base = np.concatenate([base, best.change[None]])
+    return chosen, base
+
+
+def _shows_at_once(step: Fitted, cells: Cells) -> bool:
+    """Return whether the frames next to a step differ by half of it or more: drift may make up the rest."""
+    mean = cells.log_ratio.sum(1) / np.maximum(cells.usable.sum(1), 1)
+    first = int(step.place[0])
+    after, before = mean[first : first + _BESIDE], mean[max(first - _BESIDE, 0) : first]
+    return float((after.mean() - before.mean()) / step.size) > 0.5
+
+
+def _places(law: Law) -> int:
+    """Return how many places a law has that are not nearly the same."""
+    return {"laser_sector": SECTORS, "led_dead": len(law.columns) // 3}.get(law.name, len(law.columns))
+
+
+def _by_other_sectors(best: Fitted, cells: Cells, base: Float) -> Fitted:
+    """Return a dim sector with the chance that sectors which vary as the others do show as much."""
+    if best.law.name != "laser_sector":
+        return best
+    with_it = np.concatenate([base, best.change[None]])
+    rest = cells.log_ratio - fitted(cells, with_it, np.ones(len(cells.frame), bool))
+    seen = cells.usable.any(0)
+    left = np.where(cells.usable, rest, 0.0).sum(0)[seen] / cells.usable.sum(0)[seen]
+    depth = float(np.abs(best.change).max())
+    chance = 2 * SECTORS * float(norm.sf(depth / max(spread_about_median(left), 1e-6)))
+    return replace(best, probability=min(1.0, max(best.probability, chance)))
+
+
+def size_of(found: Fitted) -> float:
+    """Return the size of a cause in the unit of its law, 0 where its sign is not the law's."""
+    if found.law.name == "step":
+        return float(abs(np.expm1(found.size)))
+    if found.law.name == "led_dead":
+        most = found.place[2]
+        return float((1 - (1 - 0.999 * most) ** max(found.size, 0.0)) / most)
+    return float(1 - (1 - found.place[2]) ** max(found.size, 0.0))
+
+
+def _size_sd(found: Fitted) -> float:
+    more = replace(found, size=found.size + found.sd)
+    return abs(size_of(more) - size_of(found))
+
+
+def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mismatch:
+    size = NamedFigure("lost", size_of(best), _size_sd(best), "share of the light")
+    name = best.law.name
+    if name == "led_dead":
+        when, where = _when(cells.frame, int(best.place[1])), float(np.degrees(best.place[0]))
+        place = (when, NamedFigure("azimuth_deg", _half_turn(where), 180 / _LED_AZIMUTHS, "deg"))
+        said = f"From frame {when.value:.0f} on the LED at image azimuth {place[1].value:.0f}° has lost"
+        fixed_to, look = "time", ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
+    else:
+        where, width = best.place[:2]
+        place = (
+            NamedFigure("azimuth_deg", where, 90 / SECTORS, "deg"),
+            NamedFigure("width_deg", width, 0.25 * width, "deg"),
+        )
+        said = f"About image azimuth {where:.0f}°, over {width:.0f}°, the laser has lost"
+        fixed_to, look = "line", ring.at(cells.frame[0], np.radians(where))
+    said += f" {100 * size.value:.0f} % of its light."
+    if rivals:
+        said += " Frames do not tell this from: " + ", ".join(rivals).replace("_", " ") + "."
+    return Mismatch(
+        " or ".join([name, *rivals]), "line" if fixed_to == "line" else "intensity", fixed_to, place, (size,),
+        best.probability, best.chi2_before, best.chi2_after, said, look,
+    )  # fmt: skip
+
+
+def _when(frame: Int, first: int) -> NamedFigure:
+    gap = float(frame[first] - frame[first - 1])
+    return NamedFigure("frame_from", (frame[first] + frame[first - 1]) / 2, gap / np.sqrt(12), "frame")
+
+
+def _half_turn(angle_deg: float) -> float:
+    return (angle_deg + 180) % 360 - 180
+
+
+def _steps(
+    steps: dict[str, tuple[Fitted, Cells]], lit: Cells | None, line: Cells | None, ring: Ring
+) -> list[Mismatch]:
+    """Return steps of brightness: of the exposure where both lights step alike, else of one light."""
+    found = []
+    for light, (best, cells) in steps.items():
+        other = {"LEDs": line, "laser": lit}[light]
+        first = int(best.place[0])
+        when = _when(cells.frame, first)
+        same = _same_step(best, when, other)
+        if same and light == "laser" and "LEDs" in steps:
+            continue  # told already
+        own = {"LEDs": "lamp_step", "laser": "laser_step"}[light]
+        name = {True: "exposure_step", False: own, None: f"exposure_step or {own}"}[same]
+        size = NamedFigure(
+            "change", float(np.expm1(best.size)), float(np.exp(best.size)) * best.sd, "relative"
+        )
+        what = {
+            True: "all frames are",
+            False: f"frames lit by the {light} alone are",
+            None: f"frames lit by the {light} are",
+        }[same]
+        way = "brighter" if best.size > 0 else "darker"
+        found.append(Mismatch(
+            name, "line" if light == "laser" and not same else "intensity", "time", (when,), (size,),
+            best.probability, best.chi2_before, best.chi2_after,
+            f"From frame {when.value:.0f} on {what} {100 * abs(size.value):.0f} % {way}.",
+            ring.whole(cells.frame[first]),
+        ))  # fmt: skip
+    return found
+
+
+def _same_step(best: Fitted, when: NamedFigure, other: Cells | None) -> bool | None:
+    """Return whether frames of the other light step alike at the time; None where they cannot tell."""
+    if other is None or len(other.frame) < _FEWEST_FRAMES:
+        return None
+    after = (other.frame >= when.value).astype(float)
+    if not 2 <= after.sum() <= len(after) - 2:
+        return None
+    column = np.repeat(after[:, None], SECTORS, 1)
+    frames = len(other.frame)
+    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
+    own = try_law(other, base, Law("step", column[None], np.zeros((1, 1))), 1)
+    sd = float(np.hypot(own.sd, best.sd))
+    alike, absent = abs(own.size - best.size) < _SURE * sd, abs(own.size) < _SURE * own.sd
+    return None if alike == absent else alike
+
+
+def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch]:
+    """Return flicker: what one half of the picture is brighter in a frame foretells the other half."""
+    whole = np.ones(len(cells.frame), bool)
+    known = fitted(cells, base, whole)
+    half = np.arange(SECTORS) // _HALF_SECTORS % 2
+    rest = np.where(cells.usable, cells.log_ratio - known, 0.0)
+    parts = np.stack([
+        rest[:, half == h].sum(1) / np.maximum(cells.usable[:, half == h].sum(1), 1) for h in (0, 1)
+    ])  # fmt: skip
+    parts = parts - parts.mean(1, keepdims=True)
+    product, frames = parts[0] * parts[1], len(cells.frame)
+    spread = float(np.sqrt(max(product.mean(), 0.0)))
+    alike = min(float(product.mean() / max(parts[0].std() * parts[1].std(), 1e-12)), 1 - 1e-9)
+    chance = float(t.sf(alike * np.sqrt((frames - 2) / (1 - alike**2)), frames - 2))
+    foretold = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])
+    before, after = (float(cells.chi2(k).sum() / max(cells.counted.sum(), 1)) for k in (known, foretold))
+    if chance > FALSE_ALARM or spread < _LEAST["flicker"] or after >= before:
+        return []
+    sd = float(product.std()) / np.sqrt(frames) / (2 * spread)
+    place = tuple(
+        NamedFigure(n, float(f), 0.0)
+        for n, f in (("frame_from", cells.frame[0]), ("frame_to", cells.frame[-1]))
+    )
+    return [Mismatch(
+        "flicker" if light == "LEDs" else "laser_flicker", "intensity" if light == "LEDs" else "line", "time",
+        place, (NamedFigure("exposure", spread, sd, "relative"),), chance, before, after,
+        f"Frames lit by the {light} vary in brightness by {100 * spread:.1f} % (1 σ) from frame to frame.",
+        ring.whole(cells.frame[int(np.argmax(np.abs(parts.mean(0))))]),
+    )]  # fmt: skip

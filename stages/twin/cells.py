@@ -1,0 +1,233 @@
+"""Brightness of compared frames in sectors of image azimuth, and what changes of it fit other frames, too.
+
+Every frame keeps, for each sector, the sums from which χ² per pixel follows for any factor put on the twin:
+a cause is put in by its law, pixel by pixel, without rendering the frame again. A law is fitted to every
+other frame and judged on those between: χ² there must fall, by what frames themselves say of chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.stats import t
+
+from pipeline.arrays import Bool, Float, Float32, Int
+from stages.twin.render import TwinFrame
+
+SECTORS = 36
+_FEWEST_PIXELS, _LEAST_RATIO = 60, 0.02
+"""A sector counts with so many pixels, and if it has at least so small a share of the light foretold."""
+_DRIFT_KNOTS = 4
+"""Knots of the slow change of brightness that is granted to wall, photo and light without a name."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Sums over the pixels of sectors, (F, S) each, divided by the pixels' variance.
+
+    Attributes
+    ----------
+    frame : (F,) int
+    square, cross, own : float
+        Of recorded², recorded · twin, twin², grey levels above black.
+    pixels : float
+    """
+
+    frame: Int
+    square: Float
+    cross: Float
+    own: Float
+    pixels: Float
+
+    @property
+    def usable(self) -> Bool:
+        """(F, S) sectors with enough pixels and light."""
+        return (self.pixels >= _FEWEST_PIXELS) & (self.cross > _LEAST_RATIO * self.own) & (self.own > 0)
+
+    @property
+    def log_ratio(self) -> Float:
+        """(F, S) logarithm of recorded over twin; 0 where a sector cannot be used."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.usable, np.log(self.cross / self.own), 0.0)
+
+    def chi2(self, log_factor: Float) -> Float:
+        """Return χ² (F,) of frames, summed over their usable pixels, with a factor (F, S) on the twin."""
+        factor = np.exp(log_factor)
+        each = self.square - 2 * factor * self.cross + factor**2 * self.own
+        return np.asarray(np.where(self.usable, each, 0.0).sum(1))
+
+    @property
+    def counted(self) -> Float:
+        """(F,) pixels of the usable sectors."""
+        return np.asarray(np.where(self.usable, self.pixels, 0.0).sum(1))
+
+    def on(self, log_factor: Float) -> Cells:
+        """Return the sums for a twin brighter by a factor (F, S)."""
+        factor = np.exp(log_factor)
+        return replace(self, cross=self.cross * factor, own=self.own * factor**2)
+
+
+@dataclass
+class CellsOfFrames:
+    """Collects the cells of frames of one light."""
+
+    frame: list[int] = field(default_factory=list)
+    parts: list[Float] = field(default_factory=list)
+
+    def add(self, frame: int, above: Float32, twin: TwinFrame, use: Bool, sector: Int) -> None:
+        """Take the pixels in ``use`` (H, W), in the sectors (H, W); ``above`` is given above black."""
+        at, level = sector[use], twin.level[use]
+        recorded, weight = above[use], 1 / twin.variance[use]
+        sums = (recorded**2 * weight, recorded * level * weight, level**2 * weight, None)
+        self.frame.append(frame)
+        self.parts.append(np.stack([np.bincount(at, w, SECTORS).astype(float) for w in sums]))
+
+    def cells(self) -> Cells | None:
+        """Return the cells of all frames; None without any."""
+        if not self.parts:
+            return None
+        return Cells(np.array(self.frame), *np.stack(self.parts, 1))
+
+
+@dataclass(frozen=True)
+class Law:
+    """What a cause does to the logarithm of brightness, for each place where it may be.
+
+    Attributes
+    ----------
+    name : str
+    columns : (C, F, S)
+        Change per unit of size.
+    places : (C, P)
+        What each column stands for.
+    """
+
+    name: str
+    columns: Float
+    places: Float
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A law with its best place and size.
+
+    Attributes
+    ----------
+    law : Law
+    column : int
+    size, sd : float
+        1 σ from the spread from frame to frame.
+    probability : float
+        That chance gives such a size, by the spread from frame to frame, anywhere it was looked for; 1 where
+        frames without a part in the fit do not fit better.
+    fall : (F,)
+        By how much χ² of each frame falls that had no part in the fit.
+    chi2_before, chi2_after : float
+        Per pixel of the frames, each without a part in the fit.
+    """
+
+    law: Law
+    column: int
+    size: float
+    sd: float
+    probability: float
+    fall: Float
+    chi2_before: float
+    chi2_after: float
+
+    @property
+    def change(self) -> Float:
+        """(F, S) change of the logarithm of brightness."""
+        return np.asarray(self.size * self.law.columns[self.column], float)
+
+    @property
+    def place(self) -> Float:
+        """What its column stands for."""
+        return np.asarray(self.law.places[self.column])
+
+
+def sectors_of(phi_rad: Float32) -> Int:
+    """Return the sector of image azimuths, the first beginning at −π."""
+    turn = np.nan_to_num(phi_rad + np.pi) / (2 * np.pi)
+    return np.asarray((turn * SECTORS).astype(np.int64) % SECTORS)
+
+
+def sector_azimuth_rad() -> Float:
+    """Return the middles (S,) of the sectors."""
+    return np.asarray(-np.pi + 2 * np.pi * (np.arange(SECTORS) + 0.5) / SECTORS)
+
+
+def drift(frames: int) -> Float:
+    """Return columns (K, F, S) of a slow change over the frames."""
+    x = np.linspace(0, _DRIFT_KNOTS - 1, frames)
+    hats = np.maximum(0.0, 1 - np.abs(x[None] - np.arange(_DRIFT_KNOTS)[:, None]))
+    return np.asarray(np.repeat(hats[..., None], SECTORS, 2), float)
+
+
+def of_sectors(frames: int, around: Float) -> Float:
+    """Return columns (K, F, S) that stay over all frames, for patterns (K, S) around the image."""
+    return np.asarray(np.repeat(around[:, None], frames, 1), float)
+
+
+def fitted(cells: Cells, base: Float, use: Bool) -> Float:
+    """Return the change (F, S) that columns (K, F, S) make of the frames in ``use`` (F,)."""
+    inside = cells.usable & use[:, None]
+    size = np.linalg.lstsq(base[:, inside].T, cells.log_ratio[inside], rcond=None)[0]
+    return np.asarray(np.tensordot(size, base, 1), float)
+
+
+def try_law(cells: Cells, base: Float, law: Law, places: int) -> Fitted:
+    """Return a law's best place and size beyond base columns (K, F, S), and how frames bear it out.
+
+    ``places`` is how many places that differ it, and the other laws, may be at: chance has as many tries.
+    """
+    frames = np.arange(len(cells.frame))
+    fall, before = np.zeros(len(frames)), np.zeros(len(frames))
+    # Half of the frames leave open between which two of all of them a step lies: the place is that of all.
+    column, size, sd = _best(cells, base, law, np.ones(len(frames), bool))
+    for half in (frames % 2 == 0, frames % 2 == 1):
+        without = fitted(cells, base, half)
+        with_it = fitted(cells, np.concatenate([base, law.columns[column][None]]), half)
+        left = cells.chi2(without)
+        before[~half], fall[~half] = left[~half], (left - cells.chi2(with_it))[~half]
+    # A law that frames without a part in the fit contradict is chance, however sure the fit is of it.
+    freedom = max(len(frames) - 1 - _DRIFT_KNOTS, 1)
+    chance = float(2 * places * t.sf(abs(size) / max(sd, 1e-12), freedom)) if fall.sum() > 0 else 1.0
+    pixels = max(float(cells.counted.sum()), 1.0)
+    return Fitted(
+        law, column, size, sd, min(1.0, chance), fall, float(before.sum()) / pixels,
+        float((before - fall).sum()) / pixels,
+    )  # fmt: skip
+
+
+def _best(cells: Cells, base: Float, law: Law, use: Bool) -> tuple[int, float, float]:
+    """Return the column whose size explains most beyond base columns, the size, and its σ over frames."""
+    inside = cells.usable & use[:, None]
+    direction = np.linalg.svd(base[:, inside].T, full_matrices=False)
+    kept = direction[0][:, direction[1] > 1e-9 * max(direction[1].max(), 1e-30)]
+    rest = cells.log_ratio[inside]
+    rest = rest - kept @ (kept.T @ rest)
+    columns = law.columns[:, inside]
+    columns = columns - (columns @ kept) @ kept.T
+    norm = np.einsum("cn,cn->c", columns, columns)
+    norm = np.where(norm > 1e-6, norm, np.inf)
+    size = columns @ rest / norm
+    best = int(np.argmax(size**2 * np.where(np.isfinite(norm), norm, 0.0)))
+    left = columns[best] * (rest - size[best] * columns[best])
+    of_frame = np.bincount(np.nonzero(inside)[0], left, len(use))
+    weight = np.bincount(np.nonzero(inside)[0], columns[best] ** 2, len(use))
+    seen = weight > 0
+    # Few frames with much weight make their own spread look small: that of all frames is the least.
+    spread = max((of_frame**2).sum(), norm[best] * (of_frame[seen] ** 2 / weight[seen]).mean())
+    spread *= seen.sum() / max(seen.sum() - 1 - _DRIFT_KNOTS, 1)
+    return best, float(size[best]), float(np.sqrt(spread)) / float(norm[best])
+
+
+def sigmas(fall: Sequence[float] | Float) -> float:
+    """Return by how many σ, taken from frame to frame, the mean of falls (F,) is above 0."""
+    if len(fall) < 2:
+        return 0.0
+    sd = float(np.std(fall, ddof=1)) / np.sqrt(len(fall))
+    return float(np.mean(fall) / max(sd, 1e-12))

@@ -1,0 +1,90 @@
+"""Causes over time and along the line, on made sums of frames: named where they are, and nothing else."""
+
+import numpy as np
+import pytest
+
+from pipeline.instrument.probe import Lighting
+from stages.twin.causes import causes
+from stages.twin.cells import SECTORS, Cells, sector_azimuth_rad, sectors_of
+from stages.twin.scene import Ring
+
+RING, FRAMES = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 18
+NUMBER = 10 * np.arange(FRAMES)
+AZIMUTH_DEG = np.degrees(sector_azimuth_rad())
+
+
+def _cells(change, seed=0, of_photo=0.01):
+    """Cells with noise of 1 σ per pixel, an error of the photo in each cell, and a logarithmic change."""
+    random = np.random.default_rng(seed)
+    pixels, level = 500.0, 20.0
+    photo = of_photo * random.standard_normal((FRAMES, SECTORS))
+    ratio = np.exp(photo + change) + random.standard_normal((FRAMES, SECTORS)) / (level * np.sqrt(pixels))
+    own = np.full((FRAMES, SECTORS), pixels * level**2)
+    square = pixels * (1 + (ratio * level) ** 2)
+    return Cells(NUMBER, square, ratio * own, own, np.full_like(own, pixels))
+
+
+def _found(lit=0.0, line=0.0, seed=0):
+    zero = np.zeros((FRAMES, SECTORS))
+    return causes(_cells(zero + lit, seed), _cells(zero + line, seed + 1000, of_photo=0.05), Lighting(), RING)
+
+
+def _step(first):
+    return (np.arange(FRAMES) >= first)[:, None].astype(float)
+
+
+def test_nothing_is_found_where_nothing_changes():
+    drift = np.linspace(-0.05, 0.05, FRAMES)[:, None]
+    uneven = 0.1 * np.cos(np.radians(AZIMUTH_DEG))
+    assert [len(_found(drift + uneven, 3 * drift - uneven, seed)) for seed in range(20)] == [0] * 20
+
+
+@pytest.mark.parametrize(
+    ("lit", "line", "name"),
+    [(0.2, 0.2, "exposure_step"), (0.2, 0.0, "lamp_step"), (0.0, -0.3, "laser_step")],
+)
+def test_a_step_belongs_to_the_exposure_or_to_one_light(lit, line, name):
+    (step,) = _found(lit * _step(8), line * _step(8))
+    assert (step.name, step.fixed_to) == (name, "time")
+    assert step.place[0].value == 75
+    assert step.parameters[0].value == pytest.approx(np.expm1(lit or line), abs=4 * step.parameters[0].sd)
+    assert step.chi2_after < step.chi2_before
+
+
+def test_an_led_that_fails_is_told_from_a_step():
+    away = np.radians(AZIMUTH_DEG - 60)
+    share = (1 + 0.3 * np.cos(away) + 0.05 * np.cos(2 * away)) / 8
+    (led,) = _found(np.log1p(-share) * _step(10))
+    assert led.name == "led_dead"
+    assert led.place[0].value == 95
+    assert led.place[1].value == pytest.approx(60, abs=20)
+    assert led.parameters[0].value == pytest.approx(1, abs=0.35)
+
+
+def test_a_dim_sector_is_found_where_it_is():
+    away = np.abs(AZIMUTH_DEG - 45)
+    dim = np.log1p(-0.6 / (1 + np.exp((away - 20) / 2)))
+    (sector,) = _found(line=dim[None])
+    assert (sector.name, sector.fixed_to) == ("laser_sector", "line")
+    assert sector.place[0].value == pytest.approx(45, abs=6)
+    assert sector.place[1].value == pytest.approx(40, abs=16)
+    assert sector.parameters[0].value == pytest.approx(0.6, abs=0.1)
+
+
+def test_flicker_of_one_light_is_told():
+    each = 0.04 * np.random.default_rng(2).standard_normal(FRAMES)[:, None]
+    (flicker,) = _found(each)
+    assert flicker.name == "flicker"
+    assert flicker.parameters[0].value == pytest.approx(0.04, abs=0.015)
+    (laser,) = _found(0.0, 2 * each)
+    assert laser.name == "laser_flicker"
+
+
+def test_a_change_of_single_sectors_is_no_flicker():
+    random = np.random.default_rng(3)
+    assert not _found(0.04 * random.standard_normal((FRAMES, SECTORS)))
+
+
+def test_sectors_begin_at_minus_pi():
+    phi = sector_azimuth_rad().astype(np.float32)
+    np.testing.assert_array_equal(sectors_of(phi), np.arange(SECTORS))
