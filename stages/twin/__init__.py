@@ -19,7 +19,7 @@ from stages.twin.causes import causes
 from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, block_contrasts, block_ratios, exposure_of
 from stages.twin.locate import LEAST_CONTRAST, ImagePlace, beside, full_size, places_in_image
-from stages.twin.name import cannot_tell, clipped_line, noise_figures, state_figures
+from stages.twin.name import cannot_tell, clipped, noise_figures, not_sharp, state_figures
 from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image, maps_of, unnamed, worst_places
 from stages.twin.render import Region, render_frame
 from stages.twin.scene import Scene, scene_of
@@ -149,7 +149,8 @@ def compared_with(
     state, samples = photometry.state, sums.blocks.samples()
     found: tuple[Mismatch, ...] = (
         *causes(*sums.cells(), scene.probe.lighting, scene.ring),
-        *sums.on_window(samples), *unnamed(samples), *clipped_line(rings),
+        *sums.on_window(samples), *unnamed(samples), *not_sharp(state.line),
+        *clipped(rings, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     _report(comparison, found, context)
     return Twin(

@@ -44,6 +44,8 @@ class Comparison:
         Dark pixels that are at black to the grey level.
     seen, view : float
         Pixels whose wall is known, and all within the view, in lit frames.
+    clipped_wall : float
+        Pixels of lit wall at the level where grey levels pile up.
     views : list of TwinView
     by_level : (2, L)
         Of lit wall: pixels, and squares of z, by the brightness of the twin.
@@ -61,6 +63,7 @@ class Comparison:
     still: float = 0.0
     seen: float = 0.0
     view: float = 0.0
+    clipped_wall: float = 0.0
     views: list[TwinView] = field(default_factory=list)
     by_level: Float = field(default_factory=lambda: np.zeros((2, len(_LEVELS))))
 
@@ -87,6 +90,7 @@ class Comparison:
             self.camera += float((square / noise.variance(after.level[wall])).sum())
             self.noise += float(after.variance[wall].sum(dtype=float))
             self.lit += float(wall.sum())
+            self.clipped_wall += float((above_black[wall] >= noise.white - noise.black.value).sum())
             level = np.digitize(after.level[wall], _LEVELS[1:])
             self.by_level += [np.bincount(level, w, len(_LEVELS)) for w in (None, z[wall] ** 2)]
             self.seen += float(size.sum() - size[Region.UNSEEN] - size[Region.DARK])

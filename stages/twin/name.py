@@ -6,22 +6,52 @@ import numpy as np
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.line_light import LineLight
 from stages.twin.noise import CameraNoise
 from stages.twin.state import PhotometricState
 
-_CLIPPED = 0.05
+_CLIPPED, _CLIPPED_WALL = 0.05, 0.01
+"""Share of ring samples, and of pixels of lit wall, from which clipping is told."""
+_IN_FOCUS_PX = 1.2
+"""1 σ of lens and pixel that lenses in focus stay below: a pixel's own is 0.29, and a spot two pixels wide at
+half height has 0.85."""
 
 
-def clipped_line(rings: RingSamples) -> tuple[Mismatch, ...]:
-    """Return a clipped line, which is counted, not inferred: it leaves χ² as it was."""
-    clipped = float(np.mean(rings.validity == RingValidity.SATURATED)) if rings.validity.size else 0.0
-    if clipped <= _CLIPPED:
+def clipped(rings: RingSamples, wall_share: float) -> tuple[Mismatch, ...]:
+    """Return a clipped line and clipped lit wall, which are counted, not inferred: χ² stays as it was.
+
+    ``wall_share`` is the share of pixels of lit wall at the level where grey levels pile up.
+    """
+    line_share = float(np.mean(rings.validity == RingValidity.SATURATED)) if rings.validity.size else 0.0
+    nan, found = float("nan"), []
+    for share, least, what, where, of in (
+        (line_share, _CLIPPED, "The line is", "line", "of ring samples"),
+        (wall_share, _CLIPPED_WALL, "Lit wall is", "image", "of pixels of lit wall"),
+    ):
+        if share > least:
+            found.append(Mismatch(
+                "saturation", "line" if where == "line" else "intensity", where, (),
+                (NamedFigure("share", share, 0.0, of),), 0.0, nan, nan,
+                f"{what} clipped in {100 * share:.0f} % {of}.",
+            ))  # fmt: skip
+    return tuple(found)
+
+
+def not_sharp(line: LineLight | None) -> tuple[Mismatch, ...]:
+    """Return a line that is wider than its sheet and a lens in focus make it.
+
+    Its width is held against a fixed limit, not against other frames: the run's photo is as blurred as its
+    frames, and re-rendered ones are, too.
+    """
+    if line is None or line.blur_px.value - 3 * line.blur_px.sd < _IN_FOCUS_PX:
         return ()
-    share, nan = NamedFigure("share", clipped, 0.0, "of ring samples"), float("nan")
+    blur, nan = line.blur_px, float("nan")
     return (
         Mismatch(
-            "saturation", "line", "line", (), (share,), 0.0, nan, nan,
-            f"The line is clipped in {100 * clipped:.0f} % of the ring samples.",
+            "defocus or thick_sheet", "line", "line", (), (NamedFigure("blur", blur.value, blur.sd, "px"),),
+            nan, nan, nan,
+            f"The line is blurred by {blur.value:.1f} px (1 σ) beyond its sheet's stated thickness: the lens "
+            "is out of focus, or the sheet is thicker than stated. In one diameter the two look alike.",
         ),
     )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from pipeline.api.diagnosis.tried import DiagnosisTried
 from pipeline.api.run import configuration, dirt_of
 from pipeline.api.twin import twin_document, write_twin
+from pipeline.artefacts.measured import RingValidity
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, RegionFit, Twin, TwinView
 from pipeline.errors import InputError
 from pipeline.files.provenance import MadeBy
@@ -20,6 +22,7 @@ from stages.texture.views import clear_of
 from stages.twin.compare import BLOCK_PX, Comparison, block_contrasts, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.locate import ImagePlace, full_size, places_in_image
+from stages.twin.name import clipped, not_sharp
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
 from stages.twin.reference import BlockSamples, in_image, unnamed
 from stages.twin.render import Region, TwinFrame
@@ -264,6 +267,18 @@ def test_faint_texture_is_found_where_brightness_is_even():
     share = np.nanmedian(shares, axis=0)
     assert share[12, 14] < 0.7
     assert share[3, 3] == pytest.approx(1, abs=0.1)
+
+
+def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
+    rings = SimpleNamespace(validity=np.array([RingValidity.SATURATED] * 2 + [RingValidity.VALID] * 8))
+    line, wall = clipped(rings, 0.3)
+    assert (line.fixed_to, line.parameters[0].value) == ("line", 0.2)
+    assert (wall.fixed_to, wall.parameters[0].value) == ("image", 0.3)
+    assert not clipped(SimpleNamespace(validity=np.array([RingValidity.VALID])), 0.001)
+    assert not not_sharp(None)
+    for blur, told in ((0.8, 0), (2.2, 1)):
+        line_light = SimpleNamespace(blur_px=Figure(blur, 0.1 * blur))
+        assert len(not_sharp(line_light)) == told
 
 
 def _twin():
