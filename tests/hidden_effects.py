@@ -23,7 +23,7 @@ class Hidden:
     ----------
     name : str
     change : callable
-        Makes a recorded picture, of a frame and a light, the one with the effect.
+        Makes the grey levels above black, of a frame and a light, those with the effect.
     names : tuple of str
         What it may be called; any one is right.
     fixed_to : str
@@ -99,7 +99,7 @@ def effects(scene: Scene, frame: Int, random: np.random.Generator) -> list[Hidde
         )  # fmt: skip
         lost, half = (0.4, 20.0) if weak else (0.85, 12.0)
         away = np.abs(np.angle(np.exp(1j * (phi - azimuth)))) * 180 / np.pi
-        dim = (1 - lost / (1 + np.exp((away - half) / 1.5))).astype(np.float32)
+        dim = (1 - lost * 0.5 * (1 - np.tanh((away - half) / 3))).astype(np.float32)
         found.append(
             Hidden(
                 f"dim sector, {kind}",

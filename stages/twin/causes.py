@@ -238,7 +238,7 @@ def _steps(
         other = {"LEDs": line, "laser": lit}[light]
         first = int(best.place[0])
         when = _when(cells.frame, first)
-        same = _same_step(best, when, other)
+        same = _same_step(best, cells.frame[first - 1 : first + 1], other)
         if same and light == "laser" and "LEDs" in steps:
             continue  # told already
         own = {"LEDs": "lamp_step", "laser": "laser_step"}[light]
@@ -261,17 +261,18 @@ def _steps(
     return found
 
 
-def _same_step(best: Fitted, when: NamedFigure, other: Cells | None) -> bool | None:
-    """Return whether frames of the other light step alike at the time; None where they cannot tell."""
+def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
+    """Return whether frames of the other light step alike between two frames; None if they cannot tell."""
     if other is None or len(other.frame) < _FEWEST_FRAMES:
         return None
-    after = (other.frame >= when.value).astype(float)
-    if not 2 <= after.sum() <= len(after) - 2:
+    columns, first = _steps_of(len(other.frame))
+    at = first.astype(int)
+    here = (other.frame[at] > between[0]) & (other.frame[at - 1] < between[1])
+    if not here.any():
         return None
-    column = np.repeat(after[:, None], SECTORS, 1)
     frames = len(other.frame)
     base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
-    own = try_law(other, base, Law("step", column[None], np.zeros((1, 1))), 1)
+    own = try_law(other, base, Law("step", columns[here], first[here, None]), 1)
     sd = float(np.hypot(own.sd, best.sd))
     alike, absent = abs(own.size - best.size) < _SURE * sd, abs(own.size) < _SURE * own.sd
     return None if alike == absent else alike

@@ -19,8 +19,9 @@ from stages.twin.render import TwinFrame
 SECTORS = 36
 _FEWEST_PIXELS, _LEAST_RATIO = 60, 0.02
 """A sector counts with so many pixels, and if it has at least so small a share of the light foretold."""
-_DRIFT_KNOTS = 4
-"""Knots of the slow change of brightness that is granted to wall, photo and light without a name."""
+_DRIFT_KNOTS, _FRAMES_OF_KNOT = 4, 4
+"""Most knots of the slow change of brightness that is granted to wall, photo and light without a name, and
+frames for each: fewer would be drawn along by a single frame."""
 
 
 @dataclass(frozen=True)
@@ -161,8 +162,9 @@ def sector_azimuth_rad() -> Float:
 
 def drift(frames: int) -> Float:
     """Return columns (K, F, S) of a slow change over the frames."""
-    x = np.linspace(0, _DRIFT_KNOTS - 1, frames)
-    hats = np.maximum(0.0, 1 - np.abs(x[None] - np.arange(_DRIFT_KNOTS)[:, None]))
+    knots = int(np.clip(frames // _FRAMES_OF_KNOT, 1, _DRIFT_KNOTS))
+    x = np.linspace(0, knots - 1, frames)
+    hats = np.maximum(0.0, 1 - np.abs(x[None] - np.arange(knots)[:, None]))
     return np.asarray(np.repeat(hats[..., None], SECTORS, 2), float)
 
 
