@@ -78,5 +78,7 @@ def _dense(band, first, end, last):  # type: ignore[no-untyped-def]
     for f in range(first, end):
         for e in range(max(first, f - band.shape[1] + 1), min(last, f + 1)):
             i, j = (f - first) * size, (e - first) * size
-            out[i : i + size, j : j + size] = band[f, f - e]
+            for a in range(size):
+                for b in range(size):
+                    out[i + a, j + b] = band[f, f - e, a, b]
     return out

@@ -116,12 +116,15 @@ def add_landmarks(  # type: ignore[no-untyped-def]
     for k in range(len(start) - 1):
         most = max(most, start[k + 1] - start[k])
     cross, solved, side = np.empty((most, 3, 6)), np.empty((most, 6, 3)), np.empty((3, size))
+    h = np.empty((3, 3))
     for k in range(len(start) - 1):
-        ws = s_weight[k]
-        h = ws * np.outer(s_point[k], s_point[k])
-        g = -ws * s_residual[k] * s_point[k]
+        ws, g = s_weight[k], right_point[k]
         for c in range(3):
-            side[c] = ws * s_point[k, c] * s_border[k]
+            g[c] = -ws * s_residual[k] * s_point[k, c]
+            for d in range(3):
+                h[c, d] = ws * (s_point[k, c] * s_point[k, d])
+            for d in range(size):
+                side[c, d] = ws * s_point[k, c] * s_border[k, d]
         _add_to_corner(s_border[k], s_residual[k], ws, corner, right_border)
         for m in range(start[k], start[k + 1]):
             _add_observation(
@@ -130,7 +133,6 @@ def add_landmarks(  # type: ignore[no-untyped-def]
             )  # fmt: skip
         for a in range(3):
             h[a, a] *= 1.0 + damping
-        right_point[k] = g
         _invert(h, inverse[k])
         _eliminate_from_corner(inverse[k], g, side, corner, right_border)
         seen = frame[start[k] : start[k + 1]]

@@ -193,8 +193,9 @@ def _regress(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     reach = max(3.0 * width, gap)
     for a in range(distance.shape[0]):
-        known = np.isfinite(distance[a]).sum()
-        first, last = 0, 0
+        known, first, last = 0, 0, 0
+        for x in distance[a]:
+            known += np.isfinite(x)
         for i in range(len(rows)):
             while first < known and distance[a, first] < rows[i] - reach:
                 first += 1
@@ -208,7 +209,8 @@ def _regress(  # type: ignore[no-untyped-def]
             out_radius[i, a], out_sigma[i, a] = _line_at(
                 d, kernel, radius[a, first:last], variance[a, first:last], width
             )
-            out_count[i, a] = np.where(np.abs(d) <= 3.0 * width, count[a, first:last], 0).sum()
+            for k in range(len(d)):
+                out_count[i, a] += count[a, first + k] if abs(d[k]) <= 3.0 * width else 0
             out_misalignment[i, a] = (weight * misalignment[a, first:last]).sum() / weight.sum()
 
 

@@ -69,7 +69,7 @@ def deviation_points(relief: Relief, points: PointCloud, spacing_mm: float) -> D
 
 
 @numba.njit(cache=True)
-def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wanted, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wanted, out):  # type: ignore[no-untyped-def]
     rows, columns = out.shape
     reach_s = int(np.ceil(2.5 * along / cell_s))
     reach_a = min(int(np.ceil(2.5 * around / cell_a)), columns // 2 - 1)
@@ -101,7 +101,22 @@ def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wante
         weight = normal[0, 0]
         for a in range(6):
             normal[a, a] += 1e-4 * weight
-            normal[a:, a] = normal[a, a:]
-        found = np.linalg.solve(normal, right)
+        _solve(normal, right)
         # mean of x² over a millimetre about its middle is 1 / 12
-        out[row, column] = found[0] + (found[3] + found[5]) / 12.0
+        out[row, column] = right[0] + (right[3] + right[5]) / 12.0
+
+
+@numba.njit(cache=True)
+def _solve(matrix, right):  # type: ignore[no-untyped-def]
+    """Solve equations in place by Cholesky's way; of the matrix, positive definite, the upper half counts."""
+    n = len(right)
+    for a in range(n):
+        for k in range(a):
+            share = matrix[k, a] / matrix[k, k]
+            for b in range(a, n):
+                matrix[a, b] -= share * matrix[k, b]
+            right[a] -= share * right[k]
+    for a in range(n - 1, -1, -1):
+        for b in range(a + 1, n):
+            right[a] -= matrix[a, b] * right[b]
+        right[a] /= matrix[a, a]

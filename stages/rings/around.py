@@ -5,6 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from stages.rings.kernels import median, take_finite
+
 # Thirty degrees: far wider than a glint, so that it has no say; a move across the pipe, one wave around the
 # ring, is followed to 3 % (the square of half a block, over 2).
 _BLOCKS = 12
@@ -18,19 +20,17 @@ def slow_around(values):  # type: ignore[no-untyped-def]
     of which less than a quarter is finite take the value of the block before.
     """
     sectors = values.size
-    level, known = np.zeros(_BLOCKS), np.zeros(_BLOCKS, np.bool_)
+    level, last, out = np.full(_BLOCKS, np.nan), np.nan, np.zeros(sectors)
     for b in range(_BLOCKS):
         block = values[b * sectors // _BLOCKS : (b + 1) * sectors // _BLOCKS]
-        finite = block[np.isfinite(block)]
+        finite = take_finite(block, out)
         if finite.size > 0 and 4 * finite.size >= block.size:
-            level[b], known[b] = np.median(finite), True
-    out = np.zeros(sectors)
-    if not known.any():
+            level[b] = last = median(finite)
+    out[:] = 0.0
+    if np.isnan(last):
         return out
-    last = level[np.flatnonzero(known)[-1]]
     for b in range(_BLOCKS):
-        if known[b]:
-            last = level[b]
+        last = level[b] if np.isfinite(level[b]) else last
         level[b] = last
     for a in range(sectors):
         place = (a + 0.5) * _BLOCKS / sectors - 0.5

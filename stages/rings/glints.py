@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.adjustment.robust import robust_spread, robust_spreads
 from pipeline.arrays import Bool, Float, Float32, Int
 from stages.rings.around import slow_around
+from stages.rings.kernels import median
 
 # Rings on either side that have a say: two of five may be wrong, and a run is confirmed by a next one, which
 # itself is measured against two more; how much clutter there is, is counted over two on either side.
@@ -94,7 +95,9 @@ def _away_from_wall(radius):  # type: ignore[no-untyped-def]
     rings, sectors = radius.shape
     move = np.zeros((rings, sectors))
     for k in range(1, rings):
-        move[k] = move[k - 1] + slow_around(radius[k] - radius[k - 1])
+        step = slow_around(radius[k] - radius[k - 1])
+        for a in range(sectors):
+            move[k, a] = move[k - 1, a] + step[a]
     out = np.full((rings, sectors), np.nan)
     window = np.empty(2 * WALL_RINGS + 1)
     for k in range(rings):
@@ -106,7 +109,7 @@ def _away_from_wall(radius):  # type: ignore[no-untyped-def]
                     window[count] = value
                     count += 1
             if count > 2:
-                out[k, a] = radius[k, a] - move[k, a] - np.median(window[:count])
+                out[k, a] = radius[k, a] - move[k, a] - median(window[:count])
     return out
 
 
@@ -139,7 +142,8 @@ def _runs(away, sigma):  # type: ignore[no-untyped-def]
                 else:
                     break
             if top > _SEED_SIGMAS:
-                out[k, np.arange(first, first + length) % sectors] = 1 if 2 * confirmed > total else 2
+                for a in range(first, first + length):
+                    out[k, a % sectors] = 1 if 2 * confirmed > total else 2
             first += length
     return out
 

@@ -238,7 +238,8 @@ def _closed_path(credit, jump):  # type: ignore[no-untyped-def]
     value, moved = np.zeros(radii, np.float32), np.empty(radii, np.float32)
     for s in range(steps):
         _moved(value, jump, moved, origin[s])
-        value[:] = moved + credit[s % azimuths]
+        for r in range(radii):
+            value[r] = moved[r] + credit[s % azimuths, r]
     path = np.empty(azimuths, np.int64)
     at = np.argmax(value)
     for s in range(steps - 1, -1, -1):

@@ -111,7 +111,10 @@ def _grouped(group, value, groups):  # type: ignore[no-untyped-def]
 
     Sorting all pixels by rounded value first, then stably by group, leaves only neighbours to be swapped.
     """
-    rings = np.zeros(int(value.max()) + 2, np.int64)
+    largest = np.float32(0)
+    for x in value:
+        largest = max(largest, x)
+    rings = np.zeros(int(largest) + 2, np.int64)
     start = np.zeros(groups + 1, np.int64)
     for k in range(group.size):
         rings[int(value[k]) + 1] += 1

@@ -10,6 +10,7 @@ from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spread, robust_sprea
 from pipeline.arrays import Bool, Byte, Float32
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.rings.glints import lone_runs
+from stages.rings.kernels import median, take_finite
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0
@@ -72,11 +73,13 @@ def wander_px(samples: RingSamples) -> float:
 @numba.njit(cache=True, nogil=True)
 def middle_and_spread(values):  # type: ignore[no-untyped-def]
     """Median, and 1 σ about it as `spread_about_median`, of the finite ``values`` (N,); 0, 0 without any."""
-    finite = values[np.isfinite(values)]
+    finite = take_finite(values, np.empty(values.size))
     if finite.size == 0:
         return 0.0, 0.0
-    middle = np.median(finite)
-    return middle, MAD_TO_SIGMA * np.median(np.abs(finite - middle))
+    middle = median(finite)
+    for k in range(finite.size):
+        finite[k] = abs(finite[k] - middle)
+    return middle, MAD_TO_SIGMA * median(finite)
 
 
 def _local_spread(away: Float32) -> Float32:

@@ -15,58 +15,66 @@ Short = NDArray[np.uint16]
 
 # Reflectance is kept as multiples of 1 / 32 of a grey level at the reference brightness.
 REFLECTANCE_SCALE = 32.0
-_SATURATED = 250
-# Above the largest number of views a tile may have; with 18 bits of brightness a key fits in 31 bits.
-_MOST_VIEWS = 256
-_NO_SAMPLE = np.int32(2**31 - 1)
-# Pixels whose samples are sorted side by side: two registers of 16 numbers of 32 bits where there are such.
+_SCALE = np.float32(REFLECTANCE_SCALE)
+_SATURATED = np.uint8(250)
+# A key is brightness, 18 bits, above weight, 8 bits; samples without weight come last and weigh nothing.
+_BITS, _WEIGHT = np.int32(8), np.int32(255)
+_NO_SAMPLE = np.int32((1 << 31) - 256)
+_ZERO, _TWO = np.int32(0), np.int32(2)
+# Pixels that are worked on side by side: two registers of 16 numbers of 32 bits where there are such.
 _AT_ONCE = 32
+_QUARTER, _MAD, _TUKEY = np.float32(0.25), np.float32(MAD_TO_SIGMA), np.float32(4.685)
+_LEAST, _ONE = np.float32(0.03 * 0.25), np.float32(1.0)
 
 
 class TileStack:
-    """Samples of one tile's pixels in up to ``views`` views."""
+    """Samples of one tile's pixels in up to ``views`` views, each view's one after the other.
+
+    Used for one tile after the other: memory that the system gives anew costs more than all writing to it.
+    """
 
     def __init__(self, views: int, rows: int, columns: int) -> None:
-        # Views before columns: samples of a view are written one after the other.
-        self._values = np.empty((rows, views, columns, 3), np.uint16)
-        self._weights = np.zeros((rows, views, columns), np.uint8)
-        self._used = 0
+        whole = -(-columns // _AT_ONCE) * _AT_ONCE
+        self._values = np.empty((views, rows, 3, whole), np.uint16)
+        self._weights = np.zeros((views, rows, whole), np.uint8)
+        self._used, self._columns = 0, columns
 
     def add(self, image: Image, projection: TileProjection) -> None:
         """Sample a view's ``image`` (H, W, 3) where ``projection`` puts the tile's pixels."""
         seen = np.flatnonzero(projection.weight.any(1))
         if seen.size:
             rows = slice(seen[0], seen[-1] + 1)
-            uv = projection.uv[rows]
             _store(
-                cv2.remap(image, uv[..., 0], uv[..., 1], cv2.INTER_CUBIC),
-                projection.inverse_brightness[rows], projection.weight[rows], self._used,
-                self._values[rows], self._weights[rows],
+                cv2.split(cv2.remap(image, projection.uv[rows], None, cv2.INTER_CUBIC)),
+                projection.inverse_brightness[rows], projection.weight[rows],
+                self._values[self._used, rows], self._weights[self._used, rows],
             )  # fmt: skip
         self._used += 1
 
     def blend(self) -> tuple[Short, Byte]:
-        """Return the blended colours (rows, columns, 3) and how many samples stand behind each."""
-        return blend_samples(self._values, self._weights)
+        """Return the blended colours (rows, columns, 3) and how many samples are behind each; start anew."""
+        colour, count = blend_samples(self._values, self._weights)
+        self._weights[:] = 0
+        self._used = 0
+        return colour[:, : self._columns], count[:, : self._columns]
 
 
 @njit(cache=True, nogil=True)
-def _store(sample, inverse_brightness, weight, view, values, weights):  # type: ignore[no-untyped-def]
+def _store(colours, inverse_brightness, weight, values, weights):  # type: ignore[no-untyped-def]
     """Write a view's samples and weights; values of weight 0 mean nothing."""
-    rows, columns = weight.shape
-    gain = np.empty(3 * columns)
-    for i in range(rows):
-        colour, line = sample[i].reshape(-1), values[i, view].reshape(-1)
-        for j in range(columns):
-            gain[3 * j] = gain[3 * j + 1] = gain[3 * j + 2] = REFLECTANCE_SCALE * inverse_brightness[i, j]
-        for k in range(3 * columns):
-            line[k] = np.uint16(min(65535.0, colour[k] * gain[k] + 0.5))
-        for j in range(columns):
-            w = weight[i, j]
-            brightest = max(colour[3 * j], colour[3 * j + 1], colour[3 * j + 2])
+    most, half, steps = np.float32(65535.0), np.float32(0.5), np.float32(254.0)
+    for i in range(len(weight)):
+        own, gain, worth = weight[i], inverse_brightness[i], weights[i]
+        for c in range(3):
+            colour, out = colours[c][i], values[i, c]
+            for p in range(len(own)):
+                out[p] = np.int32(min(most, np.float32(colour[p]) * (_SCALE * gain[p]) + half))
+        blue, green, red = colours[0][i], colours[1][i], colours[2][i]
+        for p in range(len(own)):
+            w = min(np.int32(255), np.int32(steps * own[p]) + np.int32(1))
             # A clipped sample counts only where there is no other.
-            worth = 1 if brightest >= _SATURATED else max(1, min(255, int(254 * w) + 1))
-            weights[i, view, j] = worth if w > 0 else 0
+            w = np.int32(1) if max(blue[p], max(green[p], red[p])) >= _SATURATED else w
+            worth[p] = w if own[p] > 0 else _ZERO
 
 
 def _sorting_network(keys: int) -> Int:
@@ -89,63 +97,63 @@ def _sorting_network(keys: int) -> Int:
 
 
 @njit(cache=True, nogil=True)
-def _sorted_keys(values, weights, first, end, network, key):  # type: ignore[no-untyped-def]
-    """Write the keys of some pixels' samples to ``key`` (views, pixels), each pixel's in ascending order.
-
-    A key is four times the brightness and then the view; samples without weight come last, as `_NO_SAMPLE`.
-    """
-    for k in range(len(key)):
-        for j in range(first, end):
-            four = np.int32(values[k, j, 0]) + 2 * np.int32(values[k, j, 1]) + np.int32(values[k, j, 2])
-            own = four * np.int32(_MOST_VIEWS) + np.int32(k)
-            key[k, j - first] = own if weights[k, j] > 0 else _NO_SAMPLE
+def _weighted_median(key, network, total, below, middle):  # type: ignore[no-untyped-def]
+    """Sort the keys (views, pixels) of each pixel and write its weighted median to ``middle`` (pixels,)."""
     for m in range(len(network)):
         low, high = key[network[m, 0]], key[network[m, 1]]
         for p in range(_AT_ONCE):
             a, b = low[p], high[p]
             low[p], high[p] = min(a, b), max(a, b)
+    below[:] = 0
+    for k in range(len(key)):
+        for p in range(_AT_ONCE):
+            middle[p] = key[k, p] >> _BITS if _TWO * below[p] < total[p] else middle[p]
+            below[p] += key[k, p] & _WEIGHT
 
 
 @njit(cache=True, nogil=True)
-def _middle_and_spread(grey, weight, n):  # type: ignore[no-untyped-def]
-    """Return weighted median and weighted median absolute deviation of n sorted values."""
-    half = 0.0
-    for m in range(n):
-        half += 0.5 * weight[m]
-    low, below = 0, weight[0]
-    while below < half and low < n - 1:
-        low += 1
-        below += weight[low]
-    middle, within, spread = grey[low], weight[low], 0.0
-    high = low + 1
-    low -= 1
-    while within < half and (low >= 0 or high < n):
-        if high >= n or (low >= 0 and middle - grey[low] <= grey[high] - middle):
-            spread = middle - grey[low]
-            within += weight[low]
-            low -= 1
-        else:
-            spread = grey[high] - middle
-            within += weight[high]
-            high += 1
-    return middle, spread
+def _write_keys(four, weight, middle, key):  # type: ignore[no-untyped-def]
+    """Write the keys of how far four times the brightness is from ``middle`` (pixels,)."""
+    for k in range(len(key)):
+        for p in range(_AT_ONCE):
+            own = (abs(four[k, p] - middle[p]) << _BITS) + np.int32(weight[k, p])
+            key[k, p] = own if weight[k, p] > 0 else _NO_SAMPLE
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _biweight_mean(values, four, weight, middle, spread, mean):  # type: ignore[no-untyped-def]
+    """Write robust mean colours to ``mean`` (3, pixels), about the middles and in units of the spreads."""
+    steepness, total = np.empty(_AT_ONCE, np.float32), np.zeros(_AT_ONCE, np.float32)
+    worth = np.empty(_AT_ONCE, np.float32)
+    for p in range(_AT_ONCE):
+        limit = _TUKEY * max(_MAD * _QUARTER * np.float32(spread[p]), _LEAST * np.float32(middle[p]) + _ONE)
+        steepness[p] = _QUARTER / limit
+    mean[:] = 0
+    for k in range(len(four)):
+        for p in range(_AT_ONCE):
+            x = np.float32(four[k, p] - middle[p]) * steepness[p]
+            inside = max(_ONE - x * x, np.float32(0))
+            worth[p] = np.float32(weight[k, p]) * inside * inside
+            total[p] += worth[p]
+        for c in range(3):
+            for p in range(_AT_ONCE):
+                mean[c, p] += worth[p] * np.float32(values[k, c, p])
+    for c in range(3):
+        for p in range(_AT_ONCE):
+            mean[c, p] /= total[p]
 
 
 @njit(cache=True, nogil=True)
-def _biweight_mean(values, grey, weight, where, n, out):  # type: ignore[no-untyped-def]
-    """Write the robust mean colour of one pixel's n samples to ``out`` (3,)."""
-    middle, spread = _middle_and_spread(grey, weight, n)
-    limit = 4.685 * max(MAD_TO_SIGMA * spread, 0.03 * middle + 1.0)
-    total, blue, green, red = 0.0, 0.0, 0.0, 0.0
-    for m in range(n):
-        x = (grey[m] - middle) / limit
-        if x * x < 1:
-            w = weight[m] * (1 - x * x) ** 2
-            total += w
-            blue += w * values[where[m], 0]
-            green += w * values[where[m], 1]
-            red += w * values[where[m], 2]
-    out[0], out[1], out[2] = int(blue / total + 0.5), int(green / total + 0.5), int(red / total + 0.5)
+def _brightness(values, weight, four, total, count):  # type: ignore[no-untyped-def]
+    """Write four times the brightness (views, pixels); sum and count the weights."""
+    total[:] = 0
+    count[:] = 0
+    for k in range(len(values)):
+        for p in range(_AT_ONCE):
+            own, w = values[k], np.int32(weight[k, p])
+            four[k, p] = np.int32(own[0, p]) + _TWO * np.int32(own[1, p]) + np.int32(own[2, p])
+            total[p] += w
+            count[p] += min(w, np.int32(1))
 
 
 def blend_samples(values: Short, weights: Byte) -> tuple[Short, Byte]:
@@ -156,33 +164,43 @@ def blend_samples(values: Short, weights: Byte) -> tuple[Short, Byte]:
 
     Parameters
     ----------
-    values : (rows, views, columns, 3) uint16
-    weights : (rows, views, columns) uint8
+    values : (views, rows, 3, columns) uint16
+        So many columns that 32 of them can be worked on at once.
+    weights : (views, rows, columns) uint8
         0 where a view does not show the pixel.
     """
-    colour, count = _blended(values, weights, _sorting_network(values.shape[1]))
+    views, rows, columns = weights.shape
+    colour, count = np.zeros((rows, columns, 3), np.uint16), np.zeros((rows, columns), np.uint8)
+    _blend(values, weights, _sorting_network(views), colour, count)
     return colour, count
 
 
-@njit(cache=True, nogil=True)
-def _blended(values, weights, network):  # type: ignore[no-untyped-def]
-    rows, views, columns = weights.shape
-    out = np.zeros((rows, columns, 3), np.uint16)
-    counts = np.zeros((rows, columns), np.uint8)
-    grey, weight = np.empty(views, np.float32), np.empty(views, np.float32)
-    where, key = np.empty(views, np.int64), np.zeros((views, _AT_ONCE), np.int32)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _blend(values, weights, network, colour, counts):  # type: ignore[no-untyped-def]
+    views, rows, columns = weights.shape
+    blocks, side = columns // _AT_ONCE, _AT_ONCE
+    near = np.empty((blocks, views, 3, side), np.uint16)
+    weight = np.empty((blocks, views, side), np.uint8)
+    four, key = np.empty((views, side), np.int32), np.empty((views, side), np.int32)
+    middle, spread, below = np.empty(side, np.int32), np.empty(side, np.int32), np.empty(side, np.int32)
+    total, count, zero = np.empty(side, np.int32), np.empty(side, np.int32), np.zeros(side, np.int32)
+    mean = np.empty((3, side), np.float32)
     for i in range(rows):
-        for first in range(0, columns, _AT_ONCE):
-            end = min(first + _AT_ONCE, columns)
-            _sorted_keys(values[i], weights[i], first, end, network, key)
-            for j in range(first, end):
-                n = 0
-                while n < views and key[n, j - first] != _NO_SAMPLE:
-                    k = key[n, j - first] & (_MOST_VIEWS - 1)
-                    grey[n] = 0.25 * (key[n, j - first] // _MOST_VIEWS)
-                    weight[n], where[n] = weights[i, k, j], k
-                    n += 1
-                counts[i, j] = n
-                if n > 0:
-                    _biweight_mean(values[i, :, j], grey, weight, where, n, out[i, j])
-    return out, counts
+        for k in range(views):
+            for b in range(blocks):
+                for p in range(side):
+                    weight[b, k, p] = weights[k, i, b * side + p]
+                    for c in range(3):
+                        near[b, k, c, p] = values[k, i, c, b * side + p]
+        for b in range(blocks):
+            _brightness(near[b], weight[b], four, total, count)
+            _write_keys(four, weight[b], zero, key)
+            _weighted_median(key, network, total, below, middle)
+            _write_keys(four, weight[b], middle, key)
+            _weighted_median(key, network, total, below, spread)
+            _biweight_mean(near[b], four, weight[b], middle, spread, mean)
+            for p in range(side):
+                counts[i, b * side + p] = count[p]
+                for c in range(3):
+                    filled = mean[c, p] + np.float32(0.5) if count[p] > 0 else np.float32(0)
+                    colour[i, b * side + p, c] = np.uint16(np.int32(filled))

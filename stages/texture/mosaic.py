@@ -68,6 +68,8 @@ class Mosaic:
             for view in plan[tile].views:
                 self._tiles_of[int(view)].append(tile)
         self._open: dict[int, tuple[SurfacePatch, TileStack]] = {}
+        self._spare: list[TileStack] = []
+        self._most_views = max((len(plan[tile].views) for tile in tiles), default=0)
         self._picture = picture
 
     def add(self, view: int, image: Image | None, pool: Executor) -> None:
@@ -83,8 +85,9 @@ class Mosaic:
     def _ensure_open(self, tile: int) -> None:
         if tile not in self._open:
             patch = self._grid.node_patch(self._tiles[tile], self._surface)
-            stack = TileStack(len(self._plan[tile].views), self._grid.tile_rows, self._grid.columns)
-            self._open[tile] = patch, stack
+            if not self._spare:
+                self._spare.append(TileStack(self._most_views, self._grid.tile_rows, self._grid.columns))
+            self._open[tile] = patch, self._spare.pop()
 
     def _sample(self, tile: int, view: int, image: Image) -> None:
         patch, stack = self._open[tile]
@@ -98,7 +101,9 @@ class Mosaic:
         )  # fmt: skip
 
     def _close(self, tile: int) -> None:
-        colour, count = self._open.pop(tile)[1].blend()
+        stack = self._open.pop(tile)[1]
+        colour, count = stack.blend()
+        self._spare.append(stack)
         rows = slice(self._tiles[tile].first_row, self._tiles[tile].last_row)
         inside = rows.stop - rows.start
         self._picture.colour[rows], self._picture.count[rows] = colour[:inside], count[:inside]

@@ -81,4 +81,4 @@ def _quality(uv: Float, brightness: Float) -> Float:
 def _enlarge(nodes: Float) -> Float32:
     """Return node values (n, m) or (n, m, 2) at all pixels, linearly; the outer ring of nodes is cut off."""
     big = cv2.resize(nodes.astype(np.float32), None, fx=NODE_PX, fy=NODE_PX, interpolation=cv2.INTER_LINEAR)
-    return np.asarray(big[NODE_PX:-NODE_PX, NODE_PX:-NODE_PX], np.float32)
+    return np.ascontiguousarray(big[NODE_PX:-NODE_PX, NODE_PX:-NODE_PX])

@@ -6,6 +6,7 @@ import pytest
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Lighting
+from stages.rings.kernels import median
 from stages.texture.blend import blend_samples
 from stages.texture.grid import NODE_PX, FlatGrid, flat_grid, footprint_mm
 from stages.texture.light import irradiance
@@ -36,20 +37,25 @@ def plain_blend(values, weights):
 
 def test_blend_agrees_with_plain_numpy():
     random = np.random.default_rng(1)
-    values = random.integers(3000, 4000, (6, 7, 15, 3)).astype(np.uint16)
-    values[:, :, 4] = 20000
-    weights = random.integers(0, 255, (6, 7, 15)).astype(np.uint8)
-    weights[:, :, 3] = 0
-    colour, count = blend_samples(values.swapaxes(1, 2).copy(), weights.swapaxes(1, 2).copy())
-    expected = [[plain_blend(values[i, j], weights[i, j]) for j in range(7)] for i in range(6)]
+    values = random.integers(3000, 4000, (15, 6, 3, 64)).astype(np.uint16)
+    values[4] = 20000
+    weights = random.integers(0, 255, (15, 6, 64)).astype(np.uint8)
+    weights[3] = 0
+    colour, count = blend_samples(values, weights)
+    expected = [[plain_blend(values[:, i, :, j], weights[:, i, j]) for j in range(64)] for i in range(6)]
     assert np.abs(colour - np.array(expected)).max() <= 0.51
-    assert np.array_equal(count, (weights > 0).sum(-1))
+    assert np.array_equal(count, (weights > 0).sum(0))
 
 
 def test_blend_leaves_pixels_without_samples_empty():
-    colour, count = blend_samples(np.ones((2, 3, 2, 3), np.uint16), np.zeros((2, 3, 2), np.uint8))
+    colour, count = blend_samples(np.ones((2, 3, 3, 32), np.uint16), np.zeros((2, 3, 32), np.uint8))
     assert colour.max() == 0
     assert count.max() == 0
+
+
+@pytest.mark.parametrize("values", [[3.0], [2.0, -1.0], [5.0, 1.0, 1.0], list(np.sin(np.arange(50.0)))])
+def test_the_compiled_median_is_numpys(values):
+    assert median(np.array(values)) == np.median(values)
 
 
 def test_one_led_on_the_axis_follows_lambert_and_inverse_square():
