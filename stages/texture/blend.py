@@ -23,6 +23,8 @@ _NO_SAMPLE = np.int32((1 << 31) - 256)
 _ZERO, _TWO = np.int32(0), np.int32(2)
 # Pixels that are worked on side by side: two registers of 16 numbers of 32 bits where there are such.
 _AT_ONCE = 32
+# A map of pairs needs no second one, and is read without a copy.
+_NO_SECOND_MAP = np.empty(0, np.float32)
 _QUARTER, _MAD, _TUKEY = np.float32(0.25), np.float32(MAD_TO_SIGMA), np.float32(4.685)
 _LEAST, _ONE = np.float32(0.03 * 0.25), np.float32(1.0)
 
@@ -45,7 +47,7 @@ class TileStack:
         if seen.size:
             rows = slice(seen[0], seen[-1] + 1)
             _store(
-                cv2.split(cv2.remap(image, projection.uv[rows], None, cv2.INTER_CUBIC)),
+                cv2.split(cv2.remap(image, projection.uv[rows], _NO_SECOND_MAP, cv2.INTER_CUBIC)),
                 projection.inverse_brightness[rows], projection.weight[rows],
                 self._values[self._used, rows], self._weights[self._used, rows],
             )  # fmt: skip
