@@ -38,7 +38,7 @@ from stages.twin.scene import SHADING_MM, SMOOTHING_MM
 
 MEASURED = "measured.npz"
 _BEYOND_MM = 250.0
-"""By so much the photo is mirrored beyond its ends: a camera looks farther ahead than the run saw."""
+"""Length of photo that is mirrored beyond each end: a camera looks farther ahead than the run has seen."""
 _ROUNDS, _LOOKED_AT = 3, 3
 """Rounds in which the lights are set, since clipping bends them, and frames of each light for it."""
 _LIT = 10.0

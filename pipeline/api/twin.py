@@ -168,7 +168,7 @@ def _shown(view: TwinView) -> dict[str, Any]:
 
 
 def _picture(grey: Byte) -> str:
-    # Half the quality of a still keeps forty frames on one page; the figures come from whole frames.
+    # Compressed this far, forty frames make one page of a few MB; the figures come from whole frames.
     data = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
 

@@ -157,7 +157,7 @@ def worked(case: Case, output: Path, truth: Path, leave_out: bool) -> Worked:
         failures += _answered(case, second, without)
         trials.append(trial_of(case, second, truth, without))
     done = Worked(tuple(trials), _seconds(answer), tuple(failures), wall_errors(case, answer, truth))
-    # What the diagnoses measured is of no more use, and large: a proof may have thousands of cases.
+    # Intermediate results are large and not needed any more: a proof may have thousands of cases.
     for folder in (answer, output / ANSWERS_WITHOUT / case.name):
         remove(RunFolder(folder).internal)
     return done
@@ -181,7 +181,7 @@ def _seconds(answer: Path) -> float | None:
 
 _SCENE = "truth_scene.yaml"
 _CACHE = "wall_errors.json"
-# Samples beside the wall's own edges are no matter of the instrument.
+# Samples off by more than so many spreads lie on edges of the wall: the instrument is not the cause.
 _OUTLYING = 5.0
 _EVERY = 4
 _STAGES = (PREMISES, RINGS)

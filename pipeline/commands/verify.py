@@ -172,7 +172,7 @@ def certificate_document(
         "alignment": {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in alignment.items()},
     }
     if found.kind == "repeatability":
-        # of one run: its part of the variance of the difference, as the random σ of both have it
+        # the share of one run in the variance of the difference, by the stated random σ of both
         own = np.mean(wall.sigma_random_mm[np.isfinite(wall.radius_mm)] ** 2)
         part = float(own / np.mean(found.differences.sigma_random_mm**2))
         deviation = float(np.std(found.differences.error_mm)) * math.sqrt(part)

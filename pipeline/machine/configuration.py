@@ -21,7 +21,8 @@ from pipeline.files.codec import Json
 from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.stage import Parameters, Stage
 
-# The section that says where a batch is worked on: of no stage, read by `pipeline.batch.cluster`.
+# The section that says on which machines a batch runs; it belongs to no stage and is read by
+# `pipeline.batch.cluster`.
 CLUSTER = "cluster"
 _COMMAND_LINE = "--set"
 _WIDTH = 110

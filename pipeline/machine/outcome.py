@@ -10,7 +10,7 @@ from typing import TypeVar
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 
 Artefact = TypeVar("Artefact")
-# Name of a number that is no number but words to be shown before all others.
+# Name of an entry whose value is a sentence, shown before the numbers.
 WARNING = "warning"
 
 

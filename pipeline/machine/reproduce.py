@@ -13,7 +13,7 @@ from pipeline.files.json_yaml import read_json
 from pipeline.machine.run_folder import Exporter, RunFolder, published_files
 
 _RECORD = "run.json"
-# Bear the time they were made at; what they show is in the other files.
+# Files that hold the time at which they were made; what they show stands in the other files.
 _DATED = frozenset({"report.html"})
 
 

@@ -18,8 +18,9 @@ _SAME_SECTION_MM = 0.1
 _STEPS = 10
 
 
-# A sector counts with so many beside it on each side, 45° in all: a line that has come sin 45° of its way
-# abreast, or farther, stays among them. See `clear_mm`.
+# The clear radius of a sector is the least of it and of so many neighbours on each side, 45° to either. A ray
+# turns by less than 45° about the axis once the part of its start beside its own direction is less than
+# sin 45° of the radius that it has reached. See `clear_mm`.
 _BESIDE = 4
 _ABREAST = 1 / np.sqrt(2)
 

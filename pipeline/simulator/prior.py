@@ -193,4 +193,4 @@ def _set(values: dict[str, Any], key: str, value: float, file: Path) -> None:
     try:
         at[int(last) if isinstance(at, list) else last] = value
     except (IndexError, ValueError, TypeError) as error:
-        raise InputError(file, f"varies {key!r}, which a scene has not", place="key vary") from error
+        raise InputError(file, f"varies {key!r}, which no scene has", place="key vary") from error

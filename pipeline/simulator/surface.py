@@ -15,7 +15,7 @@ from pipeline.simulator.wall.grid import Wall
 
 # Blocks of a millimetre that the two floors look ahead.
 NEAR_BLOCKS, WIDE_BLOCKS = 2, 32
-# Sectors of azimuth in which the wall's steepness is told: a pit or a weld spoils only its own.
+# The wall's steepness is tabled by sectors of azimuth, so that a pit slows the rays of its own sector alone.
 SECTORS = 32
 # Spacing of a bent axis' points: at a bend of 50 mm the frames between them, mixed linearly and not made
 # square again, are wrong by (0.25/50)²/8 = 3e-6.

@@ -74,7 +74,7 @@ def test_the_simulated_sheet_is_knocked_at_its_time_and_keeps_other_changes():
 
 @pytest.mark.parametrize("text", ["ovality~step=0.1", "encoder_scale~ramp=0.01"])
 def test_what_is_no_part_of_the_instrument_has_no_course(text):
-    with pytest.raises(InputError, match="has no course"):
+    with pytest.raises(InputError, match="cannot change with time"):
         switch_on(bench_truth(50.8), [parse_switch(text)])
 
 

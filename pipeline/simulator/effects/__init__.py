@@ -66,7 +66,9 @@ class Coursed:
         after = EFFECT_FUNCTIONS[switch.name](scene, **switch.quantities)
         others = (f.name for f in fields(scene) if f.name != "instrument")
         if any(getattr(after, name) is not getattr(scene, name) for name in others):
-            raise InputError(switch.key, "has no course", expected="an effect on camera, laser or window")
+            raise InputError(
+                switch.key, "cannot change with time", expected="an effect on camera, laser or window"
+            )
         return cls(replace(scene, changes=()), switch)
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:

@@ -215,7 +215,7 @@ def _rms(values: Float) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-# States that a run does not know beforehand, by the harmonic that they take up in every bore by itself.
+# Unknowns of every run, with the harmonic of the radius that each of them changes in all bores.
 STATES = {"off-centre probe": 1, "pipe of another radius": 0}
 # Typical 1 σ of a frame's light, width and skewness along one azimuth, in which they are weighed together.
 _PROFILE_SIGMA = (0.05, 0.05, 0.15)

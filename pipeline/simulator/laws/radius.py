@@ -32,9 +32,10 @@ _CHECKED = (
     "focal_scale", "radial_distortion", "sensor_tilt", "pixel_aspect", "pupil_shift", "housing_glass",
     "tube_wedge", "tube_tilt", "dome_axial", "dome_lateral", "outside_index", "ovality",
 )  # fmt: skip
-# Of the size: laws of first order leave out terms of the size's square, at most 1.5 % at typical sizes.
+# Tolerance as a share of the size: laws of first order leave out the square of the size, at most 1.5 % of it
+# at typical sizes.
 SHARE = 0.02
-# The notes' own words where the catalogue has the law that holds.
+# Laws as the physics notes give them, where these are wrong and the catalogue gives the one that holds.
 _NOTED = {"tube_tilt": "change of d(i)/sin θ; sheet side −(r/l) t χ (1 − 1/n) cos(ψ − ψ₀)"}
 _MENDED = {
     "tube_tilt": (
