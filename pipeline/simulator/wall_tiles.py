@@ -24,9 +24,9 @@ TILE_PX = 8
 # Precision of a hit at a corner, which only begins the search for others, and of a pixel's, mm: a hundredth
 # of what a pixel spans in a 2 inch bore.
 _CLOSE_START_MM, _CLOSE_MM = 0.05, 1e-3
-# A lobe cos^2h is left out where it is below e^-9 of its peak. A lamp lies at most half a bore's radius beside
-# the camera: the cosine towards it is at most 1.28 times that towards the camera, and cos² halfway is
-# below 1.3 facing².
+# A lobe cos^2h is left out where it is below e^-9 of its peak. A lamp lies at most half a bore's radius
+# beside the camera: the cosine towards it is at most 1.28 times that towards the camera, and cos² halfway
+# is below 1.3 facing².
 _LOBE_ENDS, _LAMP_FACING = 9.0, 1.3
 # How much the cosine to the optical axis may differ within a tile: 11 px at 200 px a radian.
 _AHEAD_ROOM = 0.06
