@@ -12,7 +12,7 @@ from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
-from pipeline.system.threads import in_threads
+from pipeline.system.parallel import in_threads
 
 _UPPER = np.triu_indices(3)
 # Frames a thread takes at a time.

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.simulator.exact import room_mm
+from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
 
 # Image radii between which the ring is searched: off the centre's few px, to beyond the corner of 2 MP

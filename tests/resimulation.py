@@ -15,7 +15,6 @@ from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
-from pipeline.simulator.exact import room_mm
 from pipeline.simulator.instrument import (
     LedRing,
     LineProfile,
@@ -26,6 +25,7 @@ from pipeline.simulator.instrument import (
 )
 from pipeline.simulator.motion import motion_through
 from pipeline.simulator.scene import Rendering
+from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall.build import bent_axis
 from pipeline.simulator.wall.description import Bend

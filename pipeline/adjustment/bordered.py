@@ -17,7 +17,7 @@ from pipeline.adjustment.elimination import BLOCK, Sums, add_landmarks, add_rows
 from pipeline.adjustment.marginal import marginalised
 from pipeline.adjustment.robust import Loss, Squares
 from pipeline.arrays import Float, Int
-from pipeline.system.threads import in_threads
+from pipeline.system.parallel import in_threads
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,8 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
 
-from pipeline.artefacts.headline import headline
 from pipeline.errors import InputError
-from pipeline.export.run_record import write_run_record
+from pipeline.export.run_record import headline, write_run_record
 from pipeline.files.codec import Json, digest
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
@@ -29,7 +28,7 @@ from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
 from pipeline.recording.decoded_once import decoded_once
 from pipeline.recording.input_file import content_key
-from pipeline.system.processes import stop_wish
+from pipeline.system.parallel import stop_wish
 
 Kind = TypeVar("Kind")
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pipeline.api.diagnosis.switches import switches_of
+from pipeline.api.diagnosis.simulated import switches_of
 from pipeline.api.like import MEASURED, Changed, scene_like
 from pipeline.files.installed import PRIORS, SCENES, file_or_shipped
 from pipeline.simulator.effects.switch import Switch, parse_switches

@@ -12,7 +12,7 @@ from typing import Any
 
 import cv2
 
-from pipeline.api.diagnosis.tried import DiagnosisTried, try_diagnosis
+from pipeline.api.diagnosis.simulated import DiagnosisTried, try_diagnosis
 from pipeline.api.job import Job, open_job, result_of, run_job, value_source
 from pipeline.arrays import Byte
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, Twin, TwinView

@@ -19,7 +19,7 @@ from pipeline.files.disk import disk_errors_named, replace_json, replace_text
 from pipeline.files.json_yaml import read_json
 from pipeline.machine.outcome import state_word
 from pipeline.pages import page_template
-from pipeline.system.processes import end_with_parent
+from pipeline.system.parallel import end_with_parent
 
 _BAGS = (".bag", ".mcap")
 

@@ -23,7 +23,7 @@ from pipeline.pages import page_template
 from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.growing import GrowingRecording
-from pipeline.system.processes import stop_wish
+from pipeline.system.parallel import stop_wish
 from stages.preview import PreliminarySection, preliminary_sections
 from stages.rings import RingParameters
 

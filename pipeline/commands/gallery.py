@@ -23,7 +23,7 @@ from pipeline.physics.effect import Channel
 from pipeline.simulator.effects.switch import parse_switches, typical_switch
 from pipeline.simulator.gallery import STATES, WINDOW_PX, Exhibit, Likeness, exhibit, likenesses, unrolled
 from pipeline.simulator.gallery.scenes import Course, surroundings
-from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, Check
+from pipeline.simulator.laws import BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, Check
 from pipeline.simulator.laws.closed_form import lever_of
 from pipeline.simulator.laws.table import all_checks, verdict
 

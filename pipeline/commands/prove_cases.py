@@ -32,12 +32,12 @@ from pipeline.machine.plan import Selection
 from pipeline.machine.run_folder import RunFolder
 from pipeline.recording import open_recording
 from pipeline.simulator.build import build_truth
-from pipeline.simulator.exact import room_mm, wall_radius
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.scene import read_scene
+from pipeline.simulator.sheet import room_mm, wall_radius
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.truth_files import SEAL_FILE, open_seal
-from pipeline.system.processes import end_with_parent
+from pipeline.system.parallel import end_with_parent
 from stages.diagnose.drill.cases import (
     TIMING,
     Case,

@@ -25,7 +25,7 @@ from pipeline.machine.run_folder import claimed, logged
 from pipeline.machine.runner import Runner
 from pipeline.review.compared import RunPair
 from pipeline.review.review import FOLDER
-from pipeline.system.processes import stop_wish
+from pipeline.system.parallel import stop_wish
 from stages.catalogue import PIPELINE
 from stages.compare import COMPARISON
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from pipeline.api.diagnosis.tried import DiagnosisTried
+from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.job import result_of
 from pipeline.api.twin import twin_job
 from pipeline.artefacts.twin import Twin

@@ -1,16 +1,22 @@
-"""run.json: recording, probe, parameters, versions, stages and state of a run."""
+"""run.json: recording, probe, parameters, versions, stages, state and headline numbers of a run."""
 
 from __future__ import annotations
 
 import math
 import resource
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+import numpy as np
+
+from pipeline.artefacts.findings import Defects
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
+from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.codec import Json
 from pipeline.files.disk import disk_errors_named, replace_json
 from pipeline.files.installed import program_version
 from pipeline.files.provenance import library_versions
+from pipeline.geometry.axis import distance_along
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.machine.plan import Plan
@@ -81,3 +87,70 @@ def _numbers(numbers: Iterable[Number]) -> list[Json]:
 def _finite(value: float | int | str) -> Json:
     """Return the value, None for what JSON cannot write."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def headline(artefacts: Mapping[type, object]) -> tuple[Number, ...]:
+    """Return headline numbers, with units, of whatever artefacts are there."""
+    return tuple(number for artefact in artefacts.values() for number in _of(artefact))
+
+
+def _of(artefact: object) -> Iterable[Number]:
+    match artefact:
+        case RingSamples():
+            return _of_rings(artefact)
+        case Trajectory():
+            return _of_trajectory(artefact)
+        case Wall():
+            return _of_wall(artefact)
+        case Defects():
+            return _of_defects(artefact)
+    return ()
+
+
+def _of_rings(rings: RingSamples) -> Iterator[Number]:
+    used = np.any(rings.valid, axis=1)
+    yield Number("laser frames", len(rings.frame), "frames")
+    yield Number("laser frames without a usable ring", int(np.sum(~used)), "frames")
+    yield Number("usable ring samples", round(100 * float(np.mean(rings.valid)), 2), "%")
+
+
+def _of_trajectory(trajectory: Trajectory) -> Iterator[Number]:
+    distance_mm = distance_along(trajectory.axis, trajectory.T_pc)
+    yield Number("distance travelled", round(float(np.sum(np.abs(np.diff(distance_mm)))), 2), "mm")
+    yield Number("relative 1 sigma of the distance scale", round(trajectory.scale_sigma, 6))
+    yield Number("motion events", len(trajectory.events))
+
+
+def _of_wall(wall: Wall) -> Iterator[Number]:
+    radius = wall.radius_map
+    seen = np.isfinite(radius.radius_mm)
+    rows = np.flatnonzero(seen.any(axis=1))
+    if not rows.size:
+        return
+    core = slice(rows[0], rows[-1] + 1)
+    length = float(radius.distance_mm[rows[-1]] - radius.distance_mm[rows[0]])
+    diameter, diameter_sigma = mean_diameter(radius)
+    yield Number("inspected length", round(length, 2), "mm")
+    yield Number("wall seen", round(100 * float(np.mean(seen[core])), 2), "%")
+    yield Number("mean diameter", round(diameter, 3), "mm")
+    yield Number("1 sigma of the mean diameter", round(diameter_sigma, 4), "mm")
+    yield Number("median 1 sigma of the radius", round(float(np.median(radius.sigma_mm[seen])), 4), "mm")
+    random = float(np.median(radius.sigma_random_mm[seen]))
+    yield Number("median 1 sigma of the radius, random part", round(random, 4), "mm")
+
+
+def mean_diameter(radius: WallMap) -> tuple[float, float]:
+    """Return the mean diameter of what was seen, mm, and its 1 σ.
+
+    What the calibration leaves open is common to all cells and stays; noise is nothing beside it.
+    """
+    seen = np.isfinite(radius.radius_mm)
+    common = radius.sigma_mm[seen].astype(float) ** 2 - radius.sigma_random_mm[seen].astype(float) ** 2
+    sigma = 2 * float(np.sqrt(max(0.0, float(common.mean()))))
+    return 2 * float(np.mean(radius.radius_mm[seen], dtype=np.float64)), sigma
+
+
+def _of_defects(defects: Defects) -> Iterator[Number]:
+    yield Number("defects", len(defects.items))
+    if defects.deepest is not None:
+        yield Number("deepest defect", round(abs(defects.deepest.depth_mm), 3), "mm")

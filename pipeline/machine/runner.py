@@ -21,7 +21,7 @@ from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, plain
 from pipeline.machine.store import Provenance, Store, Stored
 from pipeline.system.native import give_back_memory
-from pipeline.system.threads import one_blas_thread
+from pipeline.system.parallel import one_blas_thread
 
 _LONGEST_PROBLEM = 300
 _LOOK_S = 0.2  # a signal that reaches another thread is seen after so long

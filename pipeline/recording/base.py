@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.arrays import Float, Image, Int
 from pipeline.recording.input_file import InputFile
-from pipeline.system.threads import in_threads
+from pipeline.system.parallel import in_threads
 
 Planes = Literal["grey", "bgr"]
 Item = TypeVar("Item")

@@ -16,10 +16,10 @@ from scipy.ndimage import median_filter
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
-from pipeline.system.threads import in_threads
+from pipeline.system.parallel import in_threads
 from stages.accumulate.survey import RingSurvey, WallSamples
 
-# Columns a thread takes at a time, and threads: see `pipeline.system.threads`.
+# Columns a thread takes at a time, and threads: see `pipeline.system.parallel`.
 _BLOCK, _THREADS = 64, 2
 # Least 1 σ of the kernel in ring spacings: narrower ones leave rows between rings with one ring. Debt:
 # data/debts.md.

@@ -18,7 +18,7 @@ from pipeline.recording.base import Recording
 from pipeline.recording.checked_frames import CheckedFrames
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.exact import room_mm
+from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
 from stages.calibrate.gauge.scene import gauge_scene
 from stages.diagnose.channels import Seen

@@ -15,7 +15,7 @@ from pipeline.artefacts.measured import PointCloud, Wall, WallTexture
 from pipeline.artefacts.model import Overlays, PackedTiles, TexturedMesh
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Parameters, Stage
-from pipeline.system.processes import CrashError, TimeLimitError, call_isolated
+from pipeline.system.parallel import CrashError, TimeLimitError, call_isolated
 from stages.mesh.bake import TilePacker, bake_tile
 from stages.mesh.charts import cut_charts, pack, tile_count, tile_length, unroll
 from stages.mesh.join import OpenMesh

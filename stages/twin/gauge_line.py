@@ -25,7 +25,7 @@ from pipeline.machine.stage import Context, Of, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checked_frames import CheckedFrames
 from pipeline.simulator.effects.switch import Switch, parse_switches
-from pipeline.simulator.exact import room_mm
+from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
 from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.state import GaugeParameters

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.api.diagnosis.switches import moves_line, switches_of
+from pipeline.api.diagnosis.simulated import moves_line, switches_of
 from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
 from pipeline.api.run import open_run
 from pipeline.api.run import run as run_recording

@@ -12,7 +12,7 @@ import pytest
 from pipeline.physics.catalogue import effect
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.laws.bench import bench_truth, trace_ring
+from pipeline.simulator.laws import bench_truth, trace_ring
 from pipeline.simulator.motion import Motion, Odometer, Signal, Slip, Wave, constant
 from pipeline.simulator.rays import viewing_rays
 from stages.diagnose.effects.base import Travel

@@ -15,7 +15,7 @@ from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.switch import Switch, typical_switch
 from pipeline.simulator.gallery import Exhibit, exhibit, likenesses
 from pipeline.simulator.gallery.scenes import moment_s, scene_pair
-from pipeline.simulator.laws.bench import harmonic
+from pipeline.simulator.laws import harmonic
 from pipeline.simulator.laws.closed_form import LAWS
 from pipeline.simulator.laws.radius import radius_check
 

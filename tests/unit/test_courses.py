@@ -9,7 +9,7 @@ from pipeline.errors import InputError
 from pipeline.physics.effect import COURSES, Course, CourseKind
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch, parse_switches, switches_from_mapping
-from pipeline.simulator.laws.bench import bench_truth
+from pipeline.simulator.laws import bench_truth
 from pipeline.simulator.prior import Concealable, draw_pair, read_prior
 from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px, texture_shift_px, without

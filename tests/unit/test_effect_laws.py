@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects.switch import Switch, typical_switch
-from pipeline.simulator.laws.bench import Check, bench_truth, trace_ring
+from pipeline.simulator.laws import Check, bench_truth, trace_ring
 from pipeline.simulator.laws.light import light_checks
 from pipeline.simulator.laws.moving import moving_checks, odometry_checks
 from pipeline.simulator.laws.radius import effect_ring, ghost_checks, radius_check, radius_checks

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import ALL_EFFECTS as EFFECTS
 from pipeline.simulator.effects import EFFECT_FUNCTIONS, switch_on
-from pipeline.simulator.effects.photometric import line_peak
+from pipeline.simulator.effects.surroundings import line_peak
 from pipeline.simulator.effects.switch import (
     Switch,
     parse_switch,
@@ -19,7 +19,7 @@ from pipeline.simulator.effects.switch import (
     switches_from_mapping,
     typical_switch,
 )
-from pipeline.simulator.laws.bench import bench_truth
+from pipeline.simulator.laws import bench_truth
 
 # What each effect may touch; a change that acts with time is "changes".
 TOUCHES = {

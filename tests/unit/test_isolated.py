@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from pipeline.system.processes import CrashError, TimeLimitError, call_isolated
+from pipeline.system.parallel import CrashError, TimeLimitError, call_isolated
 
 
 def doubled(values: np.ndarray) -> np.ndarray:

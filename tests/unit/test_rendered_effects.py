@@ -12,7 +12,7 @@ from pipeline.recording.base import FrameTable
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch, parse_switch, parse_switches, typical_switch
 from pipeline.simulator.instrument import LineProfile
-from pipeline.simulator.laws.bench import bench_truth, trace_ring
+from pipeline.simulator.laws import bench_truth, trace_ring
 from pipeline.simulator.motion import Motion, Signal, constant
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import through_lens

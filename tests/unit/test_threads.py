@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from pipeline.system.threads import in_threads
+from pipeline.system.parallel import in_threads
 from tests.patience import patience
 
 

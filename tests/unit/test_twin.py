@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.api.diagnosis.tried import DiagnosisTried
+from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.run import configuration, dirt_of
 from pipeline.api.twin import twin_document, write_twin
 from pipeline.artefacts.measured import RingValidity

@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.api.diagnosis.switches import switches_of
-from pipeline.api.diagnosis.tried import try_diagnosis
+from pipeline.api.diagnosis.simulated import switches_of, try_diagnosis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.machine.display import SilentDisplay
 from pipeline.simulator.instrument import TrueCamera

@@ -7,10 +7,10 @@ from collections import Counter
 import numpy as np
 
 from pipeline.artefacts.findings import Defect
-from pipeline.artefacts.headline import mean_diameter
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, Wall
 from pipeline.export.report.page import Card, Table
 from pipeline.export.report.summary import RunSummary
+from pipeline.export.run_record import mean_diameter
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.outcome import WARNING, Number, State, state_word
 from pipeline.pages import notation

@@ -6,9 +6,9 @@ from collections import Counter
 from dataclasses import asdict
 from typing import Any
 
-from pipeline.artefacts.headline import mean_diameter
 from pipeline.artefacts.measured import Wall
 from pipeline.export.report.tables import NOT_CALIBRATED
+from pipeline.export.run_record import mean_diameter
 from pipeline.pages import notation
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.replay import ACCEPTED, OPEN, REJECTED

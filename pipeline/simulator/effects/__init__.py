@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import ALL_EFFECTS
 from pipeline.physics.effect import CourseKind
-from pipeline.simulator.effects import camera, laser, photometric, picture, pose, window
+from pipeline.simulator.effects import camera, laser_and_window, picture, surroundings
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.truth import SceneTruth
@@ -19,14 +19,11 @@ from pipeline.simulator.truth import SceneTruth
 EffectFunction = Callable[..., SceneTruth]
 # Speed is a central difference over ± 1 ms, far below the time between frames.
 _STEP_S = 1e-3
-_FAMILIES = {
-    "laser": laser, "camera": camera, "window": window, "pose": pose, "photometric": photometric,
-    "picture": picture,
-}  # fmt: skip
+_MODULES = (laser_and_window, camera, surroundings, picture)
 
 # Each takes the truth, then the catalogue's quantities by name.
 EFFECT_FUNCTIONS: Mapping[str, EffectFunction] = MappingProxyType(
-    {name: getattr(_FAMILIES[effect.family], name) for name, effect in ALL_EFFECTS.items()}
+    {name: next(getattr(m, name) for m in _MODULES if hasattr(m, name)) for name in ALL_EFFECTS}
 )
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.simulator.effects.photometric import mean_radius_mm
+from pipeline.simulator.effects.surroundings import mean_radius_mm
 from pipeline.simulator.instrument import Dust, Flicker, Sector, lamp_azimuth_rad
 from pipeline.simulator.truth import SceneTruth, with_laser, with_sensor
 

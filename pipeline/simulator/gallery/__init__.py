@@ -15,7 +15,7 @@ from scipy.ndimage import map_coordinates, spline_filter
 from pipeline.arrays import Float, Float32
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.gallery.scenes import Course, course_of, scene_pair
-from pipeline.simulator.laws.bench import RADII_MM, exponent, harmonic, strongest
+from pipeline.simulator.laws import RADII_MM, exponent, harmonic, strongest
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.truth import SceneTruth
 

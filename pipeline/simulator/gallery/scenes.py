@@ -11,9 +11,9 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.recording.base import FrameTable
 from pipeline.simulator.effects import switch_on
-from pipeline.simulator.effects.photometric import line_peak
+from pipeline.simulator.effects.surroundings import line_peak
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.laws.bench import BASELINE_MM, RADII_MM, bench_truth, harmonic, trace_ring
+from pipeline.simulator.laws import BASELINE_MM, RADII_MM, bench_truth, harmonic, trace_ring
 from pipeline.simulator.motion import Motion, Odometer, Signal, constant
 from pipeline.simulator.truth import SceneTruth, with_laser
 from pipeline.simulator.wall.build import build_wall

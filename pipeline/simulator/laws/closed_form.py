@@ -13,8 +13,8 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.instrument import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
-from pipeline.simulator.effects.window import TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
-from pipeline.simulator.laws.bench import BASELINE_MM, FOCAL_PX
+from pipeline.simulator.effects.laser_and_window import TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
+from pipeline.simulator.laws import BASELINE_MM, FOCAL_PX
 
 Law = Callable[..., Float]
 _DOME_POWER = (GLASS_INDEX - 1) * DOME_THICKNESS_MM / (GLASS_INDEX * DOME_RADIUS_MM**2)

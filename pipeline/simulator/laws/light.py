@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
 from pipeline.simulator.effects import switch_on
-from pipeline.simulator.effects.photometric import line_peak
+from pipeline.simulator.effects.surroundings import line_peak
 from pipeline.simulator.effects.switch import Switch
-from pipeline.simulator.laws.bench import ALBEDO, BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, Check, bench_wall
+from pipeline.simulator.laws import ALBEDO, BASELINE_MM, FOCAL_PX, LINE_SIGMA_MM, Check, bench_wall
 from pipeline.simulator.laws.closed_form import lever_of, theta_of
 from pipeline.simulator.laws.strip import Profiles, exposed_profiles, profiles, strip_truth
 from pipeline.simulator.motion import Motion, Signal, constant

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.geometry.axis import frames_at
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch, typical_switch
-from pipeline.simulator.laws.bench import (
+from pipeline.simulator.laws import (
     BASELINE_MM,
     FOCAL_PX,
     IMAGE_SIZE,

@@ -11,7 +11,7 @@ from pipeline.arrays import Float
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch, typical_switch
-from pipeline.simulator.laws.bench import (
+from pipeline.simulator.laws import (
     FOCAL_PX,
     RADII_MM,
     Check,

@@ -11,7 +11,7 @@ from pipeline.arrays import Float, Float32
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueSensor
-from pipeline.simulator.laws.bench import FOCAL_PX, bench_truth
+from pipeline.simulator.laws import FOCAL_PX, bench_truth
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import shade_of, through_lens
 from pipeline.simulator.truth import SceneTruth, with_sensor

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from pipeline.simulator.laws.bench import EXPONENT_TOLERANCE, Check
+from pipeline.simulator.laws import EXPONENT_TOLERANCE, Check
 from pipeline.simulator.laws.light import light_checks
 from pipeline.simulator.laws.moving import moving_checks, odometry_checks
 from pipeline.simulator.laws.radius import ghost_checks, radius_checks

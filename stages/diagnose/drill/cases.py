@@ -15,7 +15,7 @@ from pathlib import Path
 import pipeline
 from pipeline.errors import BoresightError, InputError
 from pipeline.files.disk import disk_errors_named, remove, sync_tree
-from pipeline.system.processes import end_with_parent
+from pipeline.system.parallel import end_with_parent
 from stages.diagnose.drill.answer import Answer, Concealed, read_answer, read_concealed
 from stages.diagnose.drill.score import Trial
 

@@ -14,7 +14,7 @@ from pipeline.arrays import Float
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
-from pipeline.system.threads import in_threads
+from pipeline.system.parallel import in_threads
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings
