@@ -5,7 +5,6 @@ import pytest
 
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.answer import _alone, _met, field_answer
-from stages.diagnose.field.confirm import InField
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.inference import Column, Evidence, Stated
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
@@ -57,7 +56,7 @@ def test_a_tilt_is_a_class_with_its_sizes_and_a_gauge_run_is_asked_for():
 
 
 def met(agrees):
-    return InField(Confirmation("0.60", "0.59", agrees), 2.0, 0.1, 0.1)
+    return Confirmation("0.60", "0.59", agrees)
 
 
 @pytest.mark.parametrize(("agrees", "verdict"), [(True, Verdict.NAMED), (False, Verdict.CLASS)])

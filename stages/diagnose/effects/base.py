@@ -155,6 +155,11 @@ class ImagePoints:
     per_px_c: Float | None = None
 
     @cached_property
+    def patterns(self) -> dict[tuple[str, Shape, bool], Float]:
+        """What static laws do here, for all their courses: by name, shape, and whether on the line."""
+        return {}
+
+    @cached_property
     def theta(self) -> Float:
         """(M,) polar angle from the optical axis, rad."""
         return np.asarray(np.arctan2(np.hypot(self.xyz_c[:, 0], self.xyz_c[:, 1]), self.xyz_c[:, 2]))
@@ -248,6 +253,10 @@ class EffectModel(ABC):
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return the shapes to be searched; one empty shape when there is nothing to search."""
         return ((),)
+
+    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape] | None:
+        """Return the part (M,) of the size that is there and the static law; None where it is no product."""
+        return None
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return (M, 2) by which the image of every wall point moves, line or texture alike."""

@@ -107,6 +107,13 @@ class Coursed(EffectModel):
         """Return a part of the time constant, the step of a frequency; None where nothing is continuous."""
         return {CourseKind.EXPONENTIAL: 0.3 * sum(shape), CourseKind.SINUSOID: 0.05}.get(self.kind)
 
+    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape] | None:
+        """Return the course's factor and the law; a swing is two products."""
+        if self.kind is CourseKind.SINUSOID:
+            return None
+        ((factor, _),) = self._parts(points, shape, np.zeros(len(self.amplitudes)))
+        return factor, self.static, self.own
+
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the law's shift at each point's part of the size."""
         parts = self._parts(points, shape, amplitude)

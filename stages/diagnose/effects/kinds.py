@@ -69,6 +69,10 @@ class Drifting(Worded):
         """Return (M,) the part of the final size that is reached."""
         return np.asarray(-np.expm1(-time_s / shape[0]))
 
+    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape]:
+        """Return the share of its final size that is reached, and the static law."""
+        return self.reached(points.time_s, shape), self.static, ()
+
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the static shift times the share of its final size that is reached."""
         static = self.static.image_shift_px(points, (), amplitude)

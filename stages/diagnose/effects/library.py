@@ -62,6 +62,31 @@ def texture_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, ampl
 
 def columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
     """Return (M, Q) derivatives of `ring_shift_px` by the amplitudes at zero, for points on the line."""
+    return _by_course(_line_columns, model, points, shape)
+
+
+def texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
+    """Return (M, 2, Q) derivatives of `texture_shift_px` by the amplitudes at zero."""
+    return _by_course(_texture_columns, model, points, shape)
+
+
+def _by_course(
+    made: Callable[[EffectModel, ImagePoints, Shape], Float], model: EffectModel, points: ImagePoints,
+    shape: Shape,
+) -> Float:  # fmt: skip
+    """Return columns; what a static law does, which all its courses share, is made once for these points."""
+    factored = model.factored(points, shape)
+    if factored is None:
+        return made(model, points, shape)
+    size, static, own = factored
+    key = (static.name, own, made is _line_columns)
+    if key not in points.patterns:
+        points.patterns[key] = made(static, points, own)
+    pattern = points.patterns[key]
+    return size.reshape(-1, *[1] * (pattern.ndim - 1)) * pattern
+
+
+def _line_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
     ring = points.ring
     sheet_px, wall_px = ring.read_move(ring.per_sheet_c), ring.read_move(ring.per_wall_c)
 
@@ -76,8 +101,7 @@ def columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
     return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
 
 
-def texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
-    """Return (M, 2, Q) derivatives of `texture_shift_px` by the amplitudes at zero."""
+def _texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
     per_wall = np.einsum("mij,mj->mi", points.ring.by_point, points.normal_c)
 
     def small(amplitude: Float) -> Float:

@@ -9,10 +9,11 @@ from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.field.confirm import InField, met_in_field
+from stages.diagnose.field.confirm import met_in_field
 from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.inference import INSTRUMENT, Evidence, Score, Stated, places_of, score, stated_belief
 from stages.diagnose.result import (
+    Confirmation,
     Diagnosis,
     EffectFound,
     Location,
@@ -154,13 +155,13 @@ def with_field(
     return found
 
 
-def _met(found: Diagnosis, met: Mapping[str, InField | None]) -> Diagnosis:
+def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
     """Return the answer with the field's confirmations, or less sure where the field contradicts it."""
     effects = tuple(_confirmed(e, met.get(e.name)) for e in found.effects)
     silent = [name for name, each in met.items() if each is None and name in EFFECTS]
     missing = tuple(f"The field by itself tells too little of {name} to bear it out." for name in silent)
     found = replace(found, effects=effects, shortcomings=(*found.shortcomings, *missing))
-    against = {name for name, each in met.items() if each is not None and not each.confirmation.agrees}
+    against = {name for name, each in met.items() if each is not None and not each.agrees}
     withdrawn = [e for e in effects if e.name in against]
     if found.verdict not in (Verdict.NAMED, Verdict.PARTLY) or not withdrawn:
         return found
@@ -186,10 +187,10 @@ def _beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[
     return replace(found, verdict=Verdict.PARTLY, members=(), remainder=left, record_next=record_next(every))
 
 
-def _confirmed(effect: EffectFound, met: InField | None) -> EffectFound:
+def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:
     if met is None:
         return effect
-    return replace(effect, confirmed_by=(*effect.confirmed_by, met.confirmation))
+    return replace(effect, confirmed_by=(*effect.confirmed_by, met))
 
 
 def _alone(found: Diagnosis, alone: FieldAnswer, field: FieldEvidence, with_gauge: bool) -> Diagnosis:

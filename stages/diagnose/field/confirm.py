@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pipeline.arrays import Float
@@ -11,9 +9,7 @@ from pipeline.pages import notation
 from stages.diagnose.agreement import same
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
-from stages.diagnose.effects.library import columns
 from stages.diagnose.field.evidence import FieldEvidence
-from stages.diagnose.field.run import ring_points
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
@@ -24,27 +20,6 @@ from stages.diagnose.result import Confirmation
 _TELLING = 0.33
 
 
-@dataclass(frozen=True)
-class InField:
-    """An effect of the gauge, met again in the field.
-
-    Attributes
-    ----------
-    confirmation : Confirmation
-        What the gauge lets expect of the field, what the field says by itself, and whether they agree.
-    before_px, after_px : float
-        How far rings are off from where texture has them (r.m.s. over the ring bins), of the pattern of this
-        effect, without and with the gauge's correction.
-    noise_px : float
-        What of that is the field's own uncertainty.
-    """
-
-    confirmation: Confirmation
-    before_px: float
-    after_px: float
-    noise_px: float
-
-
 def confirm_in_field(
     model: EffectModel,
     shape: Shape,
@@ -52,7 +27,7 @@ def confirm_in_field(
     covariance: Float,
     found: FieldEvidence,
     stated: Stated,
-) -> InField | None:
+) -> Confirmation | None:
     """Return whether the field by itself says the same of an effect as the gauge; None when it cannot tell.
 
     The field's estimate owes nothing to the gauge: poses from texture, a pipe of unknown size, the stated
@@ -64,28 +39,21 @@ def confirm_in_field(
     size = float(np.linalg.norm(amplitude))
     if own is None or np.sqrt(np.trace(own.covariance)) > _TELLING * size:
         return None
-    gap = own.amplitude - amplitude
-    confirmation = Confirmation(
+    return Confirmation(
         f"in the field, from the gauge: {_words(model, shape, amplitude, covariance)}",
         f"field alone: {_words(model, shape, own.amplitude, own.covariance)}",
         same(amplitude, own.amplitude, own.covariance + covariance, size),
-    )
-    pattern = columns(model, ring_points(found.run), shape)
-    pattern = pattern[np.isfinite(pattern).all(1)]
-    noise = np.einsum("mi,ij,mj->m", pattern, own.covariance, pattern)
-    return InField(
-        confirmation, _rms(pattern @ own.amplitude), _rms(pattern @ gap), float(np.sqrt(np.mean(noise)))
     )
 
 
 def met_in_field(
     examined: Examined, found: FieldEvidence, stated: Stated
-) -> tuple[InField | None, ...]:  # fmt: skip
+) -> tuple[Confirmation | None, ...]:  # fmt: skip
     """Return, for each effect of the gauge's likeliest hypothesis, whether the field says the same."""
     best = examined.best
     if best is None:
         return ()
-    out: list[InField | None] = []
+    out: list[Confirmation | None] = []
     for term in best.fit.terms:
         if isinstance(term.model, Coursed) and term.model.kind in OWN_CLOCK:
             # What happens at a time of the gauge run need not happen in another recording.
@@ -118,7 +86,3 @@ def _words(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float
     named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
     spread = float(np.sqrt(np.trace(covariance) / len(amplitude)))
     return f"{named} {notation.plus_minus(spread, model.amplitudes[0].unit)}"
-
-
-def _rms(values: Float) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -63,7 +63,7 @@ class Equations:
         use = part.frames[self.frame] & np.isin(self.kind, part.kinds)
         return self.at(np.flatnonzero(use))
 
-    def at(self, rows: Int) -> Equations:
+    def at(self, rows: slice | Int) -> Equations:
         """Return the measurements at these rows."""
         return Equations(*(getattr(self, f.name)[rows] for f in fields(self)))
 
@@ -103,8 +103,8 @@ def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
         by_pose = part.by_pose * root
         wide = np.concatenate([part.by_global[:, used[:-1]], part.residual[:, None]], 1) * root
         corner[np.ix_(used, used)] += wide.T @ wide
-        for k, (own, _) in enumerate(_by_frame(part, frames)):
-            if len(own):
+        for k, (own, of_frame) in enumerate(_by_frame(part, frames)):
+            if len(of_frame):
                 blocks[k] += by_pose[own].T @ by_pose[own]
                 mixed[k][:, used] += by_pose[own].T @ wide[own]
     band, pull = _band(blocks, motion)
@@ -166,7 +166,7 @@ def score_inflation(equations: Equations, reduced: Reduced, left: Marginal, grou
     pose_by_kept = reduced.pose_by_global @ left.follow
     follow, step = np.zeros((len(equations.frame), left.follow.shape[1])), np.zeros(len(equations.frame))
     for rows, used in _by_kind(equations):
-        by_used = equations.by_global[np.ix_(rows, used)]
+        by_used = equations.by_global[rows][:, used]
         follow[rows], step[rows] = by_used @ left.follow[used], by_used @ left.step[used]
     for k, (own, by_pose) in enumerate(_by_frame(equations, len(pose_by_kept))):
         follow[own] -= by_pose @ pose_by_kept[k]
@@ -188,16 +188,24 @@ def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> F
     return out
 
 
-def _by_kind(equations: Equations) -> Iterator[tuple[Int, Int]]:
+def _by_kind(equations: Equations) -> Iterator[tuple[slice | Int, Int]]:
     """Yield the rows of each kind and the globals that they depend on at all."""
     for kind in np.unique(equations.kind):
-        rows = np.flatnonzero(equations.kind == kind)
-        yield rows, np.flatnonzero(np.any(equations.by_global[rows] != 0, axis=0))
+        rows = _without_copy(np.flatnonzero(equations.kind == kind))
+        yield rows, np.flatnonzero(equations.by_global[rows].any(axis=0))
 
 
-def _by_frame(equations: Equations, frames: int) -> Iterator[tuple[Int, Float]]:
+def _by_frame(equations: Equations, frames: int) -> Iterator[tuple[slice | Int, Float]]:
     """Yield each frame's rows and their derivatives by its pose."""
     order = np.argsort(equations.frame, kind="stable")
     bounds = np.searchsorted(equations.frame[order], np.arange(frames + 1))
     for first, end in pairwise(bounds):
-        yield order[first:end], equations.by_pose[order[first:end]]
+        rows = _without_copy(order[first:end])
+        yield rows, equations.by_pose[rows]
+
+
+def _without_copy(rows: Int) -> slice | Int:
+    """Return rows that follow one another as a slice, which copies nothing."""
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1 and np.all(np.diff(rows) == 1):
+        return slice(int(rows[0]), int(rows[-1]) + 1)
+    return rows

@@ -24,7 +24,7 @@ from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.confirm import Sized, by_bore, confirmations, partial_of, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
 from stages.diagnose.gauge.fit import evidence, fit
-from stages.diagnose.gauge.formula import ADEQUATE, patterns_p
+from stages.diagnose.gauge.formula import ADEQUATE, patterns_p, swings
 from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.judge import Judged, Regime, Verdicts, judge, judged_of, regimes_of
 from stages.diagnose.gauge.run import GaugeRun, Term
@@ -187,11 +187,12 @@ def examine(
             searched = search(_watched(measurements, 1, progress), nothing, coursed, stated)
             searched = replace(searched, run=_watched(searched.run, 2, progress))
             # Effects that the library lacks move rings and fiducials as well.
-            beyond = patterns_p(searched.run, searched.nothing, stated)
+            swung = swings(searched.run, searched.nothing, stated)
+            beyond = patterns_p(searched.run, searched.nothing, stated, swung)
             seen = Examined(searched, None, (), table, groups, patterns_p=beyond)
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))
-            return _judged(replace(seen, verdicts=judge(searched, coursed, stated)), coursed, stated)
+            return _judged(replace(seen, verdicts=judge(searched, coursed, stated, swung)), coursed, stated)
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
 

@@ -24,7 +24,7 @@ from stages.diagnose.gauge.elimination import (
     score_inflation,
 )
 from stages.diagnose.gauge.points import BASELINE_SIGMA_PX, BASELINE_SIZE
-from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
+from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, asking, linearise
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, instrument_information
 
 _CONVERGED = 0.5
@@ -60,7 +60,12 @@ class Fit:
     @cached_property
     def linearised(self) -> Linearised:
         """The run's equations there."""
-        return linearise(self.run, self.state, self.terms, ())
+        return linearise(self.run, self.state, self.terms)
+
+    def at(self, run: GaugeRun) -> Linearised:
+        """Return the equations there of a run that may have other weights or fewer measurements."""
+        same = run.measures_as(self.run)
+        return self.linearised if same else linearise(run, self.state, self.terms)
 
     @cached_property
     def reduced(self) -> Reduced:
@@ -125,9 +130,10 @@ def evidence(
     tuple of Evidence
         The whole run's first.
     """
-    linearised = linearise(run, found.state, found.terms, asked, with_baseline=True)
-    each = [linearised.equations, *(linearised.equations.of(part) for part in parts)]
-    return tuple(_reduced(run, found, asked, equations, linearised.motion) for equations in each)
+    at = found.at(run)
+    whole = asking(run, found.state, at, asked, with_baseline=True)
+    each = [whole, *(whole.of(part) for part in parts)]
+    return tuple(_reduced(run, found, asked, equations, at.motion) for equations in each)
 
 
 def _reduced(

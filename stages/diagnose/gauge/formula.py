@@ -17,7 +17,7 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.run import GaugeRun, Term, linearise
+from stages.diagnose.gauge.run import GaugeRun, Term, asking, linearise
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan
 from stages.diagnose.inference import (
     DEGREES,
@@ -48,9 +48,12 @@ _SHOWN, _MOST = 1e-6, 100.0
 _WEAK = 1e-3
 
 
-def empirical(run: GaugeRun, before: Fit, stated: Stated) -> Fit:
-    """Return a fit with the few patterns added that explain the most of what it leaves."""
-    swinging = [s for s in swings(run, before, stated) if s.p_value * len(SWINGS) < _NEEDED]
+def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored]) -> Fit:
+    """Return a fit with the few patterns added that explain the most of what it leaves.
+
+    ``swung`` are the `swings` about that fit.
+    """
+    swinging = [s for s in swung if s.p_value * len(SWINGS) < _NEEDED]
     words = [*VOCABULARY, *((s.model, s.shape) for s in swinging)]
     about = evidence(run, before, words)[0]
     own = [(t.model, t.shape) for t in before.terms]
@@ -71,9 +74,9 @@ def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
     return scan(run, found, {model.name: model for model in SWINGS}, stated)
 
 
-def patterns_p(run: GaugeRun, nothing: Fit, stated: Stated) -> float:
+def patterns_p(run: GaugeRun, nothing: Fit, stated: Stated, swung: Sequence[Scored]) -> float:
     """Return the chance of what patterns and swings without a cause take up when nothing is hidden."""
-    swinging = min((s.p_value for s in swings(run, nothing, stated)), default=1.0) * len(SWINGS)
+    swinging = min((s.p_value for s in swung), default=1.0) * len(SWINGS)
     left = adequacy(evidence(run, nothing, VOCABULARY)[0], nothing.terms, stated)
     return float(min(2 * min(left, swinging), 1.0))
 
@@ -84,7 +87,8 @@ def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
     Such a pattern describes those effects and is not a rival, even if it fits some of the noise besides.
     """
     terms = freed(run, named).terms
-    equations = linearise(run, named.state, terms, [(t.model, t.shape) for t in formula.terms]).equations
+    patterns = [(t.model, t.shape) for t in formula.terms]
+    equations = asking(run, named.state, linearise(run, named.state, terms), patterns)
     size = [len(t.amplitude) for t in terms], [len(t.amplitude) for t in formula.terms]
     weighted = np.sqrt(equations.weight)[:, None] * equations.by_global[:, -sum(size[0]) - sum(size[1]) :]
     pattern = weighted[:, sum(size[0]) :] @ np.concatenate([t.amplitude for t in formula.terms])

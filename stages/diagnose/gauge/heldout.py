@@ -14,7 +14,7 @@ from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, elimi
 from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
 from stages.diagnose.gauge.points import BASELINE_SIZE
-from stages.diagnose.gauge.run import GaugeRun, linearise, ring_mm_per_px
+from stages.diagnose.gauge.run import GaugeRun, asking, ring_mm_per_px
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, total
 from stages.diagnose.result import FitQuality
 
@@ -112,17 +112,18 @@ def _on_other_wall(run: GaugeRun, found: Fit) -> tuple[Int, Int]:
 
 def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequence[Rule]) -> float:
     """Return the weighted r.m.s. of parts of the run, each with its poses and own unknowns at their best."""
-    about = linearise(run, judged.fit.state, judged.fit.terms, (), with_baseline=True)
+    about = judged.fit.at(run)
     # Smooth patterns of a hundredth of a pixel would take up what is asked about: they stay out of it.
-    about.equations.by_global[:, -BASELINE_SIZE:] = 0.0
-    per_px = np.full(len(about.equations.frame), np.nan)
-    per_px[about.equations.kind == RING] = ring_mm_per_px(about.rings)
-    per_px[about.equations.kind == EDGE] = 1.0
+    whole = asking(run, judged.fit.state, about, (), with_baseline=True)
+    whole.by_global[:, -BASELINE_SIZE:] = 0.0
+    per_px = np.full(len(whole.frame), np.nan)
+    per_px[whole.kind == RING] = ring_mm_per_px(about.rings)
+    per_px[whole.kind == EDGE] = 1.0
     columns, value = kept_columns(judged.fit, ())
     squares = weights = 0.0
     for part, rule in zip(parts, rules, strict=True):
-        use = part.frames[about.equations.frame] & np.isin(about.equations.kind, part.kinds)
-        equations = about.equations.of(part)
+        use = part.frames[whole.frame] & np.isin(whole.kind, part.kinds)
+        equations = whole.of(part)
         reduced = eliminate_poses(equations, about.motion, len(judged.fit.state.T_pc))
         left, _ = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.by_global.shape[1]))
         step = left.step + left.follow @ rule(Shared(columns, value, left.information, left.right))

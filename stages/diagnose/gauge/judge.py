@@ -14,9 +14,16 @@ from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.nameless import DECOYS, Nameless
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.formula import Rival, adequacy, empirical, rival_patterns, says_the_same
+from stages.diagnose.gauge.formula import (
+    Rival,
+    adequacy,
+    empirical,
+    rival_patterns,
+    says_the_same,
+    swings,
+)
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.scan import refined, scan, span
+from stages.diagnose.gauge.scan import Scored, refined, scan, span
 from stages.diagnose.gauge.search import LEAST_SHARE, Search, refits, shift_px
 from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Evidence, Stated, estimate, total
 
@@ -151,10 +158,15 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
     return tuple(out)
 
 
-def judge(searched: Search, library: Mapping[str, EffectModel], stated: Stated) -> Verdicts:
-    """Rank the found hypothesis, its rivals, decoys and an empirical formula."""
+def judge(
+    searched: Search, library: Mapping[str, EffectModel], stated: Stated, swung: Sequence[Scored]
+) -> Verdicts:
+    """Rank the found hypothesis, its rivals, decoys and an empirical formula.
+
+    ``swung`` are the swings without a cause about the stated instrument.
+    """
     run, regimes, alike = searched.run, regimes_of(searched.run), searched.alike
-    formula = empirical(run, searched.nothing, stated)
+    formula = empirical(run, searched.nothing, stated, swung)
     fits = _distinct(
         [
             searched.nothing, searched.found, *searched.rivals, *_decoyed(searched, stated), formula,
@@ -187,7 +199,7 @@ def _with_patterns(searched: Search, stated: Stated) -> list[Fit]:
     run, found = searched.run, searched.found
     if not found.terms:
         return []
-    both = empirical(run, found, stated)
+    both = empirical(run, found, stated, swings(run, found, stated))
     sizes = [shift_px(both, t) for t in both.terms]
     own = len(found.terms)
     if max(sizes[own:], default=0.0) < LEAST_SHARE * max(sizes[:own]):
@@ -195,7 +207,7 @@ def _with_patterns(searched: Search, stated: Stated) -> list[Fit]:
     laws = {t.model.law for t in found.terms}
     rivals = (f for f in searched.rivals if f.terms and {t.model.law for t in f.terms} != laws)
     near = sorted(rivals, key=lambda f: f.cost)[:_WITH_PATTERNS]
-    return [both, *(empirical(run, f, stated) for f in near)]
+    return [both, *(empirical(run, f, stated, swings(run, f, stated)) for f in near)]
 
 
 def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Bool:

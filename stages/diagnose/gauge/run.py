@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 
 import numpy as np
@@ -18,7 +18,7 @@ from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
-from stages.calibrate.gauge.terms import edge_equations, ring_equations
+from stages.calibrate.gauge.terms import edge_equations, expected_ring, ring_equations
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.library import (
     columns,
@@ -78,6 +78,10 @@ class GaugeRun:
     ring_weight: Float
     watch: Watch = field(default=unwatched, repr=False, compare=False, metadata=NOT_STORED)
 
+    def measures_as(self, other: GaugeRun) -> bool:
+        """Return whether the other run has these very measurements and weights."""
+        return all(getattr(self, f.name) is getattr(other, f.name) for f in fields(self) if f.compare)
+
 
 @dataclass(frozen=True)
 class Linearised:
@@ -89,29 +93,61 @@ class Linearised:
     edges: ImagePoints
 
 
-def linearise(
-    run: GaugeRun, state: Unknowns, terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
-    with_baseline: bool = False,
-) -> Linearised:  # fmt: skip
-    """Return the equations with columns for globals, terms, the effects asked about, and the baseline."""
+def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearised:
+    """Return the equations with columns for globals and terms."""
     run.watch()
     edges, edge_at = _without_edge_shift(run, state, terms)
     rings, ring_at = _without_ring_shift(run, state, terms)
-    residual = _off_bore(state, rings)
+    residual = expected_ring(state, rings)[0]
     rings = _on_bore(rings, ring_at, residual)
     ring_at = ring_points(state, rings, run.time_s, run.width_px)
-    parts = [_edge_part(run, state, edges, edge_at, terms, asked)]
-    parts.append(_ring_part(run, state, rings, ring_at, residual, terms, asked))
+    parts = [_edge_part(run, state, edges, edge_at, terms)]
+    parts.append(_ring_part(run, state, rings, ring_at, residual, terms))
     if run.encoder is not None:
-        parts.append(_encoder_part(run, run.encoder, state, terms, asked))
+        parts.append(_encoder_part(run, run.encoder, state, terms))
     joined = {k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])}
-    if with_baseline:
-        joined["by_global"] = np.concatenate(
-            [joined["by_global"], _baseline(edges, edge_at, ring_at, parts)], 1
-        )
     smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
     motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
     return Linearised(Equations(**joined), motion, ring_at, edge_at)
+
+
+def asking(
+    run: GaugeRun, state: Unknowns, at: Linearised, asked: Sequence[tuple[EffectModel, Shape]],
+    with_baseline: bool = False,
+) -> Equations:  # fmt: skip
+    """Return equations with columns, behind the others, for the effects asked about and for the baseline.
+
+    Where a prediction fails, measurements do not count.
+    """
+    run.watch()
+    equations, mm_per_px = at.equations, ring_mm_per_px(at.rings)
+    each = [_asked_column(run, state, at, mm_per_px, *one) for one in asked]
+    more = np.concatenate([np.zeros((len(equations.frame), 0)), *each], 1)
+    bad = ~np.isfinite(more).all(1)
+    if with_baseline:
+        more = np.concatenate([more, _baseline(run, at, mm_per_px)], 1)
+    by_global = np.concatenate([equations.by_global, more], 1)
+    by_global[bad] = 0.0
+    return replace(equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight))
+
+
+def _asked_column(
+    run: GaugeRun, state: Unknowns, at: Linearised, mm_per_px: Float, model: EffectModel, shape: Shape
+) -> Float:
+    """Return (M, Q) derivatives of the residuals by an effect's amplitudes."""
+    parts = [
+        _across(texture_columns(model, at.edges, shape), run.edges),
+        -mm_per_px[:, None] * columns(model, at.rings, shape),
+    ]
+    if run.encoder is not None:
+        travel = travel_of(run, run.encoder, state)
+        parts.append(state.encoder[0] * reading_columns(model, travel, shape))
+    return np.concatenate(parts)
+
+
+def _across(shift: Float, edges: Edges) -> Float:
+    """Return shifts (E, 2, ...) of edges along their normals."""
+    return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
 
 
 def travel_of(run: GaugeRun, encoder: Encoder, state: Unknowns) -> Travel:
@@ -120,14 +156,14 @@ def travel_of(run: GaugeRun, encoder: Encoder, state: Unknowns) -> Travel:
     return Travel(run.time_s, state.T_pc[:, 2, 3], speed_along(state, run.time_s), reading)
 
 
-def _baseline(edges: Edges, edge_at: ImagePoints, ring_at: ImagePoints, parts: Sequence[Equations]) -> Float:
+def _baseline(run: GaugeRun, at: Linearised, mm_per_px: Float) -> Float:
     """Return (M, 38) derivatives of the residuals by the baseline's patterns, in px."""
-    on_edges = edge_baseline(edge_at, edges.normal)
+    on_edges = edge_baseline(at.edges, run.edges.normal)
     # The residual of a ring falls with its outward shift by the millimetres of a pixel.
-    on_rings = -ring_mm_per_px(ring_at)[:, None] * ring_baseline(ring_at)
-    count = len(parts[2].residual) if len(parts) > 2 else 0
+    on_rings = -mm_per_px[:, None] * ring_baseline(at.rings)
+    rest = len(at.equations.frame) - len(on_edges) - len(on_rings)
     # At the edge of the camera model's domain the derivative does not exist; such points are left out.
-    return np.nan_to_num(block_diag(on_edges, on_rings, np.zeros((count, 0))), posinf=0.0, neginf=0.0)
+    return np.nan_to_num(block_diag(on_edges, on_rings, np.zeros((rest, 0))), posinf=0.0, neginf=0.0)
 
 
 def ring_mm_per_px(points: ImagePoints) -> Float:
@@ -147,11 +183,6 @@ def _without_ring_shift(
         uv = run.rings.uv - shift[:, None] * run.rings.outward
     rings = replace(run.rings, uv=uv)
     return rings, ring_points(state, rings, run.time_s, run.width_px)
-
-
-def _off_bore(state: Unknowns, rings: BoreRings) -> Float:
-    """Return (R,) by how many mm rings lie outside the bore."""
-    return ring_equations(state, rings).rows.residual
 
 
 def _on_bore(rings: BoreRings, points: ImagePoints, residual: Float) -> BoreRings:
@@ -175,30 +206,24 @@ def _without_edge_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -
 
 def _ring_part(
     run: GaugeRun, state: Unknowns, rings: BoreRings, points: ImagePoints, residual: Float,
-    terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
+    terms: Sequence[Term],
 ) -> Equations:  # fmt: skip
     mm_per_px = ring_mm_per_px(points)
     shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
-    shift += [columns(model, points, shape) for model, shape in asked]
     made = ring_equations(state, rings)
     rows = replace(made.rows, residual=residual)
     return _with_effects(rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster, RING)
 
 
 def _edge_part(
-    run: GaugeRun, state: Unknowns, edges: Edges, points: ImagePoints,
-    terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
-) -> Equations:  # fmt: skip
+    run: GaugeRun, state: Unknowns, edges: Edges, points: ImagePoints, terms: Sequence[Term]
+) -> Equations:
     made = edge_equations(state, edges)
 
-    def across(shift: Float) -> Float:
-        return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
-
     def texture_shift(term: Term, amplitude: Float) -> Float:
-        return across(texture_shift_px(term.model, points, term.shape, amplitude))
+        return _across(texture_shift_px(term.model, points, term.shape, amplitude), edges)
 
     shift = [_term_slope(t, partial(texture_shift, t)) for t in terms]
-    shift += [across(texture_columns(model, points, shape)) for model, shape in asked]
     # Cells of fiducials count on where those of wall end.
     return _with_effects(
         made.rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, -1 - made.cluster, EDGE
@@ -235,10 +260,7 @@ def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
     return np.stack(out, -1)
 
 
-def _encoder_part(
-    run: GaugeRun, encoder: Encoder, state: Unknowns,
-    terms: Sequence[Term], asked: Sequence[tuple[EffectModel, Shape]],
-) -> Equations:  # fmt: skip
+def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Sequence[Term]) -> Equations:
     count = len(run.time_s)
     scale, offset, delay = state.encoder
     travel = travel_of(run, encoder, state)
@@ -250,7 +272,6 @@ def _encoder_part(
     by_border = np.zeros((count, state.border_size))
     by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
     shift = [_term_slope(t, partial(t.model.reading_shift_mm, travel, t.shape)) for t in terms]
-    shift += [reading_columns(model, travel, shape) for model, shape in asked]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
     cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
     # The weight is small: the encoder is examined separately, and a slip must not move the poses.

@@ -64,6 +64,7 @@ def _best(
     run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], stated: Stated
 ) -> list[Scored]:
     """Return each effect's best shape."""
+    found = found if run.measures_as(found.run) else replace(found, run=run)
     best: dict[str, Scored] = {}
     tried: dict[str, int] = {}
     for part in _portions(asked):

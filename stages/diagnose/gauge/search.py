@@ -88,7 +88,7 @@ def stated_start(state: Unknowns) -> Unknowns:
 def weighed(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> GaugeRun:
     """Return the run with weights by the residuals' spread frame by frame, outliers counting little."""
     plain = replace(run, edge_weight=np.ones(len(run.edges.uv)), ring_weight=np.ones(len(run.rings.uv)))
-    found = linearise(plain, state, terms, ()).equations
+    found = linearise(plain, state, terms).equations
     count = len(run.edges.uv)
     edges, rings = slice(0, count), slice(count, count + len(run.rings.uv))
     return replace(
