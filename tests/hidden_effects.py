@@ -60,10 +60,10 @@ def effects(scene: Scene, frame: Int, random: np.random.Generator) -> list[Hidde
         kind = "weak" if weak else "strong"
         loss = 0.12 if weak else 0.35
         spot = (1 - loss * np.exp(-0.5 * (near / 16) ** 2)).astype(np.float32)
-        found.append(Hidden(f"dust, {kind}", _times(spot), ("window_dirt",), "image", here))
+        found.append(Hidden(f"dust, {kind}", _times(spot), ("window_dirt",), "image", here, loss))
         share = 0.35 if weak else 0.8
         mask = (share * np.exp(-0.5 * (near / 20) ** 2)).astype(np.float32)
-        found.append(Hidden(f"scatter, {kind}", _scattering(mask), ("window_scatter",), "image", here))
+        found.append(Hidden(f"scatter, {kind}", _scattering(mask), ("window_scatter",), "image", here, share))
         found.append(
             Hidden(
                 f"droplet, {kind}",
@@ -124,7 +124,7 @@ def effects(scene: Scene, frame: Int, random: np.random.Generator) -> list[Hidde
         found.append(
             Hidden(
                 f"gamma, {kind}",
-                lambda n, k, i, power=power: 255 * (i / 255) ** (1 / power),
+                lambda n, k, i, power=power: 255 * (np.maximum(i, 0) / 255) ** (1 / power),
                 ("response",),
                 "image",
                 {},

@@ -40,7 +40,12 @@ _LEAST = {"step": 0.02, "flicker": 0.01, "led_dead": 0.2, "laser_sector": 0.25}
 """Smallest sizes that are named: a photo errs by a per cent or two from frame to frame, and so does the
 wall's reflectance for the laser's colour, by more, from place to place."""
 _LED_AZIMUTHS, _FINE = 24, 5
-_SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (12, 20, 30, 45, 60, 90, 120), (0.3, 0.6, 0.9, 0.97)
+_SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (10, 13, 16, 20, 25, 32, 40, 50, 65, 80, 100, 120), (0.3, 0.7, 0.95)
+_LOBE = 0.15
+"""Relative 1 σ of an LED's share for want of its lobe, which no probe states: even light and one that falls
+as the cosine differ by so much at the ring."""
+_SHAPE = 0.03
+"""1 σ of a sector's loss for want of its shape, whose width is tried in steps of a quarter."""
 _HALF_SECTORS = 3
 """Sectors side by side in the same half, when one half of the picture is to foretell the other."""
 
@@ -139,8 +144,9 @@ def _chosen(cells: Cells, base: Float, laws: Sequence[Law]) -> tuple[list[tuple[
         tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
         tries.sort(key=lambda f: -f.fall.sum())
         best = _by_other_sectors(tries[0], cells, base)
-        size, more = size_of(best), 1.0 if best.law.name == "led_dead" else np.inf
-        if best.probability > FALSE_ALARM or not _LEAST[best.law.name] < size < more + _SURE * _size_sd(best):
+        size, led = size_of(best), best.law.name == "led_dead"
+        most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED loses more than it has
+        if best.probability > FALSE_ALARM or not _LEAST[best.law.name] < size < most:
             break
         if best.law.name == "step" and not _shows_at_once(best, cells):
             break
@@ -149,9 +155,18 @@ def _chosen(cells: Cells, base: Float, laws: Sequence[Law]) -> tuple[list[tuple[
             for o in tries[1:]
             if o.probability < FALSE_ALARM and sigmas(best.fall - o.fall) < _SURE
         ]
-        chosen.append((best, rivals))
+        if not any(_same_sector(best, earlier) for earlier, _ in chosen):
+            chosen.append((best, rivals))
         base = np.concatenate([base, best.change[None]])
     return chosen, base
+
+
+def _same_sector(one: Fitted, other: Fitted) -> bool:
+    """Return whether two dim sectors overlap: the second is what the first one's shape leaves over."""
+    if not one.law.name == other.law.name == "laser_sector":
+        return False
+    away = abs(_half_turn(float(one.place[0] - other.place[0])))
+    return bool(away < (one.place[1] + other.place[1]) / 2 + 360 / SECTORS)
 
 
 def _shows_at_once(step: Fitted, cells: Cells) -> bool:
@@ -192,7 +207,8 @@ def size_of(found: Fitted) -> float:
 
 def _size_sd(found: Fitted) -> float:
     more = replace(found, size=found.size + found.sd)
-    return abs(size_of(more) - size_of(found))
+    beyond = {"led_dead": _LOBE * size_of(found), "laser_sector": _SHAPE}[found.law.name]
+    return float(np.hypot(size_of(more) - size_of(found), beyond))
 
 
 def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mismatch:
@@ -289,7 +305,8 @@ def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch
     ])  # fmt: skip
     parts = parts - parts.mean(1, keepdims=True)
     product, frames = parts[0] * parts[1], len(cells.frame)
-    spread = float(np.sqrt(max(product.mean(), 0.0)))
+    granted = len(drift(frames))  # what the drift takes up of the frames' changes
+    spread = float(np.sqrt(max(product.sum() / max(frames - granted, 1), 0.0)))
     alike = min(float(product.mean() / max(parts[0].std() * parts[1].std(), 1e-12)), 1 - 1e-9)
     chance = float(t.sf(alike * np.sqrt((frames - 2) / (1 - alike**2)), frames - 2))
     foretold = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])

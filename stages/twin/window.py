@@ -18,8 +18,13 @@ from stages.twin.cells import sigmas
 from stages.twin.locate import FALSE_ALARM, ImagePlace
 from stages.twin.render import Region, TwinFrame
 
+_POWER_STEP = 0.4
 _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0, 1.2, 1.4, 1.7, 2.0))
 """Bending and radius, in radii of the place, of the drops that are tried."""
+_SPOTS = (0.4, 0.6, 0.8, 1.2, 1.8)
+"""1 σ of the spots of dirt and scatter that are tried, in radii of the place."""
+_LEAST_REACH_PX = 24.0
+"""A place is looked at so far about its middle, or over two radii if that is more."""
 _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 4
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
 _STATED = {
@@ -41,7 +46,8 @@ class WindowPlace:
     ----------
     place : ImagePlace
     sums : list of (2, L)
-        Of each frame: Σ (recorded − twin)(law − twin)/σ² and Σ (law − twin)²/σ² of dirt, scatter, drops.
+        Of each frame: Σ (recorded − twin)(law − twin)/σ² and Σ (law − twin)²/σ² of dirt, scatter, drops
+        of each width.
     square, pixels, frame : list
         Of each frame: Σ (recorded − twin)²/σ², pixels, number.
     """
@@ -57,7 +63,7 @@ class WindowPlace:
         box, v, u = self._box(above.shape)
         level, part = twin.level[box], twin.region[box] == Region.WALL
         away = np.hypot(u - self.place.u_px, v - self.place.v_px)
-        inside = away < 2 * self.place.radius_px
+        inside = away < self._reach_px
         use = inside & part & free[box]
         if use.sum() < _WHOLE * inside.sum():
             return
@@ -70,8 +76,12 @@ class WindowPlace:
         self.pixels.append(int(use.sum()))
         self.frame.append(frame)
 
+    @property
+    def _reach_px(self) -> float:
+        return max(2 * self.place.radius_px, _LEAST_REACH_PX)
+
     def _box(self, shape: tuple[int, ...]) -> tuple[tuple[slice, slice], Float32, Float32]:
-        reach = int(2 * self.place.radius_px + 2 * _AROUND_PX)
+        reach = int(self._reach_px + 2 * _AROUND_PX)
         rows, columns = (
             slice(max(int(at) - reach, 0), min(int(at) + reach, size))
             for at, size in ((self.place.v_px, shape[0]), (self.place.u_px, shape[1]))
@@ -81,8 +91,12 @@ class WindowPlace:
 
     def _laws(self, level: Float32, away: Float, u: Float32, v: Float32) -> list[Float32]:
         """Return what dirt and scatter of size 1 and each drop make of grey levels (h, w)."""
-        spot = np.exp(-0.5 * (away / (0.8 * self.place.radius_px)) ** 2).astype(np.float32)
-        made = [level * (1 - spot), level + spot * (cv2.GaussianBlur(level, (0, 0), _AROUND_PX) - level)]
+        mean = cv2.GaussianBlur(level, (0, 0), _AROUND_PX)
+        made: list[Float32] = []
+        for other in (np.zeros_like(level), mean):
+            for width in _SPOTS:
+                spot = np.exp(-0.5 * (away / (width * self.place.radius_px)) ** 2).astype(np.float32)
+                made.append(np.asarray(level + spot * (other - level), np.float32))
         for power, size in _DROPS:
             near = 1 - np.minimum((away / (size * self.place.radius_px)) ** 2, 1)
             at = [
@@ -102,9 +116,9 @@ class WindowPlace:
             return None
         sums = np.stack(self.sums)
         tried = {
-            "window_dirt": _fall(sums[:, :, 0:1], False),
-            "window_scatter": _fall(sums[:, :, 1:2], False),
-            "droplet": _fall(sums[:, :, 2:], True),
+            "window_dirt": _fall(sums[:, :, : len(_SPOTS)], False),
+            "window_scatter": _fall(sums[:, :, len(_SPOTS) : 2 * len(_SPOTS)], False),
+            "droplet": _fall(sums[:, :, 2 * len(_SPOTS) :], True),
         }
         name = max(tried, key=lambda n: tried[n][0].sum())
         fall, size, sd = tried[name]
@@ -142,23 +156,25 @@ class WindowPlace:
         return f"{at}, in all frames, {_STATED[names[0]]} {share}{others}."
 
 
-def _fall(sums: Float, fixed: bool) -> tuple[Float, float, float]:
-    """Return by how much χ² of each frame (F,) falls with a size from the others, the size and its 1 σ.
+def _fall(sums: Float, drops: bool) -> tuple[Float, float, float]:
+    """Return by how much χ² of each frame (F,) falls, width and size from the others, the size and its 1 σ.
 
-    ``sums`` is (F, 2, L). With ``fixed`` the size is 1, and the best of the laws is chosen by the others.
+    ``sums`` is (F, 2, L) for laws of L widths, of which the best is taken; the size of ``drops`` is fixed.
     """
-    frames = np.arange(len(sums))
-    fall = np.zeros(len(sums))
+    frames, fall = np.arange(len(sums)), np.zeros(len(sums))
     for half in (frames % 2 == 0, frames % 2 == 1):
-        cross, own = sums[half].sum(0)
-        if fixed:
-            k, size = int(np.argmax(2 * cross - own)), 1.0
-        else:
-            k, size = 0, float(cross[0] / max(own[0], 1e-9))
+        k, size = _best(sums[half], drops)
         fall[~half] = 2 * size * sums[~half, 0, k] - size**2 * sums[~half, 1, k]
+    k, size = _best(sums, drops)
+    if drops:
+        return fall, _DROPS[k][0], _POWER_STEP / 2
+    left = sums[:, 0, k] - size * sums[:, 1, k]
+    return fall, size, float(np.sqrt((left**2).sum())) / max(float(sums[:, 1, k].sum()), 1e-9)
+
+
+def _best(sums: Float, drops: bool) -> tuple[int, float]:
+    """Return which law lets χ² fall most over frames, and its size."""
     cross, own = sums.sum(0)
-    if fixed:
-        return fall, _DROPS[int(np.argmax(2 * cross - own))][0], 0.2
-    size = float(cross[0] / max(own[0], 1e-9))
-    left = sums[:, 0, 0] - size * sums[:, 1, 0]
-    return fall, size, float(np.sqrt((left**2).sum())) / max(float(own[0]), 1e-9)
+    sizes = np.ones(len(own)) if drops else cross / np.maximum(own, 1e-9)
+    k = int(np.argmax(2 * sizes * cross - sizes**2 * own))
+    return k, float(sizes[k])
