@@ -8,6 +8,8 @@ import numpy as np
 # Sums may be reordered; NaN keeps its meaning.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
 UNKNOWNS = 5
+# A sector that is narrower, px, has radii without a pixel: pixels are a unit apart, askew up to √2.
+_LEAST_ARC_PX = 1.2
 
 
 @numba.njit(cache=True, nogil=True)
@@ -49,6 +51,13 @@ def first_at_least(values, low, high, limit):  # type: ignore[no-untyped-def]
         else:
             high = middle
     return low
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def neighbours_joined(sectors, radius_px):  # type: ignore[no-untyped-def]
+    """Return how many sectors on either side are joined to one, so that it is wide enough at a radius."""
+    arc_px = 2 * np.pi / sectors * radius_px
+    return int(np.ceil(0.5 * (_LEAST_ARC_PX / arc_px - 1))) if arc_px < _LEAST_ARC_PX else 0
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

@@ -16,7 +16,15 @@ import numba
 import numpy as np
 
 from pipeline.arrays import Byte, Float, Float32
-from stages.rings.kernels import FAST, bell, factor, first_at_least, inverse_diagonal, solve
+from stages.rings.kernels import (
+    FAST,
+    bell,
+    factor,
+    first_at_least,
+    inverse_diagonal,
+    neighbours_joined,
+    solve,
+)
 from stages.rings.sectors import Sectors
 
 WINDOW_WIDTHS = 5.0
@@ -24,7 +32,6 @@ _FLANK = 0.6
 _STEPS, _FULL_STEPS = 12, 4
 _LOG_WIDTH_PRIOR = 0.3
 _SLOPE_SECTORS = 6
-_LEAST_ARC_PX = 1.2
 _CLIP_SIGMAS = 2.0
 # Steps converge quadratically: one this small leaves less than a hundredth of it to go.
 _SETTLED_WIDTHS, _SETTLED_LOG_WIDTH = 0.03, 0.06
@@ -103,8 +110,7 @@ def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  #
     Where sectors are narrower than a pixel, whole neighbours are joined in until there is enough to fit.
     """
     sectors = start.size - 1
-    step = 2 * np.pi / sectors
-    aside = int(np.ceil(0.5 * (_LEAST_ARC_PX / (step * seed) - 1))) if step * seed < _LEAST_ARC_PX else 0
+    step, aside = 2 * np.pi / sectors, neighbours_joined(sectors, seed)
     count = 0
     for turn in range(-aside, aside + 1):
         b = (a + turn) % sectors

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA
 from pipeline.arrays import Byte, Float, Float32, Int
-from stages.rings.kernels import FAST, first_at_least
+from stages.rings.kernels import FAST, first_at_least, neighbours_joined
 from stages.rings.sectors import Sectors
 
 Image = Byte | Float32
@@ -68,23 +68,26 @@ def search_band(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _radial_profile(image, pixel, radius, low, high, first, bins, total, count):  # type: ignore[no-untyped-def]
+def _radial_profile(image, start, pixel, radius, a, aside, first, bins, total, count):  # type: ignore[no-untyped-def]
     """Mean grey level in bins of one pixel from radius ``first``; return how many bins are seen.
 
-    Bins without a pixel, where sectors are narrow, take the value of the bin before.
+    Of sector ``a`` and as many ``aside`` on either side: what is narrower than a pixel has none at some
+    radii. Bins without a pixel take the value of the bin before.
     """
     total[:bins] = 0.0
     count[:bins] = 0
     seen = 0
-    k = first_at_least(radius, low, high, first - 0.5)
-    while k < high:
-        b = int(radius[k] - first + 0.5)
-        if b >= bins:
-            break
-        total[b] += image[pixel[k]]
-        count[b] += 1
-        seen = b + 1
-        k += 1
+    for turn in range(-aside, aside + 1):
+        s = (a + turn) % (start.size - 1)
+        k = first_at_least(radius, start[s], start[s + 1], first - 0.5)
+        while k < start[s + 1]:
+            b = int(radius[k] - first + 0.5)
+            if b >= bins:
+                break
+            total[b] += image[pixel[k]]
+            count[b] += 1
+            seen = max(seen, b + 1)
+            k += 1
     level = 0.0
     for b in range(seen - 1, -1, -1):
         if count[b] > 0:
@@ -137,7 +140,8 @@ def _search_sectors(  # type: ignore[no-untyped-def]
             continue
         first = int(np.floor(low_px[a])) - reach
         bins = int(np.ceil(high_px[a])) + reach + 1 - first
-        seen = _radial_profile(image, pixel, radius, start[a], start[a + 1], first, bins, total, count)
+        aside = neighbours_joined(start.size - 1, 0.5 * (low_px[a] + high_px[a]))
+        seen = _radial_profile(image, start, pixel, radius, a, aside, first, bins, total, count)
         _correlate(total, seen, template, response)
         _keep_peaks(response, reach, seen - reach, first, found_px[a], score[a])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from pipeline.arrays import Bool, Byte, Float
 from pipeline.artefacts.measured import RingValidity
@@ -29,6 +30,8 @@ _RIVAL = 0.5
 # A ring that lost more than this share of its way round from one image to the next may have left the band, or
 # the image's noise may no longer be that of the image before. Searching anew costs time and cannot do harm.
 _LOST = 0.1
+# As many as tell an outlier (`stages.rings.validity`): five or more that leave the ring together are the wall.
+_EXPECTED_SECTORS = 9
 
 
 @dataclass(frozen=True)
@@ -81,13 +84,16 @@ def trace_ring(
 def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace | None:
     """Fit the ring within a band about the ring seen ``before``; None when most of it is not there.
 
+    Expected is the running median of that ring: a few sectors that were on a reflection beside the line would
+    else never see the line in their band again.
     Sectors without a line in the band are searched along their whole ray: a step of the bore moves the ring
     from one image to the next, and for part of its way round.
     """
     if before.coverage < _MOST:
         return None
     width, noise = before.width_px, before.response.dark_noise
-    expected, band = before.radius_everywhere(), BAND_WIDTHS * width
+    expected = median_filter(before.radius_everywhere(), _EXPECTED_SECTORS, mode="wrap")
+    band = BAND_WIDTHS * width
     peaks = search_band(image, sectors, expected - band, expected + band, width, noise)
     peaks = peaks.above(_limit(sectors, 2 * band))
     missing = np.isnan(peaks.radius_px[:, 0])

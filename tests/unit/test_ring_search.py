@@ -1,5 +1,7 @@
 """Finding the ring without help: off centre, broken, beside glints, or not there at all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,29 @@ def test_a_ring_that_steps_to_another_bore_is_followed(sectors):
     assert np.isfinite(errors(part, 0.0)[clear]).mean() > 0.98
     assert np.nanmax(np.abs(errors(whole, 190.0))) < 0.5
     assert whole.coverage > 0.98
+
+
+def test_a_sector_that_was_on_a_reflection_comes_back_to_the_line(sectors):
+    ring = off_centre(170.0, 8.0)
+    light = ring_light(SIZE, CENTRE, ring, 1.2, 80.0)
+    light += ring_light(SIZE, CENTRE, lambda psi: ring(psi) - 20.0, 1.2, 16.0)
+    first = trace_ring(image_of(light), sectors, 255.0)
+    strayed = first.fit.radius_px.copy()
+    strayed[[40, 300, 301, 302, 500]] -= 20.0
+    before = replace(first, fit=first.fit._replace(radius_px=strayed))
+    error = errors(trace_ring(image_of(light, 1), sectors, 255.0, before), ring(sectors.azimuth_rad))
+    assert np.nanmax(np.abs(error)) < 1.0
+    assert np.isfinite(error[[40, 301, 500]]).all()
+
+
+def test_sectors_narrower_than_a_pixel_see_the_line_and_not_what_is_beside_it():
+    sectors, ring = cut_sectors(SIZE, np.array(CENTRE), 1440), off_centre(120.0, 3.0)
+    light = ring_light(SIZE, CENTRE, ring, 0.7, 80.0)
+    light += ring_light(SIZE, CENTRE, lambda psi: ring(psi) - 12.0, 0.7, 16.0)
+    first = trace_ring(image_of(light), sectors, 255.0)
+    error = errors(trace_ring(image_of(light, 1), sectors, 255.0, first), ring(sectors.azimuth_rad))
+    assert np.isfinite(error).mean() > 0.99
+    assert np.nanmax(np.abs(error)) < 0.5
 
 
 def test_two_equally_bright_lines_are_ghosts(sectors):
