@@ -30,7 +30,7 @@ _RIVAL = 0.5
 # A ring that lost more than this share of its way round from one image to the next may have left the band, or
 # the image's noise may no longer be that of the image before. Searching anew costs time and cannot do harm.
 _LOST = 0.1
-# As many as tell an outlier (`stages.rings.validity`): five or more that leave the ring together are the wall.
+# As many as tell an outlier (`stages.rings.validity`): five or more that leave the ring are the wall.
 _EXPECTED_SECTORS = 9
 
 
