@@ -19,7 +19,10 @@ def frames(distance, origin, rotation, s, out_origin, out_rotation):  # type: ig
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def section_frame(distance, origin, rotation, s, o, m):  # type: ignore[no-untyped-def]
     """Write point ``o`` (3,) and frame ``m`` (3, 3): z is kept, x made square to it."""
-    k = min(max(np.searchsorted(distance, s) - 1, 0), len(distance) - 2)
+    k, above = 0, len(distance) - 1
+    while above - k > 1:
+        middle = (k + above) // 2
+        k, above = (middle, above) if distance[middle] < s else (k, middle)
     span = distance[k + 1] - distance[k]
     w = (s - distance[k]) / span
     inside = min(max(w, 0.0), 1.0) if w == w else w

@@ -192,6 +192,7 @@ def _regress(  # type: ignore[no-untyped-def]
     out_radius, out_sigma, out_count, out_misalignment,
 ):  # fmt: skip
     reach = max(3.0 * width, gap)
+    d, kernel = np.empty(distance.shape[1]), np.empty(distance.shape[1])
     for a in range(distance.shape[0]):
         known, first, last = 0, 0, 0
         for x in distance[a]:
@@ -201,17 +202,20 @@ def _regress(  # type: ignore[no-untyped-def]
                 first += 1
             while last < known and distance[a, last] <= rows[i] + reach:
                 last += 1
-            d = distance[a, first:last] - rows[i]
-            kernel = np.exp(-0.5 * (d / width) ** 2)
-            weight = kernel / variance[a, first:last]
-            if weight.sum() <= 0 or not _near_rings(d, width, gap):
+            total, carried = 0.0, 0.0
+            for k in range(first, last):
+                d[k] = distance[a, k] - rows[i]
+                kernel[k] = np.exp(-0.5 * (d[k] / width) ** 2)
+                total += kernel[k] / variance[a, k]
+                carried += kernel[k] / variance[a, k] * misalignment[a, k]
+            if total <= 0 or not _near_rings(d[first:last], width, gap):
                 continue
             out_radius[i, a], out_sigma[i, a] = _line_at(
-                d, kernel, radius[a, first:last], variance[a, first:last], width
+                d[first:last], kernel[first:last], radius[a, first:last], variance[a, first:last], width
             )
-            for k in range(len(d)):
-                out_count[i, a] += count[a, first + k] if abs(d[k]) <= 3.0 * width else 0
-            out_misalignment[i, a] = (weight * misalignment[a, first:last]).sum() / weight.sum()
+            for k in range(first, last):
+                out_count[i, a] += count[a, k] if abs(d[k]) <= 3.0 * width else 0
+            out_misalignment[i, a] = carried / total
 
 
 @numba.njit(cache=True, nogil=True)
@@ -229,16 +233,22 @@ def _near_rings(d, width, gap):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _line_at(d, kernel, radius, variance, width):  # type: ignore[no-untyped-def]
     """Return value at d = 0 of the weighted line and its 1 σ, from the scatter about it where larger."""
-    w = kernel / variance
-    m0, m1, m2 = w.sum(), (w * d).sum(), (w * d * d).sum()
-    b0, b1 = (w * radius).sum(), (w * d * radius).sum()
+    m0, m1, m2, b0, b1, sum1, sum2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(len(d)):
+        w = kernel[k] / variance[k]
+        m0, m1, m2 = m0 + w, m1 + w * d[k], m2 + w * d[k] * d[k]
+        b0, b1 = b0 + w * radius[k], b1 + w * d[k] * radius[k]
+        sum1, sum2 = sum1 + kernel[k], sum2 + kernel[k] * kernel[k]
     determinant = m0 * m2 - m1 * m1
-    if determinant > 1e-6 * m0 * m0 * width * width:
-        value, slope = (m2 * b0 - m1 * b1) / determinant, (m0 * b1 - m1 * b0) / determinant
-        share = w * (m2 - m1 * d) / determinant
-    else:
-        value, slope, share = b0 / m0, 0.0, w / m0
-    misfit = (w * (radius - value - slope * d) ** 2).sum()
-    freedom = kernel.sum() - 2.0 * (kernel * kernel).sum() / max(kernel.sum(), 1e-12)
+    sloped = determinant > 1e-6 * m0 * m0 * width * width
+    value = (m2 * b0 - m1 * b1) / determinant if sloped else b0 / m0
+    slope = (m0 * b1 - m1 * b0) / determinant if sloped else 0.0
+    misfit, spread = 0.0, 0.0
+    for k in range(len(d)):
+        w = kernel[k] / variance[k]
+        share = w * (m2 - m1 * d[k]) / determinant if sloped else w / m0
+        misfit += w * (radius[k] - value - slope * d[k]) ** 2
+        spread += share * share * variance[k]
+    freedom = sum1 - 2.0 * sum2 / max(sum1, 1e-12)
     excess = misfit / freedom if freedom > 0.2 else 1.0
-    return value, np.sqrt((share * share * variance).sum() * max(1.0, excess))
+    return value, np.sqrt(spread * max(1.0, excess))

@@ -98,14 +98,16 @@ def _posterior(away, weight, bend, most):  # type: ignore[no-untyped-def]
         last = -1
         for s in range(2 * sectors):
             a = s % sectors if way > 0 else sectors - 1 - s % sectors
-            if not (weight[a] > 0.0).any():
+            total = 0.0
+            for j in range(states):
+                total += weight[a, j]
+            if not total > 0.0:
                 continue
-            if last < 0:
-                message[:] = weight[a] / weight[a].sum()
-            else:
+            if last >= 0:
                 _step(message, away[last], away[a], weight[a], bend, most, out)
-                message[:] = out
-            messages[a, :] = message
+            for j in range(states):
+                message[j] = out[j] if last >= 0 else weight[a, j] / total
+                messages[a, j] = message[j]
             last = a
     for a in range(sectors):
         total = 0.0

@@ -119,14 +119,18 @@ def _grouped(group, value, groups):  # type: ignore[no-untyped-def]
     for k in range(group.size):
         rings[int(value[k]) + 1] += 1
         start[group[k] + 1] += 1
-    rings, start = np.cumsum(rings), np.cumsum(start)
+    for k in range(1, rings.size):
+        rings[k] += rings[k - 1]
+    end = np.zeros(groups, np.int64)
+    for k in range(groups):
+        end[k] = start[k]
+        start[k + 1] += start[k]
     by_value = np.empty(group.size, np.int32)
     for k in range(group.size):
         ring = int(value[k])
         by_value[rings[ring]] = k
         rings[ring] += 1
     order = np.empty(group.size, np.int32)
-    end = start[:-1].copy()
     for k in by_value:
         at = end[group[k]]
         while at > start[group[k]] and value[order[at - 1]] > value[k]:

@@ -208,11 +208,15 @@ def _match(contrast, unusable, width, value, by_row, by_column, inverse, row, co
     residual = np.full(count, np.nan)
     for k in range(count):
         t, r, c = value[k], by_row[k], by_column[k]
-        own = np.sum(r), np.sum(c), np.sum(t * r), np.sum(t * c)
+        sr = sc = tr = tc = tt = np.float32(0)
+        for i in range(n):
+            for j in range(n):
+                sr, sc, tt = sr + r[i, j], sc + c[i, j], tt + t[i, j] * t[i, j]
+                tr, tc = tr + t[i, j] * r[i, j], tc + t[i, j] * c[i, j]
+        own = sr, sc, tr, tc
         dr, dc, ts, ss = _match_one(
             contrast, unusable, width, t, r, c, own, inverse[k], row[k], column[k], steps
         )
-        tt = np.sum(t * t)
         if tt > 0 and ss > 0:
             offset[k, 0], offset[k, 1] = dr, dc
             correlation[k] = ts / np.sqrt(tt * ss)
