@@ -104,3 +104,20 @@ def test_a_slip_leaves_delay_and_scale_alone() -> None:
         plain.values[1:4], slipped.values[1:4], atol=3 * plain.sigma[1:4].max(), rtol=0
     )
     assert np.all(np.abs(plain.values[1:4] - slipped.values[1:4]) < 3 * slipped.sigma[1:4])
+
+
+def test_readings_that_are_rounded_alike_leave_a_size_as_unsure_as_that():
+    sizes = (0.33, 0.36, 0.39, 0.42, 0.45, 0.48)
+    errors = []
+    for seed, size in enumerate(sizes):
+        sight = seen(np.random.default_rng(seed), False, drift_mm=0.002, every=3)
+        # At 15 mm/s every picture comes 30 counts after the one before.
+        even = replace(sight, distance_mm=sight.distance_mm - way(sight.time_s, False) + 15.0 * sight.time_s)
+        reading = 15.0 * read(False).time_s + np.where(read(False).time_s > 1.05, -size, 0.0)
+        stepped = QUANTUM_MM * np.round(reading / QUANTUM_MM)
+        (found,) = steps_found(with_events(even, replace(read(False), distance_mm=stepped)), read(False))
+        errors.append((found.gain_mm + size, found.sigma_mm))
+    off, sigma = np.array(errors).T
+    assert np.max(np.abs(off)) > 0.01
+    assert np.sqrt(np.mean((off / sigma) ** 2)) < 1.3
+    assert np.all(np.abs(off) < 2.5 * sigma)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.channels import Seen
-from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.confirm import met_in_field
 from stages.diagnose.field.evidence import FieldEvidence, travels
-from stages.diagnose.inference import INSTRUMENT, Evidence, Score, Stated, places_of, score, stated_belief
+from stages.diagnose.gauge.scan import Scored
+from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
 from stages.diagnose.result import (
     Confirmation,
     Diagnosis,
@@ -34,26 +35,6 @@ _BY_FIELD = "The field, by itself, shows: "
 
 
 @dataclass(frozen=True)
-class Shown:
-    """An effect at its best shape, as the field alone has it, and how many shapes were tried."""
-
-    model: EffectModel
-    shape: Shape
-    score: Score
-    tried: int
-
-    @property
-    def p_value(self) -> float:
-        """Chance of such a score at the best of the shapes tried when nothing is hidden."""
-        return min(self.score.p_value * self.tried, 1.0)
-
-    @property
-    def statement(self) -> str:
-        """Return the effect with its size, as if it were alone."""
-        return self.model.statement(self.shape, self.score.amplitude)
-
-
-@dataclass(frozen=True)
 class FieldAnswer:
     """What a field recording by itself says.
 
@@ -61,12 +42,12 @@ class FieldAnswer:
     ----------
     global_p : float
         Chance of such measurements when nothing is hidden.
-    shown : tuple of Shown
+    shown : tuple of Scored
         Effects that would explain it about as well as the best, the best first; empty when nothing shows.
     """
 
     global_p: float
-    shown: tuple[Shown, ...]
+    shown: tuple[Scored, ...]
 
     @property
     def members(self) -> tuple[str, ...]:
@@ -96,9 +77,9 @@ def field_answer(found: FieldEvidence, library: Mapping[str, EffectModel], state
 
 def scores_of(
     whole: Evidence, library: Mapping[str, EffectModel], stated: Stated
-) -> list[Shown]:  # fmt: skip
+) -> list[Scored]:  # fmt: skip
     """Return every effect's score at its best shape, the most telling first."""
-    best: dict[str, Shown] = {}
+    best: dict[str, Scored] = {}
     tried: dict[str, int] = {}
     for name, shape in sorted({(c.effect, c.shape) for c in whole.columns if c.effect != INSTRUMENT}):
         if name not in library:
@@ -108,12 +89,12 @@ def scores_of(
             continue
         tried[name] = tried.get(name, 0) + 1
         if name not in best or result.statistic > best[name].score.statistic:
-            best[name] = Shown(library[name], shape, result, 1)
-    counted = [Shown(s.model, s.shape, s.score, tried[name]) for name, s in best.items()]
+            best[name] = Scored(library[name], shape, result, 1)
+    counted = [replace(s, tried=tried[name]) for name, s in best.items()]
     return sorted(counted, key=lambda s: -s.score.statistic)
 
 
-def location_in_field(found: FieldEvidence, shown: Sequence[Shown]) -> Location | None:
+def location_in_field(found: FieldEvidence, shown: Sequence[Scored]) -> Location | None:
     """Return where and when the field shows it; one diameter gives no exponent."""
     if not shown or found.run is None:
         return None
@@ -129,7 +110,7 @@ def location_in_field(found: FieldEvidence, shown: Sequence[Shown]) -> Location 
     )  # fmt: skip
 
 
-def _about_as_good(scores: Sequence[Shown]) -> tuple[Shown, ...]:
+def _about_as_good(scores: Sequence[Scored]) -> tuple[Scored, ...]:
     top = scores[0].score.statistic
     return tuple(s for s in scores if s.score.statistic > top - max(_APART, _ALMOST * top))
 

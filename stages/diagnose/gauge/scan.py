@@ -36,6 +36,11 @@ class Scored:
         """Chance of such a score at the best of the shapes tried when nothing is hidden."""
         return min(self.score.p_value * self.tried, 1.0)
 
+    @property
+    def statement(self) -> str:
+        """The effect with its size, as if it were alone."""
+        return self.model.statement(self.shape, self.score.amplitude)
+
 
 def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated) -> list[Scored]:
     """Return the scores of the effects not yet in the fit, the most telling first."""

@@ -12,7 +12,7 @@ from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.events import SHORTEST_S, chance
 from stages.diagnose.travel.model import EventKind, TravelFit, candidate_columns, fitted, moment
-from stages.diagnose.travel.sight import Sight, readings_at
+from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 
 # Explanations whose χ² differs by less than this (3 σ squared) are both kept.
 _APART = 9.0
@@ -149,7 +149,10 @@ def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
 
 def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     event, sight = fit.events[place_in_list], fit.sight
-    gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
+    gain_mm = float(fit.values[4 + place_in_list])
+    # Where an even motion hits the counts alike, readings of one side are rounded alike: no mean helps.
+    rounding = quantum_mm(encoder) * np.sqrt(2 / 12)
+    sigma = float(np.hypot(fit.sigma[4 + place_in_list], rounding))
     rivals = _rivals(fit, place_in_list, encoder)
     # Somewhere between two pictures; where the reading itself jumps, as long as a short slip lasts.
     within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
