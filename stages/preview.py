@@ -37,8 +37,6 @@ class PreliminarySection:
         By the encoder as it was read; NaN without one.
     diameter_mm, diameter_sigma_mm : float
         σ from the scatter of the points about the circle; the calibration is not in it.
-    roundness_mm : float
-        Robust σ of the points about the circle: relief, ovality and noise together.
     seen : float
         Share of the ring with a usable line.
     """
@@ -48,7 +46,6 @@ class PreliminarySection:
     distance_mm: float
     diameter_mm: float
     diameter_sigma_mm: float
-    roundness_mm: float
     seen: float
 
 
@@ -87,7 +84,7 @@ def _section(frame: int, time_s: float, distance_mm: float, xyz_c: Float) -> Pre
     seen = len(xy) / len(xyz_c)
     independent = max(360.0 * seen / _ALIKE, 1.0)
     sigma = 2 * spread / float(np.sqrt(independent))
-    return PreliminarySection(frame, time_s, distance_mm, 2 * radius, sigma, spread, seen)
+    return PreliminarySection(frame, time_s, distance_mm, 2 * radius, sigma, seen)
 
 
 def _reading(recording: Recording, time_s: float) -> float:

@@ -1,4 +1,4 @@
-"""A recording that is still being written: watched until it rests, shown meanwhile on a live page."""
+"""``boresight run --follow``: a recording still being written, shown on a live page until it rests."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from rich.console import Console
@@ -103,35 +102,7 @@ def _bytes(file: Path) -> int:
 _WIDTH, _HEIGHT, _SHOWN = 1000, 260, 2000
 
 
-class Shown(Protocol):
-    """What the page shows of a section."""
-
-    @property
-    def frame(self) -> int:
-        """Number of the frame."""
-
-    @property
-    def time_s(self) -> float:
-        """Time of the frame, s."""
-
-    @property
-    def distance_mm(self) -> float:
-        """Reading of the encoder, mm; NaN without one."""
-
-    @property
-    def diameter_mm(self) -> float:
-        """Diameter of the circle through the ring, mm."""
-
-    @property
-    def diameter_sigma_mm(self) -> float:
-        """1 σ of the diameter, mm."""
-
-    @property
-    def seen(self) -> float:
-        """Share of the ring with a usable line."""
-
-
-def write_live_page(name: str, sections: Sequence[Shown], state: str, folder: Path) -> None:
+def write_live_page(name: str, sections: Sequence[PreliminarySection], state: str, folder: Path) -> None:
     """Replace ``live.html`` at one stroke; it loads itself anew every two seconds while it is growing.
 
     Raises
@@ -150,7 +121,7 @@ def write_live_page(name: str, sections: Sequence[Shown], state: str, folder: Pa
         temporary.replace(folder / "live.html")
 
 
-def _chart(sections: Sequence[Shown]) -> dict[str, object] | None:
+def _chart(sections: Sequence[PreliminarySection]) -> dict[str, object] | None:
     """Return the diameter over time as points of a polyline, thinned to what a screen shows."""
     thinned = sections[:: max(1, len(sections) // _SHOWN)]
     if len(thinned) < 2:
