@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-
 import numpy as np
 
 from pipeline.machine.stage import Context
@@ -12,7 +10,6 @@ from pipeline.machine.stage import Context
 def quiet_context(seed: int = 0, workers: int = 2) -> Context:
     """Return a context that tells nobody anything."""
     return Context(
-        logging.getLogger("boresight"),
         lambda done, total: None,
         lambda name, value, unit="": None,
         np.random.default_rng(seed),

@@ -250,11 +250,6 @@ class Factor:
         own = self.band.solve(unit)[rows] + self.solved_border[rows] @ border @ self.solved_border[rows].T
         return np.asarray(own.reshape(len(frames), BLOCK, len(frames), BLOCK))
 
-    def frame_covariance(self, frames: Int) -> Float:
-        """Return (len(frames), 7, 7) marginal covariances."""
-        each = np.arange(len(frames))
-        return np.asarray(self.joint_covariance(frames)[each, :, each])
-
     def border_information(self) -> Float:
         """Return (B, B), the frames eliminated."""
         upper = np.triu(self.corner[0])

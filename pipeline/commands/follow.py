@@ -186,7 +186,7 @@ def _context(logger: logging.Logger, wish: threading.Event) -> Context:
     def report(name: str, value: float | int | str, unit: str = "") -> None:
         logger.info("live: %s = %s %s", name, value, unit)
 
-    return Context(logger, progress, report, np.random.default_rng(0))
+    return Context(progress, report, np.random.default_rng(0))
 
 
 def new_sections(

@@ -213,7 +213,7 @@ class Runner:
 
         random = np.random.default_rng(step.seed)
         scratch = Scratch(self._folder.internal)
-        return Context(self._logger, progress, report, random, self._workers, scratch, warn)
+        return Context(progress, report, random, self._workers, scratch, warn)
 
     def _stop_if_wished(self) -> None:
         if self._wish.is_set():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from types import NoneType
@@ -55,8 +54,6 @@ class Context:
 
     Attributes
     ----------
-    logger
-        For messages to the log file and, from warnings on, to the user.
     progress
         To be called now and then; raises `pipeline.errors.Cancelled` when the user stopped the run.
     report
@@ -71,7 +68,6 @@ class Context:
         Room for arrays larger than memory should hold.
     """
 
-    logger: logging.Logger
     progress: Progress
     report: Report
     random: np.random.Generator

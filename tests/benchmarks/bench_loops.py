@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -105,7 +104,7 @@ def _telling(told: dict[str, float | int | str]) -> Context:
     def tell(name: str, value: float | int | str, unit: str = "") -> None:
         told[name] = value
 
-    return replace(quiet_context(), report=tell, logger=logging.getLogger("bench_loops"))
+    return replace(quiet_context(), report=tell)
 
 
 def _print_errors(found: Trajectory, true_T_pc: Float) -> None:

@@ -12,7 +12,6 @@ compared frames of runs in which nothing is hidden. Subsets of one recording are
 from __future__ import annotations
 
 import argparse
-import logging
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -115,7 +114,7 @@ def opened(run: Path, folder: Path) -> Opened:
 
 
 def _context() -> Context:
-    return Context(logging.getLogger("bench"), lambda *_: None, lambda *_: None, np.random.default_rng(1))
+    return Context(lambda *_: None, lambda *_: None, np.random.default_rng(1))
 
 
 def hidden(run: Opened, few: Few, seed: int, only: str) -> None:
