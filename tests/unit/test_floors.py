@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,28 @@ def test_the_architecture_shows_the_same_floors() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
     rows = [f"| {name} | {', '.join(f'`{room}`' for room in rooms)} |" for name, rooms in FLOORS]
     assert "\n".join(rows) in text, "bring the table of ARCHITECTURE.md in line with FLOORS"
+
+
+def test_the_architecture_names_files_that_are_there() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
+    rows = [row for row in text.partition("## Where is")[2].splitlines() if row.startswith("| ")]
+    assert len(rows) > 30
+    assert [name for row in rows for name in absent(row)] == []
+    assert absent("| x | `pipeline/errors.py`, `gone.py`; `pipeline/gone/` |") == [
+        "gone.py",
+        "pipeline/gone/",
+    ]
+
+
+def absent(row: str) -> list[str]:
+    """Return the files of a row that are not there; a bare name lies beside or below the one before it."""
+    out, before = [], ROOT
+    for name in re.findall(r"`([\w/]+(?:\.py|\.ts|/))`", row):
+        places = [folder / name for folder in (ROOT, before, before.parent)]
+        found = next((place for place in places if place.exists()), None)
+        out += [name] if found is None else []
+        before = before if found is None else found
+    return out
 
 
 def test_private_names_stay_where_they_are() -> None:
