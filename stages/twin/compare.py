@@ -206,5 +206,7 @@ def block_contrasts(above_black: Float32, twin: TwinFrame, white_above_black: fl
         for a in (above_black, np.asarray(twin.level))
     ]
     cross, own = about(fine[0] * fine[1]), about(fine[1] ** 2)
-    known = (about(use) > 0.99) & (own > _LEAST_TEXTURE)
+    # At the border of the view light and texture end: what lies two blocks from it is no place of its own.
+    whole = cv2.erode((about(use) > 0.99).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    known = whole & (own > _LEAST_TEXTURE)
     return np.where(known, cross / np.maximum(own, _LEAST_TEXTURE), np.float32(np.nan)).astype(np.float32)
