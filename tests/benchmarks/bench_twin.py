@@ -40,7 +40,8 @@ from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.channels import FIDUCIALS, GaugeMeasured
 from stages.premises import PREMISES
 from stages.rings import RINGS
-from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, gauge_line_of, sigmas
+from stages.twin.cells import sigmas
+from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, gauge_line_of
 from tests.shared_data import PROJECT_ROOT
 
 _OPEN = ("open-1", "open-2")
@@ -133,11 +134,11 @@ def swaps(folder: Path, answers: Path, only: str) -> None:
         )
         if case.answer:
             named += 1
-            better_than_stated += sigmas(stated, own) > 0
+            better_than_stated += sigmas(stated - own) > 0
         others = [o for o in different[k % len(different) :] + different if o.name != case.name][:_WRONG]
         for other in others:
             wrong = line.chi2(line.displacement_px(other.answer))
-            told = sigmas(wrong, own)
+            told = sigmas(wrong - own)
             pairs, worse = pairs + 1, worse + (told > 0)
             print(f"  with the answer of {other.name}: {wrong.mean():.3f}, worse by {told:.1f} σ", flush=True)
         print(f"  {time.process_time() - start:.0f} s of processor time", flush=True)

@@ -11,9 +11,9 @@ from pipeline.machine.display import SilentDisplay
 from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.window import CylinderWindow
-from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, sigmas
+from stages.twin.cells import sigmas
+from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, seen_at
 from stages.twin.line_blocks import LineBlocks, light_of
-from stages.twin.placement import seen_at
 
 FRAMES, BLOCKS, PIXELS = 12, 30, 160
 NOISE = 2.0
@@ -53,9 +53,9 @@ def test_the_nearer_of_two_instruments_fits_better_and_no_difference_is_none():
     line = _line()
     azimuth = line.blocks.azimuth_rad
     near, far = (line.chi2(size * np.cos(azimuth)) for size in (0.1, 0.4))
-    assert sigmas(far, near) > 3
-    assert sigmas(near, far) < -3
-    assert sigmas(near, near) == 0
+    assert sigmas(far - near) > 3
+    assert sigmas(near - far) < -3
+    assert sigmas(near - near) == 0
 
 
 def test_a_line_that_is_predicted_nowhere_is_left_unexplained():
