@@ -54,3 +54,16 @@ class CheckedFrames:
         if encoder is not None and self.encoder_factor != 1.0:
             encoder = Encoder(encoder.time_s, encoder.distance_mm * self.encoder_factor)
         return replace(recording, frames=table, encoder=encoder)
+
+
+def withheld_frames(label: NDArray[np.str_], every: int) -> Bool:
+    """Return which frames (N,) are withheld: one in ``every`` of each light, none for 0.
+
+    The lights take turns, so that the frames beside a withheld one are measured where lights alternate.
+    """
+    withheld = np.zeros(len(label), bool)
+    kinds = np.unique(label)
+    for turn, kind in enumerate(kinds):
+        first = every * (2 * turn + 1) // (2 * len(kinds))
+        withheld[np.flatnonzero(label == kind)[first :: max(every, 1)]] = every > 0
+    return withheld

@@ -14,10 +14,11 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checked_frames import CheckedFrames, withheld_frames
 from stages.premises.light import (
     Light,
     alike,
+    copies,
     light_seen,
     pattern_breaks,
     repeated,
@@ -79,37 +80,31 @@ def check_premises(
     light = _light(recording.frames, pictures)
     story = _story(recording.frames, table, pictures, light)
     label = _labels(table, story, light, pictures)
-    steps = steps_of_wall(pictures, light)
+    copy = copies(pictures, light, _lights_of(_stated(table, story.row)), story.row)
+    label = np.where(copy, _stated(table, story.row), label)
+    steps = steps_of_wall(pictures, light, copy)
     row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder)
     time_s = row_times(table, row)
     changes = _Changes(recording.frames, label, row, story.swapped)
     _refuse_unmended(changes, parameters)
     _warn_of_frames(changes, pictures, light, table, context)
+    _warn_of(
+        recording.frames.frame[copy],
+        "show the picture before once more in place of their own and are left out: the recorder hung",
+        "nothing, if what was passed meanwhile need not be seen", context,
+    )  # fmt: skip
     radius_mm = radius_seen_mm(pictures, probe)
     check_diameter(radius_mm, recording.pipe, context)
     factor = encoder_factor(recording, time_s, steps, radius_mm, context)
     _warn_of_clock(time_s, recording, context)
     _report(pictures, radius_mm, changes, context)
-    keep = np.concatenate([[True], np.diff(row) > 0])
+    keep = np.concatenate([[True], np.diff(row) > 0]) & ~copy
     withheld = withheld_frames(label[keep], parameters.withhold)
     context.report("frames withheld from measurement", int(withheld.sum()), "frames")
     return CheckedFrames(
         recording.frames.frame[keep], time_s[keep], label[keep], factor,
         int(changes.relabelled.sum()), int(changes.retimed.sum()), withheld if withheld.any() else None,
     )  # fmt: skip
-
-
-def withheld_frames(label: Labels, every: int) -> Bool:
-    """Return which frames (N,) are withheld: one in ``every`` of each light, none for 0.
-
-    The lights take turns, so that the frames beside a withheld one are measured where lights alternate.
-    """
-    withheld = np.zeros(len(label), bool)
-    kinds = np.unique(label)
-    for turn, kind in enumerate(kinds):
-        first = every * (2 * turn + 1) // (2 * len(kinds))
-        withheld[np.flatnonzero(label == kind)[first :: max(every, 1)]] = every > 0
-    return withheld
 
 
 def _table(recording: Recording) -> FrameTable:
@@ -121,6 +116,10 @@ def _table(recording: Recording) -> FrameTable:
 
 def _lights_of(illumination: Labels) -> Int:
     return np.where(illumination == _LASER, int(Light.LINE), int(Light.WALL))
+
+
+def _stated(table: FrameTable, row: Int) -> Labels:
+    return np.asarray(table.illumination[np.clip(row, 0, len(table.frame) - 1)])
 
 
 def _light(frames: FrameTable, pictures: Pictures) -> Int:
@@ -168,12 +167,14 @@ def _story(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int
         return Story(rows_of_repeats(rows, pictures) if lit else rows, np.zeros(count, bool))
     if not wrong.any():
         return Story(np.arange(count), np.zeros(count, bool))
-    return cheapest_story(Lights(light, stated, pattern_breaks(light), repeated(pictures, light)))
+    again = repeated(pictures, light)
+    told = np.where(again, Light.UNKNOWN, light)  # of a picture shown twice nothing tells its own light
+    return cheapest_story(Lights(told, stated, pattern_breaks(light), again))
 
 
 def _labels(table: FrameTable, story: Story, light: Int, pictures: Pictures) -> Labels:
     """Return the illumination (F,) of every picture: as it shows, else as its row states."""
-    stated = table.illumination[np.minimum(story.row, len(table.frame) - 1)]
+    stated = _stated(table, story.row)
     led, both = stated == _LED, stated == _BOTH
     wall = _LED if led.sum() >= both.sum() else _BOTH
     if led.any() and both.any() and alike(pictures, led, both):
@@ -288,7 +289,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: _Changes, context: Co
 
 PREMISES = Stage(
     "premises",
-    "2",
+    "3",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

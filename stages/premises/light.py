@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
+from scipy.ndimage import label, maximum_filter1d, median_filter, minimum_filter1d
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Int
@@ -160,11 +160,14 @@ class Steps:
     size: Float
 
 
-def steps_of_wall(pictures: Pictures, light: Int) -> Steps:
-    """Return the steps between pictures that both show the lit wall; all there are where light is unknown."""
+def steps_of_wall(pictures: Pictures, light: Int, copy: Bool) -> Steps:
+    """Return the steps between pictures that both show the lit wall; all there are where light is unknown.
+
+    A picture that is a ``copy`` (F,) of the one before has the place of the first of its copies.
+    """
     known = bool(np.any(light != Light.UNKNOWN))
-    end = np.flatnonzero(pictures.partner >= 0)
-    start = pictures.partner[end]
+    end = np.flatnonzero((pictures.partner >= 0) & ~copy)
+    start = np.maximum.accumulate(np.where(copy, 0, np.arange(len(copy))))[pictures.partner[end]]
     use = ((light[end] == Light.WALL) & (light[start] == Light.WALL)) | np.full(len(end), not known)
     use &= np.isfinite(pictures.step[end])
     return Steps(start[use], end[use], pictures.step[end[use]])
@@ -259,3 +262,16 @@ def repeated(pictures: Pictures, light: Int) -> Bool:
         if compared.any():
             out |= like & follows & (pictures.change < _STANDS * np.median(pictures.change[compared]))
     return out
+
+
+def copies(pictures: Pictures, light: Int, stated: Int, row: Int) -> Bool:
+    """Return (F,) true for pictures that are the one before once more, in place of their own.
+
+    A recorder that hangs stores one picture for some frames, and the table goes on. ``stated`` (F,) is the
+    light that the ``row`` (F,) of every picture states: where lights take turns, a run of copies contradicts
+    it. Where the probe merely stands, each light repeats its own picture and nothing is contradicted.
+    """
+    again = repeated(pictures, light) & (np.diff(row, prepend=-1) > 0)
+    runs, _ = label(again)
+    contradicted = np.unique(runs[again & (light != stated)])
+    return np.asarray(again & np.isin(runs, contradicted))

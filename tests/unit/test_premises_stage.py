@@ -214,6 +214,20 @@ def test_repeated_pictures_are_left_out(good, run):
     assert any("repeat the picture before" in t for t in told)
 
 
+@pytest.mark.parametrize("first", [21, 22], ids=["led", "laser"])
+@pytest.mark.parametrize("count", [1, 6, 15])
+def test_pictures_of_a_recorder_that_hung_are_left_out_and_all_times_stay(first, count, good, run):
+    frame = np.arange(COUNT)
+    hung = (frame > first) & (frame <= first + count)
+    spoiled = replace(good, source=KeptFrames(good.source, np.where(hung, first, frame)))
+    found, told = checked(spoiled, run.probe)
+    assert found.frame.tolist() == frame[~hung].tolist()
+    np.testing.assert_allclose(found.time_s, good.frames.time_s[~hung])
+    assert np.array_equal(found.illumination, good.frames.illumination[~hung])
+    assert len(told) == 1
+    assert f"{count} pictures show the picture before once more" in told[0]
+
+
 @pytest.mark.parametrize("replaced", [False, True])
 def test_a_repeated_picture_in_one_light_is_left_out(good, run, replaced):
     lit = np.flatnonzero(good.frames.illumination == "led")

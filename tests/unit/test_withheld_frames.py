@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.recording.base import FrameTable, Illumination, PipeFacts, Recording
-from pipeline.recording.checked_frames import WITHHELD, CheckedFrames
-from stages.premises import PremisesParameters, withheld_frames
+from pipeline.recording.checked_frames import WITHHELD, CheckedFrames, withheld_frames
+from stages.premises import PremisesParameters
 
 
 def _recording(table):
