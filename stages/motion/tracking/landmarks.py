@@ -42,8 +42,8 @@ class LandmarkMap:
         No longer looked for.
     misses : (L,) int
         Times in a row that it was not found.
-    patches : list of Patches
-        Appearance, in batches.
+    patches : Patches
+        Appearance of the first L; the arrays may have room for more.
     found : int
         Landmarks found so far, dropped ones included.
     """
@@ -56,28 +56,22 @@ class LandmarkMap:
     born: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     retired: Bool = field(default_factory=lambda: np.zeros(0, bool))
     misses: Int = field(default_factory=lambda: np.zeros(0, np.int64))
-    patches: list[Patches] = field(default_factory=list)
+    patches: Patches = field(init=False)
     found: int = 0
 
-    def patches_of(self, index: Int) -> Patches:
-        """Return the patches of landmarks at places (N,) as one batch."""
-        starts = self._starts()
-        batch = np.searchsorted(starts, index, side="right") - 1
-        if not index.size:
-            return Patches.none(2 * self.half + 1)
-        parts = [(self.patches[b], index[batch == b] - starts[b]) for b in np.unique(batch)]
-        return Patches.joined([p.of(i) for p, i in parts])
+    def __post_init__(self) -> None:
+        self.patches = Patches.none(2 * self.half + 1)
 
     def add(self, at: Float, born: int, patches: Patches) -> None:
         """Add landmarks at strip positions (N, 2)."""
         n = len(at)
+        self.patches = self.patches.followed_by(len(self.number), patches)
         self.number = np.append(self.number, self.found + np.arange(n))
         self.row, self.column = np.append(self.row, at[:, 0]), np.append(self.column, at[:, 1])
         self.offset = np.concatenate([self.offset, np.zeros((n, 2))])
         self.born = np.append(self.born, np.full(n, born))
         self.retired = np.append(self.retired, np.zeros(n, bool))
         self.misses = np.append(self.misses, np.zeros(n, np.int64))
-        self.patches.append(patches)
         self.found += n
 
     @property
@@ -87,15 +81,11 @@ class LandmarkMap:
 
     def drop_retired(self) -> Int:
         """Forget retired landmarks, so that the work of a frame does not grow; return their numbers."""
-        dropped, keep, starts = self.number[self.retired], ~self.retired, self._starts()
-        kept = [p.of(keep[a:b]) for p, a, b in zip(self.patches, starts[:-1], starts[1:], strict=True)]
-        self.patches = [p for p in kept if len(p.value)]
+        dropped, keep = self.number[self.retired], ~self.retired
+        self.patches = self.patches.of(np.flatnonzero(keep))
         for name in ("number", "row", "column", "offset", "born", "retired", "misses"):
             setattr(self, name, getattr(self, name)[keep])
         return np.asarray(dropped)
-
-    def _starts(self) -> Int:
-        return np.cumsum([0] + [len(p.value) for p in self.patches])
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ eliminated by matching zero-mean patches and scaling by the least-squares gain.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -46,23 +45,26 @@ class Patches:
     @property
     def sigma_per_noise(self) -> Float:
         """Return 1 σ (N,), strip samples, of a match in noise of 1 σ = 1 per sample (Cramér-Rao bound)."""
-        return np.asarray(np.sqrt(np.trace(self._covariance, axis1=1, axis2=2) / 2))
-
-    @property
-    def _covariance(self) -> Float:
-        return np.asarray(np.linalg.inv(self.information + _REGULAR * np.eye(2)))
+        return _sigma(self._covariance(np.arange(len(self.value))))
 
     def of(self, index: Int | Bool) -> Patches:
         """Return some of the patches."""
         return Patches(*(getattr(self, name)[index] for name in _FIELDS))
 
-    def match(self, contrast: Float32, usable: Bool, row: Float, column: Float) -> Matches:
-        """Find the patches near predicted positions (N,) in a strip (H, W), up to half a patch away."""
+    def match(
+        self, contrast: Float32, usable: Bool, row: Float, column: Float, index: Int | None = None
+    ) -> Matches:
+        """Find patches near predicted positions (N,) in a strip (H, W), up to half a patch away.
+
+        ``index`` (N,) says which patches; without it, all.
+        """
+        index = np.arange(len(self.value)) if index is None else index
+        covariance = self._covariance(index)
         offset, correlation, residual = _match(
             *_wrapped(contrast, usable, self.value.shape[1]), contrast.shape[1],
-            self.value, self.by_row, self.by_column, self._covariance, row, column, _MOST_STEPS,
+            self.value, self.by_row, self.by_column, index, covariance, row, column, _MOST_STEPS,
         )  # fmt: skip
-        return Matches(offset, correlation, residual * self.sigma_per_noise)
+        return Matches(offset, correlation, residual * _sigma(covariance))
 
     @staticmethod
     def none(side: int) -> Patches:
@@ -70,10 +72,22 @@ class Patches:
         empty = np.zeros((0, side, side), np.float32)
         return Patches(empty, empty, empty, np.zeros((0, 2, 2)))
 
-    @staticmethod
-    def joined(parts: Sequence[Patches]) -> Patches:
-        """Return several batches as one."""
-        return Patches(*(np.concatenate([getattr(p, name) for p in parts]) for name in _FIELDS))
+    def followed_by(self, count: int, more: Patches) -> Patches:
+        """Return the first ``count`` patches and ``more``, in the same arrays while these have room."""
+        end = count + len(more.value)
+        arrays = [getattr(self, name) for name in _FIELDS]
+        if end > len(self.value):
+            arrays = [np.resize(a[:count], (2 * end, *a.shape[1:])) for a in arrays]
+        for array, name in zip(arrays, _FIELDS, strict=True):
+            array[count:end] = getattr(more, name)
+        return Patches(*arrays)
+
+    def _covariance(self, index: Int) -> Float:
+        return np.asarray(np.linalg.inv(self.information[index] + _REGULAR * np.eye(2)))
+
+
+def _sigma(covariance: Float) -> Float:
+    return np.asarray(np.sqrt(np.trace(covariance, axis1=1, axis2=2) / 2))
 
 
 _FIELDS = tuple(Patches.__dataclass_fields__)
@@ -200,14 +214,14 @@ def _match_one(contrast, unusable, width, template, by_row, by_column, own, inve
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _match(contrast, unusable, width, value, by_row, by_column, inverse, row, column, steps):  # type: ignore[no-untyped-def]
-    """Return offset (N, 2), correlation (N,) and residual 1 σ (N,) in a strip of ``_wrapped``."""
-    count, n = value.shape[0], value.shape[1]
+def _match(contrast, unusable, width, value, by_row, by_column, index, inverse, row, column, steps):  # type: ignore[no-untyped-def]
+    """Return offset (N, 2), correlation (N,) and residual 1 σ (N,) of patches in a strip of ``_wrapped``."""
+    count, n = len(index), value.shape[1]
     offset = np.full((count, 2), np.nan)
     correlation = np.zeros(count)
     residual = np.full(count, np.nan)
     for k in range(count):
-        t, r, c = value[k], by_row[k], by_column[k]
+        t, r, c = value[index[k]], by_row[index[k]], by_column[index[k]]
         sr = sc = tr = tc = tt = np.float32(0)
         for i in range(n):
             for j in range(n):

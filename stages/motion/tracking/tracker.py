@@ -166,7 +166,7 @@ class TextureTracker:
         # Landmarks retire after some time, so that new ones take their places should the probe come back.
         m.retired |= frame - m.born >= self._parameters.max_track_frames
         near = np.flatnonzero(self._in_view(strip, guess) & ~m.retired)
-        found = m.patches_of(near).match(strip.contrast, strip.usable, guess[near, 0], guess[near, 1])
+        found = m.patches.match(strip.contrast, strip.usable, guess[near, 0], guess[near, 1], near)
         at = guess[near] + found.offset + np.array([strip.first_row, 0])
         good = (found.correlation > self._parameters.min_correlation) & np.isfinite(at).all(1)
         good &= found.sigma < _LARGEST_SIGMA * self._parameters.landmark_sigma_px
