@@ -121,4 +121,4 @@ def _rings(state: State, noise: float, random: np.random.Generator, unsure: int,
     xyz_c = xyz_c + noise * 0.05 * random.standard_normal(len(xyz_c))[:, None] * outward
     by_instrument = random.standard_normal((len(xyz_c), 3, unsure)) * 0.01
     frame = np.repeat(np.arange(len(state.T_pc)), bins)
-    return RingBins(frame, xyz_c, by_instrument, np.full(len(xyz_c), 0.05))
+    return RingBins(frame, xyz_c, by_instrument, 0.2 * outward, 0 * by_instrument, np.full(len(xyz_c), 0.05))

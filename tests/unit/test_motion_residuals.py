@@ -12,10 +12,13 @@ from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.motion_priors import smooth_motion_rows, third_difference_coefficients
 from pipeline.adjustment.robust import GemanMcClure
 from pipeline.arrays import Float
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.equations import landmark_rows
 from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
+from stages.motion.rings import ring_bins
+from tests.gauge_runs import stated_probe
 from tests.motion_scene import displaced, scene
 
 H = 1e-5
@@ -55,6 +58,33 @@ def check_rows(
     for b in range(state.border_size):
         wanted = slope(lambda s: make(s).residual, state, border=b)
         np.testing.assert_allclose(rows.by_border[:, b], wanted, atol=border_atol, err_msg=f"border {b}")
+
+
+def test_relief_of_the_wall_does_not_pull_on_the_instrument() -> None:
+    """Rings of a rough wall, seen by the true probe: residual and derivative may have nothing in common."""
+    random, azimuth = np.random.default_rng(4), np.linspace(-np.pi, np.pi, 720, endpoint=False)
+    probe, rough_mm, frames = stated_probe(), 1.0, 60
+    radius_mm = 50 + rough_mm * random.standard_normal((frames, len(azimuth)))
+    wall = np.stack([radius_mm * np.cos(azimuth), radius_mm * np.sin(azimuth), 0 * radius_mm], -1)
+    wall[..., 2] = probe.laser.baseline_mm
+    uv = probe.camera.project(wall).uv - probe.camera.centre_px
+    radius_px = np.linalg.norm(uv, axis=-1).astype(np.float32)
+    alike = np.full(radius_px.shape, 0.01, np.float32)
+    valid = np.full(radius_px.shape, RingValidity.VALID, np.uint8)
+    samples = RingSamples(
+        np.arange(frames), azimuth, probe.camera.centre_px, radius_px, alike, alike, alike, valid
+    )
+    bins = ring_bins(samples, np.arange(frames), probe, 720, 0.1)
+    off, normal_c = np.hypot(*bins.xyz_c[:, :2].T) - 50, bins.xyz_c * [1.0, 1.0, 0.0]
+    normal_c /= np.linalg.norm(normal_c, axis=1)[:, None]
+
+    def pull(by_instrument: Float) -> Float:
+        """Return by how many σ the residuals pull on each correction."""
+        score = off[:, None] * np.einsum("mj,mjq->mq", normal_c, by_instrument)
+        return np.abs(score.sum(0)) / np.sqrt(np.sum(score**2, 0))
+
+    assert pull(bins.instrument_where_expected(off, normal_c)).max() < 3.5
+    assert pull(bins.by_instrument).max() > 5, "the control: derivatives at the found ring pull"
 
 
 def test_ring_rows(given) -> None:

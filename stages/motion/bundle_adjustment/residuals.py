@@ -61,7 +61,8 @@ def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
     turn = -np.einsum("mj,mjk->mk", normal_c, skew(xyz_c))
     first = state.border_size - len(state.instrument)
-    by_border[:, first : first + unsure] = np.einsum("mj,mjq->mq", normal_c, rings.by_instrument)
+    by_instrument = rings.instrument_where_expected(residual, normal_c)
+    by_border[:, first : first + unsure] = np.einsum("mj,mjq->mq", normal_c, by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
     by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
     return Rows(rings.frame[:, None], by_frame, by_border, residual, rings.sigma_mm, loss)
