@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from pipeline.commands import Assignments, ConfigFile
 from pipeline.errors import BoresightError, Cancelled, UnusableError
 
 if TYPE_CHECKING:
@@ -88,14 +89,6 @@ class _Commands(TyperGroup):
 
 app = typer.Typer(name="boresight", cls=_Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 
-_ConfigFile = Annotated[
-    Path | None, typer.Option("--config", metavar="FILE", help="Parameters (YAML); see: boresight config.")
-]
-_Assignments = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="One parameter; may be repeated."),
-]
-
 
 def _tell_version(wanted: bool) -> None:
     if wanted:
@@ -121,8 +114,8 @@ def run(
     probe: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Probe to use in place of the recording's own.")
     ] = None,
-    config: _ConfigFile = None,
-    assignments: _Assignments = None,
+    config: ConfigFile = None,
+    assignments: Assignments = None,
     twin: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Keep the dirt out of the photo that this twin found.")
     ] = None,
@@ -181,8 +174,8 @@ def stages() -> None:
 
 @app.command(rich_help_panel=_INSPECT)
 def config(
-    file: _ConfigFile = None,
-    assignments: _Assignments = None,
+    file: ConfigFile = None,
+    assignments: Assignments = None,
     default: Annotated[
         bool, typer.Option("--default", help="Print the defaults with meaning, unit and range.")
     ] = False,

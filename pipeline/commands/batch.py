@@ -11,6 +11,7 @@ from rich.console import Console
 
 from pipeline.batch import BatchOutcome, Work, find_recordings, write_summary
 from pipeline.batch.cluster import Cluster, LocalWorkers, RunningScheduler, outcomes, read_cluster, workers
+from pipeline.commands import Assignments
 from pipeline.errors import InputError
 from pipeline.files.disk import disk_errors_named
 from pipeline.machine.configuration import resolve
@@ -36,9 +37,7 @@ def batch(
     config: Annotated[
         Path | None, typer.Option(metavar="FILE", help="parameters, and perhaps the cluster (YAML)")
     ] = None,
-    assignments: Annotated[
-        list[str] | None, typer.Option("--set", metavar="STAGE.NAME=VALUE", help="one parameter")
-    ] = None,
+    assignments: Assignments = None,
 ) -> None:
     """Run every recording below a folder; one that fails stops no other.
 

@@ -11,17 +11,16 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.api import calibrate as calibration
-from pipeline.commands.working import Assignments, ConfigFile, print_warnings
+from pipeline.commands import Assignments, ConfigFile, ResultFolder, StatedProbe
+from pipeline.commands.working import print_warnings
 from pipeline.machine.display import ProgressDisplay
 from stages.calibrate.gauge import GaugeCalibration
 
 
 def calibrate(
     gauge: Annotated[Path, typer.Argument(help="recording of a run through a gauge")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")],
-    probe: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="stated probe, in place of the recording's own")
-    ] = None,
+    output: ResultFolder,
+    probe: StatedProbe = None,
     config: ConfigFile = None,
     assignments: Assignments = None,
 ) -> None:

@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.api.job import Job, result_of, value_source
-from pipeline.commands.working import Assignments, ConfigFile, worked
+from pipeline.commands import Assignments, ConfigFile, ResultFolder
+from pipeline.commands.working import worked
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable
 from pipeline.files.provenance import MadeBy
@@ -83,9 +84,7 @@ def calibrate_camera(
     file_format: Annotated[
         str | None, typer.Option("--format", help=f"also write the camera as {', '.join(WRITTEN)}")
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="folder for the results")] = Path(
-        "camera-calibration"
-    ),
+    output: ResultFolder = Path("camera-calibration"),
     config: ConfigFile = None,
     assignments: Assignments = None,
 ) -> None:

@@ -13,8 +13,9 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.api.job import Job, result_of, value_source
+from pipeline.commands import Assignments, ConfigFile, ResultFolder
 from pipeline.commands.calibrate_camera import BoardKind, describe_board
-from pipeline.commands.working import Assignments, ConfigFile, worked
+from pipeline.commands.working import worked
 from pipeline.files.disk import require_writable
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera import Camera
@@ -52,9 +53,7 @@ def calibrate_laser(
     probe: Annotated[
         Path | None, typer.Option(metavar="FILE", help="probe file to write again with camera and plane")
     ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")] = (
-        Path("laser-calibration")
-    ),
+    output: ResultFolder = (Path("laser-calibration")),
     config: ConfigFile = None,
     assignments: Assignments = None,
 ) -> None:

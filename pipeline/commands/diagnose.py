@@ -9,20 +9,19 @@ import typer
 from rich.console import Console
 
 from pipeline.api.diagnosis import diagnose as diagnosis
-from pipeline.commands.working import Assignments, ConfigFile, print_warnings
+from pipeline.commands import Assignments, ConfigFile, ResultFolder, StatedProbe
+from pipeline.commands.working import print_warnings
 from pipeline.machine.display import ProgressDisplay
 from stages.diagnose.drill.answer import Answer
 
 
 def diagnose(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")],
+    output: ResultFolder,
     field: Annotated[Path | None, typer.Argument(help="recording of an inspection")] = None,
     gauge: Annotated[
         Path | None, typer.Option(metavar="GAUGE", help="recording of the same probe's run through a gauge")
     ] = None,
-    probe: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="stated probe, in place of the recording's own")
-    ] = None,
+    probe: StatedProbe = None,
     without: Annotated[
         list[str] | None,
         typer.Option("--without", metavar="NAME", help="leave an effect out of the library; repeatable"),

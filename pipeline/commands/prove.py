@@ -13,6 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from pipeline.commands import ResultFolder
 from pipeline.commands.prove_cases import (
     Drawing,
     NotRenderedError,
@@ -93,7 +94,7 @@ def _trial(trial: Trial) -> dict[str, Any]:
 
 
 def prove(
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")],
+    output: ResultFolder,
     sealed: Annotated[
         Path | None, typer.Option(metavar="DIR", help="recordings from elsewhere, NAME-gauge and NAME-field")
     ] = None,

@@ -13,13 +13,14 @@ from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.job import result_of
 from pipeline.api.twin import twin_job
 from pipeline.artefacts.twin import Twin
-from pipeline.commands.working import Assignments, worked
+from pipeline.commands import Assignments, ResultFolder
+from pipeline.commands.working import worked
 from pipeline.machine.display import ProgressDisplay
 
 
 def twin(
     run: Annotated[Path, typer.Argument(help="run folder, best of a run with --set premises.withhold=10")],
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")],
+    output: ResultFolder,
     diagnosis: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="diagnosis whose corrected probe takes the place of the run's"),

@@ -19,7 +19,8 @@ from scipy.stats import binned_statistic_2d
 
 from pipeline.api.job import Job, value_source
 from pipeline.artefacts.wall_map import WallMap
-from pipeline.commands.working import Assignments, ConfigFile, worked
+from pipeline.commands import Assignments, ConfigFile
+from pipeline.commands.working import worked
 from pipeline.errors import InputError
 from pipeline.files.json_yaml import read_json
 from pipeline.files.provenance import MadeBy

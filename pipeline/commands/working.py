@@ -1,26 +1,15 @@
-"""What commands that compute have in common: their parameters, and the progress that they show."""
+"""A job run by a command: its progress shown, its warnings printed."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.console import Console
 
 from pipeline.api.job import Job, run_job
 from pipeline.machine.display import ProgressDisplay
 from pipeline.machine.outcome import RunOutcome, warnings_of
 from pipeline.machine.plan import Selection
-
-ConfigFile = Annotated[
-    Path | None, typer.Option("--config", metavar="FILE", help="parameters by stage (YAML)")
-]
-Assignments = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="one parameter; may be repeated"),
-]
 
 
 def worked(job: Job, console: Console) -> RunOutcome:
