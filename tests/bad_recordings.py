@@ -114,3 +114,28 @@ def is_laser(frame: int) -> bool:
 def noise(frame: int, picture: Image) -> Image:
     """Return a picture of noise: what a camera sees that is nowhere near a wall."""
     return np.random.default_rng(frame).normal(60, 12, picture.shape).clip(0, 255).astype(np.uint8)
+
+
+def without(file: str) -> Spoil:
+    return lambda folder: (folder / file).unlink()
+
+
+def emptied(file: str) -> Spoil:
+    return lambda folder: (folder / file).write_text("")
+
+
+def black(_: int, picture: np.ndarray) -> np.ndarray:
+    return np.zeros_like(picture)
+
+
+def lights_swapped(lines: list[str]) -> list[str]:
+    other = {"laser": "led", "led": "laser"}
+    return [",".join([*line.split(",")[:2], other[line.split(",")[2].strip()] + "\n"]) for line in lines]
+
+
+def spoilt(good: Path, folder: Path, spoil: Spoil) -> Path:
+    """Return a copy of a recording below a folder, spoilt."""
+    copy = folder / "recording"
+    shutil.copytree(good, copy)
+    spoil(copy)
+    return copy

@@ -24,9 +24,8 @@ TILE_PX = 8
 # Precision of a hit at a corner, which only begins the search for others, and of a pixel's, mm: a hundredth
 # of what a pixel spans in a 2 inch bore.
 _CLOSE_START_MM, _CLOSE_MM = 0.05, 1e-3
-# A lobe cos^2h is left out where it is below e^-9 of its peak. A lamp lies at most half a bore's radius
-# beside the camera: the cosine towards it is at most 1.28 times that towards the camera, and cos² halfway
-# is below 1.3 facing².
+# A lobe cos^2h is left out below e^-9 of its peak. A lamp lies at most half a bore's radius off the camera:
+# the cosine towards it is at most 1.28 times that towards the camera, and cos² halfway below 1.3 facing².
 _LOBE_ENDS, _LAMP_FACING = 9.0, 1.3
 # How much the cosine to the optical axis may differ within a tile: 11 px at 200 px a radian.
 _AHEAD_ROOM = 0.06
@@ -39,10 +38,8 @@ class Corners(NamedTuple):
     ----------
     ray : (rows, columns, 6)
         Origin and direction in W; NaN where no ray maps.
-    ahead : (rows, columns)
-        Cosine to the optical axis.
-    way, distance_mm : (rows, columns)
-        Of the hit; NaN where there is none.
+    ahead, way, distance_mm : (rows, columns)
+        Cosine to the optical axis; way and distance of the hit, NaN where there is none.
     """
 
     ray: Float
@@ -134,10 +131,8 @@ def _add_tiles(
         for u in range(0, image.shape[1], TILE_PX):
             i, j = v // TILE_PX + margin, u // TILE_PX + margin
             ahead = corners.ahead
-            if (
-                max(max(ahead[i, j], ahead[i, j + 1]), max(ahead[i + 1, j], ahead[i + 1, j + 1]))
-                < least - _AHEAD_ROOM
-            ):
+            most = max(max(ahead[i, j], ahead[i, j + 1]), max(ahead[i + 1, j], ahead[i + 1, j + 1]))
+            if most < least - _AHEAD_ROOM:
                 continue
             for n in range(samples * samples):
                 _add_tile(view, corners, lamps, share, weights, samples, n, k, T, v, u, v_to, room, image)
@@ -161,10 +156,8 @@ def _add_tile(
         _write_row(corners.ray, i, j, weights, y, first, room.nodes)
         for c in range(first):
             room.work.w_ray[c] = view.pose[min(v, view.pose.shape[0] - 1), k, c, 3]
-        way_left, way_right = (
-            (1 - h) * way[i, j] + h * way[i + 1, j],
-            (1 - h) * way[i, j + 1] + h * way[i + 1, j + 1],
-        )
+        way_left = (1 - h) * way[i, j] + h * way[i + 1, j]
+        way_right = (1 - h) * way[i, j + 1] + h * way[i + 1, j + 1]
         s_left = (1 - h) * distance[i, j] + h * distance[i + 1, j]
         s_right = (1 - h) * distance[i, j + 1] + h * distance[i + 1, j + 1]
         for u in range(u_from, min(u_from + TILE_PX, image.shape[1])):
@@ -301,7 +294,6 @@ def _narrow_light(
         if forward > 0.0 and square > 0.0:
             along = (x * ray[3] + y * ray[4] + z * ray[5]) * near
             sheen = sheen_at(texture, (square + facing) ** 2 / (2.0 + 2.0 * along))
-            light += (
-                lamps.share[n] * (even + (1.0 - even) * forward**lamps.lobe) * square * near * near * sheen
-            )
+            value = lamps.share[n] * (even + (1.0 - even) * forward**lamps.lobe)
+            light += value * square * near * near * sheen
     return REFERENCE_MM * REFERENCE_MM * light

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-import shutil
 import subprocess
 import sys
 import time
@@ -18,14 +17,19 @@ import pytest
 from pipeline.cli import main
 from tests.bad_recordings import (
     Spoil,
+    black,
     cut_sample,
+    emptied,
     is_laser,
+    lights_swapped,
     noise,
     noised,
     repainted,
     replaced,
     rewritten,
+    spoilt,
     truncated,
+    without,
 )
 from tests.disk_limit import file_size_limit
 from tests.shared_data import PROJECT_ROOT
@@ -62,21 +66,6 @@ def boresight(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str
         return Told(code, told.out, " ".join(told.err.split()))
 
     return call
-
-
-def spoilt(good: Path, folder: Path, spoil: Spoil) -> Path:
-    copy = folder / "recording"
-    shutil.copytree(good, copy)
-    spoil(copy)
-    return copy
-
-
-def without(file: str) -> Spoil:
-    return lambda folder: (folder / file).unlink()
-
-
-def emptied(file: str) -> Spoil:
-    return lambda folder: (folder / file).write_text("")
 
 
 REFUSALS: dict[str, tuple[Spoil, tuple[str, ...]]] = {
@@ -121,15 +110,6 @@ def test_inputs_that_cannot_be_read(
     assert [m for m in messages if not any(part in told.err for part in m.split("|"))] == []
     assert "Traceback" not in told.err
     assert not (tmp_path / "run").exists()
-
-
-def black(_: int, picture: np.ndarray) -> np.ndarray:
-    return np.zeros_like(picture)
-
-
-def lights_swapped(lines: list[str]) -> list[str]:
-    other = {"laser": "led", "led": "laser"}
-    return [",".join([*line.split(",")[:2], other[line.split(",")[2].strip()] + "\n"]) for line in lines]
 
 
 UNUSABLES: dict[str, Spoil] = {

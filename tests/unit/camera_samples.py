@@ -59,3 +59,65 @@ def sample_directions(camera: Camera, share: float = 0.97) -> np.ndarray:
     theta = np.concatenate([[0.0, 1e-9, 1e-4], np.linspace(0.01, share * widest_angle(camera), 40)])
     psi = np.linspace(-np.pi, np.pi, 23, endpoint=False)
     return directions(theta[:, None], psi[None, :]).reshape(-1, 3)
+
+
+KALIBR = """
+cam0:
+  cam_overlaps: []
+  camera_model: omni
+  distortion_coeffs: [-0.3, 0.1, 0.001, -0.002]
+  distortion_model: radtan
+  intrinsics: [1.4, 900.0, 901.0, 640.5, 400.5]
+  resolution: [1280, 800]
+  rostopic: /camera
+"""
+
+OPENCV = """%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 300., 0., 320., 0., 301., 240., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 4
+   cols: 1
+   dt: d
+   data: [ 1.e-01, 2.0e-02, 0., 0. ]
+fisheye_model: 1
+"""
+
+OCAMCALIB = """#direct
+5 -520.5652 0.0 8.352995e-04 -7.676461e-07 8.237295e-10
+
+#inverse
+12 825.895938 495.981451 -42.499088 56.094452 59.572411 -34.740913 16.605677 73.767555 -6.589434 -64.870872 \
+-37.527006 -6.759911
+
+#center
+553.766179 962.534189
+#affine
+1.000305 -0.000492 -0.001864
+#size
+1080 1920
+"""
+
+CAMODOCAL = """%YAML:1.0
+model_type: KANNALA_BRANDT
+camera_name: camera
+image_width: 1296
+image_height: 972
+projection_parameters:
+   k2: 9.8467e-02
+   k3: -3.27869e-02
+   k4: -8.5313419e-04
+   k5: 3.5386e-04
+   mu: 2.7299e+02
+   mv: 2.7297e+02
+   u0: 5.7735e+02
+   v0: 5.0894e+02
+"""
+
+GOOD = {"opencv": OPENCV, "kalibr": KALIBR, "ocamcalib": OCAMCALIB, "camodocal": CAMODOCAL}

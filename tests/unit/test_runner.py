@@ -8,9 +8,8 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from pipeline.api.job import Job, result_of, run_job
+from pipeline.api.job import result_of, run_job
 from pipeline.errors import Cancelled, InputError, UnusableError
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
@@ -27,7 +26,6 @@ from pipeline.machine.plan import PipelineError, Selection
 from pipeline.machine.runner import FailedError
 from pipeline.machine.stage import Context, Parameters, Stage
 from tests.disk_limit import file_size_limit
-from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
 from tests.toy_stages import DRAW, SMOOTH, TOYS, WEIGH, Drawn, DrawParameters, Total, Weighed
 from tests.toys import run_toys, toy_job
@@ -191,42 +189,6 @@ def test_ctrl_c_stops_at_the_next_progress(tmp_path: Path) -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
-@dataclass(frozen=True)
-class Left:
-    value: float
-
-
-@dataclass(frozen=True)
-class Right:
-    value: float
-
-
-_MEETING = threading.Barrier(2, timeout=patience(60))
-
-
-def go_left(drawn: Drawn, *, parameters: Parameters, context: Context) -> Left:
-    _MEETING.wait()
-    return Left(1.0)
-
-
-def go_right(drawn: Drawn, *, parameters: Parameters, context: Context) -> Right:
-    _MEETING.wait()
-    return Right(2.0)
-
-
-def fail_left(drawn: Drawn, *, parameters: Parameters, context: Context) -> Left:
-    _MEETING.wait()
-    raise UnusableError("left", "there is no way")
-
-
-def linger_right(drawn: Drawn, *, parameters: Parameters, context: Context) -> Right:
-    _MEETING.wait()
-    for _ in range(3000):
-        time.sleep(0.01)
-        context.progress(1, 2)
-    raise AssertionError("it went on")
-
-
 @pytest.mark.parametrize(("stages", "weighed"), [((DRAW,), "nothing else"), (TOYS, "the total")])
 def test_a_stage_is_given_none_for_what_no_stage_makes(
     tmp_path: Path, stages: tuple[Stage, ...], weighed: str
@@ -250,27 +212,6 @@ def test_linear_algebra_runs_on_one_thread_whatever_the_number_of_cores(tmp_path
         run_job(job, Selection(), SilentDisplay())
         assert count_threads(None, parameters=Parameters(), context=None).value == 2, "given back"  # type: ignore[arg-type]
     assert result_of(job, Weighed).value == 1
-
-
-def forked_job(folder: Path, left: Any, right: Any) -> Job:
-    stages = (DRAW, Stage("left", "1", Parameters, left), Stage("right", "1", Parameters, right))
-    return replace(toy_job(folder), stages=stages, exporters=(), configuration=resolve(stages, None, ()))
-
-
-def test_stages_that_need_nothing_of_each_other_run_side_by_side(tmp_path: Path) -> None:
-    """Each waits for the other: one after the other, they would wait for ever."""
-    outcome = run_job(forked_job(tmp_path / "run", go_left, go_right), Selection(), SilentDisplay())
-    assert states(outcome) == ["completed"] * 3
-    assert [s.name for s in outcome.stages] == ["draw", "left", "right"]
-
-
-def test_a_stage_that_fails_stops_the_one_beside_it(tmp_path: Path) -> None:
-    with pytest.raises(UnusableError, match="there is no way"):
-        run_job(forked_job(tmp_path / "run", fail_left, linger_right), Selection(), SilentDisplay())
-    told = record(tmp_path / "run")
-    assert told["state"] == "unusable"
-    assert [s["state"] for s in told["stages"]] == ["completed", "unusable", "cancelled"]
-    assert told["stages"][2]["problem"] == "stopped with stage left"
 
 
 def answer_something_else(drawn: Drawn, *, parameters: Any, context: Context) -> SMOOTH.output():  # type: ignore[valid-type]

@@ -89,6 +89,12 @@ AZIMUTHS = 180
 NOTHING_MM = 3e-4
 # Channel of the laser's light in BGR pictures: the stated wavelength is green (520 nm).
 _GREEN = 1
+# Unknowns of every run, with the harmonic of the radius that each of them changes in all bores.
+STATES = {"off-centre probe": 1, "pipe of another radius": 0}
+# Typical 1 σ of a frame's light, width and skewness along one azimuth, in which they are weighed together.
+_PROFILE_SIGMA = (0.05, 0.05, 0.15)
+# What is alike beyond so many is not listed.
+_MOST_ALIKE = 5
 
 
 @dataclass(frozen=True)
@@ -215,12 +221,6 @@ def _rms(values: Float) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-# Unknowns of every run, with the harmonic of the radius that each of them changes in all bores.
-STATES = {"off-centre probe": 1, "pipe of another radius": 0}
-# Typical 1 σ of a frame's light, width and skewness along one azimuth, in which they are weighed together.
-_PROFILE_SIGMA = (0.05, 0.05, 0.15)
-
-
 @dataclass(frozen=True)
 class Likeness:
     """Another effect or state whose pattern is alike: |cosine| in 4 inch alone and over all three bores."""
@@ -228,10 +228,6 @@ class Likeness:
     name: str
     one_bore: float
     all_bores: float
-
-
-# What is alike beyond so many is not listed.
-_MOST_ALIKE = 5
 
 
 def likenesses(exhibits: Sequence[Exhibit], least: float = 0.9) -> dict[str, list[Likeness]]:
