@@ -78,13 +78,12 @@ class Job:
         """The recording that is worked on."""
         return self.source(Recording)
 
-    def plan(self) -> Plan:
-        """Return the wired plan; raises `PipelineError` when stages do not fit together."""
-        return self._plan
-
     @cached_property
-    def _plan(self) -> Plan:
-        """Made once: keys follow the program's text, which may be mended while a job is at work."""
+    def plan(self) -> Plan:
+        """The wired plan; raises `PipelineError` when stages do not fit together.
+
+        It is made once: keys follow the program's text, which may be changed while a job is at work.
+        """
         return make_plan(self.stages, self.configuration, self.sources)
 
 
@@ -178,7 +177,7 @@ def result_of(job: Job, kind: type[Kind]) -> Kind:
     InputError
         When it is not there: the folder was meddled with since.
     """
-    step = job.plan().maker(kind)
+    step = job.plan.maker(kind)
     for folder in (job.folder, *job.lent):
         store = RunFolder(folder).store
         stored = None if step is None else store.borrow(step.stage.name, step.key, plain(kind))
@@ -191,7 +190,7 @@ def result_of(job: Job, kind: type[Kind]) -> Kind:
 
 def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
     """Run a job in its folder; raises as `Runner.run` and `run_folder.claimed`."""
-    plan = job.plan()
+    plan = job.plan
     selection.check(plan)
     made_by = MadeBy(job.command, plan.input_hashes(), job.configuration.tree())
     lent = [RunFolder(path).store for path in job.lent]

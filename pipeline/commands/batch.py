@@ -69,7 +69,9 @@ def batch(
 def _cluster(count: int | None, scheduler: str, config: Path | None) -> Cluster:
     if count and scheduler:
         raise InputError(
-            "--workers", "and --scheduler exclude each other", hint="a scheduler has the workers it has"
+            "--workers",
+            "and --scheduler exclude each other",
+            hint="give one of them: a scheduler brings its own workers",
         )
     if scheduler:
         return RunningScheduler(address=scheduler)

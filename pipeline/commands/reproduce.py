@@ -53,7 +53,7 @@ def reproduce(
     with _temporary_folder() as temporary:
         again = output or temporary / "run"
         job = _job(record, again, temporary)
-        check_inputs_unchanged(record, job.plan().input_hashes())
+        check_inputs_unchanged(record, job.plan.input_hashes())
         with ProgressDisplay(Console(stderr=True)) as display:
             run_job(job, Selection("", "", True), display)
         compared = compare_runs(RunFolder(run), RunFolder(again), EXPORTERS)

@@ -80,7 +80,9 @@ def _compared(
     if earlier is None:
         for name, given in (("--years", years), ("--config", config), ("--set", assignments or None)):
             if given is not None:
-                raise InputError(name, "concerns a comparison", hint="give the earlier run with --compare")
+                raise InputError(
+                    name, "has a meaning only for a comparison", hint="give the earlier run with --compare"
+                )
         return None
     # A review of one run need not wait for what compares two.
     from pipeline.commands.staged_comparison import StagedComparison

@@ -98,7 +98,7 @@ def check_inputs_unchanged(record: RunRecord, now: Mapping[str, str]) -> None:
                 place,
                 f"the {name} is not what the run was made from",
                 expected=stated,
-                hint="restore it; a run of other inputs cannot agree",
+                hint="restore it: a run of other inputs gives other results",
             )
 
 

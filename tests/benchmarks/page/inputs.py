@@ -93,7 +93,7 @@ def prepare(folder: Path, work: Path) -> Inputs:
         _run(folder, work / "run")
     job = open_job(folder, work / "run", None, PIPELINE, EXPORTERS, resolve(PIPELINE, None, ()))
     with claimed(work / "run") as claim:
-        steps = job.plan().steps
+        steps = job.plan.steps
         results = {s.output: claim.store.read(s.stage.name, s.key, s.output).artefact for s in steps}
     return Inputs(job.recording, job.probe, folder, work / "run", spent, results)
 
