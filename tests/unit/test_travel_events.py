@@ -11,6 +11,7 @@ from pipeline.recording.base import Encoder
 from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.model import EventKind
 from stages.diagnose.travel.sight import Sight
+from stages.diagnose.travel.solve import PLAY
 from stages.diagnose.travel.steps import StepFound, steps_found
 from tests.travel_cases import QUANTUM_MM, read, seen, way
 
@@ -121,3 +122,15 @@ def test_readings_that_are_rounded_alike_leave_a_size_as_unsure_as_that():
     assert np.max(np.abs(off)) > 0.01
     assert np.sqrt(np.mean((off / sigma) ** 2)) < 1.3
     assert np.all(np.abs(off) < 2.5 * sigma)
+
+
+@pytest.mark.parametrize(("lasts_s", "at_s", "gain_mm"), [(0.13, 5.13, -1.7), (0.03, 3.64, 0.64)])
+def test_a_slip_where_the_probe_turns_is_no_play(lasts_s: float, at_s: float, gain_mm: float) -> None:
+    encoder = read()
+    part = np.clip((encoder.time_s - at_s) / lasts_s + 0.5, 0.0, 1.0)
+    slipped = replace(encoder, distance_mm=encoder.distance_mm + gain_mm * part)
+    for seed in range(3):
+        fit = with_events(seen(np.random.default_rng(seed), drift_mm=0.002, every=3), slipped)
+        assert fit.values[PLAY] == 0.0
+        (found,) = steps_found(fit, slipped)
+        assert found.gain_mm == pytest.approx(gain_mm, abs=4 * found.sigma_mm)

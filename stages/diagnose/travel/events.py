@@ -7,7 +7,9 @@ from scipy.stats import t as student
 
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.model import Event, EventKind, TravelFit, candidate_columns, fitted
+from stages.diagnose.travel.noise import DriftNoise, whitened_fit
 from stages.diagnose.travel.sight import Sight
+from stages.diagnose.travel.solve import DELAY, FAR_BETTER, PLAY, SMOOTH
 
 # So many steps and stray pictures are taken up, one after the other.
 _MOST = 16
@@ -24,7 +26,28 @@ def with_events(sight: Sight, encoder: Encoder, without: tuple[str, ...] = ()) -
     """Return the fit with the events that the readings ask for, the strongest first.
 
     Effects ``without`` which it is fitted are not known: what they do is left to others, and to the noise.
+    A slip where the probe turns looks like play at first, and what the play then does elsewhere like more
+    slips: where delay or play is found, the events that are found without them are tried as well.
     """
+    fit = _searched(sight, encoder, without)
+    lags = [SMOOTH[k] for k in (DELAY, PLAY) if fit.values[k] != 0]
+    others = (_searched(sight, encoder, (*without, name)).events for name in lags)
+    again = [fitted(sight, encoder, events, None, without) for events in others]
+    return min((fit, *again), key=lambda f: _cost(f, fit.noise))
+
+
+def _cost(fit: TravelFit, noise: DriftNoise) -> float:
+    """Return χ² of what is left, and what each thing that was taken up has to gain."""
+    path_mm, found = fit.sight.path_mm, fit.whitened
+    difference_mm = found.residual + fit.columns @ found.estimate
+    left = whitened_fit(difference_mm, fit.columns, noise.covariance(path_mm))
+    taken_up = len(fit.events) + np.count_nonzero(fit.values[[DELAY, PLAY]])
+    free = sum(e.during for e in fit.events)
+    return float(left.residual @ left.weighted + FAR_BETTER * taken_up + np.log(len(path_mm)) * free)
+
+
+def _searched(sight: Sight, encoder: Encoder, without: tuple[str, ...]) -> TravelFit:
+    """Return the fit with the events that the readings ask for, one after the other."""
     fit = fitted(sight, encoder, (), None, without)
     for _ in range(_MOST):
         event, score, count = _strongest(fit)
@@ -33,7 +56,9 @@ def with_events(sight: Sight, encoder: Encoder, without: tuple[str, ...] = ()) -
         fit = fitted(sight, encoder, _joined(sight, (*fit.events, event)), None, without)
     fit = _without_needless(fit, encoder)
     wider = tuple(_with_its_ends(sight, e) for e in fit.events)
-    return fit if wider == fit.events else fitted(sight, encoder, wider, None, without)
+    if wider == fit.events:
+        return fit
+    return _without_needless(fitted(sight, encoder, wider, None, without), encoder)
 
 
 def _with_its_ends(sight: Sight, event: Event) -> Event:

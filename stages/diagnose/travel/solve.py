@@ -21,7 +21,7 @@ _LONGEST_S = 1.0
 _SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
 _WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
 # χ² of one number exceeds 19.5 by chance once in 10⁵; 23 leaves a margin for noise that is not quite normal.
-_FAR_BETTER = 23.0
+FAR_BETTER = 23.0
 
 
 @dataclass(frozen=True)
@@ -79,12 +79,12 @@ def simplest(ends: Sequence[End], covariance_mm: Float) -> tuple[End, bool]:
 
     Delay and play can imitate or cancel each other, so that each is kept only where it improves the fit much.
     """
-    cost = [e.misfit(covariance_mm) + _FAR_BETTER * (2 - len(e.held)) for e in ends]
+    cost = [e.misfit(covariance_mm) + FAR_BETTER * (2 - len(e.held)) for e in ends]
     best = int(np.argmin(cost))
     held = ends[best].held
     rivals = [c for c, e in zip(cost, ends, strict=True) if len(e.held) == 1 and e.held != held]
     return ends[best], len(held) == 0 or (
-        len(held) == 1 and min(rivals, default=np.inf) > cost[best] + _FAR_BETTER
+        len(held) == 1 and min(rivals, default=np.inf) > cost[best] + FAR_BETTER
     )
 
 
