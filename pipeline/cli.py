@@ -229,16 +229,18 @@ def _warn(console: Console, title: str, warnings: Sequence[str]) -> None:
 
 
 def _print_outcome(outcome: RunOutcome, folder: Path) -> None:
+    from pipeline.pages.run_words import figure_name
+
     for number in outcome.metrics:
         typer.echo(f"{number.name:<48} {number.value} {number.unit}".rstrip())
     for stage in outcome.stages:
         for number in stage.numbers:
             if "rejected" in number.name and number.value:
-                typer.echo(f"{stage.name + ': ' + number.name:<48} {number.value} {number.unit}".rstrip())
+                typer.echo(f"{figure_name(number.name):<48} {number.value} {number.unit}".rstrip())
     report = folder / "report.html"
     typer.echo(f"Report: {report.resolve()}" if report.is_file() else f"Run folder: {folder.resolve()}")
     if report.is_file():
-        typer.echo(f"To go through it, decide and sign: boresight review {shlex.quote(str(folder))}")
+        typer.echo(f"To decide on the findings and sign: boresight review {shlex.quote(str(folder))}")
 
 
 for _command in _ATTACHED:

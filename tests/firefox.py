@@ -27,6 +27,14 @@ _SETTINGS = {
 }  # fmt: skip
 
 
+# Keys without a character, as WebDriver names them (W3C WebDriver, 17.4.2).
+_KEYS = {
+    "Backspace": "\ue003", "Tab": "\ue004", "Enter": "\ue007", "Shift": "\ue008", "Control": "\ue009",
+    "Escape": "\ue00c", "ArrowLeft": "\ue012", "ArrowUp": "\ue013", "ArrowRight": "\ue014",
+    "ArrowDown": "\ue015", "Space": " ",
+}  # fmt: skip
+
+
 class Firefox:
     """One window."""
 
@@ -56,6 +64,15 @@ class Firefox:
                 return found
             time.sleep(0.1)
         raise AssertionError(f"never true: {expression}")
+
+    def keys(self, *names: str) -> None:
+        """Press keys one after the other; ``Shift+Tab`` presses them together."""
+        for name in names:
+            pressed = [_KEYS.get(part, part) for part in name.split("+")] if len(name) > 1 else [name]
+            down = [{"type": "keyDown", "value": key} for key in pressed]
+            up = [{"type": "keyUp", "value": key} for key in reversed(pressed)]
+            hands = {"type": "key", "id": "keyboard", "actions": [*down, *up]}
+            self.ask("WebDriver:PerformActions", actions=[hands])
 
     def close(self) -> None:
         self._stream.close()

@@ -66,10 +66,11 @@ def _read_again(files: RunFiles, finding: Finding) -> str:
         return ""
     same = OutlineGauge(files.artefact(Wall).radius_map).measure(run.outline)
     return (
-        f"The depth was read again because the outline was drawn again. The run found {_depth(run.size)}, "
-        "from the single ring points against the fitted pipe; the review reads the wall map, as the largest "
-        "mean over 1 mm against the wall within 6 mm around the outline. "
-        f"Read in this way, the run's own outline gives {_depth(same)}, the new one {_depth(finding.size)}."
+        "The depth was read again because the outline was drawn again. "
+        f"The run found {_depth(run.size)}, from single points of the rings against the fitted pipe. "
+        "The review reads the map of the wall: the extreme of its means over 1 mm, against the wall within "
+        f"6 mm around the outline. Read so, the run's own outline gives {_depth(same)}, the new one "
+        f"{_depth(finding.size)}."
     )
 
 

@@ -195,7 +195,7 @@ class Compared:
         walls, own = self.walls, self.pair.now.files.artefact(Overlays)
         if layer == DIFFERENCE[0]:
             return _overlay(
-                own.deviation, layer, "Later less earlier radius", -walls.limit_mm, walls.limit_mm,
+                own.deviation, layer, "Radius, later minus earlier", -walls.limit_mm, walls.limit_mm,
                 walls.difference_level,
             )  # fmt: skip
         return _overlay(

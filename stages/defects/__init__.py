@@ -217,5 +217,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "8", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "9", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

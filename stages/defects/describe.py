@@ -27,6 +27,8 @@ from stages.defects.surface import Surface, cells_of
 
 # In words only: beside longer and shorter in one sentence, a quarter more is still nearly round.
 _NEARLY_ROUND = 1.25
+# Another kind is told from the probability that is usually taken for more than chance.
+_WORTH_TELLING = 0.05
 
 
 @dataclass(frozen=True)
@@ -138,18 +140,25 @@ def _form(elongation: float) -> str:
     return "nearly round" if elongation < _NEARLY_ROUND else f"{elongation:.1f} times as long as wide"
 
 
+def _a(kind: DefectKind) -> str:
+    """Return a kind with its article; corrosion has none."""
+    return kind.value if kind is DefectKind.CORROSION else f"a {kind}"
+
+
 def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth, darkness: float) -> str:
     """Say what it is and why it is classed so."""
     kinds = list(likely)
-    words = f"{kinds[0].capitalize()}, {notation.depth(depth.depth_mm, depth.sigma_mm)}"
+    # Rounded as in defects.json, or the two would differ in their last digit.
+    words = f"{kinds[0].capitalize()}, {notation.depth(round(depth.depth_mm, 4), round(depth.sigma_mm, 4))}"
     if kinds[0] is DefectKind.WELD:
         return f"{words}, {features.length_mm:.0f} mm along the pipe. Classed as weld: it goes all round."
     words += (
         f", {features.length_mm:.1f} mm along × {features.width_mm:.1f} mm around. Classed as {kinds[0]}: "
-        f"{features.slim_mm:.1f} mm across, {_form(features.elongation)}; its surface varies by "
-        f"{100 * features.roughness:.0f} % of its depth"
+        f"{features.slim_mm:.1f} mm across, {_form(features.elongation)}, roughness of its surface "
+        f"{100 * features.roughness:.0f} % of its depth."
     )
-    words += f"; {kinds[1]} is {100 * likely[kinds[1]]:.0f} % likely." if len(kinds) > 1 else "."
+    if len(kinds) > 1 and likely[kinds[1]] >= _WORTH_TELLING:
+        words += f" It may also be {_a(kinds[1])}: probability {100 * likely[kinds[1]]:.0f} %."
     if abs(darkness) > 0.1:
         words += (
             f" The photo is {100 * abs(darkness):.0f} % {'darker' if darkness > 0 else 'brighter'} there."

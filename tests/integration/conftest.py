@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.review.papers.report import PAPERS, paper_of
+from pipeline.review.review import Review
+from tests.reviewed import reviewed
 from tests.sample_run import run_sample
 
 
@@ -22,3 +25,15 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
             run_sample(run)
             (folder / "sample.done").touch()
     return run
+
+
+@pytest.fixture(scope="module")
+def review(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Review:
+    """A review with every kind of decision, signed."""
+    return reviewed(sample, tmp_path_factory.mktemp("papers") / "run")
+
+
+@pytest.fixture(scope="module")
+def papers(review: Review) -> dict[str, bytes]:
+    """All papers of that review."""
+    return {name: paper_of(name, review, review.state()).content for name in PAPERS}

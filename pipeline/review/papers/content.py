@@ -83,7 +83,7 @@ def _summary(rows: list[dict[str, Any]]) -> list[list[str]]:
         if of_sign:
             row = max(of_sign, key=lambda r: abs(r["depth_mm"]))
             out.append([name, f"{notation.depth(row['depth_mm'], row['depth_sigma_mm'])}, "
-                              f"{row['kind']} {row['label']}"])  # fmt: skip
+                              f"finding {row['label']} ({row['kind']})"])  # fmt: skip
     return out
 
 

@@ -15,27 +15,33 @@ from pipeline.artefacts.findings import DefectKind
 from pipeline.artefacts.model import Overlays
 from pipeline.pages import notation
 from pipeline.review.decisions.replay import ACCEPTED
-from pipeline.review.papers.tables import csv_text, findings_table, rounded
+from pipeline.review.papers.tables import csv_text, findings_table
 from pipeline.review.review import Review, State
 
-# Columns of the pipe tally of POF, Specifications and requirements for ILI, 2016, appendix 6 (the same in
-# POF 100, 2021), of those that one probe run can fill; depth tolerance after clause 6 of the same.
+# The pipe tally of the Pipeline Operators Forum, "Specifications and requirements for in-line inspection of
+# pipelines", version 2016, appendix 6: all its columns, in its order and with its units. The edition of 2021,
+# POF 100, names some of them otherwise; the comment of every row says which edition it is.
 POF_COLUMNS = (
-    "Log distance [m]", "Feature type", "Feature identification", "Anomaly dimension class",
-    "Clock position", "Surface location", "Inward/outward", "Nominal thickness [mm]", "Max. depth [%.t]",
-    "Max. depth [mm]", "Depth tolerance at 80 % [mm]", "Length [mm]", "Width [mm]", "Comments",
+    "Log distance [m]", "Latitude", "Longitude", "Altitude [m]", "Feature type", "Feature identification",
+    "Comment / Cluster ID", "Girth weld Nr", "Joint manufacturing type", "Joint / component length [m]",
+    "Internal diameter [mm]", "Nominal thickness [mm]", "Measured/reference thickness [mm]", "Ovality [%]",
+    "Bend Y/N", "Abs. Dist. to upstream weld [m]", "Clock position seam weld / anomaly", "Surface location",
+    "Inward/outward", "Depth / height [%.D or mm]", "Size (length x width) [mm]", "Mean depth [%.t or mm]",
+    "Max. depth [%.t or mm]", "Length [mm]", "Width [mm]", "Anomaly dimension classification",
+    "ERF (metal losses)", "Reference table for performance", "Comments",
 )  # fmt: skip
-_POF_TYPE = {DefectKind.DEPOSIT: "Other", DefectKind.WELD: "Weld"}
+_POF_EDITION = "POF 2016, appendix 6"
+_POF_TYPE = {DefectKind.DEPOSIT: "Additional metal/material", DefectKind.WELD: "Weld"}
 _POF_FEATURE = {
     DefectKind.PIT: "Corrosion", DefectKind.CORROSION: "Corrosion", DefectKind.GOUGE: "Gouge",
     DefectKind.CRACK: "Crack", DefectKind.DENT: "Dent", DefectKind.DEPOSIT: "Debris",
-    DefectKind.WELD: "Girth weld",
+    DefectKind.WELD: "",
 }  # fmt: skip
 _POF_CLASS = {
     "general": "GENE", "pitting": "PITT", "pinhole": "PINH", "axial grooving": "AXGR",
     "axial slotting": "AXSL", "circumferential grooving": "CIGR", "circumferential slotting": "CISL",
 }  # fmt: skip
-# 80 % of a normal distribution lie within this many σ.
+# 80 % of a normal distribution lie within this many σ: at this certainty POF states tolerances (clause 6).
 _80_PERCENT = 1.2816
 
 # Columns of the table Conditions of NASSCO's standard exchange database, PACP 7.
@@ -53,32 +59,61 @@ _CONTINUOUS_MM = 1000.0
 
 
 def pof_text(review: Review, state: State) -> bytes:
-    """Return the accepted findings as a list of features after POF."""
-    wall = state.assumed.wall_thickness_mm
-    return csv_text([_pof(row, wall) for row in _accepted(review, state)], POF_COLUMNS).encode("utf-8-sig")
+    """Return the accepted findings as a pipe tally of POF; what one run of a probe cannot know is empty."""
+    wall, bore = state.assumed.wall_thickness_mm, 2 * review.files.artefact(Overlays).nominal_radius_mm
+    return csv_text([_pof(row, wall, bore) for row in _accepted(review, state)], POF_COLUMNS).encode(
+        "utf-8-sig"
+    )
 
 
 def _accepted(review: Review, state: State) -> list[dict[str, Any]]:
     return [row for row in findings_table(review, state) if row["status"] == ACCEPTED]
 
 
-def _pof(row: dict[str, Any], wall_mm: float | None) -> dict[str, Any]:
-    kind, depth, sigma = DefectKind(row["kind"]), row["depth_mm"], row["depth_sigma_mm"]
-    if depth is None or (kind.is_metal_loss and depth <= 0):  # no loss was measured: the comment says so
-        depth = sigma = None
-    kind_of = _POF_CLASS.get(row["pof_class"], "")
-    return dict(zip(POF_COLUMNS, (
-        _metres(row), _POF_TYPE.get(kind, "Anomaly"), _POF_FEATURE[kind], kind_of,
-        row["clock"] or row["clock_from"], "Int",
-        "" if depth is None or kind.is_metal_loss else "Inw" if depth < 0 else "Outw",
-        wall_mm, _share(depth, wall_mm) if kind.is_metal_loss else None,
-        None if depth is None else abs(depth), None if sigma is None else round(_80_PERCENT * sigma, 3),
-        row["length_mm"], row["width_mm"], _comment(row),
-    ), strict=True))  # fmt: skip
+def _pof(row: dict[str, Any], wall_mm: float | None, bore_mm: float) -> dict[str, Any]:
+    kind = DefectKind(row["kind"])
+    told: dict[str, Any] = dict.fromkeys(POF_COLUMNS) | {
+        "Log distance [m]": _metres(row), "Feature type": _POF_TYPE.get(kind, "Anomaly"),
+        "Feature identification": _POF_FEATURE[kind], "Comment / Cluster ID": f"Finding {row['label']}",
+        "Internal diameter [mm]": bore_mm, "Nominal thickness [mm]": wall_mm,
+        "Clock position seam weld / anomaly": _pof_clock(row["clock"] or row["clock_from"]),
+        "Surface location": "" if kind is DefectKind.WELD else "Int", "Comments": _pof_comment(row),
+    }  # fmt: skip
+    if kind is DefectKind.DENT:
+        return told | _pof_deformation(row)
+    return told | _pof_loss(row, wall_mm) if kind.is_metal_loss else told
 
 
-def _share(depth_mm: float | None, wall_mm: float | None) -> float | None:
-    return None if depth_mm is None or not wall_mm else rounded(100 * depth_mm / wall_mm, 1)
+def _pof_deformation(row: dict[str, Any]) -> dict[str, Any]:
+    depth = row["depth_mm"]
+    way = {} if depth is None else {
+        "Inward/outward": "Inw" if depth < 0 else "Outw", "Depth / height [%.D or mm]": f"{abs(depth)} mm",
+    }  # fmt: skip
+    return way | {"Size (length x width) [mm]": f"{row['length_mm']:.0f}x{row['width_mm']:.0f}"}
+
+
+def _pof_loss(row: dict[str, Any], wall_mm: float | None) -> dict[str, Any]:
+    """Return depth in % of the wall where that is given; none where no loss was measured: see the comment."""
+    depth, deep = row["depth_mm"], ""
+    if depth is not None and depth > 0:
+        deep = f"{100 * depth / wall_mm:.1f}%" if wall_mm else f"{depth} mm"
+    return {
+        "Max. depth [%.t or mm]": deep, "Length [mm]": row["length_mm"], "Width [mm]": row["width_mm"],
+        "Anomaly dimension classification": _POF_CLASS.get(row["pof_class"], ""),
+        "ERF (metal losses)": "Not calculated",
+    }  # fmt: skip
+
+
+def _pof_clock(clock: str) -> str:
+    """Return a clock position as POF writes it: half past twelve is 0:30."""
+    hours, minutes = clock.split(":")
+    return f"{int(hours) % 12}:{minutes}"
+
+
+def _pof_comment(row: dict[str, Any]) -> str:
+    sigma = row["depth_sigma_mm"]
+    tolerance = "" if sigma is None else f"; depth ± {_80_PERCENT * sigma:.3f} mm at 80 % certainty"
+    return f"{_comment(row)}{tolerance} ({_POF_EDITION})"
 
 
 def pacp_text(review: Review, state: State) -> bytes:

@@ -77,6 +77,12 @@ def test_for_whom_it_was_inspected_is_given_on_the_page_and_printed(page: Tab) -
         page.page.click('button:text-is("Use in the reports")')
     facts = page.page.request.get(f"{page.origin}/api/papers/findings.json").json()["facts"]
     assert facts == [["Client", "Water Works"], ["Date", "2026-05-31"]]
+    page.page.fill("#fact-site", "half written")
+    with page.one_change():
+        page.page.click("text=Undo")
+    assert page.page.input_value("#fact-client") == "", "fields show what is known, also after an undo"
+    assert page.page.input_value("#fact-site") == "half written", "but keep what is being written"
+    page.page.fill("#fact-site", "")
 
 
 def test_every_paper_can_be_taken_away(page: Tab) -> None:

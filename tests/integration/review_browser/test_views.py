@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 
 import numpy as np
 import pytest
+from playwright.sync_api import Route
 
 from pipeline.pages import notation
 from tests.patience import patience
@@ -92,22 +94,31 @@ def test_the_lit_frame_is_first_and_the_laser_frame_beside_it(page: Tab) -> None
 
 
 def test_what_takes_long_is_said_to_be_loading(page: Tab) -> None:
-    """Where a frame lies, and the frame itself, each half a second late."""
+    """Where a frame lies, and the frame itself, are held back until the page has said that it waits."""
     said = "[...document.querySelectorAll('#view-frame .told, #view-frame .name')].map((e) => e.textContent)"
-    for late in ("**/api/sights*", "**/stand?*", "**/seen.png*", "**/api/frames/*.jpg"):
-        page.page.route(late, lambda route: (time.sleep(0.5), route.continue_()))
+    frames, view = "/^Loading the recorded frames/", "/^Loading a recorded frame in the model/"
+    picture, held = "/^lit frame \\d+, loading…$/", dict[str, Route]()
+
+    def until_said(words: str, asked: str) -> None:
+        page.until(f"{said}.some((t) => {words}.test(t))")
+        end = time.monotonic() + patience(15)
+        while asked not in held and time.monotonic() < end:
+            page.page.wait_for_timeout(20)
+        held.pop(asked).continue_()
+
+    for asked in ("sights?", "stand?", "seen.png?"):
+        page.page.route(re.compile(re.escape(asked)), lambda r, _, asked=asked: held.update({asked: r}))
     try:
         page.js("boresight.session.moveTo([40, 0.8])")
-        page.until(f"{said}.some((t) => t.startsWith('Loading the recorded frames'))")
-        page.until(f"{said}.some((t) => /^lit frame \\d+, loading…$/.test(t))")
+        until_said(frames, "sights?")
         page.until(f"!{said}.some((t) => /loading/i.test(t))")
         page.page.check("#alike")
-        page.until(f"{said}.some((t) => t.startsWith('Loading a recorded frame in the model'))")
-        page.until(f"{said}.some((t) => /^lit frame \\d+, loading…$/.test(t))")
+        for words, asked in ((view, "sights?"), (view, "stand?"), (picture, "seen.png?")):
+            until_said(words, asked)
         page.until(f"!{said}.some((t) => /loading/i.test(t))")
     finally:
         page.page.uncheck("#alike")
-        page.page.unroute_all(behavior="wait")
+        page.page.unroute_all(behavior="ignoreErrors")
 
 
 def test_the_first_view_waits_for_nothing_that_it_does_not_show(context, server) -> None:

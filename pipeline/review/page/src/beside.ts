@@ -6,7 +6,7 @@ import type { Change, Comparison, Overlay, Point } from "./types";
 import { CHOSEN_COLOUR, TURN, clock, element, number, wrapped } from "./words";
 
 type Way = "swipe" | "beside" | "difference" | "difference_sigma";
-const WAYS: [Way, string][] = [["swipe", "Swipe"], ["beside", "Side by side"], ["difference", "Later less earlier"], ["difference_sigma", "1 σ of the difference"]];
+const WAYS: [Way, string][] = [["swipe", "Swipe"], ["beside", "Side by side"], ["difference", "Difference, later minus earlier"], ["difference_sigma", "1 σ of the difference"]];
 const LAYERS: [string, string][] = [["photo", "Photo"], ["deviation", "Deviation from the fitted pipe"]];
 const [CASING, NOW, THEN, CURSOR] = ["#000000", "#ffffff", "#7cc7ff", CHOSEN_COLOUR];
 const GAP_PX = 4;

@@ -8,7 +8,7 @@ import { clock, element, measured, number } from "./words";
 const DEGREES = 180 / Math.PI;
 
 export function comparePage(session: Session): HTMLElement {
-  const root = element("main", { class: "page", id: "compare" }, element("p", { class: "quiet" }, "Laying the two runs on each other…"));
+  const root = element("main", { class: "page", id: "compare" }, element("p", { class: "quiet" }, "Aligning the two runs…"));
   let shown: CompareView | null = null;
   const load = async () => {
     const found = await session.source.comparison();
@@ -34,15 +34,15 @@ function parts(session: Session, found: Comparison, view: CompareView): HTMLElem
     element("section", {}, element("h2", {}, `${session.run.name} against ${found.earlier}`), element("p", {}, found.statement)),
     view.root,
     element("section", {}, element("h2", {}, "Outcome of each finding"),
-      element("p", { class: "quiet" }, "Both walls are read by the same method within the same outline. Growth into the wall is positive; its σ includes the noise of the clean wall beside the finding, the resolution of the maps, the registration and the calibration. p is the probability of such a change by chance, corrected for the number of findings (Holm). ◆ marks a change that is declared."),
+      element("p", { class: "quiet" }, "Depths of both runs are read by the same method within the same outline. Growth into the wall is positive; its σ includes the noise of the sound wall beside the finding, the resolution of the maps, the alignment and the calibration. p is the probability of such a change by chance, corrected for the number of findings (Holm). ◆ marks a change that counts as real."),
       element("div", { class: "scroll" }, growthTable(session, found, view)),
       element("p", {}, element("a", { href: `${folder}growth.csv`, download: "growth.csv" }, "growth.csv"), " ", element("a", { href: `${folder}growth.json`, download: "growth.json" }, "growth.json"))),
-    element("section", {}, element("h2", {}, "How the runs lie on each other"), registrationTable(found), element("div", { class: "plots" }, ...courses(found.registration))),
+    element("section", {}, element("h2", {}, "Alignment of the two runs"), registrationTable(found), element("div", { class: "plots" }, ...courses(found.registration))),
   ];
 }
 
 function growthTable(session: Session, { changes, years }: Comparison, view: CompareView): HTMLElement {
-  const heads = ["finding", "kind", "place", "outcome", "depth then", "depth now", "growth", "p", "length", "width", "area", ...(years ? ["growth a year"] : [])];
+  const heads = ["finding", "kind", "place", "outcome", "depth then", "depth now", "growth", "p", "length", "width", "area", ...(years ? ["growth per year"] : [])];
   const rows = changes.map((c) => {
     const open = element("button", { click: () => { view.show(c); view.root.scrollIntoView({ block: "nearest" }); } }, c.id ? session.called(c.id) : `earlier ${c.earlier_id}`);
     const rate = c.depth_rate_mm_per_year === null ? "–" : measured(c.depth_rate_mm_per_year, c.depth_rate_sigma_mm_per_year, "mm");
@@ -72,7 +72,7 @@ function registrationTable({ registration: r, diameter, one_calibration }: Compa
     ["shift along the pipe", `${number(r.shift_range_mm[0])} to ${number(r.shift_range_mm[1])} mm, each ± ${number(r.shift_sigma_mm[0])} mm`],
     ["scale along the pipe", measured(r.scale, r.scale_sigma, "")],
     ["roll", `${degrees(r.roll_range_rad[0])} to ${degrees(r.roll_range_rad[1])}°, each ± ${number((r.roll_sigma_rad[0] ?? 0) * DEGREES)}°`],
-    ["seen by both", `${number(r.overlap_mm[0], 0)} to ${number(r.overlap_mm[1], 0)} mm`],
+    ["seen in both runs", `${number(r.overlap_mm[0], 0)} to ${number(r.overlap_mm[1], 0)} mm`],
     ["pieces of wall that agree", `${r.agreeing} of ${r.blocks}, correlation ${number(r.correlation)}; by chance with a probability of ${r.chance.toExponential(0)}`],
     ["welds found in both", r.welds.length ? r.welds.map((w) => `${number(w.earlier_mm, 1)} → ${number(w.now_mm, 1)} mm`).join(", ") : "none"],
     ["growth of the mean diameter", `${measured(diameter.value, diameter.sigma)}${one_calibration ? ", with one calibration" : ", each run with its own calibration"}`],

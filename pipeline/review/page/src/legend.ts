@@ -55,8 +55,8 @@ function unit({ name }: Overlay): string { return name === LOSS ? "% of the wall
 function wallOf(session: Session): number | null { return session.state.assumed.wall_thickness_mm ?? session.run.wall_thickness_mm; }
 
 function button(session: Session, root: HTMLElement, back: () => void): HTMLElement {
-  if (session.isFixed()) return element("button", { title: "colours for every measured value", click: () => session.fix(null) }, "Full range");
-  return element("button", { title: "fix the values of the end colours, here and for the runs compared", click: () => ask(session, root, back) }, "Set limits");
+  if (session.isFixed()) return element("button", { title: "let the colours span every measured value", click: () => session.fix(null) }, "Full range");
+  return element("button", { title: "fix the values of the first and last colour, also for the runs compared", click: () => ask(session, root, back) }, "Set limits");
 }
 
 function ask(session: Session, root: HTMLElement, back: () => void): void {

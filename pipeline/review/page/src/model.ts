@@ -143,8 +143,8 @@ export class ModelView {
     this.without.setAttribute("aria-pressed", String(!this.eye.isInside));
     this.cut.disabled = this.eye.isInside;
     this.raking.disabled = !this.eye.isInside || this.session.stand !== null;
-    this.canvas.title = this.hint.textContent = this.eye.isInside ? "Wheel or W S flies, drag or A D looks around, a click moves the spot (ring)."
-      : "Drag turns, wheel zooms, right drag shifts, a click moves the spot (ring).";
+    this.canvas.title = this.hint.textContent = this.eye.isInside ? "Fly: wheel or W S. Look around: drag or A D. A click moves the spot (ring)."
+      : "Turn: drag. Zoom: wheel. Shift: right drag. A click moves the spot (ring).";
   }
 
   private async start(): Promise<void> {

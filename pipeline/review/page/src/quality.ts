@@ -23,7 +23,7 @@ export function qualityPage(session: Session): HTMLElement {
       : "Not run. boresight diagnose tests whether the instrument was as its probe file states. To show the answer here, copy its diagnosis.json and diagnosis.html into the run folder."), pictures),
     run.warnings.length ? element("section", {}, element("h2", {}, "Warnings of this run"), element("ul", {}, ...run.warnings.map((w) => element("li", {}, w)))) : null,
     element("details", {}, element("summary", {}, "All figures, stage by stage"), element("div", { class: "columns" }, ...stages)),
-    element("section", {}, element("h2", {}, "Made from"), element("table", {},
+    element("section", {}, element("h2", {}, "Input files"), element("table", {},
       ...Object.entries(run.inputs).map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, `SHA-256 ${v}`))))));
   // Asked for when it is first looked at: the first view has the server to itself.
   const seen = new IntersectionObserver((all) => { if (all.some((e) => e.isIntersecting)) { seen.disconnect(); void load(); } });

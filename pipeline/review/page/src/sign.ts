@@ -29,12 +29,12 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
   const last = seal?.signature;
   const standing = !seal ? "Checking the run's files…" : !last ? "Not signed." : seal.signed
     ? `Signed by ${last.name} on ${moment(last.at)}${last.standard ? `, ${last.standard}` : ""}.`
-    : `Changed since ${last.name} signed on ${moment(last.at)}: unsigned.`;
+    : `Not signed: changed since ${last.name} signed on ${moment(last.at)}.`;
   const made = [
     element("section", {}, element("h2", {}, "Signature"),
       element("p", { class: seal?.signed ? "signed" : "unsigned" }, standing),
       last?.remarks ? element("p", {}, `Remarks: ${last.remarks}`) : null,
-      element("p", { class: "quiet" }, `Inputs and decisions: SHA-256 ${seal?.sha256 ?? "…"}`),
+      element("p", { class: "quiet" }, `SHA-256 of the run's files and decisions: ${seal?.sha256 ?? "…"}`),
       signing),
   ];
   signing?.dispatchEvent(new CustomEvent("undecided", { detail: open }));
@@ -44,7 +44,7 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
     ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: folder + file, target: "_blank", rel: "noopener" }, name))))));
   const lost = state.lost.map((e) => element("li", {}, `${e.who} ${told(session, e.action)}`));
   if (lost.length) made.push(element("section", {}, element("h2", {}, "Decisions without their finding"),
-    element("p", {}, "The run was computed again and no longer shows what these were taken on."), element("ul", {}, ...lost)));
+    element("p", {}, "The run has been computed again, and the findings that these decisions were about are no longer there."), element("ul", {}, ...lost)));
   if (state.history.length) made.push(element("section", {}, element("h2", {}, "History"), element("ol", { class: "history" },
     ...state.history.map((e) => element("li", {}, `${moment(e.at)} ${e.who}: ${told(session, e.action)}`)))));
   return made;
@@ -82,11 +82,16 @@ function signature(session: Session): HTMLElement {
     agreed.required = !(undecided.hidden = open === 0);
   };
   return element("form", { class: "sign", undecided: ask, submit: (e) => { e.preventDefault(); void session.sign(name.value.trim(), standard.value.trim(), remarks.value.trim()); } },
-    element("p", { class: "quiet wide" }, "A signature binds the run's files and every decision as they are now. Any later change shows as unsigned."),
+    element("p", { class: "quiet wide" }, "A signature holds for the run's files and decisions as they are now. After any later change the review counts as unsigned."),
     element("label", { for: "sign-name" }, "Name"), name,
     element("label", { for: "sign-standard" }, "Standard applied"), standard,
     element("label", { for: "sign-remarks" }, "Remarks"), remarks,
     undecided, element("button", { class: "accept" }, "Sign"));
+}
+
+/** Bring a field to what is known by now, unless something else is being written in it. */
+function fill(input: HTMLInputElement, value: string): void {
+  if (input.value === input.defaultValue || input.value === value) input.value = input.defaultValue = value;
 }
 
 function assumptions(session: Session): HTMLElement {
@@ -94,8 +99,12 @@ function assumptions(session: Session): HTMLElement {
   const wall = element("input", { type: "number", min: "0.1", max: "1000", step: "any", id: "wall", value: String(assumed.wall_thickness_mm ?? session.run.wall_thickness_mm ?? "") });
   const strength = element("input", { type: "number", min: "1", max: "5000", step: "any", id: "yield", value: String(assumed.yield_mpa ?? "") });
   const value = (input: HTMLInputElement) => (input.value ? Number(input.value) : null);
+  session.on(["state"], () => {
+    fill(wall, String(session.state.assumed.wall_thickness_mm ?? session.run.wall_thickness_mm ?? ""));
+    fill(strength, String(session.state.assumed.yield_mpa ?? ""));
+  });
   return element("section", {}, element("h2", {}, "Pipe data"),
-    element("p", { class: "quiet" }, "Before signing. From the wall thickness follow wall loss and POF class, with the yield strength also the failure pressure by B31G. Leave empty what is not known."),
+    element("p", { class: "quiet" }, "Give these before signing. The wall thickness gives wall loss and POF class; with the yield strength, also the failure pressure by B31G. Leave empty what is not known."),
     element("form", { class: "sign", submit: (e) => { e.preventDefault(); void session.act({ do: "assume", wall_thickness_mm: value(wall), yield_mpa: value(strength) }); } },
       element("label", { for: "wall" }, "Wall thickness, mm"), wall,
       element("label", { for: "yield" }, "Yield strength, MPa"), strength,
@@ -111,9 +120,10 @@ const FACTS: [string, string][] = [
 function inspection(session: Session): HTMLElement {
   const { described } = session.state;
   const inputs = FACTS.map(([name]) => element("input", { type: name === "date" ? "date" : "text", maxlength: "200", id: `fact-${name}`, value: described[name] ?? "" }));
+  session.on(["state"], () => FACTS.forEach(([name], k) => fill(inputs[k] as HTMLInputElement, session.state.described[name] ?? "")));
   const facts = () => Object.fromEntries(FACTS.map(([name], k) => [name, (inputs[k] as HTMLInputElement).value.trim()]));
   return element("section", {}, element("h2", {}, "The inspection"),
-    element("p", { class: "quiet" }, "Before signing. This stands at the head of every report; what is left empty appears there as “not stated”."),
+    element("p", { class: "quiet" }, "Give these before signing. They are printed at the head of every report; what is left empty is listed there as “not stated”."),
     element("form", { class: "sign facts", submit: (e) => { e.preventDefault(); void session.act({ do: "describe", ...facts() }); } },
       ...FACTS.flatMap(([name, label], k) => [element("label", { for: `fact-${name}` }, label), inputs[k] as HTMLInputElement]),
       element("button", {}, "Use in the reports")));
