@@ -19,6 +19,10 @@ from tests.review_server import ReviewServer
 from tests.shared_data import PROJECT_ROOT
 
 LENGTH_MM = 2000.0
+_TO_BE_MARKED = """(({ session, model: { marks } }) => {
+  const { radius_mm: r } = session.run;
+  return session.standing.filter(({ size: s }) =>
+    s.distance_to_mm > marks.at - 2 * r && s.distance_from_mm < marks.at + 8 * r).length; })(boresight)"""
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +98,8 @@ def test_only_what_is_near_the_eye_is_there_in_detail(long: Path) -> None:
             seen = page.js("boresight.model.coarse.pieces.filter((p) => p.mesh.visible).length")
             assert seen > 0, "what is far is seen coarsely"
             page.until("boresight.model.coarse.pieces.some((p) => p.mesh.material[0].map)")
+            marked = "document.querySelectorAll('.mark.finding').length"
+            assert page.js(marked) == page.js(_TO_BE_MARKED), "of a crowd, those near the eye"
             page.js("boresight.session.moveTo([1200, -1])")
             at = page.js("[boresight.flat.x(1200), boresight.flat.size[0]]")
             assert 0 <= at[0] <= at[1], "the wall follows the spot"

@@ -10,8 +10,9 @@ import type { Finding, Point } from "./types";
 import { CHOSEN_COLOUR, TURN, element } from "./words";
 
 const MM = 1e-3;
-// Findings and distances are marked within so many radii of the eye; all of a long pipe would be a crowd.
-const NEAR_RADII = 14, RINGS_AHEAD_RADII = 7, CLOCK_RADII = 1.4;
+// Findings and distances are marked within so many radii of the eye, from inside so many behind and ahead of it: all of a long
+// pipe would be a crowd, and outlines are dear without a graphics card.
+const NEAR_RADII = 14, [BEHIND_RADII, AHEAD_RADII] = [2, 8], RINGS_AHEAD_RADII = 7, CLOCK_RADII = 1.4;
 const STEP_RAD = 0.06;
 const [WITHIN, AROUND] = [0.985, 1.015]; // radii of marks, seen from inside and from outside
 const BAR_PX: Point = [50, 150];
@@ -49,17 +50,18 @@ export class Marks {
     this.labels = [];
     for (const group of [this.findings, this.rings]) clear(group);
     this.casings = [];
-    const near = NEAR_RADII * this.session.run.radius_mm;
-    const seen = this.session.standing.filter((f) => f.size.distance_to_mm > distance - near && f.size.distance_from_mm < distance + near);
+    const { radius_mm: radius } = this.session.run;
+    const [first, last] = [distance - (isInside ? BEHIND_RADII : NEAR_RADII) * radius, distance + (isInside ? AHEAD_RADII : NEAR_RADII) * radius];
+    const seen = this.session.standing.filter((f) => f.size.distance_to_mm > first && f.size.distance_from_mm < last);
     const isChosen = (f: Finding) => f.id === this.session.selected;
     this.outlines(seen.filter((f) => !isChosen(f)), "#ffffff", 1.8, 4);
     this.outlines(seen.filter(isChosen), CHOSEN_COLOUR, 3, 5.5);
     for (const finding of seen) this.name(finding, isChosen(finding));
     this.distances();
     this.clock();
-    const last = this.session.run.distance_mm[1];
-    this.end.textContent = `end of the measured wall, ${last.toFixed(0)} mm`;
-    if (isInside) this.put(this.place(last, 0, 0), this.end, null);
+    const end = this.session.run.distance_mm[1];
+    this.end.textContent = `end of the measured wall, ${end.toFixed(0)} mm`;
+    if (isInside) this.put(this.place(end, 0, 0), this.end, null);
   }
 
   /** Bring the words to where their places are seen. */

@@ -18,9 +18,9 @@ const ANISOTROPY = 8;
 // What a browser without a graphics card can still turn, and what keeps the tab's memory small.
 const MOST_TRIANGLES = 215_000;
 const AT_ONCE = 2;
-// While the view moves without a graphics card, vertices are joined in cells of this many radii along and around: a tenth of
-// the triangles are left, and between them a round wall is off by 0.1 % of its radius.
-const THINNED_RADII = 0.08;
+// While the view moves without a graphics card, vertices are joined in cells of this many radii along and around: a twentieth
+// of the triangles is left, and between them a round wall is off by 0.2 % of its radius.
+const THINNED_RADII = 0.12;
 
 interface Part {
   mesh: THREE.Mesh; base: Float32Array; away: Float32Array; variants: Map<string, THREE.Material>; at: Float64Array; span: Point;
