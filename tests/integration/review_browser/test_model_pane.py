@@ -38,7 +38,8 @@ def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
         )
     page.page.click("text=Home")
     page.until("document.querySelectorAll('.mark.hour:not([hidden])').length > 0")
-    assert any(text.endswith(" mm") for text in marks(page, ":not(.hour, .finding, .end)"))
+    distances = "[...document.querySelectorAll('.mark:not(.hour, .finding, .end):not([hidden])')]"
+    page.until(f"{distances}.some((e) => e.textContent.endsWith(' mm'))")
     page.js("boresight.model.fly(1e4)")
     page.until("document.querySelector('.mark.end:not([hidden])')")
     last = page.js("boresight.session.run.distance_mm[1]")
