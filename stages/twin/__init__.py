@@ -20,9 +20,10 @@ from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, block_contrasts, block_ratios, exposure_of
 from stages.twin.locate import LEAST_CONTRAST, ImagePlace, beside, full_size, places_in_image
 from stages.twin.name import cannot_tell, clipped, noise_figures, not_sharp, state_figures
-from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image, maps_of, unnamed, worst_places
+from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image, unnamed
 from stages.twin.render import Region, render_frame
 from stages.twin.scene import Scene, scene_of
+from stages.twin.shown import maps_of, worst_places
 from stages.twin.state import PhotometricState, Sampled, estimate_state, sample_frames
 from stages.twin.window import WindowPlace
 
@@ -184,7 +185,8 @@ class Sums:
         if kind != Illumination.LASER:
             self.lit.add(frame, above, after, free & (after.region == Region.WALL), self._sector)
         if kind == Illumination.LASER:
-            self.line.add(frame, above, after, free & (after.region == Region.LINE_CORE), self._sector)
+            near = (after.region == Region.LINE_CORE) | (after.region == Region.LINE_FLANK)
+            self.line.add_line(frame, above, after, free & near, self._sector)
         if kind == Illumination.LED:
             self.blocks.add(frame, above, before, noise.white - noise.black.value)
         exposure = float(np.exp(exposure_of(above, after)))
@@ -264,7 +266,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "5",
+    "6",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -25,22 +25,20 @@ from stages.twin.cells import (
     drift,
     fitted,
     of_sectors,
-    sector_azimuth_rad,
     sigmas,
     try_law,
 )
+from stages.twin.laws import LED_AZIMUTHS, line_laws, lit_laws, steps_of
 from stages.twin.locate import FALSE_ALARM
-from stages.twin.scene import Ring, even_light
+from stages.twin.scene import Ring
 
 _FEWEST_FRAMES, _ROUNDS, _BESIDE = 6, 3, 3
 """Frames that a light needs, causes looked for one after the other, frames that show a step on each side."""
 _SURE = 3.0
 """σ, from frame to frame, by which one law must fit better than another to be told from it."""
-_LEAST = {"step": 0.02, "flicker": 0.01, "led_dead": 0.2, "laser_sector": 0.25}
+_LEAST = {"step": 0.02, "flicker": 0.01, "laser_flicker": 0.04, "led_dead": 0.2, "laser_sector": 0.25}
 """Smallest sizes that are named: a photo errs by a per cent or two from frame to frame, and so does the
 wall's reflectance for the laser's colour, by more, from place to place."""
-_LED_AZIMUTHS, _FINE = 24, 5
-_SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (10, 13, 16, 20, 25, 32, 40, 50, 65, 80, 100, 120), (0.3, 0.7, 0.95)
 _LOBE = 0.15
 """Relative 1 σ of an LED's share for want of its lobe, which no probe states: even light and one that falls
 as the cosine differ by so much at the ring."""
@@ -57,7 +55,7 @@ def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring
     for light, cells in (("LEDs", lit), ("laser", line)):
         if cells is None or len(cells.frame) < _FEWEST_FRAMES:
             continue
-        base, laws = _lit_laws(cells, lighting, ring) if light == "LEDs" else _line_laws(cells)
+        base, laws = lit_laws(cells, lighting, ring) if light == "LEDs" else line_laws(cells)
         chosen, base = _chosen(cells, base, laws)
         for best, rivals in chosen:
             if best.law.name == "step":
@@ -66,75 +64,6 @@ def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring
                 found.append(_mismatch(best, rivals, cells, ring))
         found += _flicker(cells, base, light, ring)
     return (*_steps(steps, lit, line, ring), *found)
-
-
-def _lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[Law]]:
-    frames = len(cells.frame)
-    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
-    azimuth = 2 * np.pi * np.arange(_LED_AZIMUTHS) / _LED_AZIMUTHS
-    share = led_share(lighting, azimuth, ring)
-    steps, first = _steps_of(frames)
-    columns = np.log1p(-0.999 * share)[:, None, None] * steps[None, ..., :1]
-    places = np.stack(
-        [np.repeat(azimuth, len(first)), np.tile(first, _LED_AZIMUTHS), np.repeat(share.max(1), len(first))],
-        1,
-    )
-    return base, [
-        Law("step", steps, first[:, None]),
-        Law("led_dead", columns.reshape(-1, frames, SECTORS), places),
-    ]
-
-
-def _line_laws(cells: Cells) -> tuple[Float, list[Law]]:
-    frames, azimuth = len(cells.frame), sector_azimuth_rad()
-    around = [np.ones(SECTORS), *(f(m * azimuth) for m in (1, 2) for f in (np.cos, np.sin))]
-    base = np.concatenate([of_sectors(frames, np.array(around)), drift(frames)])
-    steps, first = _steps_of(frames)
-    patterns, places = _sector_patterns()
-    return base, [
-        Law("step", steps, first[:, None]),
-        Law("laser_sector", of_sectors(frames, patterns), places),
-    ]
-
-
-def _steps_of(frames: int) -> tuple[Float, Float]:
-    """Return columns (C, F, S) of steps, two frames or more on each side, and the first frames after (C,)."""
-    first = np.arange(2, frames - 1)
-    after = (np.arange(frames)[None] >= first[:, None]).astype(float)
-    return np.repeat(after[..., None], SECTORS, 2), first.astype(float)
-
-
-def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:
-    """Return which share (L, S) of the light in each sector comes from an LED at azimuths (L,)."""
-    around = sector_azimuth_rad()
-    point = np.stack(
-        [*(ring.radius_mm * f(around) for f in (np.cos, np.sin)), np.full(SECTORS, ring.ahead_mm)], 1
-    )
-    inward = np.stack([-np.cos(around), -np.sin(around), np.zeros(SECTORS)], 1)
-    whole = even_light(lighting, point, inward)
-    return np.stack([
-        even_light(replace(lighting, leds=1), _turned(point, -a), _turned(inward, -a)) / lighting.leds / whole
-        for a in azimuth_rad
-    ])  # fmt: skip
-
-
-def _turned(vector: Float, angle: float) -> Float:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.asarray(vector @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]))
-
-
-def _sector_patterns() -> tuple[Float, Float]:
-    """Return log brightness (C, S) of dim sectors, and middle, width and loss of each (C, 3)."""
-    fine = (np.arange(SECTORS * _FINE) + 0.5) / _FINE * 360 / SECTORS - 180
-    patterns, places = [], []
-    for middle in np.arange(-180.0, 180.0, 180 / SECTORS):
-        away = np.abs((fine - middle + 180) % 360 - 180)
-        for width in _SECTOR_WIDTHS_DEG:
-            shape = np.exp(-np.log(2) * (2 * away / width) ** 8).reshape(SECTORS, _FINE).mean(1)
-            for lost in _SECTOR_LOSSES:
-                patterns.append(np.log1p(-lost * shape))
-                places.append((middle, width, lost))
-    return np.array(patterns), np.array(places)
 
 
 def _chosen(cells: Cells, base: Float, laws: Sequence[Law]) -> tuple[list[tuple[Fitted, list[str]]], Float]:
@@ -216,7 +145,7 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
     name = best.law.name
     if name == "led_dead":
         when, where = _when(cells.frame, int(best.place[1])), float(np.degrees(best.place[0]))
-        place = (when, NamedFigure("azimuth_deg", _half_turn(where), 180 / _LED_AZIMUTHS, "deg"))
+        place = (when, NamedFigure("azimuth_deg", _half_turn(where), 180 / LED_AZIMUTHS, "deg"))
         said = f"From frame {when.value:.0f} on the LED at image azimuth {place[1].value:.0f}° has lost"
         fixed_to, look = "time", ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
     else:
@@ -281,7 +210,7 @@ def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
     """Return whether frames of the other light step alike between two frames; None if they cannot tell."""
     if other is None or len(other.frame) < _FEWEST_FRAMES:
         return None
-    columns, first = _steps_of(len(other.frame))
+    columns, first = steps_of(len(other.frame))
     at = first.astype(int)
     here = (other.frame[at] > between[0]) & (other.frame[at - 1] < between[1])
     if not here.any():
@@ -311,7 +240,8 @@ def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch
     chance = float(t.sf(alike * np.sqrt((frames - 2) / (1 - alike**2)), frames - 2))
     foretold = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])
     before, after = (float(cells.chi2(k).sum() / max(cells.counted.sum(), 1)) for k in (known, foretold))
-    if chance > FALSE_ALARM or spread < _LEAST["flicker"] or after >= before:
+    name = "flicker" if light == "LEDs" else "laser_flicker"
+    if chance > FALSE_ALARM or spread < _LEAST[name] or after >= before:
         return []
     sd = float(product.std()) / np.sqrt(frames) / (2 * spread)
     place = tuple(
@@ -319,7 +249,7 @@ def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch
         for n, f in (("frame_from", cells.frame[0]), ("frame_to", cells.frame[-1]))
     )
     return [Mismatch(
-        "flicker" if light == "LEDs" else "laser_flicker", "intensity" if light == "LEDs" else "line", "time",
+        name, "intensity" if light == "LEDs" else "line", "time",
         place, (NamedFigure("exposure", spread, sd, "relative"),), chance, before, after,
         f"Frames lit by the {light} vary in brightness by {100 * spread:.1f} % (1 σ) from frame to frame.",
         ring.whole(cells.frame[int(np.argmax(np.abs(parts.mean(0))))]),

@@ -85,6 +85,19 @@ class CellsOfFrames:
         self.frame.append(frame)
         self.parts.append(np.stack([np.bincount(at, w, SECTORS).astype(float) for w in sums]))
 
+    def add_line(self, frame: int, above: Float32, twin: TwinFrame, use: Bool, sector: Int) -> None:
+        """Take the pixels of a laser frame, whose light counts wherever across the line it lies.
+
+        A line beside its predicted place, for want of the right sheet or radius, is no darker for that:
+        sectors are compared by all light about the line, as if it had its twin's place and profile.
+        """
+        at, level = sector[use], twin.level[use]
+        sums = (above[use], level, level**2 / twin.variance[use], None)
+        light, foretold, own, pixels = (np.bincount(at, w, SECTORS).astype(float) for w in sums)
+        ratio = light / np.where(foretold > 0, foretold, np.inf)
+        self.frame.append(frame)
+        self.parts.append(np.stack([pixels + ratio**2 * own, ratio * own, own, pixels]))
+
     def cells(self) -> Cells | None:
         """Return the cells of all frames; None without any."""
         if not self.parts:

@@ -16,8 +16,8 @@ import numpy as np
 from scipy.stats import norm, t
 
 from pipeline.adjustment.robust import spread_about_median
-from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.artefacts.twin import Look, Mismatch, NamedFigure, TwinMap
+from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX, block_ratios
 from stages.twin.locate import FALSE_ALARM, ImagePlace
@@ -25,15 +25,14 @@ from stages.twin.render import TwinFrame
 
 _SURE, _FEWEST_FRAMES, _FEWEST_CELLS = 3.0, 4, 2
 """σ from frame to frame by which an order must predict better, frames for that, and cells of a region."""
-_WALL_COLUMNS = 128
+WALL_COLUMNS = 128
 """Cells of the wall around the pipe; they are as long as wide: about two blocks at the laser ring."""
 _LEAST_ON_WALL, _LEAST_OF_ROWS = 0.05, 0.01
 """Relative changes that count: at steps of the wall the photo itself errs by a few per cent."""
-_SHOWN = 8.0
 _RING_BLOCKS, _LEAST_SPREAD, _NEAR_BLOCKS = 4, 1e-3, 3
 """Width of the rings in which blocks are alike, their least relative spread, and what is next to a block."""
-_WORST, _SHOWN_PX = 6, 60.0
-"""Worst places that are shown, and half the side of their thumbnails."""
+SHOWN_PX = 60.0
+"""Half the side of the thumbnail of a place."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class BlockSamples:
     def orders(self) -> dict[str, Int]:
         """Number (N,) of the cell that each block is in, by what is then fixed."""
         image = self.row * (self.column.max() + 1) + self.column
-        wall = self.along * _WALL_COLUMNS + self.around
+        wall = self.along * WALL_COLUMNS + self.around
         return {"image": image, "wall": wall, "rows": self.frame * (self.row.max() + 1) + self.row}
 
     @cached_property
@@ -108,7 +107,7 @@ class BlockSamples:
         """Return which blocks (N,) lie next to one in the image, and which next to it on the wall."""
         image = np.hypot(self.row - self.row[k], self.column - self.column[k]) < _NEAR_BLOCKS
         turn = np.abs(self.around - self.around[k])
-        turn = np.minimum(turn, _WALL_COLUMNS - turn)
+        turn = np.minimum(turn, WALL_COLUMNS - turn)
         return image, np.hypot(self.along - self.along[k], turn) < _NEAR_BLOCKS
 
     def look(self, use: Bool, half_px: float) -> Look:
@@ -151,14 +150,14 @@ class BlocksOfFrames:
 
     def samples(self) -> BlockSamples | None:
         """Return all blocks; None where there are none."""
-        found, cell_mm = [], 2 * np.pi * self.mean_radius_mm / _WALL_COLUMNS
+        found, cell_mm = [], 2 * np.pi * self.mean_radius_mm / WALL_COLUMNS
         for k, (ratio, distance, azimuth) in enumerate(self.parts):
             row, column = np.nonzero(np.isfinite(ratio) & np.isfinite(distance))
             if not len(row):
                 continue
             change = ratio[row, column] / np.median(ratio[row, column]) - 1
             along = np.floor(distance[row, column] / cell_mm)
-            around = np.floor((azimuth[row, column] / (2 * np.pi)) % 1 * _WALL_COLUMNS) % _WALL_COLUMNS
+            around = np.floor((azimuth[row, column] / (2 * np.pi)) % 1 * WALL_COLUMNS) % WALL_COLUMNS
             found.append((change, np.full(len(row), k), row, column, along, around))
         if not found:
             return None
@@ -192,7 +191,7 @@ def _fixed_in_image(samples: BlockSamples, place: ImagePlace) -> str:
     return samples.fixed_to(away < max(place.radius_px, BLOCK_PX))
 
 
-def _map(samples: BlockSamples, order: str, shape: tuple[int, int]) -> tuple[Float, Float]:
+def map_of(samples: BlockSamples, order: str, shape: tuple[int, int]) -> tuple[Float, Float]:
     """Return the mean of the cells of an order and its 1 σ, each of a shape; NaN where few blocks are."""
     cell, cells = samples.orders[order], shape[0] * shape[1]
     count = np.bincount(cell, minlength=cells)[:cells]
@@ -211,8 +210,8 @@ def unnamed(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
 
 def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
     """Return regions of the wall that stay brighter or darker than their photo, if frames bear it out."""
-    shape = (int(samples.along.max()) + 1, _WALL_COLUMNS)
-    mean, sd = _map(samples, "wall", shape)
+    shape = (int(samples.along.max()) + 1, WALL_COLUMNS)
+    mean, sd = map_of(samples, "wall", shape)
     known = np.isfinite(mean)
     bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * max(known.sum(), 1)))) * sd, _LEAST_ON_WALL)
     beyond = known & (np.abs(np.nan_to_num(mean)) > bound)
@@ -233,13 +232,13 @@ def _on_wall(cells: Int, mean: Float, sd: Float, known: int, samples: BlockSampl
     most = int(np.argmax(np.abs(value)))
     chance = min(1.0, 2 * known * float(norm.sf(abs(value[most]) / max(float(spread[most]), 1e-9))))
     distance = samples.first_mm + (cells[:, 0].mean() + 0.5) * cell_mm
-    azimuth = (cells[:, 1].mean() + 0.5) * 360 / _WALL_COLUMNS
+    azimuth = (cells[:, 1].mean() + 0.5) * 360 / WALL_COLUMNS
     azimuth -= 360 * (azimuth > 180)
     extent = cell_mm * float(np.sqrt(len(cells)))
     nan, way = float("nan"), "brighter" if value[most] > 0 else "darker"
     place = (
         NamedFigure("distance_mm", distance, cell_mm / 2, "mm"),
-        NamedFigure("azimuth_deg", azimuth, 180 / _WALL_COLUMNS, "deg"),
+        NamedFigure("azimuth_deg", azimuth, 180 / WALL_COLUMNS, "deg"),
         NamedFigure("extent_mm", extent, cell_mm, "mm"),
     )
     size = NamedFigure("change", float(value[most]), float(spread[most]), "relative")
@@ -247,7 +246,7 @@ def _on_wall(cells: Int, mean: Float, sd: Float, known: int, samples: BlockSampl
         "", "intensity", "wall", place, (size,), chance, nan, nan,
         f"At {distance:.0f} mm, azimuth {azimuth:.0f}°, the wall is {100 * abs(value[most]):.0f} % {way} "
         "than its photo: it shines differently from each side, or lies elsewhere than the radius map says.",
-        samples.look(use, _SHOWN_PX),
+        samples.look(use, SHOWN_PX),
     )  # fmt: skip
 
 
@@ -256,7 +255,7 @@ def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
     everywhere = np.ones(len(samples.change), bool)
     if samples.frame.max() + 1 < _FEWEST_FRAMES or samples.fixed_to(everywhere) != "rows":
         return ()
-    mean, _ = _map(samples, "rows", (int(samples.frame.max()) + 1, int(samples.row.max()) + 1))
+    mean, _ = map_of(samples, "rows", (int(samples.frame.max()) + 1, int(samples.row.max()) + 1))
     size = float(np.nanstd(mean))
     frames = np.unique(samples.frame)
     chance = float(t.sf(sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
@@ -270,54 +269,6 @@ def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
             nan, nan,
             f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as of lamps "
             "that flicker within a frame of a rolling shutter.",
-            samples.look(everywhere, 2 * _SHOWN_PX),
+            samples.look(everywhere, 2 * SHOWN_PX),
         ),
     )  # fmt: skip
-
-
-def worst_places(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
-    """Return the places where lit wall differs most, whether or not something else explains them."""
-    if samples is None:
-        return ()
-    left, found = np.abs(samples.strength), []
-    for _ in range(_WORST):
-        k = int(np.argmax(left))
-        if left[k] <= 0:
-            break
-        image, wall = samples.near(k)
-        found.append(_worst(samples, k, image, wall))
-        left = np.where(image | wall, 0.0, left)
-    return tuple(found)
-
-
-def _worst(samples: BlockSamples, k: int, image: Bool, wall: Bool) -> Mismatch:
-    at = samples.look(np.arange(len(samples.change)) == k, _SHOWN_PX)
-    fixed = next((w for w, use in (("image", image), ("wall", wall)) if samples.fixed_to(use) == w), "")
-    change, times, nan = float(samples.change[k]), abs(float(samples.strength[k])), float("nan")
-    why = {"image": "It stays there in other frames.", "wall": "It moves with the wall."}.get(
-        fixed, "Other frames do not show it, or too few see this wall."
-    )
-    size = NamedFigure("change", change, abs(change) / max(times, 1e-9), "relative")
-    place = tuple(NamedFigure(n, v, BLOCK_PX / 2, "px") for n, v in (("u_px", at.u_px), ("v_px", at.v_px)))
-    return Mismatch(
-        "", "intensity", fixed, place, (size,), nan, nan, nan,
-        f"In frame {at.frame} at ({at.u_px:.0f}, {at.v_px:.0f}) the wall is {100 * abs(change):.0f} % "
-        f"{'brighter' if change > 0 else 'darker'} than re-rendered, {times:.0f} times what blocks usually "
-        f"differ by there. {why}",
-        at,
-    )  # fmt: skip
-
-
-def maps_of(samples: BlockSamples | None) -> tuple[TwinMap, ...]:
-    """Return maps over the image and over the unrolled wall."""
-    if samples is None:
-        return ()
-    return tuple(TwinMap(order, _picture(samples, order)) for order in ("image", "wall"))
-
-
-def _picture(samples: BlockSamples, order: str) -> Byte:
-    rows = samples.along if order == "wall" else samples.row
-    columns = _WALL_COLUMNS if order == "wall" else int(samples.column.max()) + 1
-    mean, sd = _map(samples, order, (int(rows.max()) + 1, columns))
-    z = np.clip(np.nan_to_num(mean / np.maximum(sd, 1e-12)), -_SHOWN + 0.1, _SHOWN - 0.1)
-    return np.where(np.isfinite(mean), 128 + 127 / _SHOWN * z, 0).astype(np.uint8)

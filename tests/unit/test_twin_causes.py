@@ -5,7 +5,8 @@ import pytest
 
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import causes
-from stages.twin.cells import SECTORS, Cells, sector_azimuth_rad, sectors_of
+from stages.twin.cells import SECTORS, Cells, CellsOfFrames, sector_azimuth_rad, sectors_of
+from stages.twin.render import TwinFrame
 from stages.twin.scene import Ring
 
 RING, FRAMES = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 18
@@ -88,3 +89,16 @@ def test_a_change_of_single_sectors_is_no_flicker():
 def test_sectors_begin_at_minus_pi():
     phi = sector_azimuth_rad().astype(np.float32)
     np.testing.assert_array_equal(sectors_of(phi), np.arange(SECTORS))
+
+
+def test_a_displaced_line_is_no_darker():
+    across = np.arange(-12.0, 13.0)[:, None] + np.zeros(360)
+    sector = np.tile(np.arange(360) // 10, (25, 1))
+    level = (100 * np.exp(-0.5 * across**2)).astype(np.float32)
+    unknown = np.full(level.shape, np.nan, np.float32)
+    twin = TwinFrame(level, np.full_like(level, 2.0), np.zeros(level.shape, np.uint8), unknown, unknown)
+    taken = CellsOfFrames()
+    for shift in (0.0, 2.0):
+        recorded = (80 * np.exp(-0.5 * (across - shift) ** 2)).astype(np.float32)
+        taken.add_line(0, recorded, twin, np.abs(across) < 8, sector)
+    np.testing.assert_allclose(taken.cells().log_ratio, np.log(0.8), atol=1e-3)

@@ -1,0 +1,86 @@
+"""Laws of what changes brightness over time and around the image, as columns over frames and sectors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.instrument.probe import Lighting
+from stages.twin.cells import SECTORS, Cells, Law, drift, of_sectors, sector_azimuth_rad
+from stages.twin.scene import Ring, even_light
+
+LED_AZIMUTHS, _FINE = 24, 5
+_SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (10, 13, 16, 20, 25, 32, 40, 50, 65, 80, 100, 120), (0.3, 0.7, 0.95)
+
+
+def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[Law]]:
+    """Return base columns (K, F, S) of lit frames, and laws of a step and of an LED that fails."""
+    frames = len(cells.frame)
+    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
+    azimuth = 2 * np.pi * np.arange(LED_AZIMUTHS) / LED_AZIMUTHS
+    share = led_share(lighting, azimuth, ring)
+    steps, first = steps_of(frames)
+    columns = np.log1p(-0.999 * share)[:, None, None] * steps[None, ..., :1]
+    places = np.stack(
+        [np.repeat(azimuth, len(first)), np.tile(first, LED_AZIMUTHS), np.repeat(share.max(1), len(first))],
+        1,
+    )
+    return base, [
+        Law("step", steps, first[:, None]),
+        Law("led_dead", columns.reshape(-1, frames, SECTORS), places),
+    ]
+
+
+def line_laws(cells: Cells) -> tuple[Float, list[Law]]:
+    """Return base columns (K, F, S) of the line, and laws of a step and of a dim sector."""
+    frames, azimuth = len(cells.frame), sector_azimuth_rad()
+    around = [np.ones(SECTORS), *(f(m * azimuth) for m in (1, 2) for f in (np.cos, np.sin))]
+    base = np.concatenate([of_sectors(frames, np.array(around)), drift(frames)])
+    steps, first = steps_of(frames)
+    patterns, places = _sector_patterns()
+    return base, [
+        Law("step", steps, first[:, None]),
+        Law("laser_sector", of_sectors(frames, patterns), places),
+    ]
+
+
+def steps_of(frames: int) -> tuple[Float, Float]:
+    """Return columns (C, F, S) of steps, two frames or more on each side, and the first frames after (C,)."""
+    first = np.arange(2, frames - 1)
+    after = (np.arange(frames)[None] >= first[:, None]).astype(float)
+    return np.repeat(after[..., None], SECTORS, 2), first.astype(float)
+
+
+def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:
+    """Return which share (L, S) of the light in each sector comes from an LED at azimuths (L,)."""
+    around = sector_azimuth_rad()
+    point = np.stack(
+        [*(ring.radius_mm * f(around) for f in (np.cos, np.sin)), np.full(SECTORS, ring.ahead_mm)], 1
+    )
+    inward = np.stack([-np.cos(around), -np.sin(around), np.zeros(SECTORS)], 1)
+    whole = even_light(lighting, point, inward)
+    return np.stack([
+        even_light(replace(lighting, leds=1), _turned(point, -a), _turned(inward, -a)) / lighting.leds / whole
+        for a in azimuth_rad
+    ])  # fmt: skip
+
+
+def _turned(vector: Float, angle: float) -> Float:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(vector @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]))
+
+
+def _sector_patterns() -> tuple[Float, Float]:
+    """Return log brightness (C, S) of dim sectors, and middle, width and loss of each (C, 3)."""
+    fine = (np.arange(SECTORS * _FINE) + 0.5) / _FINE * 360 / SECTORS - 180
+    patterns, places = [], []
+    for middle in np.arange(-180.0, 180.0, 180 / SECTORS):
+        away = np.abs((fine - middle + 180) % 360 - 180)
+        for width in _SECTOR_WIDTHS_DEG:
+            shape = np.exp(-np.log(2) * (2 * away / width) ** 8).reshape(SECTORS, _FINE).mean(1)
+            for lost in _SECTOR_LOSSES:
+                patterns.append(np.log1p(-lost * shape))
+                places.append((middle, width, lost))
+    return np.array(patterns), np.array(places)

@@ -1,0 +1,68 @@
+"""What is on the window: named by the law that frames bear out, on made pictures."""
+
+import cv2
+import numpy as np
+import pytest
+
+from stages.twin.compare import block_contrasts
+from stages.twin.locate import ImagePlace
+from stages.twin.render import Region, TwinFrame
+from stages.twin.window import WindowPlace
+
+
+def _frame(level):
+    unknown = np.full(level.shape, np.nan, np.float32)
+    return TwinFrame(
+        level,
+        np.full(level.shape, 4.0, np.float32),
+        np.full(level.shape, Region.WALL, np.uint8),
+        unknown,
+        unknown,
+    )
+
+
+def _textured(random):
+    fine = cv2.GaussianBlur(random.standard_normal((200, 240)).astype(np.float32), (0, 0), 2.0)
+    return (90 + 25 * fine / fine.std()).astype(np.float32)
+
+
+def _dirty_picture(level, name):
+    v, u = np.mgrid[0:200, 0:240].astype(np.float32)
+    near = np.exp(-0.5 * ((u - 120) ** 2 + (v - 100) ** 2) / 13**2)
+    if name == "window_dirt":
+        return level * (1 - 0.3 * near)
+    if name == "window_scatter":
+        return (1 - 0.6 * near) * level + 0.6 * near * cv2.blur(level, (61, 61))
+    square = np.minimum(((u - 120) ** 2 + (v - 100) ** 2) / 25**2, 1)
+    seen = [(m + (x - m) * (1 - 1.4 * (1 - square))).astype(np.float32) for x, m in ((u, 120), (v, 100))]
+    return cv2.remap(level, *seen, cv2.INTER_LINEAR) if name else level
+
+
+@pytest.mark.parametrize("name", ["window_dirt", "window_scatter", "droplet", ""])
+def test_what_is_on_the_window_is_told_by_frames_or_withdrawn(name):
+    random = np.random.default_rng(3)
+    place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
+    for frame in range(9):
+        level = _textured(random)
+        recorded = _dirty_picture(level, name) + 2 * random.standard_normal(level.shape)
+        place.add(frame, recorded.astype(np.float32), _frame(level), np.ones(level.shape, bool))
+    found = place.judged("image")
+    assert place.judged("wall") is None
+    if not name:
+        assert found is None
+        return
+    assert found is not None
+    assert found.name == name
+    assert found.chi2_after < found.chi2_before
+
+
+def test_faint_texture_is_found_where_brightness_is_even():
+    random = np.random.default_rng(3)
+    shares = []
+    for _ in range(6):
+        level = _textured(random)
+        recorded = _dirty_picture(level, "window_scatter") + random.standard_normal(level.shape)
+        shares.append(block_contrasts(recorded.astype(np.float32), _frame(level), 1e9))
+    share = np.nanmedian(shares, axis=0)
+    assert share[12, 14] < 0.7
+    assert share[3, 3] == pytest.approx(1, abs=0.1)
