@@ -12,6 +12,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
+from stages.motion.rings import NO_STEPS
 from stages.motion.tracking.landmarks import OBSERVATION, ObservationStore, TrackedPoses
 from stages.motion.tracking.strips import StripGrid
 from stages.motion.tracking.tracker import TrackedTexture
@@ -53,7 +54,7 @@ def long_motion(
     texture = TrackedTexture(store, grid, TrackedPoses(lit, guess[lit], np.zeros(len(lit), bool)))
     distance = step_mm * k / SCALE + ENCODER_SIGMA_MM * random.standard_normal(frames)
     encoder = EncoderReadings(distance - distance[0], ENCODER_SIGMA_MM, np.ones(frames, bool))
-    return LongMotion(MeasuredRun(texture, rings, laser, k / 30, guess, encoder, probe), T_pc)
+    return LongMotion(MeasuredRun(texture, rings, laser, k / 30, guess, encoder, probe, NO_STEPS), T_pc)
 
 
 def _poses(z_mm: Float) -> Float:

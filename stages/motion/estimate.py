@@ -29,7 +29,7 @@ from stages.motion.events import find_events
 from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import RingCircles, circles_in_rings
+from stages.motion.rings import BoreSteps, RingCircles, circles_in_rings
 from stages.motion.route.laying import lay_route
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.tracking.prediction import PosePredictor
@@ -123,7 +123,10 @@ def measure_run(
     _require_distance(texture.poses, encoder)
     place = places_of(recording, rings.frame)
     T_pc = predictor.between(texture.poses)
-    return MeasuredRun(texture, rings, place, recording.frames.time_s, T_pc, encoder, probe)
+    at_mm = T_pc[places_of(recording, circles.frame), 2, 3] + probe.laser.baseline_mm
+    bore = BoreSteps.of(circles.radius_mm, at_mm)
+    context.report("steps of the bore", len(bore.at_mm), "")
+    return MeasuredRun(texture, rings, place, recording.frames.time_s, T_pc, encoder, probe, bore)
 
 
 @dataclass(frozen=True)
@@ -284,7 +287,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "10",
+    "11",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import interp1d
+from scipy.ndimage import maximum_filter1d
 
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Float, Float32, Int
@@ -24,6 +25,9 @@ _ROUNDS = 5
 _OUTLYING = 3.0
 """Spreads at which a sample weighs half in the fit of a circle. Not measured."""
 _AT_ONCE = 256
+_STEP_MM, _STEP_RINGS = 0.5, 5
+"""A bore steps where the medians of so many rings before and behind differ by so much within two rings: five
+times the relief about the smooth pipe (`surface_sigma_mm`), and no weld's ripple lasts so long. A choice."""
 _FARTHEST_PX = 20.0
 """A ring farther than this from where it is expected is a hole or an outlier, of little weight. Up to there
 derivatives change evenly: with relief of 5 px rms nothing is left of their pull. A choice."""
@@ -65,6 +69,46 @@ class RingBins:
         away = residual_mm / np.einsum("mi,mi->m", normal_c, self.by_pixel)
         away = np.clip(away, -_FARTHEST_PX, _FARTHEST_PX)
         return np.asarray(self.by_instrument - away[:, None, None] * self.instrument_by_pixel)
+
+
+@dataclass(frozen=True)
+class BoreSteps:
+    """Where the bore steps (k,), and how much wider (k + 1,) than the longest the lengths between are, mm.
+
+    A pipe of one bore has no steps. Held to one radius, two bores 2 mm apart moved the probe by 20 σ.
+    """
+
+    at_mm: Float
+    wider_mm: Float
+
+    @staticmethod
+    def of(radius_mm: Float, at_mm: Float) -> BoreSteps:
+        """Return the steps that radii (F,) of rings at distances (F,) show; NaN where a ring has none."""
+        order = np.argsort(at_mm, kind="stable")
+        order = order[np.isfinite(radius_mm[order])]
+        radius_mm, at_mm, n = radius_mm[order], at_mm[order], _STEP_RINGS
+        if len(radius_mm) < 2 * n + 2:
+            return NO_STEPS
+        median = np.median(np.lib.stride_tricks.sliding_window_view(radius_mm, n), axis=1)
+        size = np.abs(median[n + 1 :] - median[: -n - 1])  # of a step at ring n + k
+        highest = size == maximum_filter1d(size, 2 * n + 1)
+        place = n + np.flatnonzero(highest & (size > _STEP_MM))
+        near = place[np.diff(place, prepend=-n) >= n]
+        place = np.array([_stepped_at(radius_mm, int(k)) for k in near], np.int64)
+        lengths = np.split(radius_mm, place)
+        usual = np.array([np.median(part) for part in lengths])
+        return BoreSteps(at_mm[place], usual - usual[np.argmax([len(part) for part in lengths])])
+
+    def wider_at(self, distance_mm: Float) -> Float:
+        """Return how much wider (M,) the bore is at distances (M,), mm."""
+        return np.asarray(self.wider_mm[np.searchsorted(self.at_mm, distance_mm)])
+
+    def behind(self, start_mm: float) -> BoreSteps:
+        """Return the steps with distance counted from ``start_mm``."""
+        return BoreSteps(self.at_mm - start_mm, self.wider_mm)
+
+
+NO_STEPS = BoreSteps(np.zeros(0), np.zeros(1))
 
 
 @dataclass(frozen=True)
@@ -158,6 +202,14 @@ def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigm
     by_instrument = by_parameters @ unsure
     farther = probe.triangulate_jacobian(uv + outward)[1] @ unsure - by_instrument
     return RingBins(frame[ok], xyz_c[ok], by_instrument[ok], by_pixel[ok], farther[ok], sigma[ok])
+
+
+def _stepped_at(radius_mm: Float, near: int) -> int:
+    """Return the first ring behind a step: medians tell it to two rings only."""
+    n = _STEP_RINGS
+    part = radius_mm[near - n : near + n + 1]
+    before, behind = np.abs(part - np.median(part[:n])), np.abs(part - np.median(part[n + 1 :]))
+    return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
 
 
 def _circles(xy_c: Float32) -> tuple[Float, Float]:

@@ -13,11 +13,12 @@ from pipeline.adjustment.motion_priors import smooth_motion_rows, third_differen
 from pipeline.adjustment.robust import GemanMcClure
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples, RingValidity
+from pipeline.geometry.axis import to_pipe
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.equations import landmark_rows
 from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import ring_bins
+from stages.motion.rings import BoreSteps, ring_bins
 from tests.gauge_runs import stated_probe
 from tests.motion_scene import displaced, scene
 
@@ -58,6 +59,24 @@ def check_rows(
     for b in range(state.border_size):
         wanted = slope(lambda s: make(s).residual, state, border=b)
         np.testing.assert_allclose(rows.by_border[:, b], wanted, atol=border_atol, err_msg=f"border {b}")
+
+
+def test_steps_of_the_bore_are_found_and_the_wall_follows_them(given) -> None:
+    random, at_mm = np.random.default_rng(7), 0.8 * np.arange(60)
+    wavy = 50 + 0.3 * np.sin(at_mm / 6) + 0.03 * random.standard_normal(60)
+    radius_mm = np.where(at_mm < 20, wavy, wavy - 2.0)
+    radius_mm[[7, 41]] = np.nan, 70.0
+    order = random.permutation(60)
+    assert not len(BoreSteps.of(wavy, at_mm).at_mm), "the control: a pipe of one bore has none"
+    steps = BoreSteps.of(radius_mm[order], at_mm[order])
+    assert steps.at_mm == pytest.approx([20.0])
+    assert steps.wider_mm == pytest.approx([2.0, 0.0], abs=0.3)
+
+    state = given[1]
+    wall = state.xyz_p
+    narrow = replace(state, bore=BoreSteps(np.array([30.0]), np.array([0.0, -2.0])))
+    apart = residuals.surface(narrow, wall)[0] - residuals.surface(state, wall)[0]
+    np.testing.assert_allclose(apart, np.where(to_pipe(state.axis, wall)[0] > 30, 2.0, 0.0), atol=1e-9)
 
 
 def test_relief_of_the_wall_does_not_pull_on_the_instrument() -> None:

@@ -40,7 +40,8 @@ def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
     s, psi, rho = to_pipe(state.axis, xyz_p)
     basis = state.axis_basis(s)
     a2, b2 = state.globals[1:3]
-    residual = rho - state.globals[0] - a2 * np.cos(2 * psi) - b2 * np.sin(2 * psi)
+    radius = state.globals[0] + state.bore.wider_at(s)
+    residual = rho - radius - a2 * np.cos(2 * psi) - b2 * np.sin(2 * psi)
     frame = state.section_frames(s)
     c, sn = np.cos(psi)[:, None], np.sin(psi)[:, None]
     tilt = 2 * (a2 * np.sin(2 * psi) - b2 * np.cos(2 * psi)) / rho

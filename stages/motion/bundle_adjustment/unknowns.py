@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline
 from pipeline.arrays import Float, Int
 from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, from_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from stages.motion.rings import NO_STEPS, BoreSteps
 
 GLOBALS = 4
 ENCODER_SCALE = GLOBALS - 1
@@ -39,6 +40,8 @@ class State:
     knot_mm, nominal_radius_mm : float
     instrument : (Q,)
         Corrections of the instrument along its principal uncertainties, then of texture matching, in σ.
+    bore : BoreSteps
+        Not unknown: where the rings show another bore.
     """
 
     T_pc: Float
@@ -50,6 +53,7 @@ class State:
     knot_mm: float
     nominal_radius_mm: float
     instrument: Float
+    bore: BoreSteps = NO_STEPS
 
     @property
     def knots(self) -> int:

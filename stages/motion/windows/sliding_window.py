@@ -17,7 +17,7 @@ from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, est
 from stages.motion.bundle_adjustment.unknowns import State, straight_start
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import ring_bins
+from stages.motion.rings import BoreSteps, ring_bins
 from stages.motion.tracking.landmarks import Tracks
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.submap_joining import JoinedRun, join_submaps
@@ -60,6 +60,8 @@ class MeasuredRun:
     encoder : EncoderReadings or None
     probe : Probe
         As stated.
+    bore : BoreSteps
+        Of the straightened pipe.
     """
 
     texture: TrackedTexture
@@ -69,6 +71,7 @@ class MeasuredRun:
     T_pc: Float
     encoder: EncoderReadings | None
     probe: Probe
+    bore: BoreSteps
 
     @property
     def whole(self) -> Window:
@@ -92,9 +95,10 @@ class MeasuredRun:
         z, grid = T_pc[:, 2, 3], self.texture.grid
         span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
         corrections = measured.unsure.shape[1] + MATCH_BIASES
-        return straight_start(
+        straight = straight_start(
             T_pc, measured.tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, corrections
         )
+        return replace(straight, bore=self.bore.behind(self._start_mm(window)))
 
     def _start_mm(self, window: Window) -> float:
         return float(self.T_pc[window.first, 2, 3]) if window.first else 0.0
