@@ -117,6 +117,16 @@ def driven(frames: int, random: np.random.Generator) -> Float:
     return from_parts(tilt @ roll, place)
 
 
+def driven_as(run: GaugeRun) -> Float:
+    """Return the true poses of run 1: the drive is drawn after the probe."""
+    random = np.random.default_rng(1)
+    stated = stated_probe()
+    random.multivariate_normal(stated.parameters, stated.covariance)
+    random.normal(size=4)
+    random.normal(0, 1, 3)
+    return driven(len(run.recording.frames.frame), random)
+
+
 def ring_uv(T_pc: Float, probe: Probe, gauge: Gauge, azimuth_rad: Float) -> Float:
     """Return where the sheet's rays (A,) meet the bore of one pose, in pixels (A, 2)."""
     direction = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad), probe.laser.slope(azimuth_rad)], -1)

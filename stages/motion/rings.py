@@ -25,9 +25,11 @@ _ROUNDS = 5
 _OUTLYING = 3.0
 """Spreads at which a sample weighs half in the fit of a circle. Not measured."""
 _AT_ONCE = 256
-_STEP_MM, _STEP_RINGS = 0.5, 5
-"""A bore steps where the medians of so many rings before and behind differ by so much within two rings: five
-times the relief about the smooth pipe (`surface_sigma_mm`), and no weld's ripple lasts so long. A choice."""
+_STEP_MM = 0.5
+"""Change of radius that counts as a step of the bore: five times the relief about the smooth pipe
+(`surface_sigma_mm`). A choice."""
+_LENGTH_RADII, _FEWEST_RINGS_OF_LENGTH = 0.5, 5
+"""A length of a bore is at least half its radius long: welds and rings of deposit are shorter. A choice."""
 _FARTHEST_PX = 20.0
 """A ring farther than this from where it is expected is a hole or an outlier, of little weight. Up to there
 derivatives change evenly: with relief of 5 px rms nothing is left of their pull. A choice."""
@@ -86,7 +88,11 @@ class BoreSteps:
         """Return the steps that radii (F,) of rings at distances (F,) show; NaN where a ring has none."""
         order = np.argsort(at_mm, kind="stable")
         order = order[np.isfinite(radius_mm[order])]
-        radius_mm, at_mm, n = radius_mm[order], at_mm[order], _STEP_RINGS
+        radius_mm, at_mm = radius_mm[order], at_mm[order]
+        if len(radius_mm) < 2 * _FEWEST_RINGS_OF_LENGTH + 2:
+            return NO_STEPS
+        apart_mm = max(float(np.ptp(at_mm)) / len(at_mm), 1e-9)
+        n = max(round(_LENGTH_RADII * float(np.median(radius_mm)) / apart_mm), _FEWEST_RINGS_OF_LENGTH)
         if len(radius_mm) < 2 * n + 2:
             return NO_STEPS
         median = np.median(np.lib.stride_tricks.sliding_window_view(radius_mm, n), axis=1)
@@ -94,7 +100,7 @@ class BoreSteps:
         highest = size == maximum_filter1d(size, 2 * n + 1)
         place = n + np.flatnonzero(highest & (size > _STEP_MM))
         near = place[np.diff(place, prepend=-n) >= n]
-        place = np.array([_stepped_at(radius_mm, int(k)) for k in near], np.int64)
+        place = np.array([_stepped_at(radius_mm, int(k), n) for k in near], np.int64)
         lengths = np.split(radius_mm, place)
         usual = np.array([np.median(part) for part in lengths])
         return BoreSteps(at_mm[place], usual - usual[np.argmax([len(part) for part in lengths])])
@@ -204,9 +210,8 @@ def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigm
     return RingBins(frame[ok], xyz_c[ok], by_instrument[ok], by_pixel[ok], farther[ok], sigma[ok])
 
 
-def _stepped_at(radius_mm: Float, near: int) -> int:
-    """Return the first ring behind a step: medians tell it to two rings only."""
-    n = _STEP_RINGS
+def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
+    """Return the first ring behind a step: medians of ``n`` rings tell it to half as many only."""
     part = radius_mm[near - n : near + n + 1]
     before, behind = np.abs(part - np.median(part[:n])), np.abs(part - np.median(part[n + 1 :]))
     return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))

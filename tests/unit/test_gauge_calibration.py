@@ -19,12 +19,22 @@ from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.edges import Sighting, find_fiducials, fit_steps
 from stages.calibrate.gauge.geometry import BoreRings, Gauge, gauge_of
 from stages.calibrate.gauge.poses import first_pose, posed_frames
-from stages.calibrate.gauge.solve import RingSource, first_unknowns
-from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns
+from stages.calibrate.gauge.solve import RingSource
+from stages.calibrate.gauge.state import SheetModel, Unknowns
 from stages.calibrate.gauge.terms import Equations, edge_equations, expected_ring, ring_equations
-from tests.gauge_runs import GaugeRun, calibrated, driven, facts, in_sigma, made_run, stated_probe
-
-USUAL = GaugeParameters.model_validate({"ring_bins": 120})
+from tests.gauge_runs import (
+    USUAL,
+    GaugeRun,
+    calibrated,
+    driven,
+    driven_as,
+    facts,
+    in_sigma,
+    made_run,
+    measured_run,
+    rings_of,
+    stated_probe,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -36,9 +46,6 @@ def _one_thread() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def run() -> GaugeRun:
     return made_run(1)
-
-
-# --- edges
 
 
 def test_edge_is_found_where_it_is_and_as_well_as_it_says() -> None:
@@ -63,19 +70,9 @@ def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None
     assert np.isnan(fit_steps(t, np.concatenate([flat, falling]))[0]).all()
 
 
-# --- derivatives
-
-
 def _unknowns(run: GaugeRun) -> tuple[Unknowns, RingSource]:
-    from pipeline.adjustment.motion_priors import LOOSE
-    from stages.calibrate.gauge.adjust import Measurements
-    from stages.calibrate.gauge.poses import poses_of_all_frames
-
-    T_pc = poses_of_all_frames(run.recording, run.posed, run.rings, run.stated)
-    source = RingSource(run.rings, run.rings.frame, run.gauge)
-    rings = source.on_bore(T_pc, run.stated, USUAL)
-    measured = Measurements(run.edges, rings, run.recording.frames.time_s, None, 0.003, LOOSE)
-    return first_unknowns(T_pc, run.posed.index, run.gauge, measured, run.stated, USUAL), source
+    given = measured_run(run)
+    return given.start, given.source
 
 
 def _where_expected(state: Unknowns, rings: BoreRings) -> BoreRings:
@@ -119,9 +116,6 @@ def test_derivatives_of_rings_do_not_hold_the_noise_of_the_measurement(run: Gaug
     assert (np.abs(moved - quiet).max(0) <= 3e-4 * largest).all()
 
 
-# --- estimates
-
-
 def test_drawn_probes_are_found_within_their_own_sigma() -> None:
     drawn = [list(in_sigma(r, calibrated(r)).values()) for r in (made_run(seed) for seed in (1, 2, 3))]
     # 30 correlated numbers: a wrong σ or a bias by its double would show
@@ -142,8 +136,6 @@ def test_stated_probe_is_off_and_the_result_says_by_how_much(run: GaugeRun) -> N
 
 
 def test_decentring_is_taken_in_when_it_is_there(run: GaugeRun) -> None:
-    from tests.gauge_runs import rings_of
-
     laser = replace(run.true.laser, decentre_x_mm=0.15, decentre_y_mm=-0.1)
     true = replace(run.true, laser=laser)
     T_pc = driven_as(run)
@@ -152,19 +144,6 @@ def test_decentring_is_taken_in_when_it_is_there(run: GaugeRun) -> None:
     result = calibrated(replace(run, rings=rings, true=true))
     assert result.sheet is SheetModel.DECENTRED
     assert max(map(abs, in_sigma(replace(run, true=true), result).values())) < 4
-
-
-def driven_as(run: GaugeRun) -> np.ndarray:
-    """Return the true poses of run 1: the drive is drawn after the probe."""
-    random = np.random.default_rng(1)
-    stated = stated_probe()
-    random.multivariate_normal(stated.parameters, stated.covariance)
-    random.normal(size=4)
-    random.normal(0, 1, 3)
-    return driven(len(run.recording.frames.frame), random)
-
-
-# --- outvoting
 
 
 def test_one_wrong_ring_in_five_is_outvoted_and_named(run: GaugeRun) -> None:
@@ -211,9 +190,6 @@ def test_one_swapped_pair_among_fifty_fiducials_is_outvoted(run: GaugeRun) -> No
     posed = _posed(_sightings(swapped, run.gauge), swapped, run)
     assert swapped.ids[premises.outvoted_fiducials(posed, swapped)].tolist() == [3, 5]
     assert premises.outvoted_fiducials(_posed(_sightings(run.gauge), run.gauge, run), run.gauge).size == 0
-
-
-# --- refusals
 
 
 def _with_fiducials(gauge: Gauge, **changes: object) -> Gauge:

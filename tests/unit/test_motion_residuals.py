@@ -62,14 +62,15 @@ def check_rows(
 
 
 def test_steps_of_the_bore_are_found_and_the_wall_follows_them(given) -> None:
-    random, at_mm = np.random.default_rng(7), 0.8 * np.arange(60)
-    wavy = 50 + 0.3 * np.sin(at_mm / 6) + 0.03 * random.standard_normal(60)
-    radius_mm = np.where(at_mm < 20, wavy, wavy - 2.0)
+    random, at_mm = np.random.default_rng(7), 0.8 * np.arange(100)
+    wavy = 50 + 0.2 * np.sin(at_mm / 6) + 0.03 * random.standard_normal(100)
+    wavy[60:70] -= 1.0  # a weld
+    radius_mm = np.where(at_mm < 32, wavy, wavy - 2.0)
     radius_mm[[7, 41]] = np.nan, 70.0
-    order = random.permutation(60)
+    order = random.permutation(100)
     assert not len(BoreSteps.of(wavy, at_mm).at_mm), "the control: a pipe of one bore has none"
     steps = BoreSteps.of(radius_mm[order], at_mm[order])
-    assert steps.at_mm == pytest.approx([20.0])
+    assert steps.at_mm == pytest.approx([32.0])
     assert steps.wider_mm == pytest.approx([2.0, 0.0], abs=0.3)
 
     state = given[1]
