@@ -46,8 +46,6 @@ def gauge_travel(
 
     Parameters
     ----------
-    run
-        The measured run.
     state
         The adjusted state, as of `stages.diagnose.gauge.search.prepare`.
     without
@@ -114,6 +112,17 @@ class LineProfile:
 
     evidence: ProfileEvidence | None
     problem: str = ""
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """Sentences on what it does not tell, and why."""
+        if self.problem:
+            return (f"The line's profile tells nothing: {self.problem}.",)
+        return self.evidence.uncovered if self.evidence is not None else ()
+
+    def known_light(self, without: Collection[str]) -> ProfileEvidence | None:
+        """Return what the line's light says to one who does not know some effects."""
+        return self.evidence.without(without) if self.evidence is not None and without else self.evidence
 
 
 @dataclass(frozen=True)
@@ -219,8 +228,8 @@ def examine_gauge(
 ) -> Seen:
     """Return what a gauge run's rings, fiducials, motion and line profile say."""
     recording, run, without = frames.applied_to(recording), fiducials.run, parameters.without
-    missing, problem = _profile_problem(profile), fiducials.problem
-    geometry, travel, light = None, None, _known_light(profile, without)
+    missing, problem = profile.limits, fiducials.problem
+    geometry, travel, light = None, None, profile.known_light(without)
     if run is not None:
         try:
             library = _of_geometry(library_without(without), light)
@@ -247,26 +256,14 @@ def examine_field(
 ) -> Seen:
     """Return what an inspection's rings, texture, motion and line profile say."""
     recording = frames.applied_to(recording)
-    run, light = motion.run(recording, probe, rings), _known_light(profile, parameters.without)
+    run, light = motion.run(recording, probe, rings), profile.known_light(parameters.without)
     if run is None:
         found = nothing_said(recording, motion.problem)
     else:
         library = _of_geometry(library_without(parameters.without), light)
         found = field_evidence(run, library, parameters.without, context.progress)
-    missing = (*_profile_problem(profile), *found.shortcomings)
+    missing = (*profile.limits, *found.shortcomings)
     return Seen(recording.name, None, found.travel, light, missing, found)
-
-
-def _known_light(profile: LineProfile, without: Collection[str]) -> ProfileEvidence | None:
-    """Return what the line's light says to one who does not know some effects."""
-    evidence = profile.evidence
-    return evidence.without(without) if evidence is not None and without else evidence
-
-
-def _profile_problem(profile: LineProfile) -> tuple[str, ...]:
-    if profile.problem:
-        return (f"The line's profile tells nothing: {profile.problem}.",)
-    return profile.evidence.uncovered if profile.evidence is not None else ()
 
 
 def _of_geometry(

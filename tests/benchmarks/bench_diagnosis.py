@@ -130,11 +130,11 @@ def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
     simulated = ring_level_run(case.scene, case.file, case.switches, case.noise)
     stated = simulated.truth.stated
     geometry, travel = None, None
-    missing: tuple[str, ...] = ()
     try:
         geometry = examine(simulated.measured, of_positions(without(left_out)), stated)
         state = geometry.searched.found.state
         travel = gauge_travel(simulated.recording, simulated.measured, state, left_out)
+        missing: tuple[str, ...] = ()
     except UnusableError as error:
         missing = (str(error),)
     seen = Seen(simulated.recording.name, geometry, travel, None, missing)
@@ -156,9 +156,9 @@ def oracle_snr(
     estimate = travel.estimate(name) if travel is not None else None
     if estimate is not None:
         return float(size / np.hypot(estimate.sigma, estimate.stated_sigma))
-    found_at = {"probe_vibration": _line_sigmas(travel), "encoder_slip": _slip_sigmas(travel)}.get(name, ())
-    if found_at:
-        return float(size / min(found_at))
+    events = {"probe_vibration": travel.lines, "encoder_slip": travel.slips} if travel is not None else {}
+    if events.get(name):
+        return float(size / min(e.sigma_mm for e in events[name]))
     if geometry is None or name not in of_positions(LIBRARY):
         return None
     searched = geometry.searched
@@ -173,27 +173,15 @@ def oracle_snr(
     return None
 
 
-def _line_sigmas(travel: TravelEvidence | None) -> tuple[float, ...]:
-    return tuple(line.sigma_mm for line in travel.lines) if travel is not None else ()
-
-
-def _slip_sigmas(travel: TravelEvidence | None) -> tuple[float, ...]:
-    return tuple(slip.sigma_mm for slip in travel.slips) if travel is not None else ()
-
-
 def _line(mode: Mode, seed: int, version: str) -> dict[str, Any]:
     case = drawn(mode, seed)
-    names = tuple(s.name for s in case.switches)
-    left_out = names if mode is Mode.LEFTOUT else ()
+    left_out = tuple(s.name for s in case.switches) if mode is Mode.LEFTOUT else ()
     start = time.process_time()
     try:
         told = diagnosed(case, left_out)
     except BoresightError as error:
-        told = {
-            "answer": {"verdict": "not_identifiable", "effects": [], "class": []},
-            "snr": [],
-            "failed": str(error),
-        }
+        nothing = {"verdict": "not_identifiable", "effects": [], "class": []}
+        told = {"answer": nothing, "snr": [], "failed": str(error)}
     return {
         "mode": mode.value, "seed": seed, "version": version, "scene": case.scene.summary,
         "concealed": [s.truth for s in case.switches], "left_out": list(left_out),
@@ -226,8 +214,7 @@ def run(
 
 
 def _described() -> str:
-    words = ["git", "describe", "--always", "--dirty"]
-    return subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip()
+    return subprocess.check_output(["git", "describe", "--always", "--dirty"], text=True).strip()
 
 
 def _tell(line: dict[str, Any]) -> None:
@@ -266,8 +253,8 @@ def summary(
             typer.echo(f"rendered   | {rate['text']}")
     for text in _course_figures(lines):
         typer.echo(text)
-    failed = sum("failed" in line for line in lines)
-    typer.echo(f"ended without an answer, counted as having identified nothing: {failed} of {len(lines)}")
+    failed = f"{sum('failed' in line for line in lines)} of {len(lines)}"
+    typer.echo(f"ended without an answer, counted as having identified nothing: {failed}")
     nulls = [line for line in lines if not line["concealed"] and "failed" not in line]
     p_values = [line["answer"]["global_p"] for line in nulls]
     if p_values:
