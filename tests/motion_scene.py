@@ -20,6 +20,7 @@ from stages.motion.tracking.landmarks import TrackedPoses, Tracks
 
 RADIUS = 50.0
 ENCODER_SIGMA_MM = 0.05
+SHAKE = np.array([0.2, 0.2, 0, 4e-3, 4e-3, 0])
 _SIGMA_PX = 0.1
 
 
@@ -40,15 +41,23 @@ def probe(uncertain: bool = True) -> Probe:
 
 
 def scene(
-    frames: int = 12, landmarks: int = 30, *, noise: float = 0.0, encoder: bool = True, seed: int = 0
+    frames: int = 12,
+    landmarks: int = 30,
+    *,
+    noise: float = 0.0,
+    encoder: bool = True,
+    seed: int = 0,
+    shake: float = 0.0,
 ) -> Scene:
-    """Return a scene; ``noise`` is in units of the stated σ."""
+    """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`."""
     random = np.random.default_rng(seed)
     instrument = probe()
     unsure = instrument.principal_uncertainties()
     k = np.arange(frames)
     turn = np.stack([0.02 * np.sin(0.3 * k), 0.015 * np.cos(0.4 * k) - 0.015, 0.01 * k], -1)
     t = np.stack([1.0 * np.sin(0.2 * k), 0.8 * np.cos(0.25 * k) - 0.8, 1.2 * k], -1)
+    move = shake * SHAKE * np.random.default_rng(seed + 1000).standard_normal((frames, 6))
+    turn, t = turn + move[:, 3:], t + move[:, :3]
     T_pc = from_parts(rotation_from_vector(turn), t)
     start = straight_start(
         T_pc, np.zeros((landmarks, 3)), -20.0, 1.2 * frames + 60, RADIUS, 30.0, unsure.shape[1] + MATCH_BIASES

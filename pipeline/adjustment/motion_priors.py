@@ -37,6 +37,8 @@ _JERK_SIGMAS = 5.0
 """Third differences of so many σ weigh half: probes also jerk. Not measured."""
 _FEWEST_FRAMES = 8
 """Known frames below which the smoothness of the motion is not estimated. Not measured."""
+TREMBLING_GROWTH = np.sqrt(20.0)
+"""By how much third differences of independent values exceed these, in 1 σ: the root of 1 + 9 + 9 + 1."""
 
 
 def third_difference_growth(stride: float) -> float:
@@ -58,10 +60,38 @@ def third_difference_sigma(T_pc: Float, known: Int) -> Float:
     """
     if len(known) < _FEWEST_FRAMES:
         return LOOSE
-    window = known[np.arange(len(known) - 3)[:, None] + np.arange(4)]
-    third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _position_and_turn(T_pc[window]))
     growth = third_difference_growth(float(np.median(np.diff(known))))
-    return np.asarray(np.maximum(robust_spreads(third, axis=0) / growth, _SMOOTHEST))
+    return np.asarray(np.maximum(_third_difference_spread(T_pc, known, 1) / growth, _SMOOTHEST))
+
+
+def trembling(T_pc: Float, known: Int) -> Float:
+    """Return the 1 σ (6,) of position, mm, and turn, rad, that changes independently from frame to frame.
+
+    Third differences over one and over two gaps tell it from motion: those of white jerk grow with the gap as
+    `third_difference_growth`, those of trembling have a variance of 1 + 9 + 9 + 1 at any gap. What poses
+    themselves err by from frame to frame counts as trembling. With fewer than sixteen frames it is 0.
+
+    Parameters
+    ----------
+    T_pc : (N, 4, 4)
+        Poses of all frames.
+    known : (K,) int
+        Frames whose poses are measured; the median of their gaps counts as their stride.
+    """
+    if len(known) < 2 * _FEWEST_FRAMES:
+        return np.zeros(6)
+    near, far = (_third_difference_spread(T_pc, known, n) ** 2 for n in (1, 2))
+    gap = float(np.median(np.diff(known)))
+    growth = [third_difference_growth(n * gap) ** 2 for n in (1, 2)]
+    jerk = np.maximum(far - near, 0) / (growth[1] - growth[0])
+    return np.asarray(np.sqrt(np.maximum(near - growth[0] * jerk, 0) / TREMBLING_GROWTH**2))
+
+
+def _third_difference_spread(T_pc: Float, known: Int, gaps: int) -> Float:
+    """Return the robust 1 σ (6,) of third differences over so many gaps between known frames."""
+    window = known[np.arange(len(known) - 3 * gaps)[:, None] + gaps * np.arange(4)]
+    third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _position_and_turn(T_pc[window]))
+    return robust_spreads(third, axis=0)
 
 
 def smooth_motion_rows(T_pc: Float, time_s: Float, sigma: Float, border: int) -> Rows:

@@ -29,6 +29,7 @@ from stages.motion.events import find_events
 from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.parameters import MotionParameters
+from stages.motion.report import report_motion, report_steps
 from stages.motion.rings import BoreSteps, RingCircles, circles_in_rings
 from stages.motion.route.laying import lay_route
 from stages.motion.tracking.landmarks import TrackedPoses
@@ -36,18 +37,13 @@ from stages.motion.tracking.prediction import PosePredictor
 from stages.motion.tracking.strips import StripGrid, WallView
 from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track_texture
 from stages.motion.trajectory import report_instrument, trajectory_of
-from stages.motion.windows.sliding_window import MeasuredRun, RunEstimate, adjust_run, joined_at_once
+from stages.motion.windows.sliding_window import MeasuredRun, adjust_run, joined_at_once
 
 _LARGEST_CHANGE = 0.1
 """Share by which the radius may differ from the rings' before the adjustment counts as diverged: the rings'
 median radius errs by far less. Not measured."""
 _LEAST_TRACKED = 0.5
 """Share of the lit frames that texture must be followed in where there is no encoder. Not measured."""
-_MOST_LOST = 0.05
-"""Share of the lit frames without enough texture that is told; sound recordings have none. Not measured."""
-_MOST_EXCESS = 4.4
-"""Reprojection error in σ of matching that is told: 2.9 in open-1, 3.4 in open-3, 4.0 with seven glints in
-each frame, 4.9 at crf 30, where distance errs by 2.8 σ: the middle of the last two."""
 _FEWEST_COLUMNS = 240
 """Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
 _OBSERVATIONS_AT_ONCE = 1 << 16
@@ -87,7 +83,7 @@ def estimate_motion(
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
-    _report(context, estimate, run.texture, trajectory)
+    report_motion(context, estimate, run.texture, trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
     return replace(trajectory, events=events)
@@ -168,7 +164,7 @@ def adjust_at_once(
         When rings and texture do not determine the motion.
     """
     estimate = estimate_state(start, measured, parameters, partial(context.progress, 0, 1))
-    _report_steps(context, estimate.adjusted.trials, int(not estimate.adjusted.settled))
+    report_steps(context, estimate.adjusted.trials, int(not estimate.adjusted.settled))
     _require_convergence(radius_mm, estimate)
     joined, has_encoder = joined_at_once(estimate), measured.encoder is not None
     trajectory = trajectory_of(joined, frames, measured.probe, has_encoder)
@@ -230,48 +226,6 @@ def _require_convergence(radius_mm: float, estimate: Estimate) -> None:
         )
 
 
-def _report_steps(context: Context, steps: int, unsettled: int) -> None:
-    context.report("steps of the joint adjustment", steps, "")
-    if unsettled:
-        context.warn(
-            "the adjustment of the motion stopped after its largest number of steps, before it had settled: "
-            "poses may be off by more than their σ. What to do: raise motion.iterations"
-        )
-
-
-def _report(context: Context, estimate: RunEstimate, texture: TrackedTexture, trajectory: Trajectory) -> None:
-    _report_steps(context, estimate.trials, estimate.unsettled)
-    context.report("landmarks", texture.store.landmarks, "")
-    context.report("texture observations", texture.store.spool.count, "")
-    context.report("lit frames without enough texture", int(texture.poses.lost[1:].sum()), "frames")
-    context.report("median reprojection error", estimate.reprojection_px, "px")
-    context.report("reprojection error against the σ of matching", estimate.excess, "times")
-    _warn_of_texture(estimate.excess, texture.poses, context)
-    context.report("pipe radius", trajectory.radius_mm, "mm")
-    context.report("encoder scale", trajectory.encoder_scale, "")
-    travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
-    context.report("distance travelled", travelled, "mm")
-    context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")
-
-
-def _warn_of_texture(excess: float, tracked: TrackedPoses, context: Context) -> None:
-    """Warn where texture was lost, or where its matches contradict each other more than is usual."""
-    lost = tracked.frames[1:][tracked.lost[1:]]
-    if len(lost) > _MOST_LOST * len(tracked.frames):
-        context.warn(
-            f"in {len(lost)} of {len(tracked.frames)} lit frames too little texture was found, first in "
-            f"frame {lost[0]}: there the motion rests on rings, encoder and smoothness. What to do: look at "
-            "these pictures; more light, a sharper lens or a slower pull show more texture"
-        )
-    if excess > _MOST_EXCESS:
-        context.warn(
-            f"matches of texture contradict each other by {excess:.1f} times their σ, where sound recordings "
-            "have 3 to 4: reflections, compression or lights that move with the probe are taken for the "
-            "wall. Distance and roll may be off by more than their σ. What to do: compare the distance with "
-            "the encoder or a tape, record with less compression"
-        )
-
-
 def _motion_of_run(
     recording: Recording,
     frames: CheckedFrames,
@@ -287,7 +241,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "11",
+    "12",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

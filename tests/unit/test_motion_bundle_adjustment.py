@@ -12,14 +12,15 @@ from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.levenberg_marquardt import Damping
+from pipeline.adjustment.motion_priors import trembling
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
-from stages.motion.bundle_adjustment.solver import adjust
+from stages.motion.bundle_adjustment.solver import adjust, estimate_state, trembles
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
-from tests.motion_scene import displaced, scene
+from tests.motion_scene import SHAKE, displaced, scene
 
 FRAMES, BORDER, OWN = 9, 6, 3
 
@@ -246,6 +247,20 @@ def test_stated_sigma_covers_the_errors() -> None:
         error = got.state.T_pc[1:, :3, 3] - given.truth.T_pc[1:, :3, 3]
         ratio.append(np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error) / 3)
     assert 0.2 < np.mean(ratio) < 2.0
+
+
+def test_trembling_loosens_the_motion_across_the_pipe_and_no_other() -> None:
+    """Held to 0 at its own 1 σ, trembling would draw all lengths together."""
+    parameters = MotionParameters(alike=1.0)
+    steady, shaken = (scene(60, 140, noise=1.0, seed=2, shake=s) for s in (0.0, 1.0))
+    across = np.array([0, 1, 3, 4])
+    loose = estimate_state(shaken.truth, shaken.measured, parameters).smooth_sigma
+    ratio = loose[across] / (np.sqrt(20) * SHAKE[across])
+    assert ratio.min() > 2
+    assert ratio.max() < 5
+    known = steady.measured.tracks.poses.frames
+    assert not trembles(trembling(steady.truth.T_pc, known))
+    assert trembles(trembling(shaken.truth.T_pc, known))
 
 
 def test_match_biases_come_last() -> None:

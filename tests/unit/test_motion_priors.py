@@ -11,6 +11,7 @@ from pipeline.adjustment.motion_priors import (
     smooth_motion_rows,
     third_difference_growth,
     third_difference_sigma,
+    trembling,
 )
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
@@ -65,6 +66,18 @@ def test_outliers_do_not_loosen_the_motion() -> None:
     T_pc = white_jerk(3)
     T_pc[::50, :3, 3] += 40.0
     np.testing.assert_allclose(third_difference_sigma(T_pc, np.arange(FRAMES))[:3] / SIGMA[:3], 1, atol=0.2)
+
+
+@pytest.mark.parametrize("stride", [1, 2])
+def test_trembling_is_told_from_motion(stride: int) -> None:
+    shake = np.array([0.5, 0.4, 0.3, 2e-3, 3e-3, 1e-3])
+    T_pc, known = white_jerk(5), np.arange(0, FRAMES, stride)
+    assert trembling(T_pc, known)[:3].max() < 0.05 * shake[:3].max()
+    T_pc[:, :3, 3] += np.random.default_rng(6).standard_normal((FRAMES, 3)) * shake[:3]
+    error = 1.2 / np.sqrt(FRAMES / (6 * stride))
+    np.testing.assert_allclose(trembling(T_pc, known)[:3] / shake[:3], 1, atol=4 * error)
+    turned = poses(np.random.default_rng(7).standard_normal((FRAMES, 6)) * shake)
+    np.testing.assert_allclose(trembling(turned, known)[3:] / shake[3:], 1, atol=4 * error)
 
 
 def test_rows_are_third_differences_with_their_derivatives() -> None:

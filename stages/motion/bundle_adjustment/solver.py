@@ -11,8 +11,8 @@ from threadpoolctl import threadpool_limits
 
 from pipeline.adjustment.bordered import Factor, Step
 from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, Watch, minimise, unwatched
-from pipeline.adjustment.motion_priors import third_difference_sigma
-from pipeline.arrays import Float
+from pipeline.adjustment.motion_priors import TREMBLING_GROWTH, third_difference_sigma, trembling
+from pipeline.arrays import Float, Int
 from pipeline.errors import UnusableError
 from stages.motion.bundle_adjustment.equations import (
     Equations,
@@ -33,6 +33,16 @@ _ONE_SIGMA = 0.5
 a step that promises less and yet fails may be due to that: it is the last."""
 _FIRST_SCALES = Scales(3.0, 1.0)
 """Scales before there are residuals: wide, so that a poor start is not taken for outliers."""
+
+_TREMBLES_RAD = 5e-4
+"""Turn from frame to frame, 1 σ, from which pictures are taken to tremble: a quarter of a pixel at 500 px per
+radian. Open-1 shows less than 1e-4, pictures shifted by half a pixel 1.7e-3."""
+_ACROSS = np.array([0, 1, 3, 4])
+"""Positions and turns across the pipe. Along it and in roll, what differs from frame to frame is what poses
+err by, and smoothness may hold it down."""
+_LOOSER = 3.0
+"""How much looser than its 1 σ trembling is held. All lengths shrink with what is held to 0 at its own 1 σ: a
+drawn shift of .4 px shortened the pipe by 1.4 %. At three times it the pull is a ninth."""
 
 Adjusted = Minimum[State, Equations]
 
@@ -65,9 +75,24 @@ def estimate_state(
     """
     with _refusing_undetermined():
         loose = adjust(start, measured, parameters, ROUGHLY, watch).state
-        sigma = third_difference_sigma(loose.T_pc, measured.tracks.poses.frames)
+        sigma = _smoothness(loose.T_pc, measured.tracks.poses.frames)
         smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         return Estimate(smooth, smooth.equations.factor(), sigma)
+
+
+def _smoothness(T_pc: Float, known: Int) -> Float:
+    """Return the 1 σ (6,) of third differences, of pictures that tremble with what trembling adds to them."""
+    sigma, shaken = third_difference_sigma(T_pc, known), trembling(T_pc, known)
+    if not trembles(shaken):
+        return sigma
+    added = np.zeros(6)
+    added[_ACROSS] = _LOOSER * TREMBLING_GROWTH * shaken[_ACROSS]
+    return np.hypot(sigma, added)
+
+
+def trembles(shaken: Float) -> bool:
+    """Tell whether trembling (6,) is more than poses err by: the turns across the pipe say it."""
+    return float(shaken[3:5].max()) > _TREMBLES_RAD
 
 
 def estimate_with_shared(
