@@ -20,7 +20,8 @@ from stages.motion.tracking.landmarks import TrackedPoses, Tracks
 
 RADIUS = 50.0
 ENCODER_SIGMA_MM = 0.05
-SHAKE = np.array([0.2, 0.2, 0, 4e-3, 4e-3, 0])
+SHAKE = np.array([0.1, 0.1, 0, 2e-3, 2e-3, 0])
+"""Trembling, 1 σ, mm and rad."""
 _SIGMA_PX = 0.1
 
 

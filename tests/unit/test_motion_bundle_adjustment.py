@@ -257,7 +257,7 @@ def test_trembling_loosens_the_motion_across_the_pipe_and_no_other() -> None:
     loose = estimate_state(shaken.truth, shaken.measured, parameters).smooth_sigma
     ratio = loose[across] / (np.sqrt(20) * SHAKE[across])
     assert ratio.min() > 2
-    assert ratio.max() < 5
+    assert ratio.max() < 6
     known = steady.measured.tracks.poses.frames
     assert not trembles(trembling(steady.truth.T_pc, known))
     assert trembles(trembling(shaken.truth.T_pc, known))
