@@ -197,7 +197,7 @@ distortion_coefficients: !!opencv-matrix
 RUN = (
     '{"format": 1, "state": "completed", "recording": {"path": "a"}, "probe": {"path": "b"}, '
     '"input_sha256": {"recording": "1", "probe": "2"}, "configuration": {"rings": {"azimuths": 1440}}, '
-    '"stages": [], "metrics": []}'
+    '"stages": [], "metrics": [], "reader_warnings": [], "warnings": []}'
 )
 DEED = '{"action": {"do": "accept", "finding": "1"}, "who": "me", "revision": 0}'
 REDRAW = '{"do": "redraw", "finding": "1", "outline": [[0, 0], [1, 0], [1, 1]]}'
