@@ -169,7 +169,7 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
     kept = tuple(e for e in seen.travel.estimates if e.effect != "encoder_scale")
     words = (
         f"The encoder's scale was not looked at in the inspection: a probe file has no place for "
-        f"{' and '.join(unsaid)}, so the inspection's motion was found with an instrument that is partly wrong."
+        f"{' and '.join(unsaid)}, so its motion was found with an instrument that is partly wrong."
     )
     travel = replace(seen.travel, estimates=kept)
     return replace(seen, travel=travel, shortcomings=(*seen.shortcomings, words))

@@ -140,7 +140,9 @@ def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
     """Return the answer with the field's confirmations, or less sure where the field contradicts it."""
     effects = tuple(_confirmed(e, met.get(e.name)) for e in found.effects)
     silent = [name for name, each in met.items() if each is None and name in EFFECTS]
-    missing = tuple(f"The inspection alone shows too little of {name} to confirm or to contradict it." for name in silent)
+    missing = tuple(
+        f"The inspection alone shows too little of {name} to confirm or to contradict it." for name in silent
+    )
     found = replace(found, effects=effects, shortcomings=(*found.shortcomings, *missing))
     against = {name for name, each in met.items() if each is not None and not each.agrees}
     withdrawn = [e for e in effects if e.name in against]
