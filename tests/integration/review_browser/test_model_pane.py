@@ -102,9 +102,11 @@ _OUTLINE_DRAWN = """(async () => {
   return out; })()"""
 
 
-@pytest.mark.parametrize("askew_rad", [0.0, 1.0])
-def test_outlines_are_unbroken_from_outside(page: Tab, askew_rad: float) -> None:
+@pytest.mark.parametrize(("layer", "askew_rad"), [("photo", 0.0), ("photo", 1.0), ("uncertainty", 0.0)])
+def test_outlines_are_unbroken_from_outside(page: Tab, layer: str, askew_rad: float) -> None:
     """At 1 rad the dent is seen askew, near the edge of what is seen of the pipe."""
+    page.page.select_option("select[aria-label='what the model shows']", layer)
+    page.until(f"boresight.model.parts.every((p) => p.mesh.material.name.startsWith('{layer} '))")
     dent = next(f for f in page.standing() if page.finding(f)["kind"] == "dent")
     page.choose(dent)
     page.page.click("text=Outside")
@@ -114,9 +116,13 @@ def test_outlines_are_unbroken_from_outside(page: Tab, askew_rad: float) -> None
       controls.update(); }})(boresight.model)""")
     page.js("(boresight.model.spot.group.visible = false, 1)")
     drawn = page.js(_OUTLINE_DRAWN)
-    page.js("(boresight.model.spot.group.visible = true, 1)")
+    page.js("(boresight.model.marks.group.visible = false, 1)")
+    bare = page.js(_OUTLINE_DRAWN)
+    page.js("(boresight.model.marks.group.visible = true, 1)")
+    page.js("(boresight.model.spot.group.visible = true, boresight.session.show('photo'), 1)")
     page.page.click("text=Inside")
     assert np.mean(drawn) > 0.97
+    assert np.mean(bare) < 0.1, "the colours below are not taken for the outline's"
 
 
 @pytest.mark.parametrize("hour", [12, 3, 6, 9, 4.5])
