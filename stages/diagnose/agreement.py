@@ -8,6 +8,7 @@ import numpy as np
 from scipy import stats
 
 from pipeline.arrays import Float
+from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.inference import DEGREES
 from stages.diagnose.result import Confirmation
 
@@ -87,3 +88,24 @@ def same(first: Float, second: Float, gap: Float, size: float, rarest: float = A
 
 def _spread(gap: Float, size: float) -> Float:
     return np.asarray(gap + (_LAW * size) ** 2 * np.eye(len(gap)))
+
+
+def sized(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:
+    """Return an effect's quantities, each with its own 1 σ, by the slopes of its amplitudes (Q,)."""
+    step = 0.1 * np.sqrt(np.diag(covariance))
+    slopes: dict[str, list[float]] = {}
+    for way in np.diag(step):
+        higher, lower = (model.quantities(shape, amplitude + s * way) for s in (1, -1))
+        for name in higher:
+            # A direction may pass from 180 to -180 degrees in between.
+            change = higher[name] - lower[name]
+            turned = (change + 180) % 360 - 180 if name.endswith("_deg") else change
+            slopes.setdefault(name, []).append(turned / 0.2)
+    unit = covariance / np.maximum(np.outer(step, step) * 100, np.finfo(float).tiny)
+    told = []
+    for name, value in model.quantities(shape, amplitude).items():
+        sigma = float(np.sqrt(np.array(slopes[name]) @ unit @ np.array(slopes[name])))
+        told += (
+            [f"{name} {value:.4g}" + (f" ± {sigma:.2g}" if sigma > 0 else "")] if np.isfinite(value) else []
+        )
+    return ", ".join(told)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.pages import notation
-from stages.diagnose.agreement import same
+from stages.diagnose.agreement import same, sized
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.field.evidence import FieldEvidence
@@ -40,8 +39,8 @@ def confirm_in_field(
     if own is None or np.sqrt(np.trace(own.covariance)) > _TELLING * size:
         return None
     return Confirmation(
-        f"in the field, from the gauge: {_words(model, shape, amplitude, covariance)}",
-        f"field alone: {_words(model, shape, own.amplitude, own.covariance)}",
+        f"in the field, from the gauge: {sized(model, shape, amplitude, covariance)}",
+        f"field alone: {sized(model, shape, own.amplitude, own.covariance)}",
         same(amplitude, own.amplitude, own.covariance + covariance, size),
     )
 
@@ -79,10 +78,3 @@ def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: S
             return None
         place = places_of(whole, model, shape)
     return score(whole, stated, place)
-
-
-def _words(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:
-    numbers = model.quantities(shape, amplitude)
-    named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
-    spread = float(np.sqrt(np.trace(covariance) / len(amplitude)))
-    return f"{named} {notation.plus_minus(spread, model.amplitudes[0].unit)}"

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.pages import notation
 from pipeline.physics.effect import CourseKind
-from stages.diagnose.agreement import TELLING, same
+from stages.diagnose.agreement import TELLING, same, sized
 from stages.diagnose.effects.base import Shape
 from stages.diagnose.gauge.change_point import change_time
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
@@ -111,8 +110,8 @@ def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | Non
         return None
     gap = first.covariance + second.covariance
     return Confirmation(
-        f"{first.where}: {_words(term, first)}",
-        f"{second.where}: {_words(term, second)}",
+        f"{first.where}: {sized(term.model, term.shape, first.amplitude, first.covariance)}",
+        f"{second.where}: {sized(term.model, term.shape, second.amplitude, second.covariance)}",
         same(first.amplitude, second.amplitude, gap, size, _AGREE),
     )
 
@@ -140,13 +139,6 @@ def _by_kind(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> tuple
 def _seen(edges: Evidence, term: Term) -> bool:
     at = [k for k, c in enumerate(edges.columns) if c.effect == term.model.name]
     return bool(np.all(np.diag(edges.information)[at] > 0))
-
-
-def _words(term: Term, part: Partial) -> str:
-    numbers = term.model.quantities(term.shape, part.amplitude)
-    spread = float(np.sqrt(np.trace(part.covariance) / len(part.amplitude)))
-    named = ", ".join(f"{name} {value:.4g}" for name, value in numbers.items() if np.isfinite(value))
-    return f"{named} {notation.plus_minus(spread, term.model.amplitudes[0].unit)}"
 
 
 @dataclass(frozen=True)

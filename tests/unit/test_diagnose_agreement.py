@@ -1,0 +1,29 @@
+"""How what two measurements say of an effect is written, with its σ."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from stages.diagnose.agreement import sized
+from stages.diagnose.effects.library import LIBRARY
+
+
+@pytest.mark.parametrize("direction_deg", [25.0, 180.0])
+def test_size_and_direction_have_each_their_own_sigma(direction_deg: float) -> None:
+    """Against draws of the amplitudes: a direction errs by σ over size, and 180° is no edge."""
+    tilt = LIBRARY["laser_tilt"]
+    at = np.radians(direction_deg)
+    amplitude = 0.006 * np.array([np.cos(at), np.sin(at)])
+    covariance = np.array([[4e-8, 1e-8], [1e-8, 2e-8]])
+    numbers = re.findall(r"(\w+) \S+ ± (\S+?)(?:,|$)", sized(tilt, (), amplitude, covariance))
+    told = {name: float(sigma) for name, sigma in numbers}
+    drawn = np.random.default_rng(1).multivariate_normal(amplitude, covariance, 4000)
+    found = [tilt.quantities((), a) for a in drawn]
+    middle = tilt.quantities((), amplitude)
+    for name, sigma in told.items():
+        off = np.array([f[name] - middle[name] for f in found])
+        assert sigma == pytest.approx(np.std((off + 180) % 360 - 180), rel=0.1)
+    assert set(told) == {"tilt_deg", "direction_deg"}
