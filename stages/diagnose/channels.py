@@ -16,8 +16,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Recording
 from pipeline.recording.checked_frames import CheckedFrames
-from stages.calibrate.gauge import GaugeParameters
-from stages.calibrate.gauge.calibrate import MeasuredRun, measure_gauge
+from stages.calibrate.gauge import GaugeParameters, MeasuredRun, measure_gauge
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import without as library_without

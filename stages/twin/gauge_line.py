@@ -32,11 +32,11 @@ from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
+from stages.calibrate.gauge import MeasuredRun
 from stages.calibrate.gauge.adjust import adjust
-from stages.calibrate.gauge.calibrate import MeasuredRun
-from stages.calibrate.gauge.scene import gauge_scene
 from stages.calibrate.gauge.state import GaugeParameters
 from stages.diagnose.channels import GaugeMeasured
+from stages.diagnose.resimulate import gauge_scene
 from stages.twin.cells import sigmas
 from stages.twin.line_blocks import BlockLight, LineBlocks, blocks_of, light_of, squares
 

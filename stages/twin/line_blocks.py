@@ -10,7 +10,7 @@ from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Recording
-from stages.calibrate.gauge.calibrate import MeasuredRun
+from stages.calibrate.gauge import MeasuredRun
 from stages.twin.noise import black_and_white
 
 RING_BINS = 240

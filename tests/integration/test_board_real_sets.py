@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.camera.calibration import rms
-from stages.calibrate.boards.calibrate import calibrate_boards
+from stages.calibrate.boards import calibrate_boards
 from stages.calibrate.boards.detect import Chessboard
 from stages.calibrate.boards.fit import BoardCalibrationParameters, fit, held_out_residuals
 from stages.calibrate.boards.start import start

@@ -9,7 +9,7 @@ from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
-from stages.calibrate.boards.calibrate import calibrate_boards
+from stages.calibrate.boards import calibrate_boards
 from stages.calibrate.boards.compare import displacement_map, uncertainty_map
 from stages.calibrate.boards.fit import MODEL_NAMES, BoardCalibrationParameters, adjust, held_out_residuals
 from stages.calibrate.boards.start import pose, start

@@ -6,8 +6,15 @@ import pytest
 
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
-from stages.calibrate.boards.detect import Charuco, Chessboard, detect, grid
-from stages.calibrate.boards.refine import WINDOW_SHARE, refine, refine_in_windows
+from stages.calibrate.boards.detect import (
+    WINDOW_SHARE,
+    Charuco,
+    Chessboard,
+    detect,
+    grid,
+    refine,
+    refine_in_windows,
+)
 from tests.board_scene import board_points, chessboard_picture, facing_pose, render
 
 CAMERA = KannalaBrandt((800, 600), (230.0, 229.5), (398.3, 301.2), (-0.0118, 0.0008, -0.0008, 0.0001))

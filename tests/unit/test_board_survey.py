@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import KannalaBrandt
-from stages.calibrate.boards.calibrate import calibrate_boards
+from stages.calibrate.boards import calibrate_boards
 from stages.calibrate.boards.detect import grid
 from stages.calibrate.boards.fit import BoardCalibrationParameters
 from stages.calibrate.boards.start import start

@@ -16,10 +16,10 @@ from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.recording.base import BoreSection, Illumination, Planes, Recording
 from stages.calibrate.gauge import premises
+from stages.calibrate.gauge.adjust import RingSource
 from stages.calibrate.gauge.edges import Sighting, find_fiducials, fit_steps
 from stages.calibrate.gauge.geometry import BoreRings, Gauge, gauge_of
 from stages.calibrate.gauge.poses import first_pose, posed_frames
-from stages.calibrate.gauge.solve import RingSource
 from stages.calibrate.gauge.state import SheetModel, Unknowns
 from stages.calibrate.gauge.terms import Equations, edge_equations, expected_ring, ring_equations
 from tests.gauge_runs import (

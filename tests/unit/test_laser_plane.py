@@ -11,7 +11,7 @@ from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from stages.calibrate.boards.detect import Chessboard, detect
-from stages.calibrate.laser.calibrate import (
+from stages.calibrate.laser import (
     LaserPicture,
     calibrate_laser_plane,
     fit_plane,

@@ -1,8 +1,35 @@
-"""A camera from pictures of a chessboard or ChArUco board."""
+"""A camera from pictures of a chessboard or ChArUco board: from corners to a judged camera."""
 
-from pipeline.machine.stage import Parameters, Stage
-from stages.calibrate.boards.calibrate import CameraFile, calibrate_camera
-from stages.calibrate.boards.fit import BoardCalibrationParameters
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.errors import UnusableError
+from pipeline.instrument.camera import Camera
+from pipeline.instrument.camera.calibration import BoardView, CalibrationReport, ModelScore
+from pipeline.machine.stage import Context, Parameters, Stage
+from stages.calibrate.boards.bundle import Estimate
+from stages.calibrate.boards.compare import (
+    Part,
+    deal,
+    displacement_map,
+    ranked,
+    score,
+    uncertainty_map,
+    without_outlier_views,
+)
+from stages.calibrate.boards.fit import (
+    MODEL_NAMES,
+    NAME,
+    BoardCalibrationParameters,
+    ModelName,
+    adjust,
+    refuse_one_plane,
+    refuse_too_few,
+)
 from stages.calibrate.boards.pictures import (
     FoundBoards,
     Pictures,
@@ -10,8 +37,125 @@ from stages.calibrate.boards.pictures import (
     find_boards,
     list_pictures,
 )
+from stages.calibrate.boards.start import start
 
 __all__ = ["BOARDS", "CAMERA", "CameraFile", "FoundBoards", "Pictures", "Target", "list_pictures"]
+
+
+@dataclass(frozen=True)
+class CameraFile:
+    """A camera that is given, and the name of its file; None where none is."""
+
+    camera: Camera | None = None
+    name: str = ""
+
+
+def calibrate_camera(
+    found: FoundBoards, reference: CameraFile, *, parameters: BoardCalibrationParameters, context: Context
+) -> CalibrationReport:
+    """Fit camera models to the boards found: see `calibrate_boards`."""
+    models = MODEL_NAMES if parameters.model == "best" else (parameters.model,)
+    report = calibrate_boards(found.views, found.image_size, models, reference.camera, parameters, context)
+    return report.with_rejected(found.rejected)
+
+
+def calibrate_boards(
+    views: Sequence[BoardView],
+    image_size: tuple[int, int],
+    models: Sequence[ModelName],
+    reference: Camera | None,
+    parameters: BoardCalibrationParameters,
+    context: Context,
+) -> CalibrationReport:
+    """Fit camera models to board views and return the one that predicts held-out views best.
+
+    Parameters
+    ----------
+    views
+        Corners found, one entry an image; at least four corners each, not in one line.
+    image_size
+        Width and height, px.
+    models
+        Those to try.
+    reference
+        A camera to compare with; without one, the best model is compared with the next best.
+
+    Raises
+    ------
+    UnusableError
+        When there are too few views, when plane boards all lie in one plane or in parallel ones, when the
+        views leave the image scale undetermined, or when no model reaches all corners.
+    """
+    refuse_too_few(views, parameters)
+    first = start(views, image_size)
+    refuse_one_plane(views, first, parameters)
+    trial = adjust(views, first, "kannala_brandt", with_shape(parameters, "bent"))
+    used, first, outliers = without_outlier_views(views, first, trial, parameters.outlier_view_factor)
+    refuse_too_few(used, parameters)
+    parameters, whole, parts = board_as_it_is(used, first, parameters)
+    scores = _scores(whole, parts, models, parameters, context)
+    ranking = ranked(scores)
+    if not ranking:
+        raise _no_model(scores)
+    chosen = ranking[0]
+    other = reference if reference is not None else next((c.camera for c in ranking[1:]), None)
+    return CalibrationReport(
+        chosen,
+        scores,
+        uncertainty_map(chosen),
+        tuple((name, "its corners fit no camera that fits the other images") for name in outliers),
+        other,
+        None if other is None else displacement_map(chosen.camera, other),
+        parameters.board_shape,
+        whole.survey,
+    )
+
+
+def board_as_it_is(
+    views: Sequence[BoardView], first: Estimate, parameters: BoardCalibrationParameters
+) -> tuple[BoardCalibrationParameters, Part, tuple[Part, ...]]:
+    """Return parameters with a definite board shape, and the views dealt out accordingly.
+
+    Where the shape is left open, the one with which Kannala-Brandt predicts held-out views best is taken.
+    """
+    if parameters.board_shape != "best":
+        return parameters, *deal(views, first, parameters)
+    tried = []
+    for shape in ("bent", "surveyed"):
+        definite = with_shape(parameters, shape)
+        whole, parts = deal(views, first, definite)
+        held_out = score(whole, parts, "kannala_brandt", definite).held_out_rms_px
+        tried.append((np.nan_to_num(held_out, nan=np.inf), definite, whole, parts))
+    return min(tried, key=lambda t: float(t[0]))[1:]
+
+
+def with_shape(parameters: BoardCalibrationParameters, shape: str) -> BoardCalibrationParameters:
+    """Return the parameters with another board shape."""
+    return BoardCalibrationParameters.model_validate(parameters.model_dump() | {"board_shape": shape})
+
+
+def _scores(
+    whole: Part,
+    parts: Sequence[Part],
+    models: Sequence[ModelName],
+    parameters: BoardCalibrationParameters,
+    context: Context,
+) -> tuple[ModelScore, ...]:
+    scores = []
+    for done, model in enumerate(models, start=1):
+        scores.append(score(whole, parts, model, parameters))
+        context.progress(done, len(models))
+    return tuple(scores)
+
+
+def _no_model(scores: Sequence[ModelScore]) -> UnusableError:
+    reasons = "; ".join(f"{s.model}: {s.refusal}" for s in scores)
+    return UnusableError(
+        NAME,
+        f"no camera model can be calibrated from these views: {reasons}",
+        hint="tilt the board more, and show it at more places of the image, also near its edges",
+    )
+
 
 BOARDS = Stage("boards", "1", Parameters, find_boards, "pictures to the corners of the board in them")
 CAMERA = Stage(

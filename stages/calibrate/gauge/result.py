@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
-from stages.calibrate.gauge.adjust import Measurements, Solution, instrument_covariance, spread
+from stages.calibrate.gauge.adjust import Finding, Measurements, instrument_covariance, spread
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import ENCODER, SheetModel
 
@@ -91,19 +91,6 @@ class GaugeCalibration:
     left_out: dict[str, int]
     radii: tuple[RadiusError, ...]
     weak: tuple[WeakDirection, ...]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """A solution with what was chosen and left out on the way to it."""
-
-    solution: Solution
-    measured: Measurements
-    sheet: SheetModel
-    evidence: dict[SheetModel, float]
-    wrong_fiducials: Int
-    wrong_rings: Int
-    left_out: dict[str, int]
 
 
 def calibration_of(name: str, frame: Int, gauge: Gauge, finding: Finding) -> GaugeCalibration:

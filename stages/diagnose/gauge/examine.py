@@ -16,7 +16,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Progress, unheard
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.effect import CourseKind
-from stages.calibrate.gauge.calibrate import MeasuredRun
+from stages.calibrate.gauge import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses
 from stages.diagnose.effects.generic import GenericTerm, Moves

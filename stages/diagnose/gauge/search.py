@@ -10,8 +10,8 @@ import numpy as np
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float, Int
+from stages.calibrate.gauge import MeasuredRun
 from stages.calibrate.gauge.adjust import adjust
-from stages.calibrate.gauge.calibrate import MeasuredRun
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
