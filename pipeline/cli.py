@@ -229,7 +229,7 @@ def _warn(console: Console, title: str, warnings: Sequence[str]) -> None:
 
 
 def _print_outcome(outcome: RunOutcome, folder: Path) -> None:
-    from pipeline.pages.run_words import figure_name
+    from pipeline.pages.notation import figure_name
 
     for number in outcome.metrics:
         typer.echo(f"{number.name:<48} {number.value} {number.unit}".rstrip())

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Image, Int
 from pipeline.recording.base import FrameSource, FrameTable, Planes, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Least squares for motion, calibration and diagnosis, which give it terms: residuals with their derivatives.
 
 ``bordered``: normal equations of frames (a block band), of landmarks and of a border of global unknowns,
-with marginal covariances; its compiled sums are in ``elimination``, its factor in ``banded_cholesky``.
-``marginal``: dense normal equations and marginalisation by the Schur complement. ``robust``: losses, robust
+with marginal covariances; its compiled sums are in ``elimination``. ``normal_equations``: dense ones with
+marginalisation by the Schur complement, and the factor of banded ones. ``robust``: losses, robust
 spread, and scores of equations that err alike (sandwich covariance). ``motion_priors``: smooth motion and
 slow drift. ``levenberg_marquardt``: the search.
 

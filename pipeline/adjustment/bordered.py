@@ -12,9 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.elimination import BLOCK, Sums, add_landmarks, add_rows
-from pipeline.adjustment.marginal import marginalised
+from pipeline.adjustment.normal_equations import BandedCholesky, marginalised
 from pipeline.adjustment.robust import Loss, Squares
 from pipeline.arrays import Float, Int
 from pipeline.system.parallel import in_threads

@@ -9,15 +9,18 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
 
+from rich.console import Console
+
 from pipeline.errors import InputError
 from pipeline.export.run_record import headline, write_run_record
 from pipeline.files.codec import Json, digest
+from pipeline.files.disk import content_key
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource, read_with_source
 from pipeline.machine.configuration import Configuration
-from pipeline.machine.display import Display
-from pipeline.machine.outcome import RunOutcome
+from pipeline.machine.display import Display, ProgressDisplay, print_warnings
+from pipeline.machine.outcome import RunOutcome, warnings_of
 from pipeline.machine.plan import Plan, Selection, Source, make_plan
 from pipeline.machine.run_folder import Exporter, RunFolder, claimed, logged
 from pipeline.machine.runner import Runner
@@ -27,7 +30,6 @@ from pipeline.recording import open_recording
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits, refuse_changed
 from pipeline.recording.decoded_once import decoded_once
-from pipeline.recording.input_file import content_key
 from pipeline.system.parallel import stop_wish
 
 Kind = TypeVar("Kind")
@@ -202,6 +204,20 @@ def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
             workers, made_by, lent, job.at_once,
         )  # fmt: skip
         return runner.run(selection)
+
+
+def run_shown(job: Job, console: Console) -> RunOutcome:
+    """Run a job with its progress shown; print those of its warnings that were not shown with it.
+
+    Raises
+    ------
+    BoresightError
+        As `run_job` raises it.
+    """
+    with ProgressDisplay(console) as display:
+        outcome = run_job(job, Selection(), display)
+    print_warnings((w for w in warnings_of(outcome.stages) if w not in display.warnings), console)
+    return outcome
 
 
 def _decoding_once(plan: Plan, folder: RunFolder) -> Plan:

@@ -24,7 +24,7 @@ from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection, Source
 from pipeline.machine.reproduce import read_run_record
 from pipeline.recording.base import Illumination, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from pipeline.review.run_files import RunFiles
 from pipeline.simulator.build import plain_truth
 from pipeline.simulator.render import renderer_of

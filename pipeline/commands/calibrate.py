@@ -12,8 +12,7 @@ from rich.table import Table
 
 from pipeline.api import calibrate as calibration
 from pipeline.commands import Assignments, ConfigFile, ResultFolder, StatedProbe
-from pipeline.commands.working import print_warnings
-from pipeline.machine.display import ProgressDisplay
+from pipeline.machine.display import ProgressDisplay, print_warnings
 from stages.calibrate.gauge import GaugeCalibration
 
 

@@ -14,9 +14,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.api.job import Job, result_of, value_source
+from pipeline.api.job import Job, result_of, run_shown, value_source
 from pipeline.commands import Assignments, ConfigFile, ResultFolder
-from pipeline.commands.working import worked
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable
 from pipeline.files.provenance import MadeBy
@@ -102,7 +101,7 @@ def calibrate_camera(
     require_writable(output)
     job = Job("calibrate-camera", sources, STAGES, EXPORTERS, configuration, output)
     console = Console(stderr=True)
-    worked(job, console)
+    run_shown(job, console)
     _show(result_of(job, CalibrationReport), output, console)
 
 

@@ -12,11 +12,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.api.job import Job, result_of, value_source
+from pipeline.api.job import Job, result_of, run_shown, value_source
 from pipeline.commands import Assignments, ConfigFile, ResultFolder
 from pipeline.commands.calibrate_camera import BoardKind, describe_board
-from pipeline.commands.working import worked
-from pipeline.files.disk import require_writable
+from pipeline.files.disk import input_file, require_writable
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.formats import read_camera
@@ -25,7 +24,6 @@ from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
 from pipeline.machine.configuration import resolve
 from pipeline.machine.run_folder import Exporter
-from pipeline.recording.input_file import input_file
 from stages.calibrate.boards import BOARDS, CameraFile, Target, list_pictures
 from stages.calibrate.laser import LASER_PLANE, LaserCalibration
 
@@ -73,7 +71,7 @@ def calibrate_laser(
     require_writable(output)
     job = Job("calibrate-laser", sources, STAGES, EXPORTERS, configuration, output)
     console = Console(stderr=True)
-    worked(job, console)
+    run_shown(job, console)
     _show(result_of(job, LaserCalibration), output, console)
 
 

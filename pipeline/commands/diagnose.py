@@ -10,8 +10,7 @@ from rich.console import Console
 
 from pipeline.api.diagnosis import diagnose as diagnosis
 from pipeline.commands import Assignments, ConfigFile, ResultFolder, StatedProbe
-from pipeline.commands.working import print_warnings
-from pipeline.machine.display import ProgressDisplay
+from pipeline.machine.display import ProgressDisplay, print_warnings
 from stages.diagnose.drill.answer import Answer
 
 

@@ -10,11 +10,10 @@ import typer
 from rich.console import Console
 
 from pipeline.api.diagnosis.simulated import DiagnosisTried
-from pipeline.api.job import result_of
+from pipeline.api.job import result_of, run_shown
 from pipeline.api.twin import twin_job
 from pipeline.artefacts.twin import Twin
 from pipeline.commands import Assignments, ResultFolder
-from pipeline.commands.working import worked
 from pipeline.machine.display import ProgressDisplay
 
 
@@ -34,7 +33,7 @@ def twin(
     console = Console(stderr=True)
     with ProgressDisplay(console) as display:
         job = twin_job(run, output, diagnosis, assignments or (), display)
-    worked(job, console)
+    run_shown(job, console)
     _show_gauge(job.source(DiagnosisTried))
     _show(result_of(job, Twin), output)
 

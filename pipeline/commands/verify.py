@@ -17,11 +17,11 @@ from matplotlib.figure import Figure
 from rich.console import Console
 from scipy.stats import binned_statistic_2d
 
-from pipeline.api.job import Job, value_source
+from pipeline.api.job import Job, run_shown, value_source
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.commands import Assignments, ConfigFile
-from pipeline.commands.working import worked
 from pipeline.errors import InputError
+from pipeline.files.disk import files_sha256
 from pipeline.files.json_yaml import read_json
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.configuration import resolve
@@ -30,7 +30,6 @@ from pipeline.machine.run_folder import Exporter
 from pipeline.machine.stage import Of, Stage, of_role
 from pipeline.pages import page_template
 from pipeline.pages.figure import rendered, tidy
-from pipeline.recording.input_file import files_sha256
 from stages.compare.reference import (
     SURFACE_SUFFIXES,
     ReferenceSurface,
@@ -109,7 +108,7 @@ def verify(
         silent = as_json and output is None
         folder = Path(own) if silent else output or run / "verify"
         exporters = (FIGURES,) if silent else (PAGE, FIGURES)
-        worked(Job("verify", sources, (stage,), exporters, configuration, folder), Console(stderr=True))
+        run_shown(Job("verify", sources, (stage,), exporters, configuration, folder), Console(stderr=True))
         document = read_json(folder / "certificate.json")
     if as_json:
         typer.echo(json.dumps(document, ensure_ascii=False))

@@ -1,17 +1,20 @@
-"""Tables for people: sections, defects and the trajectory as CSV and JSON."""
+"""Tables for people: sections, defects, trajectory as CSV and JSON; the centreline as GeoJSON and DXF too."""
 
 from __future__ import annotations
 
 import csv
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.artefacts.findings import Defect, Defects, Sections
-from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.measured import PipePiece, Trajectory
+from pipeline.geometry.axis import distance_along, frames_at
 from pipeline.geometry.rigid import quaternion_from_rotation
 from pipeline.pages import notation
 
@@ -87,3 +90,95 @@ def write_trajectory(trajectory: Trajectory, folder: Path) -> None:
         rows.writerows(
             [int(f), *(f"{v:.9g}" for v in row)] for f, row in zip(trajectory.frame, values, strict=True)
         )
+
+
+_STEP_MM = 10.0
+_MOST_POINTS = 5000
+"""Points lie 10 mm apart, on long pipes farther: 5000 are as many as a drawing handles with ease."""
+_POINT = ("distance_mm", "x_mm", "y_mm", "z_mm", "sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "piece")
+_PIECE = (
+    "kind", "from_mm", "to_mm", "length_mm", "sigma_mm", "angle_deg", "angle_sigma_deg", "toward_clock",
+    "radius_mm", "radius_sigma_mm", "standard",
+)  # fmt: skip
+
+
+def write_centreline(trajectory: Trajectory, folder: Path) -> None:
+    """Write ``centreline.csv``, ``.geojson`` and ``.dxf``, and ``route.csv``: straight lengths and bends."""
+    distance, xyz, sigma = _points(trajectory)
+    pieces = trajectory.pieces or (PipePiece("straight", float(distance[0]), float(distance[-1]), math.nan),)
+    with (folder / "centreline.csv").open("w", newline="", encoding="utf-8") as stream:
+        rows = csv.writer(stream, lineterminator="\n")
+        rows.writerow(_POINT)
+        for s, p, u in zip(distance, xyz, sigma, strict=True):
+            rows.writerow([*(f"{v:.6g}" for v in (s, *p, *u)), _piece_at(pieces, float(s))])
+    with (folder / "route.csv").open("w", newline="", encoding="utf-8") as stream:
+        rows = csv.writer(stream, lineterminator="\n")
+        rows.writerow(_PIECE)
+        rows.writerows(_row(piece) for piece in pieces)
+    document = json.dumps(_geojson(pieces, distance, xyz), indent=1, allow_nan=False)
+    (folder / "centreline.geojson").write_text(document + "\n", encoding="utf-8")
+    (folder / "centreline.dxf").write_text("\n".join(_dxf(pieces, distance, xyz)) + "\n", encoding="ascii")
+
+
+def _points(trajectory: Trajectory) -> tuple[Float, Float, Float]:
+    """Return distances (n,), points (n, 3) in P and their 1 σ (n, 3) over the way that the camera drove."""
+    s = distance_along(trajectory.axis, trajectory.T_pc)
+    first, last = float(s.min()), float(s.max())
+    step = max(_STEP_MM, (last - first) / _MOST_POINTS)
+    distance = np.linspace(first, last, max(int(np.ceil((last - first) / step)), 1) + 1)
+    order = np.argsort(s, kind="stable")
+    own = np.sqrt(np.diagonal(trajectory.covariance, axis1=1, axis2=2)[order, :3])
+    sigma = np.stack([np.interp(distance, s[order], own[:, i]) for i in range(3)], -1)
+    return distance, frames_at(trajectory.axis, distance)[0], sigma
+
+
+def _piece_at(pieces: tuple[PipePiece, ...], distance_mm: float) -> str:
+    return next((p.kind for p in pieces if distance_mm <= p.to_mm), pieces[-1].kind)
+
+
+def _row(piece: PipePiece) -> list[str]:
+    # Azimuth atan2(y, x) with y down; 12 o'clock is −y.
+    clock = (math.degrees(piece.toward_rad) + 90) % 360 / 30
+    numbers = (
+        piece.from_mm, piece.to_mm, piece.to_mm - piece.from_mm, piece.sigma_mm,
+        math.degrees(piece.angle_rad), math.degrees(piece.angle_sigma_rad), clock, piece.radius_mm,
+        piece.radius_sigma_mm,
+    )  # fmt: skip
+    return [piece.kind, *(f"{v:.6g}" if math.isfinite(v) else "" for v in numbers), piece.standard]
+
+
+def _parts(
+    pieces: tuple[PipePiece, ...], distance: Float, xyz: Float
+) -> Iterator[tuple[PipePiece, list[list[float]]]]:
+    """Yield each piece with its points, mm; neighbours share the one where they meet."""
+    for piece in pieces:
+        inside = (distance >= piece.from_mm) & (distance <= piece.to_mm)
+        places = np.unique(np.concatenate([[piece.from_mm], distance[inside], [piece.to_mm]]))
+        line = np.stack([np.interp(places, distance, xyz[:, i]) for i in range(3)], -1)
+        yield piece, np.round(line, 3).tolist()
+
+
+def _geojson(pieces: tuple[PipePiece, ...], distance: Float, xyz: Float) -> dict[str, object]:
+    """Return a feature for each piece: RFC 7946, but for coordinates in metres of P, which knows no map."""
+    features = []
+    for piece, line in _parts(pieces, distance, xyz):
+        properties = {name: text for name, text in zip(_PIECE, _row(piece), strict=True) if text}
+        metres = [[round(v / 1000, 6) for v in point] for point in line]
+        geometry = {"type": "LineString", "coordinates": metres}
+        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
+    frame = "metres in the pipe's frame P: x right, y down, z along the pipe at its start"
+    return {"type": "FeatureCollection", "coordinate_frame": frame, "features": features}
+
+
+def _dxf(pieces: tuple[PipePiece, ...], distance: Float, xyz: Float) -> Iterator[str]:
+    """Yield the lines of a DXF drawing (release 12): a polyline in mm for each piece, by kind on layers."""
+    yield from ("0", "SECTION", "2", "HEADER", "9", "$ACADVER", "1", "AC1009", "0", "ENDSEC")
+    yield from ("0", "SECTION", "2", "ENTITIES")
+    for piece, line in _parts(pieces, distance, xyz):
+        layer = piece.kind.upper()
+        yield from ("0", "POLYLINE", "8", layer, "66", "1", "70", "8", "10", "0", "20", "0", "30", "0")
+        for x, y, z in line:
+            yield from ("0", "VERTEX", "8", layer, "70", "32")
+            yield from ("10", f"{x:.3f}", "20", f"{y:.3f}", "30", f"{z:.3f}")
+        yield from ("0", "SEQEND", "8", layer)
+    yield from ("0", "ENDSEC", "0", "EOF")

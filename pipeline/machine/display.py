@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -115,3 +116,9 @@ class ProgressDisplay:
         files = self._ended >= self._stages
         words = "writing files" if files else f"{self._ended} of {self._stages} stages"
         self._progress.update(self._whole, completed=done, total=self._stages, told=words)
+
+
+def print_warnings(warnings: Iterable[str], console: Console) -> None:
+    """Print warnings, a line each."""
+    for warning in warnings:
+        console.print(f"warning: {warning}", highlight=False)

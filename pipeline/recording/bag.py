@@ -31,6 +31,7 @@ import numpy as np
 
 from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
+from pipeline.files.disk import content_key, input_file
 from pipeline.files.json_yaml import read_yaml
 from pipeline.recording.bag_file import BAG_ERRORS, Bag, RosBag, bag_files, open_mcap
 from pipeline.recording.bag_topics import (
@@ -45,7 +46,6 @@ from pipeline.recording.bag_topics import (
 from pipeline.recording.base import FrameTable, Planes, Recording, ascending, complete, decoded_ahead
 from pipeline.recording.checks import encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe
-from pipeline.recording.input_file import content_key, input_file
 
 _KEYS = (*COMMON_KEYS, "topics", "illumination")
 

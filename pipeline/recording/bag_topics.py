@@ -18,7 +18,7 @@ from pipeline.files.json_yaml import Section
 from pipeline.recording.bag_file import Bag
 from pipeline.recording.base import Encoder, FrameTable, Illumination, Imu, Planes
 from pipeline.recording.checks import refuse_backward
-from pipeline.recording.pixels import decode_still
+from pipeline.recording.images import decode_still
 from pipeline.recording.tables import refuse_other_units
 
 IMAGE_TOPICS = ("/camera/image_raw", "/camera/image_raw/compressed", "/camera/image/compressed")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Float, Image, Int
-from pipeline.recording.input_file import InputFile
+from pipeline.files.disk import InputFile
 from pipeline.system.parallel import in_threads
 
 Planes = Literal["grey", "bgr"]
@@ -52,6 +54,28 @@ def decoded_ahead(
 ) -> Iterator[tuple[int, Made]]:
     """Yield (number, decoded item) in order, decoding a few ahead on other threads."""
     return in_threads(lambda item: (item[0], decode(item[1])), items, _THREADS)
+
+
+Pairs = Iterator[tuple[int, Item]]
+Coming = Future[tuple[int, Item] | None]
+
+
+def in_background(items: Pairs[Item], ahead: int) -> Pairs[Item]:
+    """Return ``items`` in order; one thread makes up to ``ahead`` of them before they are asked for.
+
+    It starts at once. What making an item raises is raised in the item's place.
+    """
+    pool = ThreadPoolExecutor(1)
+    return _as_made(items, pool, deque(pool.submit(next, items, None) for _ in range(ahead)))
+
+
+def _as_made(items: Pairs[Item], pool: ThreadPoolExecutor, coming: deque[Coming[Item]]) -> Pairs[Item]:
+    try:
+        while (item := coming.popleft().result()) is not None:
+            coming.append(pool.submit(next, items, None))
+            yield item
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 class Illumination(StrEnum):

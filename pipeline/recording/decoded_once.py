@@ -16,9 +16,8 @@ import numpy as np
 from pipeline.arrays import Byte, Image, Int
 from pipeline.errors import InputError
 from pipeline.machine.scratch import Scratch
-from pipeline.recording.background import in_background
-from pipeline.recording.base import Illumination, Planes, Recording, ascending
-from pipeline.recording.pixels import plane_of, shown
+from pipeline.recording.base import Illumination, Planes, Recording, ascending, in_background
+from pipeline.recording.images import plane_of, shown
 from pipeline.recording.video import AHEAD, FEW, VideoSource
 
 # Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
@@ -87,7 +86,7 @@ class FrameStore:
             self._write(number, frame, [np.ascontiguousarray(plane_of(p)) for p in chosen])
 
     def take(self, number: int, planes: Planes) -> Image | None:
-        """Return the pixels of a frame that is there, as `pipeline.recording.pixels.pixels` gives them."""
+        """Return the pixels of a frame that is there, as `pipeline.recording.images.pixels` gives them."""
         kept = self._kept[number]
         if kept is None:
             return None

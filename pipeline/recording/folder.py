@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import InputError
+from pipeline.files.disk import InputFile, content_key, input_file
 from pipeline.files.json_yaml import Section, read_yaml
 from pipeline.recording.base import Encoder, FrameTable, Imu, Recording
 from pipeline.recording.checks import common_frames, encoder_warnings
 from pipeline.recording.description import COMMON_KEYS, describe, inside, optional_file, required_file
 from pipeline.recording.images import ImageSequence, is_pattern, open_images
-from pipeline.recording.input_file import InputFile, content_key, input_file
 from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 from pipeline.recording.video import VideoSource, open_video
 

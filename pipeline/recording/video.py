@@ -14,9 +14,8 @@ import numpy as np
 
 from pipeline.arrays import Image, Int
 from pipeline.errors import InputError
-from pipeline.recording.background import in_background
-from pipeline.recording.base import FrameTable, Planes, ascending, complete
-from pipeline.recording.pixels import shown
+from pipeline.recording.base import FrameTable, Planes, ascending, complete, in_background
+from pipeline.recording.images import shown
 from pipeline.recording.video_index import VideoIndex, list_frames
 
 # Fixed, so that which frames of a damaged file are given up does not depend on the machine.

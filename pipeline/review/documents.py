@@ -14,7 +14,7 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.json_yaml import parse_json, read_json
-from pipeline.pages.run_words import figure_name, stage_title
+from pipeline.pages.notation import figure_name, stage_title
 from pipeline.review.cautions import cautions, labels
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.replay import GONE, Finding, covered

@@ -15,15 +15,14 @@ from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wal
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import InputError
 from pipeline.files.codec import digest, is_digest_of
-from pipeline.files.disk import FileStamp, stamp_of
+from pipeline.files.disk import FileStamp, content_key, stamp_of
 from pipeline.files.json_yaml import parse_json, read_json
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.run_folder import RunFolder
 from pipeline.recording import open_recording
 from pipeline.recording.base import PipeFacts, Recording
-from pipeline.recording.checked_frames import CheckedFrames
-from pipeline.recording.input_file import content_key
+from pipeline.recording.checks import CheckedFrames
 from pipeline.review.decisions.replay import Finding, Measured
 
 _Artefact = TypeVar("_Artefact")

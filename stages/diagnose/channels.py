@@ -15,7 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.calibrate.gauge import GaugeParameters, MeasuredRun, measure_gauge
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import EffectModel

@@ -15,7 +15,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Parameters, Stage
 from pipeline.recording.base import Encoder, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.diagnose.channels import Adjusted, FreeMotion, Seen
 from stages.diagnose.effects.base import Amplitude, Shape, Travel
 from stages.diagnose.effects.library import LIBRARY

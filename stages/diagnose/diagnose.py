@@ -10,7 +10,7 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Stage
 from pipeline.recording.base import Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.diagnose.channels import (
     FIDUCIALS,
     FIELD_EVIDENCE,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from pipeline.adjustment.marginal import covariance_of, log_determinant, marginalised
+from pipeline.adjustment.normal_equations import covariance_of, log_determinant, marginalised
 from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import EffectModel, Shape

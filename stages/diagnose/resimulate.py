@@ -17,7 +17,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.physics.catalogue import EFFECTS, effect
 from pipeline.physics.effect import Course
 from pipeline.recording.base import Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import (

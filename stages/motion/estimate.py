@@ -20,7 +20,7 @@ from pipeline.geometry.axis import distance_along
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import FrameTable, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State

@@ -14,7 +14,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
-from pipeline.recording.checked_frames import CheckedFrames, withheld_frames
+from pipeline.recording.checks import CheckedFrames, withheld_frames
 from stages.premises.light import (
     Light,
     alike,

@@ -6,7 +6,7 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.rings.extract import RingParameters, extract_rings
 
 __all__ = ["RINGS", "RingParameters", "extract_rings"]

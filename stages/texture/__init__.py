@@ -6,7 +6,7 @@ from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.texture.texture import TextureParameters, photograph_wall
 
 

@@ -14,7 +14,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
 from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, block_contrasts, block_ratios, exposure_of

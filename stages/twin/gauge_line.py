@@ -25,7 +25,7 @@ from pipeline.errors import UnusableError
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.machine.stage import Context, Of, Stage
 from pipeline.recording.base import Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.instrument import TrueCamera

@@ -20,7 +20,7 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import distance_along
 from pipeline.recording import open_recording
 from pipeline.recording.base import Illumination
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from pipeline.review.run_files import RunFiles
 from tests.review_browser import chromium, tab
 from tests.review_server import ReviewServer

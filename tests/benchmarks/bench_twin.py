@@ -35,7 +35,7 @@ from pipeline.machine.stage import of_role
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Course, CourseKind
 from pipeline.recording import open_recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.channels import FIDUCIALS, GaugeMeasured
 from stages.premises import PREMISES

@@ -30,7 +30,7 @@ from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.twin import PhotometryParameters, Sums, TwinParameters, compared_with, photometry_of
 from stages.twin.causes import causes
 from stages.twin.locate import places_in_image

@@ -10,7 +10,13 @@ import pytest
 from pipeline.adjustment.bordered import BorderedSystem, Rows
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, minimise
-from pipeline.adjustment.marginal import ArrowEquations, covariance_of, log_determinant, marginalised, solved
+from pipeline.adjustment.normal_equations import (
+    ArrowEquations,
+    covariance_of,
+    log_determinant,
+    marginalised,
+    solved,
+)
 from pipeline.adjustment.robust import cluster_covariance, cluster_variance, two_way_variance
 from pipeline.arrays import Float
 

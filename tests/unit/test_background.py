@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from pipeline.recording.background import in_background
+from pipeline.recording.base import in_background
 
 
 def numbered(count, error_at=None, made=None):

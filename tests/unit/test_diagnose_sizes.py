@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.adjustment.marginal import Marginal
+from pipeline.adjustment.normal_equations import Marginal
 from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import SWINGS

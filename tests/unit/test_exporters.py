@@ -14,8 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.artefacts.measured import PipePiece, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
 from pipeline.export.arrays import write_radius_map, write_rings
-from pipeline.export.centreline import write_centreline
-from pipeline.export.tables import write_trajectory
+from pipeline.export.tables import write_centreline, write_trajectory
 from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from tests.pose_chain import chain, curved

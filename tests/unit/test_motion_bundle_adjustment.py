@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.levenberg_marquardt import Damping
 from pipeline.adjustment.motion_priors import trembling
+from pipeline.adjustment.normal_equations import BandedCholesky
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation

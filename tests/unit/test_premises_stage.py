@@ -76,7 +76,7 @@ def test_lights_and_times_are_mended(name, seed, good, run):
 
 def test_the_spoilings_spoil(good):
     """Without mending, what is counted as wrong is there."""
-    from pipeline.recording.checked_frames import CheckedFrames
+    from pipeline.recording.checks import CheckedFrames
 
     for spoil in (lost(1), swapped_from, wrong_at_random):
         spoiled = spoil(good, np.random.default_rng(1))

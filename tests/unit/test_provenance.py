@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.api.job import run_job
+from pipeline.files.disk import files_sha256
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe_file import read_with_source, write_probe
 from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection
-from pipeline.recording.input_file import files_sha256
 from tests.toys import toy_job, toy_probe
 
 MADE_BY = MadeBy("diagnose", {"gauge": "ab" * 32}, {"without": ["laser_tilt"]})

@@ -3,7 +3,7 @@
 import pytest
 
 from pipeline.artefacts.measured import RingValidity
-from pipeline.pages.run_words import SAMPLE_REASONS, STAGES, figure_name, stage_title
+from pipeline.pages.notation import SAMPLE_REASONS, STAGES, figure_name, stage_title
 from stages.catalogue import PIPELINE
 
 

@@ -12,9 +12,9 @@ from pipeline.artefacts.wall_map import WallMap
 from pipeline.commands.verify import verify
 from pipeline.errors import InputError, UnusableError
 from pipeline.export.arrays import write_cloud
+from pipeline.files.disk import files_sha256
 from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
-from pipeline.recording.input_file import files_sha256
 from pipeline.system.native import open3d
 from stages.compare.reference import read_surface, read_wall_map, read_wall_points
 from stages.compare.registration.by_points import register_points

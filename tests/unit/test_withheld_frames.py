@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.recording.base import FrameTable, Illumination, PipeFacts, Recording
-from pipeline.recording.checked_frames import WITHHELD, CheckedFrames, withheld_frames
+from pipeline.recording.checks import WITHHELD, CheckedFrames, withheld_frames
 from stages.premises import PremisesParameters
 
 

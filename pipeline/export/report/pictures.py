@@ -17,7 +17,7 @@ from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.export.report.page import Flat, Legend, Mark, Strip, Tick, round_ticks
-from pipeline.export.report.summary import RunSummary
+from pipeline.export.report.tables import RunSummary
 
 TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
 # Pixels of one picture of the whole wall, and of one about a finding: the page stays below 8 MB.

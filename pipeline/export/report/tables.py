@@ -1,20 +1,63 @@
-"""What the report says in words and numbers: its verdict, its first screen and its tables."""
+"""What the report says of a run in words and numbers: its verdict, its first screen and its tables."""
 
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.artefacts.findings import Defect
-from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, Wall
+from pipeline.artefacts.findings import Defect, Defects, Sections
+from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, Wall, WallTexture
+from pipeline.artefacts.model import Overlays
 from pipeline.export.report.page import Card, Table
-from pipeline.export.report.summary import RunSummary
 from pipeline.export.run_record import mean_diameter
 from pipeline.geometry.axis import distance_along
-from pipeline.machine.outcome import WARNING, Number, State, state_word
+from pipeline.instrument.probe import Probe
+from pipeline.machine.outcome import WARNING, Number, StageOutcome, State, state_word
 from pipeline.pages import notation
-from pipeline.pages.run_words import SAMPLE_REASONS, figure_name, stage_title
+from pipeline.pages.notation import SAMPLE_REASONS, figure_name, stage_title
+from pipeline.recording.base import Recording
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """A run as the report shows it; an artefact that was not made is None.
+
+    Attributes
+    ----------
+    recording, probe
+    created : str
+        When the run was made, ISO 8601, or empty.
+    rings, trajectory, wall, texture, overlays, sections, defects
+    stages : tuple of StageOutcome
+        How each ended, and the numbers it reported. Names of numbers that begin with ``rejected`` account for
+        what was not used.
+    versions : tuple of (str, str)
+        Name and version of the program and of what it stands on.
+    inputs : tuple of (str, str)
+        File and hash of what went in.
+    """
+
+    recording: Recording
+    probe: Probe
+    created: str
+    rings: RingSamples | None = None
+    trajectory: Trajectory | None = None
+    wall: Wall | None = None
+    texture: WallTexture | None = None
+    overlays: Overlays | None = None
+    sections: Sections | None = None
+    defects: Defects | None = None
+    stages: tuple[StageOutcome, ...] = ()
+    versions: tuple[tuple[str, str], ...] = ()
+    inputs: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def numbers(self) -> tuple[tuple[str, Number], ...]:
+        """All numbers that stages reported, each with its stage's name."""
+        return tuple((stage.name, number) for stage in self.stages for number in stage.numbers)
+
 
 NOT_CALIBRATED = (
     "The instrument's numbers are only stated, not calibrated on a gauge: diameters rest on them, "

@@ -15,15 +15,14 @@ from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTextu
 from pipeline.artefacts.model import Overlays
 from pipeline.export.report.page import Curve, Finding, Page, Plot, plot
 from pipeline.export.report.pictures import Gallery, gallery
-from pipeline.export.report.summary import RunSummary
-from pipeline.export.report.tables import cards, tables, verdict
+from pipeline.export.report.tables import RunSummary, cards, tables, verdict
 from pipeline.files.codec import digest
 from pipeline.files.installed import program_version
 from pipeline.instrument.probe import Probe
 from pipeline.machine.outcome import Results, warnings_of
 from pipeline.pages import notation
 from pipeline.recording.base import Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 
 # Libraries that the results stand on, named with their versions.
 _STANDS_ON = ("numpy", "scipy", "opencv-contrib-python-headless", "av")

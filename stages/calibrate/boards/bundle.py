@@ -1,6 +1,6 @@
 """Least squares over one camera and many board poses: residuals, their derivatives, and the covariance.
 
-Each pose couples only to its own view and to the camera: `pipeline.adjustment.marginal.ArrowEquations`.
+Each pose couples only to its own view and to the camera: `ArrowEquations` of the normal equations.
 Residuals are weighted after Huber by iterated reweighting. A plane board may be bent: the same quadratic sag
 in all views, as in the board warp of mrcal.
 """
@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Stop, minimise
-from pipeline.adjustment.marginal import ArrowEquations, covariance_of
+from pipeline.adjustment.normal_equations import ArrowEquations, covariance_of
 from pipeline.adjustment.robust import cluster_covariance
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, skew

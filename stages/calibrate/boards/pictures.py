@@ -13,11 +13,10 @@ import numpy as np
 
 from pipeline.arrays import Image
 from pipeline.errors import InputError, UnusableError
-from pipeline.files.disk import disk_errors_named
+from pipeline.files.disk import InputFile, content_key, disk_errors_named, input_file
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.machine.plan import Source
 from pipeline.machine.stage import Context, Parameters
-from pipeline.recording.input_file import InputFile, content_key, input_file
 from stages.calibrate.boards.detect import (
     LEAST_CORNERS,
     Board,

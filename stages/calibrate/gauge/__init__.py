@@ -17,7 +17,7 @@ from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Illumination, Recording
-from pipeline.recording.checked_frames import CheckedFrames
+from pipeline.recording.checks import CheckedFrames
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Finding, Measurements, RingSource, first_unknowns, solve
 from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges

@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor, Rows
-from pipeline.adjustment.marginal import marginalised
+from pipeline.adjustment.normal_equations import marginalised
 from pipeline.adjustment.robust import cluster_variance
 from pipeline.arrays import Float, Int
 from stages.diagnose.field.system import FieldSystem

@@ -12,10 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipeline.adjustment.banded_cholesky import BandedCholesky
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.elimination import Sums, add_rows
-from pipeline.adjustment.marginal import Marginal, marginalised
+from pipeline.adjustment.normal_equations import BandedCholesky, Marginal, marginalised
 from pipeline.adjustment.robust import two_way_variance
 from pipeline.arrays import Bool, Float, Int
 

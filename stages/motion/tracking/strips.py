@@ -17,8 +17,7 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
-from pipeline.recording.background import in_background
-from pipeline.recording.base import Illumination, Recording
+from pipeline.recording.base import Illumination, Recording, in_background
 from stages.motion.tracking.normalisation import (
     SOFTENING_PX,
     equally_sharp,
