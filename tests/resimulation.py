@@ -27,7 +27,7 @@ from pipeline.simulator.motion import motion_through
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.build import bent_axis
+from pipeline.simulator.wall import bent_axis
 from pipeline.simulator.wall.description import Bend
 from pipeline.simulator.wall.grid import Wall, WallGrid
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pypdf import PdfReader
 
-from pipeline.review.decisions import actions as do
+from pipeline.review import decisions as do
 from pipeline.review.decisions.replay import Finding
 from pipeline.review.review import Review, open_review
 from pipeline.review.run_files import RunFiles

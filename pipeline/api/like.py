@@ -29,7 +29,7 @@ from pipeline.review.run_files import RunFiles
 from pipeline.simulator.build import plain_truth
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.scene import Scene, scene_from
-from pipeline.simulator.wall.build import MeasuredPipe, write_measured
+from pipeline.simulator.wall import MeasuredPipe, write_measured
 from pipeline.simulator.wall.grid import Wall, WallGrid
 from stages.texture.surface import wall_surface
 from stages.twin import PHOTOMETRY, Photometry

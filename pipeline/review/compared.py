@@ -31,12 +31,10 @@ from pipeline.files.provenance import MadeBy
 from pipeline.geometry.axis import distance_along
 from pipeline.review.decisions.replay import GONE, REJECTED, Finding
 from pipeline.review.documents import cleaned, overlay_document
-from pipeline.review.flat_tiles import FlatPicture, layers_of, overlay_picture, picture_of
-from pipeline.review.growth_table import COLUMNS, growth_rows
-from pipeline.review.papers.tables import csv_text
+from pipeline.review.flat_tiles import FlatPicture, Limits, layers_of, overlay_picture, picture_of
 from pipeline.review.review import Review, State, open_review
 from pipeline.review.run_files import RunFiles
-from pipeline.review.values import Limits
+from pipeline.review.tables import GROWTH_COLUMNS, csv_text, growth_rows
 
 DIFFERENCE = ("difference", "difference_sigma")
 EARLIER = "earlier-"
@@ -176,7 +174,7 @@ class Compared:
         if name not in _TABLES:
             raise InputError("tables", f"there is no {name[:40]!r}", expected=", ".join(_TABLES))
         if name == "growth.csv":
-            return _TABLES[name], csv_text(self._rows(self.changes), COLUMNS).encode("utf-8-sig")
+            return _TABLES[name], csv_text(self._rows(self.changes), GROWTH_COLUMNS).encode("utf-8-sig")
         return _TABLES[name], json.dumps(self._told(), indent=1, ensure_ascii=False).encode()
 
     def _told(self) -> dict[str, Any]:

@@ -15,14 +15,13 @@ from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.files.json_yaml import parse_json, read_json
 from pipeline.pages.notation import figure_name, stage_title
-from pipeline.review.cautions import cautions, labels
 from pipeline.review.decisions.ledger import Entry
-from pipeline.review.decisions.replay import GONE, Finding, covered
-from pipeline.review.flat_tiles import FlatPicture
+from pipeline.review.decisions.replay import GONE, Finding, covered, labels
+from pipeline.review.flat_tiles import WALL_LOSS, FlatPicture, full_range_mm, overlay_of
+from pipeline.review.measuring import cautions
 from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
-from pipeline.review.values import WALL_LOSS, full_range_mm, overlay_of
 
 _LEGEND_STEPS = 64
 # What the page needs of a finding as the run measured it; the rest comes with the state.

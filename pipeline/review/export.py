@@ -17,7 +17,7 @@ from pipeline.review import documents
 from pipeline.review.flat_tiles import TILE_PX, FlatPicture, layers_of, picture_of
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.model_stretches import model_of
-from pipeline.review.papers.report import PAPERS, paper_of
+from pipeline.review.papers import PAPERS, paper_of
 from pipeline.review.quality import quality_document
 from pipeline.review.review import Review, State
 

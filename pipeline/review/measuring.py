@@ -1,8 +1,9 @@
-"""Measuring on a run's wall: outlines and what the tools read off it, each number with its 1 σ."""
+"""Measuring on a run's wall: outlines, and what tools read off it, with 1 σ; what is doubtful of findings."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import cv2
@@ -10,12 +11,16 @@ import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32, Int
-from pipeline.artefacts.findings import clock_of_azimuth
+from pipeline.artefacts.findings import DefectKind, clock_of_azimuth
+from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.wall_map import WallMap, cells_within
 from pipeline.errors import BoresightError
-from pipeline.review.decisions.replay import Measured, Outline
+from pipeline.pages import notation
+from pipeline.review.decisions.replay import Finding, Measured, Outline
+from pipeline.review.run_files import RunFiles, measured_findings
 
 _AROUND_MM = 6.0
+_SURE_SIGMA = 2.0
 _LEAST_AROUND = 20
 # Depth is the extreme of the mean over this length, so that one noisy cell is no depth.
 _MEAN_MM = 1.0
@@ -190,3 +195,46 @@ def _diameter(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
         Reading("diameter", r0 + r1, sigma0 + sigma1, "mm"),
         Reading("mean diameter", 2 * float(np.nanmean(section)), 2 * common, "mm"),
     )
+
+
+def cautions(files: RunFiles, finding: Finding) -> tuple[str, ...]:
+    """Return in sentences what an inspector should know before relying on a finding as it stands."""
+    return tuple(c for c in (contradiction(finding), _read_again(files, finding)) if c)
+
+
+def contradiction(finding: Finding) -> str:
+    """Return where the kind says one way and the measured depth the other, at 2 σ."""
+    size, is_loss = finding.size, DefectKind(finding.kind).is_metal_loss
+    into_wall = size.depth_mm if is_loss else -size.depth_mm
+    if not into_wall < -_SURE_SIGMA * size.depth_sigma_mm:
+        return ""
+    way = "goes into the wall" if is_loss else "stands into the bore"
+    read = notation.depth(size.depth_mm, size.depth_sigma_mm)
+    return f"A {finding.kind} {way}, but this outline measures {read}. Check its kind and its outline."
+
+
+def _read_again(files: RunFiles, finding: Finding) -> str:
+    """Return why a measured finding's depth changed when its outline was drawn again."""
+    if not finding.edited:
+        return ""
+    run = _as_measured(files, files.version).get(finding.original or 0)
+    if run is None or run.outline == finding.outline:
+        return ""
+    same = OutlineGauge(files.artefact(Wall).radius_map).measure(run.outline)
+    return (
+        "The depth was read again because the outline was drawn again. "
+        f"The run found {_told_depth(run.size)}, from single points of the rings against the fitted pipe. "
+        "The review reads the map of the wall: the extreme of its means over 1 mm, against the wall within "
+        f"6 mm around the outline. Read so, the run's own outline gives {_told_depth(same)}, the new one "
+        f"{_told_depth(finding.size)}."
+    )
+
+
+def _told_depth(size: Measured) -> str:
+    return notation.depth(size.depth_mm, size.depth_sigma_mm)
+
+
+@lru_cache(maxsize=4)
+def _as_measured(files: RunFiles, _version: str) -> dict[int, Finding]:
+    found = measured_findings(files.defects_text(), files.path / "defects.json")
+    return {f.original: f for f in found if f.original is not None}

@@ -20,14 +20,13 @@ from starlette.staticfiles import StaticFiles
 from pipeline.artefacts.model import Overlays
 from pipeline.errors import BoresightError, InputError
 from pipeline.review import documents, same_view
-from pipeline.review.decisions.actions import Point, action_of
+from pipeline.review.decisions import Point, action_of
 from pipeline.review.decisions.ledger import StaleError
-from pipeline.review.flat_tiles import FlatPicture, picture_of
+from pipeline.review.flat_tiles import FlatPicture, Limits, picture_of
 from pipeline.review.frames import UnseenError, finder_of
 from pipeline.review.measuring import Tool, readings
 from pipeline.review.model_stretches import model_of
 from pipeline.review.review import Review
-from pipeline.review.values import Limits
 
 if TYPE_CHECKING:  # a review of one run alone need not wait for it
     from pipeline.review.compared import Compared
@@ -248,7 +247,7 @@ class ReviewApp:
 
     def _paper(self, request: Request, _: bytes) -> Response:
         # It draws with matplotlib, for which the first view need not wait.
-        from pipeline.review.papers.report import paper_of
+        from pipeline.review.papers import paper_of
 
         paper = paper_of(request.path_params["name"], self.review, self.review.state())
         disposition = f'{"inline" if paper.shown else "attachment"}; filename="{paper.name}"'

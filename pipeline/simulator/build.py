@@ -22,11 +22,11 @@ from pipeline.simulator.instrument import (
     TrueSensor,
     lamp_azimuth_rad,
 )
-from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.motion import Motion, Odometer, motion_of, motion_through
 from pipeline.simulator.scene import LightScene, Scene, SensorScene
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.build import build_wall, facts_of, read_measured
+from pipeline.simulator.view import REFERENCE_MM
+from pipeline.simulator.wall import build_wall, facts_of, read_measured
 from pipeline.simulator.wall.grid import Wall
 
 # Number of the random stream of the instrument's draw; the wall's streams hash their purpose (`Seeds`).

@@ -21,14 +21,13 @@ from pipeline.recording.base import Illumination
 from pipeline.simulator.calm import clear_mm
 from pipeline.simulator.instrument import TrueCamera, TrueInstrument, TrueLaser, TrueSensor
 from pipeline.simulator.kernel import in_bands
-from pipeline.simulator.line_light import add_line
 from pipeline.simulator.rays import RayTable, focal_px, ray_table
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.sensor import exposed, shade_of, through_lens, with_dark_signal
 from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
 from pipeline.simulator.surface import Surface, Texture, surface_of, texture_of
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.view import Line, View, line_of, line_tiles
+from pipeline.simulator.view import Line, View, add_line, line_of, line_tiles
 from pipeline.simulator.wall.grid import Wall
 from pipeline.simulator.wall_light import glow_of_lamps, glow_of_line, lamps_of, stray_light
 from pipeline.simulator.wall_tiles import add_wall

@@ -11,7 +11,7 @@ from scipy.special import ndtri
 from pipeline.arrays import Float32, Image
 from pipeline.simulator.instrument import Dust, TrueSensor
 from pipeline.simulator.kernel import in_bands, kernel
-from pipeline.simulator.line_light import hashed
+from pipeline.simulator.view import hashed
 
 # Glare spreads over tens of px: a picture 8 times smaller holds it.
 _VEIL_SHRINK = 8

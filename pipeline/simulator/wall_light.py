@@ -10,11 +10,10 @@ from scipy.signal import fftconvolve
 from pipeline.arrays import Float
 from pipeline.simulator.instrument import LedRing, TrueLaser, lamp_azimuth_rad
 from pipeline.simulator.kernel import kernel
-from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.raycast import azimuth_of, first_hit, normal_at, radius_at
 from pipeline.simulator.rays import part_ray_at
 from pipeline.simulator.surface import Surface, albedo_at, sheen_at
-from pipeline.simulator.view import View, Work, to_wall
+from pipeline.simulator.view import REFERENCE_MM, View, Work, to_wall
 
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
 _CLOSE_MM = 5e-4

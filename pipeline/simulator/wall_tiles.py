@@ -13,10 +13,9 @@ import numpy as np
 from pipeline.arrays import Float, Float32
 from pipeline.simulator.calm import hit_near
 from pipeline.simulator.kernel import in_bands, kernel, summing_kernel
-from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.raycast import first_hit, normal_at
 from pipeline.simulator.surface import Texture, albedo_at, sheen_at
-from pipeline.simulator.view import View, Work, new_work, to_wall
+from pipeline.simulator.view import REFERENCE_MM, View, Work, new_work, to_wall
 from pipeline.simulator.wall_light import Lamps, glow_at, least_ahead, light_of_ray
 
 # Side of a tile, px; the ray table's spacing, so that its nodes are the tiles' corners.

@@ -21,7 +21,7 @@ from pipeline.machine.store import Store
 from pipeline.recording import open_recording
 from pipeline.recording.tables import read_encoder, read_frame_table
 from pipeline.recording.video import open_video
-from pipeline.review.decisions.actions import action_of
+from pipeline.review.decisions import action_of
 from pipeline.review.model_stretches import read_model
 from pipeline.review.run_files import RunFiles, measured_findings
 from pipeline.review.server import Deed, Measuring, Signing, parsed

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.review.papers.report import PAPERS, paper_of
+from pipeline.review.papers import PAPERS, paper_of
 from pipeline.review.review import Review
 from tests.reviewed import reviewed
 from tests.sample_run import run_sample

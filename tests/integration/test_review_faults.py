@@ -106,7 +106,8 @@ def test_a_file_changed_with_its_old_date_breaks_the_seal(files: RunFiles) -> No
 def test_a_clock_set_back_between_decisions_loses_none(
     files: RunFiles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pipeline.review.decisions import actions, ledger
+    from pipeline.review import decisions as actions
+    from pipeline.review.decisions import ledger
 
     review = open_review(files)
     for k, at in enumerate(("2026-11-21T10:00:00+00:00", "1999-01-01T00:00:00+00:00")):
@@ -125,7 +126,7 @@ def test_a_broken_diagnosis_beside_the_run_is_told(files: RunFiles) -> None:
 
 _FILLING = """
 from pipeline.errors import InputError
-from pipeline.review.decisions.actions import Comment
+from pipeline.review.decisions import Comment
 from pipeline.review.decisions.ledger import Ledger
 ledger = Ledger(disk / "review" / "decisions.sqlite")
 ledger.prepare()

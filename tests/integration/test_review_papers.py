@@ -17,10 +17,10 @@ import pytest
 
 from pipeline.artefacts.measured import Wall
 from pipeline.pages import notation
-from pipeline.review.decisions import actions as do
+from pipeline.review import decisions as do
+from pipeline.review.papers import PAPERS, paper_of
 from pipeline.review.papers.content import report_content
 from pipeline.review.papers.pictures import canvas_of
-from pipeline.review.papers.report import PAPERS, paper_of
 from pipeline.review.review import Review, open_review
 from pipeline.review.run_files import RunFiles, measured_findings
 from tests.reviewed import REMARK, has, html_text, pdf_text, rows_of, standing

@@ -16,9 +16,9 @@ import pytest
 from pypdf import PdfReader
 from pypdf.generic import DictionaryObject
 
-from pipeline.review.decisions import actions as do
+from pipeline.review import decisions as do
+from pipeline.review.papers import paper_of
 from pipeline.review.papers.exchange import EN_COLUMNS, EN_HEADER
-from pipeline.review.papers.report import paper_of
 from pipeline.review.review import Review, open_review
 from pipeline.review.run_files import RunFiles
 from tests.reviewed import plain, rows_of, standing

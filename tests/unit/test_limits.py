@@ -21,7 +21,7 @@ from pipeline.machine.reproduce import read_run_record
 from pipeline.recording import tables
 from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 from pipeline.review import guard, model_stretches, quality
-from pipeline.review.decisions.actions import action_of
+from pipeline.review.decisions import action_of
 from pipeline.review.model_stretches import read_model
 from pipeline.review.run_files import RunFiles, measured_findings
 from pipeline.review.server import Deed, Measuring, Signing, parsed

@@ -9,12 +9,19 @@ import pytest
 
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
-from pipeline.review.cautions import contradiction, labels
-from pipeline.review.decisions import actions as do
+from pipeline.review import decisions as do
 from pipeline.review.decisions.ledger import Ledger, StaleError
-from pipeline.review.decisions.replay import Finding, ImpossibleError, Measured, counting, covered, replay
+from pipeline.review.decisions.replay import (
+    Finding,
+    ImpossibleError,
+    Measured,
+    counting,
+    covered,
+    labels,
+    replay,
+)
 from pipeline.review.documents import b31g, strength
-from pipeline.review.measuring import OutlineGauge, readings
+from pipeline.review.measuring import OutlineGauge, contradiction, readings
 from tests.shared_data import PROJECT_ROOT
 
 SQUARE = ((48.0, 0.1), (52.0, 0.1), (52.0, 0.2), (48.0, 0.2))

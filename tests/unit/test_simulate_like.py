@@ -9,7 +9,7 @@ from pipeline.errors import InputError
 from pipeline.geometry.axis import straight_axis
 from pipeline.simulator.build import plain_truth
 from pipeline.simulator.scene import scene_from
-from pipeline.simulator.wall.build import MeasuredPipe, read_measured, write_measured
+from pipeline.simulator.wall import MeasuredPipe, read_measured, write_measured
 from pipeline.simulator.wall.grid import Wall, WallGrid
 
 PROBE = {

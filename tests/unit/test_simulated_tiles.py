@@ -8,7 +8,7 @@ import pytest
 from pipeline.geometry.axis import PipeAxis, frames_at
 from pipeline.simulator.render import renderer_of, view_of
 from pipeline.simulator.truth import SceneTruth
-from pipeline.simulator.wall.build import bent_axis
+from pipeline.simulator.wall import bent_axis
 from pipeline.simulator.wall.description import Bend
 from pipeline.simulator.wall_light import lamps_of
 from pipeline.simulator.wall_tiles import add_wall

@@ -13,11 +13,10 @@ import pytest
 
 from pipeline.errors import InputError
 from pipeline.geometry.axis import from_pipe
+from pipeline.simulator.wall import build_wall, facts_of
 from pipeline.simulator.wall import shape as wall_shape
-from pipeline.simulator.wall.build import build_wall, facts_of
 from pipeline.simulator.wall.description import Bend, Pipe
-from pipeline.simulator.wall.grid import Wall, grid_over
-from pipeline.simulator.wall.noise import Seeds, above_share, field
+from pipeline.simulator.wall.grid import Seeds, Wall, above_share, field, grid_over
 from pipeline.simulator.wall.shape import bore_radius, coarse_field
 
 HERE = Path()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pipeline.errors import BoresightError, InputError
 from pipeline.files.disk import disk_errors_named
-from pipeline.review.decisions.actions import Action, action_of
+from pipeline.review.decisions import Action, action_of
 
 _BUSY_S = 10.0
 _KEPT = "free space or mend its permissions, then do the last step again; what was decided before is kept"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -10,11 +11,13 @@ import cv2
 import numpy as np
 
 from pipeline.errors import BoresightError
-from pipeline.review.decisions import actions as do
+from pipeline.review import decisions as do
 from pipeline.review.decisions.ledger import Entry
 
 Outline = tuple[tuple[float, float], ...]
 OPEN, ACCEPTED, REJECTED, GONE = "open", "accepted", "rejected", "gone"
+_MADE = {"m": "merged", "a": "added"}
+_ID = re.compile(r"([ma]?)(\d+)(.*)")
 
 
 class ImpossibleError(BoresightError):
@@ -236,3 +239,26 @@ def _any_inside(points: Outline, outline: Outline) -> bool:
     return any(
         cv2.pointPolygonTest(polygon, tuple(map(float, p * scale)), False) > 0 for p in np.asarray(points)
     )
+
+
+def labels(findings: Iterable[Finding]) -> dict[str, str]:
+    """Return what each finding is called, by its id: ``3``, ``4 (merged)``, ``5 (added)``, ``3.1 (split)``.
+
+    Those made by hand are numbered on from the measured ones, in the order in which they were made;
+    ``findings`` are all of a review, those that are gone too.
+    """
+    parts = {f.id: _parts(f.id) for f in findings}
+    measured = max((number for made, number, _ in parts.values() if not made), default=0)
+    by_hand = sorted({number for made, number, _ in parts.values() if made})
+    counted = {number: measured + k for k, number in enumerate(by_hand, 1)}
+    out = {}
+    for name, (made, number, rest) in parts.items():
+        how = "split" if rest else _MADE.get(made, "")
+        out[name] = f"{counted[number] if made else number}{rest}" + (f" ({how})" if how else "")
+    return out
+
+
+def _parts(name: str) -> tuple[str, int, str]:
+    found = _ID.fullmatch(name)
+    assert found is not None, f"{name} is no id of a finding"
+    return found[1], int(found[2]), found[3]

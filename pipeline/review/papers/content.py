@@ -13,8 +13,8 @@ from pipeline.pages import notation
 from pipeline.review.decisions.ledger import Entry
 from pipeline.review.decisions.replay import ACCEPTED, OPEN, REJECTED
 from pipeline.review.documents import ASSUMPTIONS, cleaned, run_document
-from pipeline.review.papers.tables import findings_table
 from pipeline.review.review import Review, Seal, State
+from pipeline.review.tables import findings_table
 
 _STATUS = {ACCEPTED: "accepted", REJECTED: "rejected", OPEN: "not decided"}
 # Headline numbers of the run that a client needs; the others are in report.html of the run.

@@ -15,8 +15,8 @@ from pipeline.artefacts.findings import DefectKind
 from pipeline.artefacts.model import Overlays
 from pipeline.pages import notation
 from pipeline.review.decisions.replay import ACCEPTED
-from pipeline.review.papers.tables import csv_text, findings_table
 from pipeline.review.review import Review, State
+from pipeline.review.tables import csv_text, findings_table
 
 # The pipe tally of the Pipeline Operators Forum, "Specifications and requirements for in-line inspection of
 # pipelines", version 2016, appendix 6: all its columns, in its order and with its units. The edition of 2021,

@@ -21,8 +21,8 @@ from pipeline.export.report.pictures import FlatImage, Window, overlay_image, ph
 from pipeline.pages import notation
 from pipeline.pages.figure import rendered, tidy
 from pipeline.review.decisions.replay import Finding, Outline
+from pipeline.review.flat_tiles import Limits, full_range_mm, values_of
 from pipeline.review.run_files import RunFiles
-from pipeline.review.values import Limits, full_range_mm, values_of
 
 # Pixels of the whole wall, and of one side of a picture about a finding: sharp in print at their size.
 _MAP_PX, _CROP_PX = 600_000, 300

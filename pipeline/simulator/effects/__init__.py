@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.errors import InputError
 from pipeline.physics.catalogue import ALL_EFFECTS
 from pipeline.physics.effect import CourseKind
-from pipeline.simulator.effects import camera, laser_and_window, picture, surroundings
+from pipeline.simulator.effects import camera, laser_and_window, surroundings
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueInstrument
 from pipeline.simulator.truth import SceneTruth
@@ -19,7 +19,7 @@ from pipeline.simulator.truth import SceneTruth
 EffectFunction = Callable[..., SceneTruth]
 # Speed is a central difference over ± 1 ms, far below the time between frames.
 _STEP_S = 1e-3
-_MODULES = (laser_and_window, camera, surroundings, picture)
+_MODULES = (laser_and_window, camera, surroundings)
 
 # Each takes the truth, then the catalogue's quantities by name.
 EFFECT_FUNCTIONS: Mapping[str, EffectFunction] = MappingProxyType(

@@ -10,7 +10,6 @@ import numpy as np
 from pipeline.errors import InputError
 from pipeline.geometry.axis import PipeAxis
 from pipeline.simulator.instrument import Dust
-from pipeline.simulator.line_light import REFERENCE_MM
 from pipeline.simulator.motion import Signal, Slip, Wave
 from pipeline.simulator.truth import (
     SceneTruth,
@@ -20,6 +19,7 @@ from pipeline.simulator.truth import (
     with_odometer,
     with_sensor,
 )
+from pipeline.simulator.view import REFERENCE_MM
 from pipeline.simulator.wall.grid import Wall
 
 # Sagitta by which the axis' polyline may cut its arc, mm.

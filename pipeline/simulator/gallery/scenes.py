@@ -16,7 +16,7 @@ from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.laws import BASELINE_MM, RADII_MM, bench_truth, harmonic, trace_ring
 from pipeline.simulator.motion import Motion, Odometer, Signal, constant
 from pipeline.simulator.truth import SceneTruth, with_laser
-from pipeline.simulator.wall.build import build_wall
+from pipeline.simulator.wall import build_wall
 from pipeline.simulator.wall.description import Pipe
 from pipeline.simulator.wall.grid import Wall
 

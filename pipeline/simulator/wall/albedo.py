@@ -23,8 +23,7 @@ from pipeline.simulator.wall.description import (
     imprint,
     reach_mm,
 )
-from pipeline.simulator.wall.grid import Grid, window, wrapped
-from pipeline.simulator.wall.noise import Seeds, above_share, field
+from pipeline.simulator.wall.grid import Grid, Seeds, above_share, field, window, wrapped
 from pipeline.simulator.wall.shape import (
     bore_radius,
     branch_cover,

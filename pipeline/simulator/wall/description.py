@@ -11,7 +11,7 @@ from pydantic import Field
 
 from pipeline.arrays import Float
 from pipeline.machine.stage import Parameters
-from pipeline.simulator.wall.noise import plane_waves
+from pipeline.simulator.wall.grid import plane_waves
 
 Tint = tuple[float, float, float]
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Float, Float32, Int
 from pipeline.simulator.wall.description import Bend, Branch, Joint, Pipe, Weld, imprint, reach_mm
-from pipeline.simulator.wall.grid import Grid, grid_over, window
-from pipeline.simulator.wall.noise import Seeds, above_share, field
+from pipeline.simulator.wall.grid import Grid, Seeds, above_share, field, grid_over, window
 
 
 def base_radius(grid: Grid, pipe: Pipe) -> Float:
