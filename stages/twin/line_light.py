@@ -1,7 +1,8 @@
 """Light of the laser line: power around and over time, profile across it and speckle, each with its σ.
 
 Next to the line a pixel is  black + power(frame) · p(φ) · ρ · s/w · profile(x/w),  x the distance across the
-line, s the sheet's own thickness and w its width after the lens, both in px, ρ the wall's reflectance.
+line, s the sheet's own thickness and w its width after the lens, both in px, ρ the wall's reflectance: what
+its photo has of blue, green and red, in the shares in which the line's brightness follows them.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import map_coordinates
+from scipy.optimize import nnls
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
@@ -21,6 +23,9 @@ _SECTORS = 36
 PROFILE_WIDTHS = 6.0
 """The line's profile is described so many widths to each side; the halo beyond is left to the residual."""
 _CORE_WIDTHS, _MIDDLE_WIDTHS = 1.0, 0.4
+
+_COLOUR_ROUNDS = 2
+"""Times that colour and power are estimated one after the other; a third round changes shares by < 1e-3."""
 
 PixelNoise = Callable[[Float32], Float32]
 
@@ -33,6 +38,8 @@ class LineLight:
     ----------
     level : float
         Grey levels of the middle of a line as wide as its sheet on white wall.
+    colour, colour_sd : (3,)
+        Shares of blue, green and red in the grey of the line, and their 1 σ.
     log_power, power_sd : (36,)
         Logarithm of the power over image azimuth, sectors uniform from −π, mean 0.
     course : Course
@@ -52,6 +59,8 @@ class LineLight:
     """
 
     level: float
+    colour: Float
+    colour_sd: Float
     log_power: Float
     power_sd: Float
     course: Course
@@ -70,7 +79,8 @@ class LineLight:
         width = np.sqrt(sheet_px**2 + self.blur_px.value**2)
         column = (sight.phi_rad + np.pi) / (2 * np.pi) * len(self.log_power) - 0.5
         power = map_coordinates(self.log_power, [column], order=1, mode="grid-wrap")
-        peak = self.level * np.exp(power) * sight.reflectance * sheet_px / width
+        reflectance = self.colour.astype(np.float32) @ sight.reflectance
+        peak = self.level * np.exp(power) * reflectance * sheet_px / width
         return peak.astype(np.float32), width.astype(np.float32)
 
     def line_and_slope(self, sight: LineSight, log_power: float) -> tuple[Float32, Float32]:
@@ -106,16 +116,43 @@ class LineSamples:
             return None
         sheet_px = np.median(np.concatenate([self._sheet_mm / s.mm_per_px for _, s, _ in self._kept]))
         blur = float(np.sqrt(max(self._width_px**2 - sheet_px**2, 0.3**2)))
-        start = _plain_line(self._sheet_mm, blur)
-        ratio = np.stack([self._sector_ratios(start, s, grey) for _, s, grey in self._kept])
+        light = self._with_power(_plain_line(self._sheet_mm, blur))
+        for _ in range(_COLOUR_ROUNDS):
+            light = self._with_power(self._with_colour(light))
+        return self._with_profile(light)
+
+    def _with_power(self, light: LineLight) -> LineLight:
+        """Return the light with its power around the image and over time."""
+        even = replace(light, level=1.0, log_power=np.zeros(_SECTORS))
+        ratio = np.stack([self._sector_ratios(even, s, grey) for _, s, grey in self._kept])
         level, power, power_sd, course, course_sd = _two_way(np.log(np.where(ratio > 0, ratio, np.nan)))
         frames = np.array([f for f, _, _ in self._kept])
-        lit = LineLight(
-            float(np.exp(level)), power, power_sd, Course(frames, course, course_sd), start.sheet_mm,
-            start.blur_px, start.profile_x, start.profile, start.halo, start.skewness,
-            start.speckle, start.spread,
-        )  # fmt: skip
-        return self._with_profile(lit)
+        known = Course(frames, course, course_sd)
+        return replace(
+            light, level=float(np.exp(level)), log_power=power, power_sd=power_sd, course=known
+        )
+
+    def _with_colour(self, light: LineLight) -> LineLight:
+        """Return the light with the shares of the photo's colours that the line's brightness follows."""
+        each = np.array([self._colour_in(light, *kept) for kept in self._kept])
+        design, value = np.concatenate(each[:, :, :3]), np.concatenate(each[:, :, 3])
+        share = nnls(design, value)[0]
+        of_frame = np.array([nnls(e[:, :3], e[:, 3])[0] for e in each])
+        sd = of_frame.std(0) / np.sqrt(max(len(each) - 1, 1))
+        total = max(float(share.sum()), 1e-9)
+        return light if share.sum() <= 0 else replace(light, colour=share / total, colour_sd=sd / total)
+
+    def _colour_in(self, light: LineLight, frame: int, sight: LineSight, grey: Float32) -> Float:
+        """Return what each colour foretells of the line in single degrees of azimuth, and its brightness."""
+        line, _ = light.line_and_slope(sight, light.course.at(frame))
+        _, width = light.peak(sight)
+        use = np.isfinite(line) & (np.abs(sight.offset_px) < _CORE_WIDTHS * width)
+        use &= grey + self._black < self._white
+        degree = np.floor(np.degrees(sight.phi_rad[use]) + 180).astype(int) % 360
+        light_of = line[use] / np.maximum(light.colour @ sight.reflectance[:, use], 1e-6)
+        parts = (*(light_of * c for c in sight.reflectance[:, use]), grey[use])
+        sums = np.stack([np.bincount(degree, p, 360) for p in parts], 1)
+        return np.asarray(sums / np.maximum(np.sqrt(np.abs(sums[:, 3:])), 1.0), float)
 
     def with_speckle(self, light: LineLight, noise: PixelNoise) -> LineLight:
         """Return the light with how much single pixels vary across the line, beyond the camera's noise.
@@ -203,7 +240,7 @@ def _plain_line(sheet_mm: float, blur_px: float) -> LineLight:
     x = np.linspace(-PROFILE_WIDTHS, PROFILE_WIDTHS, 193)
     nothing, unknown = np.zeros(0), Figure(0.0, 0.0)
     return LineLight(
-        1.0, np.zeros(_SECTORS), np.zeros(_SECTORS), Course(nothing.astype(np.int64), nothing, nothing),
+        1.0, np.full(3, 1 / 3), np.full(3, np.inf), np.zeros(_SECTORS), np.zeros(_SECTORS), Course(nothing.astype(np.int64), nothing, nothing),
         Figure(sheet_mm, 0.1 * sheet_mm), Figure(blur_px, 0.1 * blur_px), x, np.exp(-0.5 * x**2), unknown,
         unknown, unknown, np.zeros_like(x),
     )  # fmt: skip

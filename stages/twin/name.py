@@ -90,6 +90,8 @@ def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
         ]
     if state.line is not None:
         line = state.line
+        colours = zip(("blue", "green", "red"), line.colour, line.colour_sd, strict=True)
+        found += [NamedFigure(f"line_{n}", float(v), float(s), "share") for n, v, s in colours]
         found += [
             NamedFigure(
                 "laser_power_spread", line.course.spread, float(np.median(line.course.sd)), "relative"

@@ -22,7 +22,7 @@ _KNOWN = 0.98
 
 @dataclass(frozen=True)
 class Reflectance:
-    """The photo's grey at several viewing angles, and the colour channel of the laser at the ring.
+    """The photo's grey at several viewing angles, and its colours at the ring.
 
     Attributes
     ----------
@@ -30,15 +30,15 @@ class Reflectance:
         Reflectance × 255, blurred as pixels at the polar angles ``theta_rad`` see it; NaN where unknown.
     theta_rad : (L,)
         Ascending, uniform.
-    line : (1, H, W) float32
-        Reflectance × 255 in the channel nearest to the laser's colour.
+    colours : (3, H, W) float32
+        Reflectance × 255 in blue, green and red.
     distance_from_mm, mm_per_px, azimuth_from_rad, rad_per_px : float
         As `WallTexture` has them.
     """
 
     levels: Float32
     theta_rad: Float
-    line: Float32
+    colours: Float32
     distance_from_mm: float
     mm_per_px: float
     azimuth_from_rad: float
@@ -50,9 +50,10 @@ class Reflectance:
         level = np.clip((theta_rad - first) / step, 0, len(self.theta_rad) - 1).astype(np.float32)
         return self._sampled(self.levels, distance_mm, azimuth_rad, level)
 
-    def of_line(self, distance_mm: Float32, azimuth_rad: Float32) -> Float32:
-        """Return the reflectance (...) that the laser meets at wall places (...)."""
-        return self._sampled(self.line, distance_mm, azimuth_rad, np.zeros_like(distance_mm))
+    def coloured(self, distance_mm: Float32, azimuth_rad: Float32) -> Float32:
+        """Return blue, green and red (3, ...) of wall places (...)."""
+        of = [self._sampled(c[None], distance_mm, azimuth_rad, np.zeros_like(distance_mm)) for c in self.colours]
+        return np.stack(of)
 
     def _sampled(
         self, levels: Float32, distance_mm: Float32, azimuth_rad: Float32, level: Float32
@@ -91,17 +92,11 @@ def reflectance_of(texture: WallTexture, probe: Probe, radius_mm: float, blur_px
         _blurred(grey, known, *_extra_blur(probe, radius_mm, float(t), px_mm, blur_px, texture))
         for t in theta
     ])  # fmt: skip
-    channel = texture.bgra[..., _channel(probe.laser.wavelength_nm)].astype(np.float32)
-    line = _blurred(channel, known, 0.0, 0.0)[None]
+    colours = np.where(known > 0, np.moveaxis(texture.bgra[..., :3], -1, 0), np.float32(np.nan))
     return Reflectance(
-        levels, theta, line, texture.distance_from_mm, texture.mm_per_px, texture.azimuth_from_rad,
+        levels, theta, colours, texture.distance_from_mm, texture.mm_per_px, texture.azimuth_from_rad,
         texture.rad_per_px,
     )  # fmt: skip
-
-
-def _channel(wavelength_nm: float) -> int:
-    """Return which of B, G, R sees a wavelength: the usual crossings of a colour sensor's filters."""
-    return int(np.searchsorted([490.0, 580.0], wavelength_nm))
 
 
 def _extra_blur(

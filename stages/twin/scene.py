@@ -57,9 +57,9 @@ class LineSight:
         Distance from the sheet's middle, px across the line, positive away from the camera.
     mm_per_px
         Of the sheet's own coordinate across the line.
-    reflectance
-        Of the wall where the sheet meets it next to the pixel, × 255, times mean radius over the distance
-        from the laser's axis.
+    reflectance : (3, N)
+        Blue, green and red of the wall where the sheet meets it next to the pixel, × 255, times mean radius
+        over the distance from the laser's axis.
     theta_rad, phi_rad
         Where in the image.
     distance_mm, azimuth_rad
@@ -181,7 +181,7 @@ class Scene:
         distance, azimuth = seen.distance_mm[keep], seen.azimuth_rad[keep]
         theta = np.arctan2(np.hypot(rays[keep, 0], rays[keep, 1]), rays[keep, 2])
         phi = np.arctan2(rays[keep, 1], rays[keep, 0])
-        reflectance = self.reflectance.of_line((distance - offset).astype(np.float32), azimuth)
+        reflectance = self.reflectance.coloured((distance - offset).astype(np.float32), azimuth)
         # The sheet's light spreads over a circle that grows with the distance from the laser's axis.
         reflectance *= (self.surface.mean_radius_mm / np.hypot(*seen.xyz_c[keep, :2].T)).astype(np.float32)
         return LineSight(
