@@ -24,8 +24,8 @@ PROFILE_WIDTHS = 6.0
 """The line's profile is described so many widths to each side; the halo beyond is left to the residual."""
 _CORE_WIDTHS, _MIDDLE_WIDTHS = 1.0, 0.4
 
-_COLOUR_ROUNDS = 2
-"""Times that colour and power are estimated one after the other; a third round changes shares by < 1e-3."""
+_COLOUR_ROUNDS = 4
+"""Times that colour and power are estimated one after the other; a fifth changes shares by less than their σ."""
 
 PixelNoise = Callable[[Float32], Float32]
 
@@ -128,9 +128,7 @@ class LineSamples:
         level, power, power_sd, course, course_sd = _two_way(np.log(np.where(ratio > 0, ratio, np.nan)))
         frames = np.array([f for f, _, _ in self._kept])
         known = Course(frames, course, course_sd)
-        return replace(
-            light, level=float(np.exp(level)), log_power=power, power_sd=power_sd, course=known
-        )
+        return replace(light, level=float(np.exp(level)), log_power=power, power_sd=power_sd, course=known)
 
     def _with_colour(self, light: LineLight) -> LineLight:
         """Return the light with the shares of the photo's colours that the line's brightness follows."""

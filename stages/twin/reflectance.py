@@ -52,7 +52,9 @@ class Reflectance:
 
     def coloured(self, distance_mm: Float32, azimuth_rad: Float32) -> Float32:
         """Return blue, green and red (3, ...) of wall places (...)."""
-        of = [self._sampled(c[None], distance_mm, azimuth_rad, np.zeros_like(distance_mm)) for c in self.colours]
+        of = [
+            self._sampled(c[None], distance_mm, azimuth_rad, np.zeros_like(distance_mm)) for c in self.colours
+        ]
         return np.stack(of)
 
     def _sampled(
