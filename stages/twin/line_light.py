@@ -25,7 +25,7 @@ PROFILE_WIDTHS = 6.0
 _CORE_WIDTHS, _MIDDLE_WIDTHS = 1.0, 0.4
 
 _COLOUR_ROUNDS = 4
-"""Times that colour and power are estimated one after the other; a fifth changes shares by less than their σ."""
+"""Times that colour and power are estimated in turn; a fifth changes shares by less than their σ."""
 
 PixelNoise = Callable[[Float32], Float32]
 
@@ -238,7 +238,8 @@ def _plain_line(sheet_mm: float, blur_px: float) -> LineLight:
     x = np.linspace(-PROFILE_WIDTHS, PROFILE_WIDTHS, 193)
     nothing, unknown = np.zeros(0), Figure(0.0, 0.0)
     return LineLight(
-        1.0, np.full(3, 1 / 3), np.full(3, np.inf), np.zeros(_SECTORS), np.zeros(_SECTORS), Course(nothing.astype(np.int64), nothing, nothing),
+        1.0, np.full(3, 1 / 3), np.full(3, np.inf), np.zeros(_SECTORS), np.zeros(_SECTORS),
+        Course(nothing.astype(np.int64), nothing, nothing),
         Figure(sheet_mm, 0.1 * sheet_mm), Figure(blur_px, 0.1 * blur_px), x, np.exp(-0.5 * x**2), unknown,
         unknown, unknown, np.zeros_like(x),
     )  # fmt: skip
