@@ -6,11 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
+import numpy as np
+
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
+from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.channels import (
     FIDUCIALS,
     FIELD_EVIDENCE,
@@ -34,15 +38,18 @@ from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.answer import with_field
 from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
+from stages.diagnose.gauge.answer import verdict_of
+from stages.diagnose.profile.finding import Finding
 from stages.diagnose.resimulate import RESIMULATION, Resimulated, Resimulation
-from stages.diagnose.result import Diagnosis, FitQuality
-from stages.diagnose.second_line import held_against_rings, sheet_by_rings
+from stages.diagnose.result import Diagnosis, FitQuality, Verdict
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.premises import PREMISES
 from stages.rings import RINGS
 from stages.triangulate import TRIANGULATE
 
 _STEPS = 2
+_NAME = "ghost_ring"
+_SHEET = ("tilt_x", "tilt_y", "cone_rad")
 
 
 @dataclass(frozen=True)
@@ -189,3 +196,76 @@ def diagnosis_stages(with_field: bool, with_gauge: bool) -> tuple[Stage, ...]:
     of_gauge = tuple(s.for_role("gauge") for s in _OF_GAUGE if with_gauge)
     of_both = (CORRECTED_MOTION.for_role("field"),) if with_field and with_gauge else ()
     return (*of_field, *of_gauge, *of_both, DIAGNOSIS)
+
+
+@dataclass(frozen=True)
+class SheetByRings:
+    """What the rings of a gauge run say of the laser sheet.
+
+    Attributes
+    ----------
+    value : (3,)
+        Tilt along x, along y, and cone, deg, true minus stated.
+    covariance : (3, 3)
+    """
+
+    value: Float
+    covariance: Float
+
+
+def sheet_by_rings(gauge: Seen | None, correction: Correction | None, probe: Probe) -> SheetByRings | None:
+    """Return the sheet as a gauge run's rings have it; None where they leave open what moved them."""
+    if gauge is None or gauge.geometry is None or correction is None:
+        return None
+    if verdict_of(gauge.geometry) not in (Verdict.CONSISTENT, Verdict.NAMED):
+        return None
+    at = [probe.parameter_names.index(name) for name in _SHEET]
+    moved = np.degrees(correction.probe.parameters[at] - probe.parameters[at])
+    return SheetByRings(moved, np.degrees(np.degrees(correction.probe.covariance[np.ix_(at, at)])))
+
+
+def against_rings(found: Finding, sheet: SheetByRings) -> Agreement | None:
+    """Return whether the sheet that a second line's place asks for is that of the rings.
+
+    None where either tells too little of the sheet.
+    """
+    value = np.array([size.value for size in found.confirms])
+    covariance = np.diag([size.sigma**2 for size in found.confirms])
+    parts = (
+        Part("rings of the gauge", _words(sheet.value), sheet.value),
+        Part("place of the second line", _words(value), value),
+    )
+    return agreement(*parts, (sheet.covariance, covariance), sheet.covariance + covariance)
+
+
+def held_against_rings(seen: Seen, sheet: SheetByRings) -> Seen:
+    """Return what a recording says, its second line borne out by the rings or withdrawn.
+
+    A faint line whose place asks for a sheet that the rings exclude is not light bounced across the bore.
+    Compression, the lens and the wall leave such light too.
+    """
+    if seen.profile is None:
+        return seen
+    second = next((f for f in seen.profile.found if f.effect == _NAME and f.confirms), None)
+    told = against_rings(second, sheet) if second is not None else None
+    if second is None or told is None:
+        return seen
+    if told.confirmation.agrees:
+        kept = replace(second, agreements=(*second.agreements, told))
+        return replace(seen, profile=seen.profile.with_finding(kept))
+    withdrawn = replace(second, p_value=1.0, confirms=(), agreements=())
+    words = (
+        f"The line's profile of {seen.name} shows faint light beside the line. It is not light "
+        f"bounced across the bore: its place would ask for {told.confirmation.measured.partition(': ')[2]}, "
+        f"and the rings say {told.confirmation.prediction.partition(': ')[2]}."
+    )
+    return replace(
+        seen,
+        profile=seen.profile.with_finding(withdrawn),
+        shortcomings=(*seen.shortcomings, words),
+    )
+
+
+def _words(sheet: Float) -> str:
+    tilt, direction = np.hypot(sheet[0], sheet[1]), np.degrees(np.arctan2(sheet[1], sheet[0]))
+    return f"a tilt of {tilt:.3f}° toward {direction:.0f}° and a cone of {sheet[2]:+.3f}°"

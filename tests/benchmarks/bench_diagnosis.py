@@ -1,9 +1,10 @@
 """Counts of the diagnosis on drawn gauge runs at ring level, one case after the other, to be gone on with.
 
 ``python -m tests.benchmarks.bench_diagnosis run RESULTS.jsonl --mode nulls --first 0 --count 300`` appends
-one line a case and leaves out those that are there; modes are nulls, singles, pairs, leftout and courses.
+one line a case and leaves out those that are there; modes are those of `ring_level_cases`.
 ``python -m tests.benchmarks.bench_diagnosis summary RESULTS.jsonl... [--proof PROOF.json]...`` prints the
-table of figures, those of rendered recordings (``boresight prove``) beside those of ring level.
+table of figures, those of rendered recordings (``boresight prove``) beside those of ring level; with
+``--spoil-answers`` each case is scored by another case's answer, and all must collapse.
 """
 
 from __future__ import annotations
@@ -12,28 +13,23 @@ import json
 import subprocess
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
-from scipy.stats import kstest
 
 from pipeline.errors import BoresightError, UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
-from pipeline.physics.effect import Course, CourseKind
-from pipeline.simulator.effects.switch import Switch, switches_from_mapping
-from pipeline.simulator.prior import Prior, draw_pair, read_prior
-from pipeline.simulator.scene import Scene
+from pipeline.physics.effect import CourseKind
+from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.channels import TRAVEL_EFFECTS, Seen, gauge_travel
 from stages.diagnose.compose import composed
 from stages.diagnose.document import to_json
 from stages.diagnose.drill.answer import Answer, Concealed
 from stages.diagnose.drill.figures import figures
-from stages.diagnose.drill.score import Trial
+from stages.diagnose.drill.score import Trial, shuffled
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without
@@ -41,79 +37,12 @@ from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.scan import scan
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.travel.evidence import TravelEvidence
-from tests.benchmarks.ring_level import Noise, ring_level_run
+from tests.benchmarks.ring_level import ring_level_run
+from tests.benchmarks.ring_level_cases import Drawn, Mode, drawn
+from tests.benchmarks.ring_level_figures import more_figures
 
-PRIOR = Path(__file__).with_name("ring_level.yaml")
-# Fewer frames at a lower rate: the same way and time, for less computing.
-_FRAMES = 2 / 3
-_TEXEL_MM = 1.0
-# How near to its time a step is to be found.
-_NEAR_S = 0.1
-_KEPT = ("verdict", "global_p", "location", "effects", "class", "fit", "feasibility", "identifiable")
+_KEPT = ("verdict", "global_p", "location", "effects", "class", "remainder", "fit", "feasibility")
 app = typer.Typer()
-
-
-class Mode(StrEnum):
-    """What is concealed, and whether the library knows it."""
-
-    NULLS = "nulls"
-    SINGLES = "singles"
-    PAIRS = "pairs"
-    LEFTOUT = "leftout"
-    COURSES = "courses"
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A case: its gauge scene, what is switched on, and the noise of its measurements."""
-
-    scene: Scene
-    file: Path
-    switches: tuple[Switch, ...]
-    noise: Noise
-
-
-def drawn(mode: Mode, seed: int) -> Drawn:
-    """Return case ``seed`` of a mode; single effects take their turns, so that all come equally often."""
-    prior = read_prior(PRIOR)
-    turn = prior.effects[seed % len(prior.effects)]
-    concealed = {Mode.NULLS: (1.0,), Mode.COURSES: (1.0,), Mode.PAIRS: (0.0, 0.0, 1.0)}.get(mode, (0.0, 1.0))
-    changes: dict[str, object] = {"concealed": concealed}
-    if mode in (Mode.SINGLES, Mode.LEFTOUT):
-        changes["effects"] = (turn,)
-    pair = draw_pair(prior.model_copy(update=changes), PRIOR, seed, list(Mode).index(mode))
-    random = np.random.default_rng([seed, 11])
-    louder = random.uniform(0.7, 1.5, 3)
-    noise = Noise(0.05 * louder[0], 0.02 * louder[1], 0.07 * louder[2], 0.05 * louder[1])
-    frames = round(_FRAMES * pair.gauge.frames)
-    rate = _FRAMES * pair.gauge.frame_rate
-    # Nobody looks at the wall's paint.
-    pipe = pair.gauge.pipe.model_copy(update={"texel_mm": _TEXEL_MM})
-    scene = pair.gauge.model_copy(update={"frames": frames, "frame_rate": rate, "pipe": pipe, "effects": {}})
-    switches = switches_from_mapping(pair.gauge.effects, PRIOR)
-    if mode is Mode.COURSES:
-        switches = (_with_course(prior, seed, frames / rate),)
-    return Drawn(scene, pair.folder / "scene.yaml", switches, noise)
-
-
-def _with_course(prior: Prior, seed: int, duration_s: float) -> Switch:
-    """Return a law with a course, both drawn; they take their turns."""
-    random = np.random.default_rng([seed, 13])
-    models = [m for m in with_courses(LIBRARY).values() if isinstance(m, Coursed)]
-    model = models[random.permutation(len(models))[0]]
-    size = next(e.size for e in prior.effects if e.name == model.law)
-    values = {q.name: q.typical for q in effect(model.law).quantities}
-    first = effect(model.law).quantities[0]
-    sign = random.choice([-1.0, 1.0]) if first.low < 0 else 1.0
-    values[first.name] *= float(sign * np.exp(random.uniform(*np.log(size))))
-    values |= {"direction_deg": float(random.uniform(-180, 180))} if "direction_deg" in values else {}
-    values |= {"order": model.own[0]} if "order" in values else {}
-    numbers = {
-        CourseKind.STEP: (random.uniform(0.15, 0.85) * duration_s,), CourseKind.RAMP: (duration_s,),
-        CourseKind.EXPONENTIAL: (random.uniform(0.15, 0.6) * duration_s,), CourseKind.SPEED: (20.0,),
-        CourseKind.DISTANCE: (100.0,),
-    }.get(model.kind, ())  # fmt: skip
-    return Switch(model.law, tuple(values.values()), Course(model.kind, tuple(map(float, numbers))))
 
 
 def of_positions(library: Mapping[str, EffectModel]) -> dict[str, EffectModel]:
@@ -242,49 +171,21 @@ def trial_from(line: dict[str, Any]) -> Trial:
 def summary(
     results: list[Path],
     proof: Annotated[list[Path] | None, typer.Option(help="proof.json of rendered recordings")] = None,
+    spoil_answers: Annotated[bool, typer.Option(help="score each case by another case's answer")] = False,
 ) -> None:
-    """Print the table of figures with 95 % intervals, and the distribution of the nulls' p."""
+    """Print the table of figures with 95 % intervals."""
     lines = list(_lines(results))
-    trials = [trial_from(line) for line in lines]
-    for row in figures(trials):
+    if spoil_answers:
+        answers = [t.answer.model_dump(by_alias=True) for t in shuffled([trial_from(n) for n in lines])]
+        lines = [line | {"answer": answer} for line, answer in zip(lines, answers, strict=True)]
+    for row in figures([trial_from(line) for line in lines]):
         typer.echo(f"ring level | {row.text}")
     for file in proof or ():
         for rate in json.loads(file.read_text("utf-8"))["figures"]:
             typer.echo(f"rendered   | {rate['text']}")
-    for text in _course_figures(lines):
+    for text in more_figures(lines):
         typer.echo(text)
-    failed = f"{sum('failed' in line for line in lines)} of {len(lines)}"
-    typer.echo(f"ended without an answer, counted as having identified nothing: {failed}")
-    nulls = [line for line in lines if not line["concealed"] and "failed" not in line]
-    p_values = [line["answer"]["global_p"] for line in nulls]
-    if p_values:
-        below = " ".join(f"{q:g}: {np.mean(np.array(p_values) < q):.3f}" for q in (0.5, 0.2, 0.1, 0.05, 0.01))
-        # Corrected for all that is tried, p may be conservative, never the other way.
-        test = kstest(p_values, "uniform", alternative="greater").pvalue
-        typer.echo(
-            f"share of {len(p_values)} nulls with p below {below}; chance of so many small ones {test:.2g}"
-        )
-    typer.echo(f"CPU s a case: {np.median([line['cpu_s'] for line in lines]):.0f} (median)")
     typer.echo(f"versions: {', '.join(sorted({line['version'] for line in lines}))}")
-
-
-def _course_figures(lines: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """Yield how often the course of what was rightly named is right, and the time of a step."""
-    named = [
-        (line["concealed"][0][2], e["course"])
-        for line in lines
-        if line["mode"] == Mode.COURSES and line["answer"]["verdict"] == "named"
-        for e in line["answer"]["effects"]
-        if e["name"] == line["concealed"][0][0]
-    ]
-    if not named:
-        return
-    right = [(true, found) for true, found in named if true["kind"] == found["kind"]]
-    yield f"Course right where the law is named: {len(right)} of {len(named)}"
-    steps = [(t["time_s"], f["time_s"]) for t, f in right if t["kind"] == CourseKind.STEP]
-    near = sum(abs(f["value"] - t) <= _NEAR_S for t, f in steps)
-    inside = sum(abs(f["value"] - t) <= 2 * f["sd"] for t, f in steps)
-    yield f"Steps within {_NEAR_S} s: {near} of {len(steps)}; within 2 σ: {inside} of {len(steps)}"
 
 
 def _lines(files: list[Path]) -> Iterator[dict[str, Any]]:

@@ -8,8 +8,8 @@ import pytest
 from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects.switch import parse_switches
 from pipeline.simulator.scene import read_scene
-from stages.diagnose.effects.generic import GENERIC, STEADY
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.nameless import GENERIC, STEADY
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.fit import fit

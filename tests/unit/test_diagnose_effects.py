@@ -1,4 +1,4 @@
-"""The library: what it covers, what each effect leaves alone, linearity, words, decoys."""
+"""The library: what it covers, what each effect leaves alone, linearity, words."""
 
 from dataclasses import replace
 
@@ -11,7 +11,6 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.effects.base import Travel
-from stages.diagnose.effects.generic import GENERIC, Moves
 from stages.diagnose.effects.library import (
     LIBRARY,
     NOT_PREDICTED,
@@ -22,7 +21,7 @@ from stages.diagnose.effects.library import (
     texture_shift_px,
     without,
 )
-from stages.diagnose.effects.nameless import DECOYS
+from stages.diagnose.effects.nameless import GENERIC, Moves
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
 # What a position or reading effect leaves alone.
@@ -66,7 +65,7 @@ def size_of(model, scale=1.0):
     return scale * sizes * np.linspace(1.0, 0.6, len(sizes))
 
 
-EVERY = [*LIBRARY.values(), *DECOYS, *GENERIC]
+EVERY = [*LIBRARY.values(), *GENERIC]
 NAMES = [m.name for m in EVERY]
 
 
@@ -215,8 +214,6 @@ def test_the_encoder_slips_lags_and_waits_at_a_reversal():
 def test_nothing_is_predicted_from_what_is_not_known_of_the_wall():
     points = ring_points(known_probe(), BORE)
     assert not ring_shift_px(LIBRARY["albedo_bias"], points, (), np.array([0.09])).any()
-    wall = next(d for d in DECOYS if d.name == "decoy_wall_1")
-    assert not ring_shift_px(wall, points, (), np.array([0.1, 0.1])).any()
 
 
 def test_ovality_stays_with_the_pipe_while_the_camera_rolls():
@@ -252,20 +249,20 @@ def generic_columns(points, wanted, of_line):
     return np.concatenate([wanted(t, points, s) for t in terms for s in t.shapes(0.0, 0.0)], axis=-1)
 
 
-def test_the_generic_basis_mimics_a_tilted_sheet_and_decoys_are_beyond_it():
+def test_the_generic_basis_mimics_a_tilted_sheet_and_not_all_there_is():
     rings = [
         ring_points(plain_probe(), Bore(r), 90, time_s=t) for r, t in ((35.0, 1.0), (42.0, 4.0), (50.8, 9.0))
     ]
     basis = np.concatenate([generic_columns(ring, columns, of_line=True) for ring in rings])
 
-    def left(model):
-        column = np.concatenate([columns(model, ring, shape_of(model)) for ring in rings])[:, 0]
+    def left(model, shape=()):
+        column = np.concatenate([columns(model, ring, shape) for ring in rings])[:, 0]
         fitted = basis @ np.linalg.lstsq(basis, column, rcond=1e-12)[0]
         return np.linalg.norm(column - fitted) / np.linalg.norm(column)
 
     assert basis.shape == (270, 72)
     assert left(LIBRARY["laser_tilt"]) < 1e-6
-    assert left(next(d for d in DECOYS if d.name == "decoy_rows_97")) > 0.5
+    assert left(LIBRARY["sheet_waviness"], (6.0,)) > 0.5
 
 
 @pytest.mark.parametrize("name", ["principal_point", "focal_scale", "radial_distortion", "sensor_tilt"])

@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from pipeline.adjustment.bordered import Rows
-from stages.diagnose.effects.generic import VOCABULARY
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.nameless import VOCABULARY
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.elimination import (
     Equations,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from stages.diagnose.profile.sensor import pattern_finding
+from stages.diagnose.profile.width import pattern_finding
 
 SIZE = (320, 320)
 BRIGHT = 2e5

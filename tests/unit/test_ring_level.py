@@ -11,8 +11,10 @@ from pipeline.simulator.effects.switch import parse_switch
 from pipeline.simulator.prior import read_prior
 from stages.calibrate.gauge.geometry import gauge_of
 from stages.diagnose.effects.library import without
-from tests.benchmarks.bench_diagnosis import PRIOR, Mode, drawn, of_positions
+from tests.benchmarks.bench_diagnosis import of_positions
 from tests.benchmarks.ring_level import Eye, Noise, ring_level_run, seen_at, traced_ring
+from tests.benchmarks.ring_level_cases import PRIOR, Mode, drawn
+from tests.benchmarks.ring_level_figures import more_figures
 from tests.exact_rings import exact_rings
 
 AZIMUTH = np.linspace(-np.pi, np.pi, 24, endpoint=False)
@@ -86,3 +88,30 @@ def test_a_field_scene_is_refused():
     facts = scene.model_copy(update={"pipe": scene.pipe.model_copy(update={"fiducials": None})})
     with pytest.raises(ValueError, match="no gauge run"):
         ring_level_run(facts, file, ())
+
+
+def test_cases_of_several_effects_hold_look_alikes_and_repeated_laws():
+    cases = [[s.name for s in drawn(Mode.SEVERAL, seed).switches] for seed in range(6)]
+    assert all(2 <= len(names) <= 4 for names in cases)
+    assert all(names[:2] == ["sheet_waviness"] * 2 for names in cases[2::3])
+    assert drawn(Mode.SEVERAL, 5).switches == drawn(Mode.SEVERAL, 5).switches
+
+
+def test_several_effects_are_scored_name_by_name_and_a_wrong_answer_scores_badly():
+    def line(*names: str) -> dict[str, object]:
+        effects = [{"name": n, "probability": 1.0} for n in names]
+        sets = [{"names": list(names), "probability": 1.0}]
+        answer = {"verdict": "named", "effects": effects, "candidates": sets}
+        concealed = [["laser_tilt", [0.3, 20.0]], ["baseline", [0.2]]]
+        return {"mode": "several", "concealed": concealed, "left_out": [], "snr": [20.0, 30.0], "cpu_s": 1.0,
+                "answer": answer}  # fmt: skip
+
+    right, wrong = (
+        "\n".join(more_figures([line(*n)])) for n in (("laser_tilt", "baseline"), ("laser_cone",))
+    )
+    assert "names that are right 2 of 2" in right
+    assert "hold the truth: 1 of 1" in right
+    assert "Brier score a case: 0.0000" in right
+    assert "names that are right 0 of 1" in wrong
+    assert "hold the truth: 0 of 1" in wrong
+    assert "Brier score a case: 3.0000" in wrong

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stages.diagnose.diagnose import SheetByRings, against_rings
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import FOUND_P, FOUND_Z, Size, finding
 from stages.diagnose.profile.ghost import bounced
 from stages.diagnose.profile.matched_filter import responses
-from stages.diagnose.second_line import SheetByRings, against_rings
 
 BLOCKS, SECTORS, WIDTH_PX = 10, 72, 1.4
 OFFSET = np.arange(-59.75, 60.0, 0.5)

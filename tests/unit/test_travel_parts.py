@@ -9,8 +9,7 @@ from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.lines import find_lines, swing_agreements
-from stages.diagnose.travel.model import fitted
-from stages.diagnose.travel.parts import second_predictions
+from stages.diagnose.travel.model import fitted, second_predictions
 from stages.diagnose.travel.sight import turns_between
 from stages.diagnose.travel.solve import DELAY, PLAY, SCALE
 from stages.diagnose.travel.steps import jump_of_reading, reading_jump, steps_found

@@ -1,12 +1,9 @@
-"""Patterns without a known cause: oscillations, and decoys that are as flexible as true effects.
-
-A true effect must beat the decoys before it is named. They are drawn with a fixed seed, so that they are the
-same in every diagnosis.
-"""
+"""Patterns without a known cause: slow ones of low harmonic, and swings; they model "none of the library"."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
@@ -16,12 +13,14 @@ from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Sh
 from stages.diagnose.effects.kinds import cosine
 
 _REFERENCE_MM = 50.0
-_SEED = 20261121
-_WRONG_EXPONENTS = {1: (-1.0, 3.5), 2: (-1.5, 4.0), 3: (-0.5, 3.0), 4: (0.5, 4.5)}
-_WAVES = 3
-_RATES_HZ = (0.02, 0.4)
-_ROW_PERIODS_PX = (97.0, 260.0, 700.0)
-_PIPE_PERIODS_MM = (15.0, 90.0)
+_HARMONICS = (0, 1, 2, 3, 4)
+_EXPONENTS = (0, 1, 2, 3)
+# Units of a pattern's size: any would do.
+_REFERENCE_S, _REFERENCE_MM_S = 10.0, 20.0
+# Shapes of a term: which coordinate its size is proportional to.
+STEADY, WITH_TIME, WITH_SPEED, WITH_DISTANCE = (0.0,), (1.0,), (2.0,), (3.0,)
+_COURSES = ("", " t/10", " v/20", " s/50")
+_IN_TIME = ("static", "drift", "speed", "static")
 
 
 class Nameless(EffectModel):
@@ -124,94 +123,150 @@ def _swing(harmonic: int, exponent: int) -> SwingTerm:
 SWINGS: tuple[SwingTerm, ...] = (_swing(0, 1), _swing(1, 2))
 
 
+class Moves(StrEnum):
+    """What a generic term moves: the line on the wall, every image outward or around, or the wall itself."""
+
+    LINE = "line"
+    OUTWARD = "outward"
+    AROUND = "around"
+    WALL = "wall"
+
+
+_FIXED_TO = {
+    Moves.LINE: FixedTo.LASER,
+    Moves.OUTWARD: FixedTo.CAMERA,
+    Moves.AROUND: FixedTo.CAMERA,
+    Moves.WALL: FixedTo.PIPE,
+}
+
+
 @dataclass(frozen=True)
-class WanderingDecoy(Nameless):
-    """A harmonic of the line that grows with a wrong power of the radius and wanders slowly in time."""
+class GenericTerm(Nameless):
+    """One harmonic with one power of the radius (line) or of θ (image); the shape is the power of time."""
 
     name: str
+    moves: Moves
     harmonic: int
-    exponent: float
-    rates_hz: tuple[float, ...]
-    phases_rad: tuple[float, ...]
-    amplitudes: tuple[Amplitude, ...] = two_parts("mm", 0.05)
+    exponent: int
+    amplitudes: tuple[Amplitude, ...]
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return constant and linear in time."""
+        return ((0.0,), (1.0,))
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the pattern on the line, nothing on texture."""
-        if not points.on_line:
+        """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a cos m(ψ_P − ψ₀)."""
+        if self.moves is Moves.WALL:
+            parts = np.array([*amplitude, 0.0])[:2]
+            return self._course(points, shape) * cosine(points.azimuth_p_rad, parts, self.harmonic)
+        if self.moves is not Moves.LINE or not points.on_line:
             return np.zeros(len(points.uv))
-        course = _waves(points.time_s, self.rates_hz, self.phases_rad)
-        pattern = cosine(points.azimuth_rad, amplitude, self.harmonic)
-        return np.asarray(growth(points, self.exponent) * course * pattern)
-
-    def formula(self, shape: Shape) -> str:
-        """Return the pattern as a formula."""
-        return f"δr = a (r/50)^{self.exponent:g} cos {self.harmonic}(ψ − ψ₀) w(t), w a drawn course"
-
-
-@dataclass(frozen=True)
-class RowDecoy(Nameless):
-    """A wave along the sensor's rows that moves every image across them."""
-
-    name: str
-    period_px: float
-    harmonic: int = 0
-    amplitudes: tuple[Amplitude, ...] = two_parts("px", 0.1)
+        return np.asarray(growth(points, self.exponent) * self._pattern(points, shape, amplitude))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the wave along v."""
-        phase = 2 * np.pi * points.uv[:, 1] / self.period_px
-        along_v = amplitude[0] * np.cos(phase) + amplitude[1] * np.sin(phase)
-        return np.stack([np.zeros_like(along_v), along_v], axis=1)
+        """Return a θ^p cos m(ψ − ψ₀) outward or around."""
+        if self.moves in (Moves.LINE, Moves.WALL):
+            return np.zeros((len(points.uv), 2))
+        heading = points.outward if self.moves is Moves.OUTWARD else points.outward[:, ::-1] * [-1.0, 1.0]
+        size = points.theta**self.exponent * self._pattern(points, shape, amplitude)
+        return np.asarray(size[:, None] * heading)
 
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
-        return f"δv = a cos(2πv/{self.period_px:g} − ψ₀)"
+        wave = f" cos {self.harmonic}(ψ − ψ₀)" if self.harmonic else ""
+        course = _COURSES[int(shape[0])]
+        if self.moves is Moves.WALL:
+            return f"wall: a cos {self.harmonic}(ψ_P − ψ₀){course}"
+        if self.moves is Moves.LINE:
+            return f"δr = a (r/50)^{self.exponent}{wave}{course}"
+        return f"image {self.moves}: a θ^{self.exponent}{wave}{course}"
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return what it moves, or time where it grows with that."""
+        time = _IN_TIME[int(shape[0])]
+        return FixedTo.TIME if time == "drift" else _FIXED_TO[self.moves], time, self.harmonic
+
+    def _pattern(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        parts = np.array([*amplitude, 0.0])[:2]
+        return self._course(points, shape) * cosine(points.azimuth_rad, parts, self.harmonic)
+
+    def _course(self, points: ImagePoints, shape: Shape) -> Float:
+        if shape == WITH_TIME:
+            return points.time_s / _REFERENCE_S
+        if shape == WITH_SPEED:
+            return points.speed_mm_s / _REFERENCE_MM_S
+        if shape == WITH_DISTANCE and points.distance_mm is not None:
+            return points.distance_mm / _REFERENCE_MM
+        return np.full(len(points.uv), float(shape == STEADY))
 
 
 @dataclass(frozen=True)
-class WallDecoy(Nameless):
-    """A harmonic of the wall itself, in P, that wanders along the distance."""
+class RowTerm(Nameless):
+    """A delay that grows down the rows: the image moves by its own velocity, in proportion to the row."""
 
-    name: str
-    harmonic: int
-    rates_per_mm: tuple[float, ...]
-    phases_rad: tuple[float, ...]
-    amplitudes: tuple[Amplitude, ...] = two_parts("mm", 0.05)
+    name: str = "generic_rows"
+    harmonic: int = 0
+    amplitudes: tuple[Amplitude, ...] = (Amplitude("delay", "s", 0.01),)
 
-    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the pattern; nothing where the distance is not known."""
-        if points.distance_mm is None:
-            return np.zeros(len(points.uv))
-        course = _waves(points.distance_mm, self.rates_per_mm, self.phases_rad)
-        return np.asarray(course * cosine(points.azimuth_p_rad, amplitude, self.harmonic))
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return a (v/H − 1/2) times the image's velocity."""
+        row = (points.uv[:, 1] + 0.5) / points.probe.camera.image_size[1] - 0.5
+        return np.asarray(amplitude[0] * row[:, None] * points.velocity_px)
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return the camera and its speed."""
+        return FixedTo.CAMERA, "speed", None
 
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
-        return f"wall: a cos {self.harmonic}(ψ_P − ψ₀) w(s), w a drawn course"
+        return "image: a (row/H − 1/2) × velocity"
 
 
-def _waves(at: Float, rates: tuple[float, ...], phases_rad: tuple[float, ...]) -> Float:
-    waves = [np.cos(2 * np.pi * rate * at + phase) for rate, phase in zip(rates, phases_rad, strict=True)]
-    return np.asarray(np.sum(waves, axis=0) * np.sqrt(2 / len(waves)))
+@dataclass(frozen=True)
+class FractionTerm(Nameless):
+    """A wave in the fraction of a pixel that the line lies at."""
+
+    name: str = "generic_fraction"
+    harmonic: int = 0
+    amplitudes: tuple[Amplitude, ...] = two_parts("px", 0.02)
+
+    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return a cos 2πρ + b sin 2πρ of the line's image radius ρ, nothing on texture."""
+        if not points.on_line:
+            return np.zeros(len(points.uv))
+        rho = np.linalg.norm(points.uv - points.probe.camera.centre_px, axis=1)
+        return cosine(2 * np.pi * rho, amplitude)
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return the camera's pixels."""
+        return FixedTo.CAMERA, "static", None
+
+    def formula(self, shape: Shape) -> str:
+        """Return the pattern as a formula."""
+        return "line: a cos(2πρ − φ₀), ρ its image radius in px"
 
 
-def _drawn() -> tuple[EffectModel, ...]:
-    random = np.random.default_rng(_SEED)
-
-    def draw(low: float, high: float) -> tuple[float, ...]:
-        return tuple(float(x) for x in random.uniform(low, high, _WAVES))
-
-    wandering = [
-        WanderingDecoy(f"decoy_wandering_{m}_{p:g}", m, p, draw(*_RATES_HZ), draw(0, 2 * np.pi))
-        for m, exponents in _WRONG_EXPONENTS.items()
-        for p in exponents
-    ]
-    rows = [RowDecoy(f"decoy_rows_{period:g}", period) for period in _ROW_PERIODS_PX]
-    longest, shortest = (1 / period for period in reversed(_PIPE_PERIODS_MM))
-    wall = [
-        WallDecoy(f"decoy_wall_{m}", m, draw(longest, shortest), draw(0, 2 * np.pi)) for m in (1, 2, 3, 4)
-    ]
-    return (*wandering, *rows, *wall)
+def _term(moves: Moves, harmonic: int, exponent: int) -> GenericTerm:
+    in_mm = moves in (Moves.LINE, Moves.WALL)
+    amplitudes = two_parts("mm", 0.05) if in_mm else two_parts("px", 0.2)
+    kept = amplitudes if harmonic else amplitudes[:1]
+    return GenericTerm(f"generic_{moves}_{harmonic}_{exponent}", moves, harmonic, exponent, kept)
 
 
-DECOYS: tuple[EffectModel, ...] = _drawn()
+GENERIC: tuple[GenericTerm, ...] = tuple(
+    _term(moves, harmonic, exponent)
+    for moves in (Moves.LINE, Moves.OUTWARD, Moves.AROUND)
+    for harmonic in _HARMONICS
+    for exponent in _EXPONENTS
+)
+
+
+def _vocabulary() -> tuple[tuple[Nameless, Shape], ...]:
+    courses = {Moves.LINE: (STEADY, WITH_TIME, WITH_SPEED), Moves.OUTWARD: (STEADY, WITH_TIME)}
+    moving = [(t, course) for t in GENERIC for course in courses.get(t.moves, (STEADY,))]
+    wall = [(_term(Moves.WALL, m, 0), course) for m in (1, 2, 3, 4) for course in (STEADY, WITH_DISTANCE)]
+    return (*moving, *wall, (RowTerm(), STEADY), (FractionTerm(), STEADY))
+
+
+# The patterns that an empirical formula is made of, in (r, ψ, t, s, speed, row).
+VOCABULARY: tuple[tuple[Nameless, Shape], ...] = _vocabulary()

@@ -12,12 +12,11 @@ from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import TELLING, same, sized
 from stages.diagnose.effects.base import Shape
-from stages.diagnose.gauge.change_point import change_time
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.scan import freed
+from stages.diagnose.gauge.scan import change_time, freed
 from stages.diagnose.inference import Evidence, Stated, estimate
 from stages.diagnose.result import Confirmation, CourseFound, Value
 

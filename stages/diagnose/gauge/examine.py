@@ -19,8 +19,7 @@ from pipeline.physics.effect import CourseKind
 from stages.calibrate.gauge import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses
-from stages.diagnose.effects.generic import GenericTerm, Moves
-from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.effects.nameless import GenericTerm, Moves, Nameless
 from stages.diagnose.gauge.confirm import Sized, by_bore, confirmations, partial_of, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
 from stages.diagnose.gauge.fit import evidence, fit

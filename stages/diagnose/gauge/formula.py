@@ -14,8 +14,7 @@ from scipy import stats
 
 from pipeline.arrays import Int
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.generic import VOCABULARY
-from stages.diagnose.effects.nameless import SWINGS
+from stages.diagnose.effects.nameless import SWINGS, VOCABULARY
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term, asking, linearise
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan

@@ -10,10 +10,9 @@ import numpy as np
 from pipeline.arrays import Bool, Float
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed
-from stages.diagnose.effects.generic import VOCABULARY
-from stages.diagnose.effects.nameless import DECOYS, Nameless
+from stages.diagnose.effects.nameless import VOCABULARY, Nameless
 from stages.diagnose.gauge.elimination import Part
-from stages.diagnose.gauge.fit import Fit, evidence, fit
+from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.formula import (
     Rival,
     adequacy,
@@ -23,8 +22,8 @@ from stages.diagnose.gauge.formula import (
     swings,
 )
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.scan import Scored, refined, scan, span
-from stages.diagnose.gauge.search import LEAST_SHARE, Search, refits, shift_px
+from stages.diagnose.gauge.scan import Scored, refined, span
+from stages.diagnose.gauge.search import LEAST_SHARE, Search, shift_px
 from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Evidence, Stated, estimate, total
 
 _STRETCHES = 2
@@ -161,7 +160,7 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
 def judge(
     searched: Search, library: Mapping[str, EffectModel], stated: Stated, swung: Sequence[Scored]
 ) -> Verdicts:
-    """Rank the found hypothesis, its rivals, decoys and an empirical formula.
+    """Rank the found hypothesis, its rivals and an empirical formula.
 
     ``swung`` are the swings without a cause about the stated instrument.
     """
@@ -169,7 +168,7 @@ def judge(
     formula = empirical(run, searched.nothing, stated, swung)
     fits = _distinct(
         [
-            searched.nothing, searched.found, *searched.rivals, *_decoyed(searched, stated), formula,
+            searched.nothing, searched.found, *searched.rivals, formula,
             *_with_patterns(searched, stated),
         ]
     )  # fmt: skip
@@ -263,17 +262,6 @@ def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
             for c in of.columns
         ]
     )
-
-
-def _decoyed(searched: Search, stated: Stated) -> list[Fit]:
-    """Return fits with the best decoy in each found effect's place."""
-    run, found, out = searched.run, searched.found, []
-    decoys = {d.name: d for d in DECOYS}
-    for k in range(len(found.terms)):
-        others = found.terms[:k] + found.terms[k + 1 :]
-        reduced = fit(run, found.state, others) if others else searched.nothing
-        out += [reduced, *refits(run, reduced, scan(run, reduced, decoys, stated), 1)]
-    return out
 
 
 def _distinct(fits: Sequence[Fit]) -> list[Fit]:

@@ -121,7 +121,8 @@ def asking(
     """
     run.watch()
     equations, mm_per_px = at.equations, ring_mm_per_px(at.rings)
-    each = [_asked_column(run, state, at, mm_per_px, *one) for one in asked]
+    travel = travel_of(run, run.encoder, state) if run.encoder is not None else None
+    each = [_asked_column(run, at, mm_per_px, travel, state.encoder[0], *one) for one in asked]
     more = np.concatenate([np.zeros((len(equations.frame), 0)), *each], 1)
     bad = ~np.isfinite(more).all(1)
     if with_baseline:
@@ -132,16 +133,16 @@ def asking(
 
 
 def _asked_column(
-    run: GaugeRun, state: Unknowns, at: Linearised, mm_per_px: Float, model: EffectModel, shape: Shape
-) -> Float:
+    run: GaugeRun, at: Linearised, mm_per_px: Float, travel: Travel | None, scale: float, model: EffectModel,
+    shape: Shape,
+) -> Float:  # fmt: skip
     """Return (M, Q) derivatives of the residuals by an effect's amplitudes."""
     parts = [
         _across(texture_columns(model, at.edges, shape), run.edges),
         -mm_per_px[:, None] * columns(model, at.rings, shape),
     ]
-    if run.encoder is not None:
-        travel = travel_of(run, run.encoder, state)
-        parts.append(state.encoder[0] * reading_columns(model, travel, shape))
+    if travel is not None:
+        parts.append(scale * reading_columns(model, travel, shape))
     return np.concatenate(parts)
 
 

@@ -27,8 +27,7 @@ from stages.diagnose.profile.cells import Cells, LineGeometry, line_geometry, ma
 from stages.diagnose.profile.finding import Finding, Size
 from stages.diagnose.profile.measure import LineProfiles, measure_profiles
 from stages.diagnose.profile.naming import UNEXPLAINED, shape_findings
-from stages.diagnose.profile.sensor import locking_finding, pattern_finding
-from stages.diagnose.profile.width import blur_finding
+from stages.diagnose.profile.width import blur_finding, locking_finding, pattern_finding
 
 _LEAST_BLOCKS = 4
 _NAMELESS = "The line's light shows what no known effect explains."

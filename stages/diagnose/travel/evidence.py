@@ -16,8 +16,7 @@ from stages.diagnose.agreement import Agreement
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.lines import Line, find_lines
-from stages.diagnose.travel.model import TravelFit
-from stages.diagnose.travel.parts import second_predictions
+from stages.diagnose.travel.model import TravelFit, second_predictions
 from stages.diagnose.travel.sight import Sight, quantum_mm
 from stages.diagnose.travel.solve import DELAY, PLAY, SCALE, SMOOTH
 from stages.diagnose.travel.steps import StepFound, steps_found

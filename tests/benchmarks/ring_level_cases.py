@@ -1,0 +1,113 @@
+"""Drawn gauge runs at ring level: what is concealed in each, and how noisy its measurements are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import Course, CourseKind
+from pipeline.simulator.effects.switch import Switch, switches_from_mapping
+from pipeline.simulator.prior import Concealable, Prior, draw_pair, read_prior
+from pipeline.simulator.scene import Scene
+from stages.diagnose.effects.courses import Coursed, with_courses
+from stages.diagnose.effects.library import LIBRARY
+from tests.benchmarks.ring_level import Noise
+
+PRIOR = Path(__file__).with_name("ring_level.yaml")
+# Fewer frames at a lower rate: the same way and time, for less computing.
+_FRAMES = 2 / 3
+_TEXEL_MM = 1.0
+_REPEATED = "sheet_waviness"
+
+
+class Mode(StrEnum):
+    """What is concealed, and whether the library knows it."""
+
+    NULLS = "nulls"
+    SINGLES = "singles"
+    PAIRS = "pairs"
+    LEFTOUT = "leftout"
+    COURSES = "courses"
+    SEVERAL = "several"
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A case: its gauge scene, what is switched on, and the noise of its measurements."""
+
+    scene: Scene
+    file: Path
+    switches: tuple[Switch, ...]
+    noise: Noise
+
+
+def drawn(mode: Mode, seed: int) -> Drawn:
+    """Return case ``seed`` of a mode; single effects take their turns, so that all come equally often."""
+    prior = read_prior(PRIOR)
+    turn = prior.effects[seed % len(prior.effects)]
+    drawn_here = (Mode.SINGLES, Mode.LEFTOUT)
+    concealed = (0.0, 1.0) if mode in drawn_here else (0.0, 0.0, 1.0) if mode is Mode.PAIRS else (1.0,)
+    changes: dict[str, object] = {"concealed": concealed}
+    if mode in drawn_here:
+        changes["effects"] = (turn,)
+    pair = draw_pair(prior.model_copy(update=changes), PRIOR, seed, list(Mode).index(mode))
+    random = np.random.default_rng([seed, 11])
+    louder = random.uniform(0.7, 1.5, 3)
+    noise = Noise(0.05 * louder[0], 0.02 * louder[1], 0.07 * louder[2], 0.05 * louder[1])
+    frames = round(_FRAMES * pair.gauge.frames)
+    rate = _FRAMES * pair.gauge.frame_rate
+    # Nobody looks at the wall's paint.
+    pipe = pair.gauge.pipe.model_copy(update={"texel_mm": _TEXEL_MM})
+    scene = pair.gauge.model_copy(update={"frames": frames, "frame_rate": rate, "pipe": pipe, "effects": {}})
+    switches = switches_from_mapping(pair.gauge.effects, PRIOR)
+    if mode is Mode.COURSES:
+        switches = (_with_course(prior, seed, frames / rate),)
+    if mode is Mode.SEVERAL:
+        switches = _several(prior, seed)
+    return Drawn(scene, pair.folder / "scene.yaml", switches, noise)
+
+
+def _with_course(prior: Prior, seed: int, duration_s: float) -> Switch:
+    """Return a law with a course, both drawn; they take their turns."""
+    random = np.random.default_rng([seed, 13])
+    models = [m for m in with_courses(LIBRARY).values() if isinstance(m, Coursed)]
+    model = models[random.permutation(len(models))[0]]
+    size = next(e.size for e in prior.effects if e.name == model.law)
+    values = {q.name: q.typical for q in effect(model.law).quantities}
+    first = effect(model.law).quantities[0]
+    sign = random.choice([-1.0, 1.0]) if first.low < 0 else 1.0
+    values[first.name] *= float(sign * np.exp(random.uniform(*np.log(size))))
+    values |= {"direction_deg": float(random.uniform(-180, 180))} if "direction_deg" in values else {}
+    values |= {"order": model.own[0]} if "order" in values else {}
+    numbers = {
+        CourseKind.STEP: (random.uniform(0.15, 0.85) * duration_s,), CourseKind.RAMP: (duration_s,),
+        CourseKind.EXPONENTIAL: (random.uniform(0.15, 0.6) * duration_s,), CourseKind.SPEED: (20.0,),
+        CourseKind.DISTANCE: (100.0,),
+    }.get(model.kind, ())  # fmt: skip
+    return Switch(model.law, tuple(values.values()), Course(model.kind, tuple(map(float, numbers))))
+
+
+def _several(prior: Prior, seed: int) -> tuple[Switch, ...]:
+    """Return two to four effects: by turns any, with two that look alike, and with one law twice."""
+    random = np.random.default_rng([seed, 17])
+    known = {e.name: e for e in prior.effects}
+    first = known[_REPEATED] if seed % 3 == 2 else known[str(random.choice(list(known)))]
+    like = [n for n in effect(first.name).alike if n in known]
+    second = first if seed % 3 == 2 else known[str(random.choice(like if like and seed % 3 else list(known)))]
+    chosen = [first] if second is first and first.name != _REPEATED else [first, second]
+    others = [e for e in prior.effects if e not in chosen]
+    more = random.permutation(len(others))[: 2 + int(random.integers(0, 3)) - len(chosen)]
+    chosen += [others[k] for k in more]
+    return tuple(_switch(prior, one, seed, k) for k, one in enumerate(chosen))
+
+
+def _switch(prior: Prior, one: Concealable, seed: int, place: int) -> Switch:
+    """Return an effect with sizes drawn; waves that come twice have different orders."""
+    if one.name == _REPEATED:
+        one = one.model_copy(update={"others": {"order": (2.0 + place % 3, 2.0 + place % 3)}})
+    alone = prior.model_copy(update={"concealed": (0.0, 1.0), "effects": (one,)})
+    return switches_from_mapping(draw_pair(alone, PRIOR, seed, 100 + place).gauge.effects, PRIOR)[0]

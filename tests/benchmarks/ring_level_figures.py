@@ -1,0 +1,122 @@
+"""Counts at ring level beyond the drill's table: nulls' p, courses, probabilities, several effects."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.stats import kstest
+
+from pipeline.physics.effect import CourseKind
+from stages.diagnose.drill.score import SNR, Rate, rate
+from stages.diagnose.effects.library import LIBRARY
+
+Line = dict[str, Any]
+# How near to its time a step is to be found.
+_NEAR_S = 0.1
+_BINS = (0.0, 1e-3, 0.01, 0.1, 0.5, 0.9, 0.99, 1.000001)
+_CREDIBLE = 0.9
+
+
+def more_figures(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield sentences with the figures of these results."""
+    answered = [line for line in lines if "failed" not in line]
+    yield from _of_nulls([line for line in answered if not line["concealed"]])
+    yield from _of_courses(answered)
+    yield from _of_each([line for line in answered if len(line["concealed"]) > 1 and not line["left_out"]])
+    known = [line for line in answered if not line["left_out"]]
+    yield from _of_probabilities(known)
+    sets = [hit for line in known if (hit := _in_credible_set(line)) is not None]
+    yield f"{_CREDIBLE:.0%} credible sets hold the truth: {_words(rate(sets))}"
+    yield f"ended without an answer: {len(lines) - len(answered)} of {len(lines)}"
+    seconds = [line["cpu_s"] for line in lines]
+    yield f"CPU s a case: {np.median(seconds):.1f} (median), {np.max(seconds):.0f} (most)"
+
+
+def _words(of: Rate) -> str:
+    low, high = of.interval
+    return f"{of.count} of {of.of} [{low:.1%}, {high:.1%}]"
+
+
+def _of_nulls(nulls: Sequence[Line]) -> Iterator[str]:
+    p_values = [line["answer"]["global_p"] for line in nulls if line["answer"].get("global_p") is not None]
+    if p_values:
+        below = " ".join(f"{q:g}: {np.mean(np.array(p_values) < q):.3f}" for q in (0.5, 0.2, 0.1, 0.05, 0.01))
+        # Corrected for all that is tried, p may be conservative, never the other way.
+        test = kstest(p_values, "uniform", alternative="greater").pvalue
+        yield f"share of {len(p_values)} nulls with p below {below}; chance of so many small ones {test:.2g}"
+
+
+def _of_courses(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield how often the course of what was rightly named is right, and the time of a step."""
+    named = [
+        (line["concealed"][0][2], e["course"])
+        for line in lines
+        if line["mode"] == "courses" and line["answer"]["verdict"] in ("named", "partly")
+        for e in line["answer"]["effects"]
+        if e["name"] == line["concealed"][0][0] and e.get("course")
+    ]
+    right = [(true, found) for true, found in named if true["kind"] == found["kind"]]
+    steps = [(t["time_s"], f["time_s"]) for t, f in right if t["kind"] == CourseKind.STEP]
+    if named:
+        yield f"course right where the law is named: {_words(Rate(len(right), len(named)))}"
+        yield f"steps within {_NEAR_S} s: {_words(rate(abs(f['value'] - t) <= _NEAR_S for t, f in steps))}"
+        yield f"steps within 2 σ: {_words(rate(abs(f['value'] - t) <= 2 * f['sd'] for t, f in steps))}"
+
+
+def _of_each(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield precision and recall of single names where several effects are concealed."""
+    right = said = 0
+    recalled = []
+    for line in lines:
+        true, names = Counter(c[0] for c in line["concealed"]), _said(line)
+        right, said = right + sum((true & names).values()), said + sum(names.values())
+        snr = dict(zip((c[0] for c in line["concealed"]), line["snr"], strict=True))
+        recalled += [name in names for name, size in snr.items() if size is not None and size >= SNR]
+    if lines:
+        yield f"several effects, {len(lines)} cases: names that are right {_words(Rate(right, said))}"
+        yield f"several effects: of those at SNR ≥ {SNR:g} named {_words(rate(recalled))}"
+
+
+def _said(line: Line) -> Counter[str]:
+    answer = line["answer"]
+    sure = answer["effects"] if answer["verdict"] in ("named", "partly") else ()
+    return Counter(e["name"] for e in sure)
+
+
+def _law(name: str) -> str:
+    return name.split(",")[0].split(" ")[0]
+
+
+def _of_probabilities(lines: Sequence[Line]) -> Iterator[str]:
+    """Yield how often a law is there that is given such a probability, and the Brier score over all laws."""
+    pairs = []
+    for line in lines:
+        told = {law: sum(c["probability"] for c in line["answer"].get("candidates", ()) if law in
+                         map(_law, c["names"])) for law in LIBRARY}  # fmt: skip
+        told |= {e["name"]: e["probability"] for e in line["answer"]["effects"]}
+        true = {c[0] for c in line["concealed"]}
+        pairs += [(p, law in true) for law, p in told.items() if p > 0 or law in true]
+    if not pairs:
+        return
+    chance, there = np.array(pairs, float).T
+    for low, high in pairwise(_BINS):
+        inside = (chance >= low) & (chance < high)
+        if inside.any():
+            told = _words(rate(map(bool, there[inside])))
+            yield f"told with {low:g} to {high:.3g} (mean {chance[inside].mean():.3f}): there in {told}"
+    yield f"Brier score a case: {np.sum((chance - there) ** 2) / len(lines):.4f}"
+
+
+def _in_credible_set(line: Line) -> bool | None:
+    """Return whether the likeliest that reach `_CREDIBLE` hold the truth; None where nothing is told."""
+    each = sorted(line["answer"].get("candidates", ()), key=lambda c: -c["probability"])
+    if not each or not line["concealed"]:
+        return None
+    before = np.cumsum([c["probability"] for c in each]) - [c["probability"] for c in each]
+    inside = [c for c, sum_before in zip(each, before, strict=True) if sum_before < _CREDIBLE]
+    true = sorted(c[0] for c in line["concealed"])
+    return any(sorted(map(_law, c["names"])) == true for c in inside)
