@@ -1,8 +1,6 @@
-"""Ring samples and instrument -> wall points in C, with noise and calibration covariance kept apart."""
+"""Ring samples and instrument to wall points in C, with the image noise of each point."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -14,7 +12,6 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.system.parallel import in_threads
 
-_UPPER = np.triu_indices(3)
 # Frames a thread takes at a time.
 _CHUNK_FRAMES = 16
 # Rings that the report's median is taken of.
@@ -45,7 +42,7 @@ def triangulate_rings(
     rings
         Ring samples, px.
     probe
-        Camera, laser sheet and their covariance.
+        Camera and laser sheet.
 
     Returns
     -------
@@ -53,14 +50,13 @@ def triangulate_rings(
         mm in C; NaN where the sample is invalid, its ray misses the sheet, or it is off the ring.
     """
     shape = rings.validity.shape
-    xyz, uncorrected, noise = (context.scratch.zeros((*shape, 3), np.float32) for _ in range(3))
-    covariance = context.scratch.zeros((*shape, 6), np.float32)
+    xyz, noise = (context.scratch.zeros((*shape, 3), np.float32) for _ in range(2))
 
     def place(frames: slice) -> Int:
         found = _triangulate_chunk(rings, frames, probe)
         hit = np.isfinite(found[0][..., 0])
         apart = off_the_ring(np.hypot(*np.moveaxis(found[0][..., :2], -1, 0)), parameters.largest_departure)
-        for whole, part in zip((xyz, uncorrected, noise, covariance), found, strict=True):
+        for whole, part in zip((xyz, noise), found, strict=True):
             part[apart] = np.nan
             whole[frames] = part
         return np.array([(hit & ~apart).sum(), (_valid(rings, frames) & ~hit).sum(), apart.sum()])
@@ -71,7 +67,7 @@ def triangulate_rings(
         counts += count
         context.progress(done, len(chunks))
     _report(context, counts, noise)
-    return RingPoints(rings.frame, rings.azimuth_rad, xyz, uncorrected, noise, covariance)
+    return RingPoints(rings.frame, rings.azimuth_rad, xyz, noise)
 
 
 def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
@@ -97,29 +93,16 @@ def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
     return out
 
 
-def calibration_covariance(by_parameters: Float, covariance: Float) -> Float:
-    """Return J Σ Jᵀ as (..., 6) entries xx, xy, xz, yy, yz, zz of Jacobians (..., 3, P) and Σ (P, P)."""
-    flat = by_parameters.reshape(-1, len(covariance))  # one large product instead of many small ones
-    spread = (flat @ covariance).reshape(by_parameters.shape)
-    full = np.einsum("...ip,...jp->...ij", spread, by_parameters)
-    return np.asarray(full[..., _UPPER[0], _UPPER[1]])
-
-
-def _triangulate_chunk(
-    rings: RingSamples, frames: slice, probe: Probe
-) -> tuple[Float32, Float32, Float32, Float32]:
+def _triangulate_chunk(rings: RingSamples, frames: slice, probe: Probe) -> tuple[Float32, Float32]:
+    """Return points and noise directions (F, A, 3) of some frames."""
     usable = _valid(rings, frames)
     direction = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
     directions = np.broadcast_to(direction, (*usable.shape, 2))[usable]
     uv = rings.centre_px + rings.radius_px[frames][usable].astype(float)[:, None] * directions
-    by_pixel, by_parameters = probe.triangulate_jacobian(uv)
+    by_pixel = probe.triangulate_jacobian(uv)[0]
     sigma = rings.sigma_px[frames][usable].astype(float)
     noise = np.einsum("nij,nj->ni", by_pixel, directions) * sigma[:, None]
-    flat = replace(probe, laser=probe.laser.untilted())
-    xyz, uncorrected = probe.triangulate(uv), flat.triangulate(uv)
-    covariance = calibration_covariance(by_parameters, probe.covariance)
-    xyz_c, flat_c = _spread(xyz, usable), _spread(uncorrected, usable)
-    return xyz_c, flat_c, _spread(noise, usable), _spread(covariance, usable)
+    return _spread(probe.triangulate(uv), usable), _spread(noise, usable)
 
 
 def _spread(values: Float, where: Bool) -> Float32:
@@ -147,8 +130,8 @@ def _report(context: Context, counts: Int, noise: Float32) -> None:
 
 TRIANGULATE = Stage(
     "triangulate",
-    "2",
+    "3",
     TriangulateParameters,
     triangulate_rings,
-    "ring samples and instrument to wall points with covariance",
+    "ring samples and instrument to wall points with their noise",
 )

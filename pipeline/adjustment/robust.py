@@ -1,4 +1,4 @@
-"""Robust spread, losses and harmonics of rings, and scores of equations that err alike in clusters.
+"""Spreads, robust losses, harmonics of rings, and scores of equations that err alike in clusters.
 
 A robust loss gives the weight of an equation and the cost that goes with it.
 The cost of a loss ρ is what its weight minimises when the equations are solved anew: w = ρ′(r) / r.
@@ -28,6 +28,11 @@ TUKEY = 4.685
 _HARMONICS = 2
 # Means over 1.5° stand for the columns of a row: narrower than the second harmonic by 120 times.
 _SECTORS = 240
+
+
+def root_mean_square(values: Float) -> float:
+    """Return the root mean square of all values."""
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def cluster_sums(scores: Float, cluster: Int) -> Float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from pathlib import Path
 from typing import Any
@@ -16,8 +15,7 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.probe import Probe
-from pipeline.pages import page_template
-from pipeline.pages.figure import rendered
+from pipeline.pages import page_template, rendered
 from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
 
 _UNDETERMINED = 0.7
@@ -85,8 +83,8 @@ def report_page(result: GaugeCalibration, document: dict[str, Any]) -> str:
         "radius": radius_figure(result),
         "correlations": correlation_figure(document["correlations"]),
     }
-    encoded = {name: base64.b64encode(png(figure)).decode("ascii") for name, figure in figures.items()}
-    return page_template("calibrate").render(d=document, pictures=encoded)
+    pictures = {name: png(figure) for name, figure in figures.items()}
+    return page_template("calibrate").render(d=document, pictures=pictures)
 
 
 def advice(names: tuple[str, ...]) -> str:

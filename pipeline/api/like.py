@@ -17,12 +17,12 @@ from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import RingSamples, Trajectory, WallTexture
 from pipeline.artefacts.measured import Wall as MeasuredWall
 from pipeline.errors import InputError
+from pipeline.export.run_record import read_run_record
 from pipeline.files.codec import digest
 from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection, Source
-from pipeline.machine.reproduce import read_run_record
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from pipeline.review.run_files import RunFiles

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 from collections.abc import Sequence
@@ -10,24 +9,24 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
-
 from pipeline.api.diagnosis.simulated import DiagnosisTried, try_diagnosis
 from pipeline.api.job import Job, open_job, result_of, run_job, value_source
-from pipeline.arrays import Byte
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, Twin, TwinView
 from pipeline.errors import InputError
+from pipeline.export.report.pictures import jpeg_uri
+from pipeline.export.run_record import check_inputs_unchanged, read_run_record
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import Display, SilentDisplay
 from pipeline.machine.plan import Selection
-from pipeline.machine.reproduce import check_inputs_unchanged, read_run_record
 from pipeline.machine.run_folder import Exporter
 from pipeline.pages import page_template
 from stages.catalogue import PIPELINE
 from stages.texture import TEXTURE
 from stages.twin import PHOTOMETRY, TWIN
 
+# Compressed this far, forty frames make one page of a few MB; the figures come from whole frames.
+_JPEG_QUALITY = 85
 _MEASURED = PIPELINE[: PIPELINE.index(TEXTURE) + 1]
 
 
@@ -151,7 +150,7 @@ def write_twin(found: Twin, tried: DiagnosisTried, made_by: MadeBy, folder: Path
     document = twin_document(found, tried) | {"made_by": made_by.document()}
     (folder / "twin.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
     views = [_shown(v) for v in found.views]
-    maps = [{"name": m.name, "picture": _picture(m.picture)} for m in found.maps]
+    maps = [{"name": m.name, "picture": jpeg_uri(m.picture, _JPEG_QUALITY)} for m in found.maps]
     page = page_template("twin").render(d=document, views=views, maps=maps)
     (folder / "twin.html").write_text(page, "utf-8")
 
@@ -161,16 +160,10 @@ def _shown(view: TwinView) -> dict[str, Any]:
         "frame": view.frame,
         "light": view.light,
         "chi2": round(view.chi2, 2),
-        "recorded": _picture(view.recorded),
-        "twin": _picture(view.twin),
-        "z": _picture(view.z),
+        "recorded": jpeg_uri(view.recorded, _JPEG_QUALITY),
+        "twin": jpeg_uri(view.twin, _JPEG_QUALITY),
+        "z": jpeg_uri(view.z, _JPEG_QUALITY),
     }
-
-
-def _picture(grey: Byte) -> str:
-    # Compressed this far, forty frames make one page of a few MB; the figures come from whole frames.
-    data = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, 85])[1]
-    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
 
 
 EXPORTERS = (Exporter("twin", write_twin),)

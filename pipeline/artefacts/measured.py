@@ -82,22 +82,15 @@ class RingPoints:
     azimuth_rad : (A,)
     xyz_c : (F, A, 3) float32
         Ray and calibrated laser surface intersected; NaN where invalid.
-    xyz_uncorrected_c : (F, A, 3) float32
-        The same with the sheet taken as the plane z = baseline (the seed paper's assumption).
     noise_direction : (F, A, 3) float32
         Change of ``xyz_c`` for +1 σ of image noise along the line's normal: the noise covariance is its
         outer product with itself (rank one).
-    calibration_covariance : (F, A, 6) float32
-        Covariance from the instrument's uncertainty, entries xx, xy, xz, yy, yz, zz. Shared by all frames:
-        it does not average away.
     """
 
     frame: Int
     azimuth_rad: Float
     xyz_c: Float32
-    xyz_uncorrected_c: Float32
     noise_direction: Float32
-    calibration_covariance: Float32
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,7 @@ from pipeline.arrays import Float
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
-from pipeline.pages import page_template
-from pipeline.pages.figure import rendered
+from pipeline.pages import page_template, rendered
 
 
 def uncertainty_figure(report: CalibrationReport) -> Figure:
@@ -144,8 +142,7 @@ def report_page(report: CalibrationReport, document: dict[str, Any]) -> str:
     pictures = {"uncertainty": png(uncertainty_figure(report)), "residuals": png(residual_figure(report))}
     if report.displacement is not None:
         pictures["displacement"] = png(displacement_figure(report))
-    encoded = {name: base64.b64encode(data).decode("ascii") for name, data in pictures.items()}
-    return page_template("calibrate_camera").render(d=document, pictures=encoded)
+    return page_template("calibrate_camera").render(d=document, pictures=pictures)
 
 
 def _board(report: CalibrationReport) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from pipeline.adjustment.robust import root_mean_square
 from pipeline.api.job import Job, result_of, run_shown, value_source
 from pipeline.commands import Assignments, ConfigFile, ResultFolder
 from pipeline.commands.calibrate_camera import BoardKind, describe_board
@@ -122,7 +123,7 @@ def description(result: LaserCalibration) -> dict[str, object]:
             "points": len(line.xyz_c),
             "pose_rms_px": line.pose_rms_px,
             "mean_distance_mm": float(plane.distances(line.xyz_c).mean()),
-            "rms_distance_mm": float(np.sqrt(np.mean(plane.distances(line.xyz_c) ** 2))),
+            "rms_distance_mm": root_mean_square(plane.distances(line.xyz_c)),
         }
         for line in result.lines
     ]
@@ -143,7 +144,7 @@ def _show(result: LaserCalibration, output: Path, console: Console) -> None:
         table.add_column(heading)
     for line in result.lines:
         distance = result.plane.distances(line.xyz_c)
-        rms_mm = float(np.sqrt(np.mean(distance**2)))
+        rms_mm = root_mean_square(distance)
         table.add_row(line.name, str(len(distance)), f"{distance.mean():+.3f}", f"{rms_mm:.3f}")
     console.print(table)
     for name, reason in result.rejected:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -18,6 +17,7 @@ from matplotlib.ticker import ScalarFormatter
 from rich.console import Console
 from rich.table import Table
 
+from pipeline.adjustment.robust import root_mean_square
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.files.disk import written_together
@@ -34,8 +34,7 @@ from pipeline.instrument.budget.monte_carlo import MonteCarlo, monte_carlo
 from pipeline.instrument.budget.scan import Pose, RingScan
 from pipeline.instrument.budget.sources import NOT_IN_RADIUS, Kind, typical_probe
 from pipeline.instrument.probe_file import read_probe
-from pipeline.pages import page_template
-from pipeline.pages.figure import rendered
+from pipeline.pages import page_template, rendered
 
 # Wished accuracies where none are given: the seed paper's 0.1 mm, and what a calibrated probe may reach.
 ACCURACIES_MM = (0.1, 0.02)
@@ -110,8 +109,7 @@ def write_budget(document: dict[str, Any], budget: Budget, study: BaselineStudy,
 
 def budget_page(document: dict[str, Any], chart_svg: bytes) -> str:
     """Return the page as one file that needs nothing else."""
-    chart = base64.b64encode(chart_svg).decode("ascii")
-    return page_template("error_budget").render(d=document, chart=chart)
+    return page_template("error_budget").render(d=document, chart=chart_svg)
 
 
 def budget_figure(budget: Budget, study: BaselineStudy) -> Figure:
@@ -137,13 +135,10 @@ def _totals(budget: Budget, drawn: MonteCarlo | None) -> dict[str, Any]:
 
 def _figures(sigma_mm: Float, drawn_mm: Float | None) -> dict[str, Any]:
     figures: dict[str, Any] = {
-        "rms_mm": _rms(sigma_mm), "max_mm": float(sigma_mm.max()), "sigma_mm": np.round(sigma_mm, 7).tolist(),
+        "rms_mm": root_mean_square(sigma_mm),
+        "max_mm": float(sigma_mm.max()), "sigma_mm": np.round(sigma_mm, 7).tolist(),
     }  # fmt: skip
-    return figures if drawn_mm is None else figures | {"monte_carlo_rms_mm": _rms(drawn_mm)}
-
-
-def _rms(values: Float) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return figures if drawn_mm is None else figures | {"monte_carlo_rms_mm": root_mean_square(drawn_mm)}
 
 
 def _draw_azimuth(axes: Axes, budget: Budget) -> None:

@@ -31,7 +31,7 @@ from pipeline.instrument.misalignment import (
     paper_error,
 )
 from pipeline.instrument.probe_file import read_probe
-from pipeline.pages.figure import rendered, tidy
+from pipeline.pages import rendered, tidy
 
 # Baseline of the physics notes; see `implied_baselines_mm` for what the paper's figures imply.
 PAPER_BASELINE_MM = 22.0

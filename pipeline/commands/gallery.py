@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -205,9 +204,9 @@ def _shown(exhibit: Exhibit, alike: Sequence[Likeness], checks: Sequence[Check])
         "switch": exhibit.switch.text,
         "quantities": list(zip(exhibit.switch.effect.quantities, exhibit.switch.values, strict=True)),
         "surroundings": surroundings(exhibit.name),
-        "picture": _inline(picture_png(exhibit)),
-        "line": _inline(line_png(exhibit)),
-        "difference": _inline(difference),
+        "picture": picture_png(exhibit),
+        "line": line_png(exhibit),
+        "difference": difference,
         "full_scale": full_scale,
         "plots": ring_plots(exhibit),
         "course": course,
@@ -233,10 +232,6 @@ def bores(exhibit: Exhibit) -> list[Bore]:
 
 def _inch(radius_mm: float) -> str:
     return f"{2 * radius_mm / _INCH_MM:g} inch"
-
-
-def _inline(png: bytes) -> str:
-    return base64.b64encode(png).decode("ascii")
 
 
 def gallery(

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pipeline.adjustment.robust import spread_about_median
+from pipeline.adjustment.robust import root_mean_square, spread_about_median
 from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
@@ -239,7 +239,7 @@ def _errors(field: Path, corrected: Probe, truth: SceneTruth, folder: Path) -> W
     usable = rings.valid[:, ::_EVERY] & np.all(np.isfinite(each), axis=0)
     spread = spread_about_median(oracle[usable])
     usable &= np.abs(oracle) < _OUTLYING * spread
-    oracle_mm, stated_mm, corrected_mm = (float(np.sqrt(np.mean(e[usable] ** 2))) for e in each)
+    oracle_mm, stated_mm, corrected_mm = (root_mean_square(e[usable]) for e in each)
     return WallErrors(stated_mm, corrected_mm, oracle_mm)
 
 

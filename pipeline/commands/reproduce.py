@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -16,21 +18,35 @@ from rich.console import Console
 from pipeline.api.job import Job, open_job, run_job
 from pipeline.errors import BoresightError, InputError
 from pipeline.export.catalogue import EXPORTERS
+from pipeline.export.run_record import RunRecord, check_inputs_unchanged, read_run_record
 from pipeline.files.disk import disk_errors_named
 from pipeline.files.provenance import library_versions
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import ProgressDisplay
 from pipeline.machine.plan import Selection
-from pipeline.machine.reproduce import (
-    Agreement,
-    Compared,
-    RunRecord,
-    check_inputs_unchanged,
-    compare_runs,
-    read_run_record,
-)
-from pipeline.machine.run_folder import RunFolder
+from pipeline.machine.run_folder import Exporter, RunFolder, published_files
 from stages.catalogue import PIPELINE
+
+# Files that hold the time at which they were made; what they show stands in the other files.
+_DATED = frozenset({"report.html"})
+
+
+class Agreement(StrEnum):
+    """How a file of the run stands to the one computed again."""
+
+    SAME = "same"
+    DIFFERENT = "different"
+    CHANGED = "changed after the run"
+    MISSING = "not made again"
+    NEW = "only made now"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A file of the run folder and what the comparison says of it."""
+
+    file: str
+    agreement: Agreement
 
 
 class NotReproducedError(BoresightError):
@@ -76,6 +92,24 @@ def _job(record: RunRecord, folder: Path, temporary: Path) -> Job:
         parameters.write_text(yaml.safe_dump({s: dict(p) for s, p in record.configuration.items()}), "utf-8")
     configuration = resolve(PIPELINE, parameters)
     return open_job(record.recording, folder, record.probe, PIPELINE, EXPORTERS, configuration)
+
+
+def compare_runs(run: RunFolder, again: RunFolder, exporters: Sequence[Exporter]) -> tuple[Compared, ...]:
+    """Return every published file of both folders but the dated report, with how they stand to each other."""
+    before = {n: r for e in exporters for n, r in published_files(e, run).items()}
+    after = {n: r for e in exporters for n, r in published_files(e, again).items()}
+    out = []
+    for name in sorted((before.keys() | after.keys()) - _DATED):
+        if name not in before:
+            state = Agreement.NEW
+        elif not before[name].matches(run.path / name):
+            state = Agreement.CHANGED
+        elif name not in after:
+            state = Agreement.MISSING
+        else:
+            state = Agreement.SAME if before[name] == after[name] else Agreement.DIFFERENT
+        out.append(Compared(name, state))
+    return tuple(out)
 
 
 def _tell(compared: tuple[Compared, ...], record: RunRecord) -> None:

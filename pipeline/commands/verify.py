@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 import tempfile
@@ -28,8 +27,7 @@ from pipeline.machine.configuration import resolve
 from pipeline.machine.plan import Source
 from pipeline.machine.run_folder import Exporter
 from pipeline.machine.stage import Of, Stage, of_role
-from pipeline.pages import page_template
-from pipeline.pages.figure import rendered, tidy
+from pipeline.pages import page_template, rendered, tidy
 from stages.compare.reference import (
     SURFACE_SUFFIXES,
     ReferenceSurface,
@@ -236,8 +234,7 @@ def write_certificate(document: dict[str, Any], differences: Differences, folder
 
 def certificate_page(document: dict[str, Any], picture_png: bytes) -> str:
     """Return the certificate as one file that needs nothing else."""
-    picture = base64.b64encode(picture_png).decode("ascii")
-    return page_template("verify").render(d=document, picture=picture)
+    return page_template("verify").render(d=document, picture=picture_png)
 
 
 def differences_figure(differences: Differences) -> Figure:

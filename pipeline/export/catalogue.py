@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.export.arrays import write_cloud, write_radius_map, write_rings
 from pipeline.export.glb import write_model
 from pipeline.export.pictures import write_overlays, write_unrolled
-from pipeline.export.report.write import write_report_page
+from pipeline.export.report import write_report_page
 from pipeline.export.tables import write_centreline, write_defects, write_sections, write_trajectory
 from pipeline.export.tileset import write_tileset
 from pipeline.machine.run_folder import Exporter

@@ -1,27 +1,32 @@
-"""run.json: recording, probe, parameters, versions, stages, state and headline numbers of a run."""
+"""run.json, written and read: recording, probe, parameters, versions, stages, state, headline numbers."""
 
 from __future__ import annotations
 
 import math
 import resource
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pipeline.artefacts.findings import Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
 from pipeline.artefacts.wall_map import WallMap
+from pipeline.errors import InputError
 from pipeline.files.codec import Json
 from pipeline.files.disk import disk_errors_named, replace_json
 from pipeline.files.installed import program_version
+from pipeline.files.json_yaml import read_json
 from pipeline.files.provenance import library_versions
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.configuration import Configuration
 from pipeline.machine.outcome import Number, RunOutcome, StageOutcome, warnings_of
 from pipeline.machine.plan import Plan
 
-# Version of run.json's format.
+_RECORD = "run.json"
+# Version of its format.
 _FORMAT = 1
 
 
@@ -56,7 +61,7 @@ def write_run_record(
         "peak_memory_mib": {"program": _peak_mib()},
     }
     with disk_errors_named(folder):
-        replace_json(folder / "run.json", tree)
+        replace_json(folder / _RECORD, tree)
 
 
 def _peak_mib() -> float:
@@ -154,3 +159,70 @@ def _of_defects(defects: Defects) -> Iterator[Number]:
     yield Number("defects", len(defects.items))
     if defects.deepest is not None:
         yield Number("deepest defect", round(abs(defects.deepest.depth_mm), 3), "mm")
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """What a run's record says of how it came about.
+
+    Attributes
+    ----------
+    recording, probe : Path
+    input_sha256 : mapping of str to str
+        Of ``recording`` and ``probe``.
+    configuration : mapping of str to mapping
+        Parameters by stage.
+    libraries : mapping of str to str
+        Versions; empty in records of older programs.
+    """
+
+    recording: Path
+    probe: Path
+    input_sha256: Mapping[str, str]
+    configuration: Mapping[str, Mapping[str, Any]]
+    libraries: Mapping[str, str]
+
+
+def read_run_record(run: Path) -> RunRecord:
+    """Return the record of a completed run.
+
+    Raises
+    ------
+    InputError
+        When there is none, it is damaged, or the run did not complete.
+    """
+    file = run / _RECORD
+    try:
+        tree: dict[str, Any] = read_json(file)
+        record = RunRecord(
+            Path(tree["recording"]["path"]), Path(tree["probe"]["path"]), dict(tree["input_sha256"]),
+            dict(tree["configuration"]), dict(tree.get("libraries", {})),
+        )  # fmt: skip
+        state = tree["state"]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            file, "is not the record of a run", expected="run.json of boresight run", hint="name a run folder"
+        ) from error
+    if state != "completed":
+        raise InputError(file, f"the run is {state}", expected="a completed run", hint="complete it first")
+    return record
+
+
+def check_inputs_unchanged(record: RunRecord, now: Mapping[str, str]) -> None:
+    """Refuse to compare results of other inputs.
+
+    Raises
+    ------
+    InputError
+        When the recording or the probe is not what the run was made from.
+    """
+    places = {"recording": record.recording, "probe": record.probe}
+    for name, place in places.items():
+        stated = record.input_sha256.get(name, "no hash in run.json")
+        if now[name] != stated:
+            raise InputError(
+                place,
+                f"the {name} is not what the run was made from",
+                expected=stated,
+                hint="restore it: a run of other inputs gives other results",
+            )

@@ -45,7 +45,7 @@ from pipeline.recording.bag_topics import (
 )
 from pipeline.recording.base import FrameTable, Planes, Recording, ascending, complete, decoded_ahead
 from pipeline.recording.checks import encoder_warnings
-from pipeline.recording.description import COMMON_KEYS, describe
+from pipeline.recording.folder import COMMON_KEYS, describe
 
 _KEYS = (*COMMON_KEYS, "topics", "illumination")
 

@@ -20,13 +20,14 @@ from pipeline.errors import InputError
 from pipeline.files.json_yaml import Section
 from pipeline.recording import open_recording
 from pipeline.recording.base import Encoder, FrameTable, Recording
-from pipeline.recording.description import inside, required_file
 from pipeline.recording.folder import (
     DESCRIPTION,
     FolderParts,
     assembled,
     described_in,
+    inside,
     recognise,
+    required_file,
     table_files,
 )
 from pipeline.recording.images import ImageSequence, is_pattern, open_images

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from pipeline.adjustment.robust import spread_about_median
+from pipeline.adjustment.robust import root_mean_square, spread_about_median
 from pipeline.arrays import Float
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import UnusableError
@@ -95,7 +95,7 @@ def accuracy(differences: Differences) -> Accuracy:
         len(error),
         float(error.mean()),
         float(np.median(error)),
-        float(np.sqrt(np.mean(error**2))),
+        root_mean_square(error),
         float(spread),
         float(np.percentile(np.abs(error), 95)),
         float(np.abs(error).max()),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.adjustment.robust import root_mean_square as rms
 from pipeline.arrays import Byte, Float
 from pipeline.recording.base import Recording
 from stages.diagnose.channels import Seen
@@ -99,21 +100,17 @@ def with_readings(found: Diagnosis, recordings: Sequence[Seen | None]) -> Diagno
     fits = [s.travel.fit for s in recordings if s is not None and s.travel is not None and s.travel.fit]
     if not names or not names <= ENCODER_EFFECTS or not fits:
         return found
-    best = max(fits, key=lambda f: _rms(f.stated_mm) / _rms(f.whitened.residual))
+    best = max(fits, key=lambda f: rms(f.stated_mm) / rms(f.whitened.residual))
     shown = ReadingPicture(best.sight.time_s, best.stated_mm, best.whitened.residual)
     return replace(found, fit=_of_readings(best), ring_picture=None, wall_picture=None, reading_picture=shown)
 
 
 def _of_readings(fit: TravelFit) -> FitQuality:
     """Return how far readings are from pictures; held out is each picture, which all the others predict."""
-    before, (missed, sigma) = _rms(fit.stated_mm), fit.left_out_mm
+    before, (missed, sigma) = rms(fit.stated_mm), fit.left_out_mm
     return FitQuality(
-        "mm of the reading", before, _rms(fit.whitened.residual), before, _rms(missed), _rms(sigma)
+        "mm of the reading", before, rms(fit.whitened.residual), before, rms(missed), rms(sigma)
     )
-
-
-def _rms(values: Float) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _of_gauge(gauge: Recording, examined: Examined) -> GaugeResiduals:

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from pipeline.batch.cluster import read_cluster
 from pipeline.errors import InputError
+from pipeline.export.run_record import read_run_record
 from pipeline.instrument.camera.formats import read_camera, write_camera
 from pipeline.instrument.probe_file import read_probe
 from pipeline.machine.configuration import resolve
-from pipeline.machine.reproduce import read_run_record
 from pipeline.machine.store import Store
 from pipeline.recording import open_recording
 from pipeline.recording.tables import read_encoder, read_frame_table

@@ -16,7 +16,6 @@ from pipeline.instrument.budget.scan import (
     RingScan,
     disturbance_jacobian,
     line_sigma_px,
-    radius_covariance,
     radius_error,
     radius_jacobian,
 )
@@ -191,12 +190,14 @@ def test_nothing_uncertain_gives_no_error():
     assert tolerances(budget, 0.1) == ()
 
 
-def test_radius_covariance_is_the_stated_rows_together():
+def test_stated_rows_together_are_the_probes_own_covariance():
     off = {"beam_decentre": 0.0, "sheet_waviness": 0.0, "focal_drift": 0.0, "baseline_drift": 0.0,
            "centre_drift": 0.0, "pixel_aspect": 0.0, "sensor_tilt": 0.0, "pupil_shift": 0.0}  # fmt: skip
     scan = RingScan(PROBE, 3 * INCH, (2.0, 1.0))
     total = error_budget(scan, off).total_mm(Kind.SYSTEMATIC, Pose.KNOWN)
-    np.testing.assert_allclose(np.sqrt(np.diag(radius_covariance(scan))), total)
+    jacobian = radius_jacobian(scan)
+    variance = np.diag(jacobian @ PROBE.covariance @ jacobian.T)
+    np.testing.assert_allclose(np.sqrt(variance), total)
 
 
 def test_image_noise_is_the_bound_that_a_matched_fit_reaches():

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
+from pipeline.export.run_record import read_run_record
 from pipeline.files.json_yaml import LARGEST_JSON_BYTES, LARGEST_YAML_BYTES
 from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.camera.mapping import LARGEST_SIDE_PX
 from pipeline.instrument.probe_file import read_probe
-from pipeline.machine.reproduce import read_run_record
 from pipeline.recording import tables
 from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 from pipeline.review import guard, model_stretches, quality

@@ -10,8 +10,8 @@ import pytest
 
 from pipeline.artefacts.measured import MotionEvent, RingSamples, RingValidity, Trajectory
 from pipeline.export import report
+from pipeline.export.report import page_of, write_report
 from pipeline.export.report.tables import RunSummary, tables
-from pipeline.export.report.write import page_of, write_report
 from pipeline.geometry.axis import PipeAxis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet

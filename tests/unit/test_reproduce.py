@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.commands.reproduce import reproduce
+from pipeline.commands.reproduce import Agreement, compare_runs, reproduce
 from pipeline.errors import InputError
+from pipeline.export.run_record import check_inputs_unchanged, read_run_record
 from pipeline.files.disk import record_of
-from pipeline.machine.reproduce import Agreement, check_inputs_unchanged, compare_runs, read_run_record
 from pipeline.machine.run_folder import Exporter, RunFolder
 
 RECORD = {

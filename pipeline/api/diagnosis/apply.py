@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.adjustment.robust import root_mean_square
 from pipeline.api.job import Job, recording_job, run_job
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
@@ -133,7 +134,7 @@ def geometry_change(before: Path, after: Path) -> GeometryChange:
         if here.size:
             mean[k], largest[k] = here.mean(), here[np.argmax(np.abs(here))]
     seen = change[np.isfinite(change)]
-    rms = float(np.sqrt(np.mean(seen**2))) if seen.size else float("nan")
+    rms = root_mean_square(seen) if seen.size else float("nan")
     return GeometryChange(mean, largest, rms, _defect_changes(before, after))
 
 

@@ -15,6 +15,7 @@ from pipeline.api.diagnosis.apply import GeometryChange, Uncorrected, apply_corr
 from pipeline.api.diagnosis.inputs import DiagnosisInputs, open_inputs
 from pipeline.api.job import Job, probe_source, result_of, run_job
 from pipeline.errors import InputError
+from pipeline.export.run_record import RunRecord, check_inputs_unchanged, read_run_record
 from pipeline.files.disk import disk_errors_named, require_writable
 from pipeline.files.installed import PARAMETERS, file_or_shipped
 from pipeline.files.provenance import MadeBy
@@ -22,7 +23,6 @@ from pipeline.instrument.probe_file import write_probe
 from pipeline.machine.configuration import Configuration, resolve
 from pipeline.machine.display import Display, SilentDisplay
 from pipeline.machine.plan import Selection
-from pipeline.machine.reproduce import RunRecord, check_inputs_unchanged, read_run_record
 from pipeline.machine.run_folder import Exporter
 from pipeline.machine.stage import Stage
 from pipeline.review.run_files import RunFiles

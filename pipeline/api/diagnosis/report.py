@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +10,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from pipeline.adjustment.robust import root_mean_square
 from pipeline.api.diagnosis.apply import GeometryChange, consequence
 from pipeline.arrays import Float
 from pipeline.files.disk import replace_text
-from pipeline.pages import page_template
-from pipeline.pages.figure import rendered, tidy
+from pipeline.pages import page_template, rendered, tidy
 from stages.diagnose.compared import OnImage
 from stages.diagnose.document import to_json
 from stages.diagnose.resimulate import Resimulated
@@ -73,8 +72,8 @@ def _by_hour(change: GeometryChange) -> list[tuple[int, float | None, float | No
     ]
 
 
-def _pictures(found: Diagnosis, shown: Shown) -> dict[str, str]:
-    """Return the pictures that there is something for, as base64."""
+def _pictures(found: Diagnosis, shown: Shown) -> dict[str, bytes]:
+    """Return the pictures (PNG) that there is something for."""
     made: dict[str, bytes] = {}
     if found.ring_picture is not None:
         made["frames"] = frames_figure(found.ring_picture)
@@ -89,7 +88,7 @@ def _pictures(found: Diagnosis, shown: Shown) -> dict[str, str]:
         made["simulated"] = simulated_figure(shown.simulated)
     if found.candidates:
         made["candidates"] = candidates_figure(found.candidates)
-    return {name: base64.b64encode(png).decode("ascii") for name, png in made.items()}
+    return made
 
 
 _SHOWN = 10
@@ -186,7 +185,7 @@ def simulated_figure(simulated: Resimulated) -> bytes:
     ):  # fmt: skip
         axes.axhspan(-simulated.floor_px, simulated.floor_px, color="#e0a030", alpha=0.35, lw=0)
         axes.scatter(degrees, off[order], s=4, color=_ACCENT, lw=0)
-        rms = float(np.sqrt(np.mean(off**2)))
+        rms = root_mean_square(off)
         axes.set_title(f"{title}: {rms:.3f} px r.m.s.", fontsize=11, loc="left")
         axes.set(xlabel="azimuth in the image, °", xlim=(-180, 180), xticks=range(-180, 181, 90))
         axes.grid(alpha=0.3)

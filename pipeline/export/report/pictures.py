@@ -5,7 +5,6 @@ Distance runs to the right, 12 o'clock is in the middle.
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +17,7 @@ from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.export.report.page import Flat, Legend, Mark, Strip, Tick, round_ticks
 from pipeline.export.report.tables import RunSummary
+from pipeline.pages import data_uri
 
 TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
 # Pixels of one picture of the whole wall, and of one about a finding: the page stays below 8 MB.
@@ -61,7 +61,7 @@ class Gallery:
         """Return photo and deviation around a defect, as addresses; empty where there is none."""
         window = window_about(defect, self.radius_mm, _CROP_PX)
         deviation = self.overlays[0][1] if self.overlays else None
-        shown = [data_uri(seen_through(i, window)) if i is not None else "" for i in (self.photo, deviation)]
+        shown = [jpeg_uri(seen_through(i, window)) if i is not None else "" for i in (self.photo, deviation)]
         return shown[0], shown[1]
 
     def _strips(self, image: FlatImage, what: str) -> tuple[Strip, ...]:
@@ -89,7 +89,7 @@ def _strip(image: FlatImage, window: Window, what: str, found: tuple[Defect, ...
     inside = [d for d in found if first <= d.distance_to_mm and d.distance_from_mm <= last]
     ticks = tuple(Tick(window.x_percent(float(v)), f"{v:g}") for v in round_ticks(first, last, 8))
     return Strip(
-        picture=data_uri(seen_through(image, window)),
+        picture=jpeg_uri(seen_through(image, window)),
         description=f"{what}, {first:.0f} to {last:.0f} mm",
         aspect=window.width_px / window.height_px,
         marks=tuple(_mark(d, window) for d in inside),
@@ -231,9 +231,9 @@ def _remapped(image: Byte, x: Float, y: Float, nearest: bool, shrink: tuple[floa
     )
 
 
-def data_uri(bgr: Byte, quality: int = 82) -> str:
-    """Return a picture (H, W, 3) as a JPEG inside an address."""
+def jpeg_uri(bgr: Byte, quality: int = 82) -> str:
+    """Return a picture (H, W, 3) or (H, W) as a JPEG inside an address."""
     encoded, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not encoded:
-        raise OSError("report.html: a picture cannot be encoded")
-    return "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
+        raise OSError("a picture of the page cannot be encoded as JPEG")
+    return data_uri(jpeg.tobytes())

@@ -1,7 +1,6 @@
 """Error budget of the ring scanner: the paper's Table I and more, analytic and by Monte Carlo.
 
-`combine.error_budget` gives the rows and their sum for a `scan.RingScan`; `scan.radius_covariance` is the
-radius' covariance from the probe's uncertainty alone; `design` answers the designer's questions.
+`error_budget` gives the rows and their sum for a `scan.RingScan`; `design` answers the designer's questions.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pipeline.adjustment.robust import root_mean_square
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget.scan import (
@@ -63,7 +63,7 @@ class Row:
 
     def level(self, pose: Pose) -> float:
         """Root mean square over azimuth, mm."""
-        return float(np.sqrt(np.mean(self.sigma_mm[pose] ** 2)))
+        return root_mean_square(self.sigma_mm[pose])
 
     def worst(self, pose: Pose) -> float:
         """Largest over azimuth, mm."""
@@ -242,7 +242,7 @@ def _random_rows(scan: RingScan, given: Mapping[str, float]) -> list[Row]:
             origin, shift = "given", np.full(scan.azimuths, given[source.name])
         fitted = np.linalg.norm(left * (shift * per_px), axis=-1)
         shares = {Pose.KNOWN: shift * per_px, Pose.FITTED: fitted}
-        sigma = float(np.sqrt(np.mean(shift**2)))
+        sigma = root_mean_square(shift)
         rows.append(Row(source, sigma, origin, shares, np.zeros((0, 0)), shift))
     return rows
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.adjustment.robust import root_mean_square
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.budget import Budget, Row, error_budget
@@ -118,4 +119,4 @@ def _level(
     except InputError:
         return math.nan
     total = error_budget(moved, given).total_mm(None, Pose.KNOWN)
-    return float(np.sqrt(np.mean(total**2)))
+    return root_mean_square(total)

@@ -157,12 +157,6 @@ def without_centre(scan: RingScan, error_mm: Float) -> Float:
     return np.asarray((flat - scan.normals @ shift).reshape(error_mm.shape))
 
 
-def radius_covariance(scan: RingScan) -> Float:
-    """Return the (A, A) covariance of the radius from the probe's uncertainty, mm², pose known."""
-    jacobian = radius_jacobian(scan)
-    return np.asarray(jacobian @ scan.probe.covariance @ jacobian.T)
-
-
 def at_baseline(scan: RingScan, baseline_mm: float) -> RingScan:
     """Return the same scan with another baseline."""
     laser = replace(scan.probe.laser, baseline_mm=baseline_mm)

@@ -18,8 +18,7 @@ from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.export.report.page import round_ticks
 from pipeline.export.report.pictures import FlatImage, Window, overlay_image, photo, seen_through, windows
-from pipeline.pages import notation
-from pipeline.pages.figure import rendered, tidy
+from pipeline.pages import notation, rendered, tidy
 from pipeline.review.decisions.replay import Finding, Outline
 from pipeline.review.flat_tiles import Limits, full_range_mm, values_of
 from pipeline.review.run_files import RunFiles

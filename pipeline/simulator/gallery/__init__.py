@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import map_coordinates, spline_filter
 
+from pipeline.adjustment.robust import root_mean_square
 from pipeline.arrays import Float, Float32
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.gallery.scenes import Course, course_of, scene_pair
@@ -119,7 +120,7 @@ class Residual:
     @property
     def rms_mm(self) -> float:
         """Root mean square of the radius error."""
-        return _rms(self.error_mm)
+        return root_mean_square(self.error_mm)
 
     @property
     def largest_mm(self) -> float:
@@ -129,7 +130,7 @@ class Residual:
     @property
     def profile_rms(self) -> tuple[float, float, float]:
         """Root mean squares of light, width and skewness."""
-        return _rms(self.light), _rms(self.width_px), _rms(self.skewness)
+        return root_mean_square(self.light), root_mean_square(self.width_px), root_mean_square(self.skewness)
 
 
 @dataclass(frozen=True)
@@ -215,10 +216,6 @@ def _residual(before: SeenLine, after: SeenLine, scene: SceneTruth, azimuth_rad:
         after.width_px - before.width_px,
         after.skewness - before.skewness,
     )
-
-
-def _rms(values: Float) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 @dataclass(frozen=True)

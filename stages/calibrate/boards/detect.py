@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyvander2d
 from scipy.spatial import cKDTree
 
-from pipeline.adjustment.robust import Cauchy, robust_spread
+from pipeline.adjustment.robust import Cauchy, robust_spread, root_mean_square
 from pipeline.arrays import Float, Image
 from pipeline.instrument.camera.calibration import BoardView
 
@@ -231,7 +231,7 @@ def refine(picture: Image, uv: Float, xyz_b: Float, share: float) -> Float:
 
 
 def _misfit(terms: Float, uv: Float) -> float:
-    return float(np.sqrt(np.mean((uv - _robust_fit(terms, uv)) ** 2)))
+    return root_mean_square(uv - _robust_fit(terms, uv))
 
 
 def refine_in_windows(picture: Image, uv: Float, share: float) -> Float:

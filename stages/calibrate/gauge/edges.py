@@ -97,8 +97,6 @@ class Edges:
         Where it was measured; only its place along ``normal`` counts.
     normal : (M, 2)
         Across the edge in the image, out of the fiducial.
-    outward_mm : (M,)
-        Wall length of one pixel along the normal.
     sigma_px : (M,)
     """
 
@@ -109,7 +107,6 @@ class Edges:
     outward_p: Float
     uv: Float
     normal: Float
-    outward_mm: Float
     sigma_px: Float
 
     def select(self, keep: Bool) -> Edges:
@@ -204,22 +201,11 @@ def predicted_edges(
     normal = np.stack([direction[:, 1], -direction[:, 0]], -1) / np.maximum(length, 1e-12)[:, None]
     across = np.einsum("mi,mi->m", uv_out - uv, normal)
     normal, across = normal * np.sign(across)[:, None], np.abs(across)
-    px_per_mm = across / _SMALL / (gauge.fiducials.size_mm / 2)
-    border_px = px_per_mm * gauge.fiducials.size_mm / _cells(gauge)
+    border_px = 2 * across / _SMALL / _cells(gauge)
     half = np.minimum(parameters.edge_half_px, 0.85 * border_px)
     outward_p = points[2] - points[0]
     outward_p /= np.linalg.norm(outward_p, axis=1)[:, None]
-    edges = Edges(
-        np.full(len(m), index),
-        m,
-        side,
-        points[0],
-        outward_p,
-        uv,
-        normal,
-        1 / np.maximum(px_per_mm, 1e-9),
-        0 * across,
-    )
+    edges = Edges(np.full(len(m), index), m, side, points[0], outward_p, uv, normal, 0 * across)
     return edges, border_px, half
 
 

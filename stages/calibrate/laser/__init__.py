@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.robust import TUKEY, cluster_sums, robust_spread
+from pipeline.adjustment.robust import TUKEY, cluster_sums, robust_spread, root_mean_square
 from pipeline.arrays import Float, Image, Int
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import transform
@@ -69,7 +69,7 @@ def _weighted(xyz_c: Float, group: Int, weight: Float) -> LaserPlane:
         normal,
         float(normal @ centroid),
         _covariance(xyz_c, group, weight, residual, axes[:, 1:]),
-        float(np.sqrt(np.mean(residual[used] ** 2))),
+        root_mean_square(residual[used]),
         int(np.count_nonzero(used)),
     )
 
