@@ -4,11 +4,12 @@
    is known where the defects are.
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
-4. Depth as the extreme of a 1 mm mean of the points (`fine`), without what noise adds to it, ± 1 σ (`depth`).
+4. Depth as the extreme of a 1 mm mean of the points (`surface`), without what noise adds to it, ± 1 σ
+(`depth`).
 5. What neither a second ring nor the photo confirms, stays at one place of the image, lies where the line
 ends, or is rather false than real in such footage, is set apart with the reason (`corroborate`,
 `credibility`).
-6. Kind from named features as a probability, with codes and words (`classify`, `describe`).
+6. Kind from named features as a probability, with codes and words (`describe`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
 """
@@ -29,6 +30,7 @@ from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
+from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
 from stages.defects.corroborate import Evidence, evidence_for
 from stages.defects.credibility import COUNTED, NO_CLUTTER, Clutter, Credibility, clutter_of, credibility_of
@@ -39,7 +41,6 @@ from stages.defects.grow import footprint, grown
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
-from stages.defects.stretch import stretches
 from stages.defects.surface import MeasuredWall, Surface
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]

@@ -15,10 +15,9 @@ from scipy.optimize import least_squares
 
 from pipeline.arrays import Float
 from stages.defects.clean import CleanWall
-from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
-from stages.defects.surface import Surface, cells_of
+from stages.defects.surface import DeviationPoints, Surface, cells_of
 
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0

@@ -14,8 +14,8 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Complex, Float
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
+from stages.defects.along import stretches, widened
 from stages.defects.relief import Relief, WallRelief
-from stages.defects.stretch import stretches, widened
 
 _ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))

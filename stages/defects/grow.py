@@ -11,10 +11,10 @@ from scipy.ndimage import label
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.machine.scratch import Scratch
+from stages.defects.along import stretches, widened
 from stages.defects.detect import Detection
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import WallRelief
-from stages.defects.stretch import stretches, widened
 
 _EIGHT = np.ones((3, 3), int)
 _REACH_MM = 80.0

@@ -11,9 +11,8 @@ from scipy.ndimage import find_objects, gaussian_filter1d, label
 from pipeline.adjustment.robust import MAD_TO_SIGMA, basis_of, ring_harmonics, robust_spread, row_median
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RadiusMap
-from stages.defects.harmonics import slow_along
+from stages.defects.along import sample, slow_along, stretches
 from stages.defects.parameters import DefectParameters
-from stages.defects.stretch import sample, stretches
 
 
 @dataclass(frozen=True)

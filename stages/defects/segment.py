@@ -13,9 +13,9 @@ from scipy.sparse.csgraph import connected_components
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.machine.scratch import Scratch
+from stages.defects.along import stretches
 from stages.defects.grow import Grown, joined
 from stages.defects.relief import WallRelief
-from stages.defects.stretch import stretches
 
 Labels = NDArray[np.int32]
 

@@ -8,10 +8,9 @@ import pytest
 from pipeline.artefacts.measured import PointCloud
 from stages.defects import _is_measured
 from stages.defects.depth import fit_bell
-from stages.defects.fine import DeviationPoints
 from stages.defects.relief import Relief, Typical
 from stages.defects.segment import Region
-from stages.defects.surface import Surface
+from stages.defects.surface import DeviationPoints, Surface
 
 _ROWS, _COLUMNS, _RADIUS_MM = 40, 720, 50.0
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from pipeline.artefacts.cloud_along import cloud_along
-from stages.defects.fine import deviation_points, fine_surface
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
+from stages.defects.surface import deviation_points, fine_surface
 from tests.synthetic_wall import wall_of
 
 DISTANCE, AZIMUTH = np.arange(0, 40, 0.5), -np.pi + np.arange(360) * np.pi / 180
