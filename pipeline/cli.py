@@ -117,20 +117,30 @@ def run(
     config: ConfigFile = None,
     assignments: Assignments = None,
     twin: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Keep the dirt out of the photo that this twin found.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of a twin: dirt that it found is kept out of the photo."),
     ] = None,
     from_stage: Annotated[
         str, typer.Option("--from", metavar="STAGE", help="Compute this stage and all after it again.")
     ] = "",
     only: Annotated[str, typer.Option(metavar="STAGE", help="Run this stage alone.")] = "",
     resume: Annotated[
-        bool, typer.Option("--resume/--no-resume", help="Continue from what is there, or start afresh.")
+        bool,
+        typer.Option(
+            "--resume/--no-resume", help="Continue from the results that are there, or compute all anew."
+        ),
     ] = True,
     follow: Annotated[
-        bool, typer.Option(help="The recording is still being written: show it live, run it when it rests.")
+        bool,
+        typer.Option(
+            help="The recording is still being written: show it live, and run it once it no longer grows."
+        ),
     ] = False,
     quiet_s: Annotated[
-        float, typer.Option(min=1, help="With --follow: at rest after so many seconds without growth.")
+        float,
+        typer.Option(
+            min=1, help="With --follow: seconds without growth after which the recording is complete."
+        ),
     ] = 10.0,
 ) -> None:
     """Turn a recording into a run folder: model, measurements, defects and report."""

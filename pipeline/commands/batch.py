@@ -26,16 +26,18 @@ def batch(
     folder: Annotated[Path, typer.Argument(help="folder of recordings, searched to any depth")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT", help="folder for the runs")],
     count: Annotated[
-        int | None, typer.Option("--workers", min=1, help="local workers; one for each core where left out")
+        int | None,
+        typer.Option("--workers", min=1, help="number of local workers (default: one for each core)"),
     ] = None,
     scheduler: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="a Dask scheduler instead, tcp://HOST:PORT")
+        str, typer.Option(metavar="ADDRESS", help="Dask scheduler in place of local workers, tcp://HOST:PORT")
     ] = "",
     probe: Annotated[
         Path | None, typer.Option(metavar="FILE", help="probe to use in place of the recordings' own")
     ] = None,
     config: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="parameters, and perhaps the cluster (YAML)")
+        Path | None,
+        typer.Option(metavar="FILE", help="parameters and, where wanted, the section cluster (YAML)"),
     ] = None,
     assignments: Assignments = None,
 ) -> None:

@@ -40,17 +40,22 @@ def calibrate_laser(
     ],
     square_mm: Annotated[float, typer.Option(min=0.01, help="edge of a square, mm")],
     wavelength_nm: Annotated[
-        float | None, typer.Option(min=380, max=750, help="wavelength of the laser, nm; else 520")
+        float | None, typer.Option(min=380, max=750, help="wavelength of the laser, nm (default: 520)")
     ] = None,
     margin_squares: Annotated[
         float | None,
-        typer.Option(min=0, max=50, help="how far the plane goes on beyond the outermost corners; else 1"),
+        typer.Option(
+            min=0,
+            max=50,
+            help="how far the board stays flat beyond its outermost corners, squares (default: 1)",
+        ),
     ] = None,
     board: Annotated[BoardKind, typer.Option(help="kind of board")] = BoardKind.CHESSBOARD,
     marker_mm: Annotated[float | None, typer.Option(min=0.01, help="charuco: edge of a marker, mm")] = None,
     dictionary: Annotated[str, typer.Option(help="charuco: OpenCV's marker dictionary")] = "DICT_5X5_100",
     probe: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="probe file to write again with camera and plane")
+        Path | None,
+        typer.Option(metavar="FILE", help="probe file: a copy with this camera and plane is written"),
     ] = None,
     output: ResultFolder = (Path("laser-calibration")),
     config: ConfigFile = None,

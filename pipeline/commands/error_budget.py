@@ -270,7 +270,7 @@ def _show(document: dict[str, Any], console: Console) -> None:
                   f"(within 10 % from {best['good_from_mm']:g} mm on).")  # fmt: skip
     for wished in document["tolerances"]:
         first = ", ".join(f"{t['name']} {t['alone']:.3g} {t['unit']}" for t in wished["sources"][:6])
-        console.print(f"Alone costing {wished['accuracy_mm']:g} mm: {first}.")
+        console.print(f"Each alone would cost {wished['accuracy_mm']:g} mm: {first}.")
 
 
 def _columns(figures: dict[str, Any]) -> tuple[str, str, str]:

@@ -154,7 +154,7 @@ def follow(place: Path, output: Path, probe: Path | None, quiet_s: float, consol
     Raises
     ------
     InputError
-        When it cannot be opened even at rest.
+        When it cannot be opened although it no longer grows.
     Cancelled
         When the user stops.
     """
@@ -168,7 +168,7 @@ def follow(place: Path, output: Path, probe: Path | None, quiet_s: float, consol
             sections += new_sections(snapshot, probe, sections[-1].frame if sections else -1, context)
             write_live_page(place.name, sections, "complete" if snapshot.complete else "growing", output)
     if snapshot.recording is None:
-        raise InputError(place, f"cannot be opened even at rest: {snapshot.problem}")
+        raise InputError(place, f"cannot be opened although it no longer grows: {snapshot.problem}")
 
 
 def restarted(snapshot: Snapshot, shown: int) -> bool:

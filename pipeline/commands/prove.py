@@ -101,11 +101,13 @@ def prove(
     truth: Annotated[
         Path | None, typer.Option(metavar="DIR", help="their opened truth, NAME-gauge/truth.json and so on")
     ] = None,
-    cases: Annotated[int, typer.Option(min=1, help="how many probes to draw, without --sealed")] = 10,
+    cases: Annotated[
+        int, typer.Option(min=1, help="number of probes to draw, where --sealed is not given")
+    ] = 10,
     prior: Annotated[
-        Path, typer.Option(metavar="FILE", help="what to draw from: a file, or the name of a shipped one")
+        Path, typer.Option(metavar="FILE", help="prior to draw from: a file, or the name of a shipped one")
     ] = Path("pairs"),
-    seed: Annotated[int, typer.Option(min=0, help="of the draw")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="random seed of the draw")] = 0,
     leave_out: Annotated[
         bool,
         typer.Option(
@@ -116,7 +118,7 @@ def prove(
         bool,
         typer.Option("--shuffle", help="score every case by another case's answer: all scores must collapse"),
     ] = False,
-    workers: Annotated[int, typer.Option(min=1, help="cases that are worked on at a time")] = 1,
+    workers: Annotated[int, typer.Option(min=1, help="number of cases worked on at a time")] = 1,
 ) -> None:
     """Prove the diagnosis on recordings in which an effect is concealed.
 

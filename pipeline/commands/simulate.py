@@ -19,7 +19,13 @@ from pipeline.errors import InputError
 
 def simulate(
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="RECORDING", help="folder to write; of all, with --draw")
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="RECORDING",
+            help="folder to write; with --draw the folder of all recordings",
+        ),
     ],
     scene: Annotated[
         Path | None, typer.Argument(help="scene file, or the name of a shipped one, such as oval-3-inch")
@@ -32,24 +38,36 @@ def simulate(
             help="an effect, such as laser_tilt=0.6@40, or with --like a diagnosis' folder; repeatable",
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="in place of the scene's; of the draw")] = None,
-    truth: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="folder of the truth; else beside the recording")
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="random seed: replaces the scene's, or is that of --draw")
     ] = None,
-    frames: Annotated[int | None, typer.Option(min=1, help="render only so many, from the first")] = None,
-    draw: Annotated[int, typer.Option(min=0, help="draw so many pairs of gauge run and inspection")] = 0,
-    first: Annotated[int, typer.Option(min=0, help="pairs of the draw that are left out before these")] = 0,
+    truth: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder of the truth (default: beside the recording)")
+    ] = None,
+    frames: Annotated[
+        int | None, typer.Option(min=1, help="number of frames to render, from the first")
+    ] = None,
+    draw: Annotated[int, typer.Option(min=0, help="number of pairs of gauge run and inspection to draw")] = 0,
+    first: Annotated[
+        int, typer.Option(min=0, help="number of drawn pairs to skip before the first that is rendered")
+    ] = 0,
     prior: Annotated[
-        Path, typer.Option(metavar="FILE", help="what to draw from: a file, or the name of a shipped one")
+        Path, typer.Option(metavar="FILE", help="prior to draw from: a file, or the name of a shipped one")
     ] = Path("pairs"),
     like: Annotated[
         Path | None,
-        typer.Option(metavar="RUN", help="this run's pipe, way, probe and light, in place of a scene"),
+        typer.Option(
+            metavar="RUN",
+            help="run folder: render the pipe, path, probe and lighting of this run, in place of a scene",
+        ),
     ] = None,
     speed: Annotated[
-        float, typer.Option(min=0.01, max=100, help="with --like: go so many times faster")
+        float, typer.Option(min=0.01, max=100, help="with --like: factor on the speed of the probe")
     ] = 1.0,
-    probe: Annotated[Path | None, typer.Option(metavar="FILE", help="with --like: another probe")] = None,
+    probe: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="with --like: probe file to render with, in place of the run's"),
+    ] = None,
     defects: Annotated[
         list[str] | None,
         typer.Option(

@@ -77,7 +77,9 @@ def verify(
     ] = None,
     reach_mm: Annotated[
         float | None,
-        typer.Option(help="points farther from a surface are not on it, mm (default: 5)"),
+        typer.Option(
+            help="points farther than this from the reference surface are left out, mm (default: 5)"
+        ),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder of the certificate (default: RUN/verify)")
@@ -200,10 +202,11 @@ def write_page(
     folder: Path,
 ) -> None:
     """Write certificate.html and certificate.png."""
-    # matplotlib takes a second to load, which figures alone need not wait for
-    from pipeline.commands.verify import write_certificate
-
-    write_certificate(certificate_document(names, wall, found, made_by), found.differences, folder)
+    drawn = rendered(differences_figure(found.differences))
+    (folder / "certificate.png").write_bytes(drawn)
+    document = certificate_document(names, wall, found, made_by)
+    page = page_template("verify").render(d=document, picture=drawn)
+    (folder / "certificate.html").write_text(page, "utf-8")
 
 
 PAGE, FIGURES = Exporter("certificate", write_page), Exporter("figures", write_figures)
@@ -223,18 +226,6 @@ def _show(document: dict[str, Any], folder: Path) -> None:
 
 
 _STATIONS, _SECTORS = 300, 120
-
-
-def write_certificate(document: dict[str, Any], differences: Differences, folder: Path) -> None:
-    """Write certificate.png and certificate.html."""
-    drawn = rendered(differences_figure(differences))
-    (folder / "certificate.png").write_bytes(drawn)
-    (folder / "certificate.html").write_text(certificate_page(document, drawn), "utf-8")
-
-
-def certificate_page(document: dict[str, Any], picture_png: bytes) -> str:
-    """Return the certificate as one file that needs nothing else."""
-    return page_template("verify").render(d=document, picture=picture_png)
 
 
 def differences_figure(differences: Differences) -> Figure:

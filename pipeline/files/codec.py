@@ -76,7 +76,7 @@ def digest(value: object) -> str:
 
 
 def is_digest_of(recorded: str, value: object) -> bool:
-    """Return whether a digest is that of a value, or was before its class had some field that is None now."""
+    """Return whether a digest is that of a value, or was before its class had fields that are None now."""
     tree, arrays = encode(value)
     own = tree.get("fields") if isinstance(tree, dict) else None
     if not isinstance(tree, dict) or not isinstance(own, dict):

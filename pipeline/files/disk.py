@@ -242,12 +242,12 @@ def input_file(path: Path) -> InputFile:
 
 
 def content_key(files: Iterable[InputFile]) -> str:
-    """Return the SHA-256 over the files' own, in order."""
+    """Return the SHA-256 of the files' SHA-256 hashes, in order."""
     return hashlib.sha256(b"".join(f.sha256 for f in files)).hexdigest()
 
 
 def files_sha256(files: Iterable[Path]) -> str:
-    """Return the SHA-256 over those of some files, in order.
+    """Return the SHA-256 of the SHA-256 hashes of some files, in order.
 
     Raises
     ------

@@ -265,7 +265,7 @@ class Runner:
             self._publish_ready()
 
     def _end(self, state: State, problem: str) -> None:
-        """Account for an ending that is not completion; the disk may be the very cause of it."""
+        """Record how a run ended that did not complete; a full disk may be why, and refuse the record too."""
         self._logger.info("ended: %s: %s", state.value, problem)
         for name, outcome in self._outcomes.items():
             if outcome.state == State.RUNNING:

@@ -1,4 +1,4 @@
-"""Recordings: readers that recognise their own files and deliver frames by need."""
+"""Recordings: readers that recognise their own files and deliver frames on demand."""
 
 from __future__ import annotations
 

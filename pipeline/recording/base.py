@@ -176,7 +176,7 @@ class PipeFacts:
 
 @dataclass(frozen=True)
 class InspectionFacts:
-    """What a report must say of an inspection and nothing measures; empty where nobody has stated it.
+    """What a report must say of an inspection and cannot be measured; empty where nobody has stated it.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ class InspectionFacts:
 
 
 class FrameSource(Protocol):
-    """Delivers images by need and in order."""
+    """Delivers images on demand and in order."""
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """Yield (frame number, image) for ascending frame numbers; None where a frame cannot be decoded.
@@ -217,7 +217,7 @@ class FrameSource(Protocol):
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded run, opened; pixels are read by need.
+    """A recorded run, opened; pixels are read on demand.
 
     Attributes
     ----------

@@ -215,7 +215,7 @@ def table_files(section: Section) -> TableFiles:
 
 @dataclass(frozen=True)
 class FolderParts:
-    """What was read from a recording folder; ``files`` as they were before."""
+    """What was read from a recording folder; ``files`` are its files as they were before it was read."""
 
     table: FrameTable
     encoder: Encoder | None

@@ -36,7 +36,7 @@ _FOUND, _REACHED = 8.0, 3.0
 _SHOWN = 0.5
 # Share of the circle that a ring must show.
 _LEAST_SEEN = 0.3
-# One explanation is taken where its place scatters so many times less than that of the other.
+# On the probe or on the wall: that one is taken in which the place scatters so many times less.
 _TOLD = 2.0
 _EIGHT = np.ones((3, 3), int)
 

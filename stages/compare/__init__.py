@@ -75,7 +75,7 @@ def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
 
 
 REGISTER = Stage(
-    "register", "2", RegisterParameters, register_walls, "Lay an earlier run's wall on a later one's."
+    "register", "3", RegisterParameters, register_walls, "Lay an earlier run's wall on a later one's."
 )
 COMPARE = Stage("compare", "2", CompareParameters, compare_findings, "Tell what became of every finding.")
 COMPARISON: tuple[Stage, ...] = (REGISTER, COMPARE)
@@ -104,8 +104,8 @@ def put_together(
 ) -> tuple[Place, ...]:
     """Return every finding of both runs once, in order of distance.
 
-    Two are one when both go into the wall, or both inward, or both are welds, and their boxes, grown by what
-    registration and grid leave open, overlap. Where several could be, the least cost over all decides.
+    Two are one when both go into the wall, or both inward, or both are welds, and their boxes overlap after
+    they were grown by the uncertainty of registration and grid. Of several pairings the cheapest counts.
     """
     before = [moved_outline(f, registration) for f in earlier]
     after = [np.asarray(f.outline, float) for f in now]
@@ -118,7 +118,7 @@ def put_together(
 
 
 def _pair(now: OutlinedFinding, earlier: OutlinedFinding, after: Float, before: Float) -> Place:
-    """Return a place of both, the earlier outline whole turns away from where it lies next to the other."""
+    """Return a place of both findings, the earlier outline moved by whole turns to lie next to the other."""
     apart = before[:, 1].mean() - after[:, 1].mean()
     turned = before - np.array([0.0, 2 * np.pi * np.round(apart / (2 * np.pi))])
     return Place(now, earlier, (_corners(after), _corners(turned)))
@@ -159,7 +159,7 @@ def _apart(one: Float, other: Float, gate: tuple[float, float]) -> float:
 
 
 def _way(finding: OutlinedFinding) -> int:
-    """Return what can be one: welds, what takes wall away, what stands inward."""
+    """Return the group in which findings can be the same: welds, what takes wall away, what stands inward."""
     return 0 if finding.kind is DefectKind.WELD else 1 if finding.kind.is_metal_loss else -1
 
 
@@ -211,7 +211,7 @@ def _measured(place: Place, number: int, cutter: Cutter, resolution: Resolution)
 
 
 def _places_alike(place: Place, patch: Patch, pair: PairedWalls) -> float:
-    """Return among how many places of its size a finding was chosen: one where both runs have it."""
+    """Return of how many places of its size on the wall a finding is the pick; 1 where both runs have it."""
     if place.now is not None and place.earlier is not None:
         return 1.0
     return pair.now.radius_mm.size / float(patch.inside.sum())
@@ -232,7 +232,7 @@ def _judged(change: Change, p_adjusted: float) -> Change:
 
 
 def _fate(change: Change) -> Fate:
-    """Return the fate by what is significant; a deposit or dent grows inward, to the negative."""
+    """Return what became of a place by what is significant; a deposit or dent grows inward, below 0."""
     place, more = change.place, change.z * (1 if change.place.kind.is_metal_loss else -1) > 0
     if place.earlier is None:
         return Fate.NEW if change.is_significant and more else Fate.ONLY_NOW

@@ -46,8 +46,8 @@ def measure_growth(
     """Return a defect's growth; ``sign`` +1 for one that goes into the wall, −1 inward.
 
     A defect that only one wall shows is read on the other at the place of its peak, as the extreme of mere
-    noise is no depth. What the maps' resolution takes off a peak is taken for what smoothing once more takes,
-    give or take as much. Noise is what the same reading makes of the walls' difference over clean wall, piece
+    noise is no depth. What the maps' resolution takes off a peak is estimated by smoothing once more, with as
+    much for its 1 σ. Noise is what the same reading makes of the walls' difference over clean wall, piece
     by piece; the registration's σ and calibration are added.
     """
     now, before = sign * patch.now_mm, sign * patch.before_mm
@@ -154,7 +154,7 @@ def _spread(now: Float, before: Float, patch: Patch, level: float, in_both: bool
 def _misplaced(
     before: Float, peaks: list[tuple[int, int]], patch: Patch, sigma_mm: tuple[float, float], in_both: bool
 ) -> float:
-    """Return 1 σ of the earlier reading from the registration's own."""
+    """Return the 1 σ of the earlier reading that the 1 σ of the registration causes."""
     changes = []
     for axis in (0, 1):
         move = [0.0, 0.0]

@@ -22,9 +22,6 @@ _ROWS_AT_ONCE = 512
 _SAMPLED_ROWS = 2000
 # Colours end at so many typical σ of the difference, so that noise shows as the palette's middle only.
 _ENDS = 8.0
-# Mean diameters of rings nearer than this were measured from one stretch of the motion and count as one:
-# chosen, a fifth of a 4 inch bore's radius; the correlation was not measured.
-_CORRELATED_MM = 10.0
 
 
 @dataclass(frozen=True)
@@ -136,12 +133,23 @@ def registered_walls(pair: PairedWalls, is_one_calibration: bool, progress: Prog
 
 
 def _diameter(grown_mm: Float, pair: PairedWalls, is_one_calibration: bool) -> Value:
-    """Return growth of the mean diameter; both calibrations count where they are two."""
+    """Return growth of the mean diameter; its σ holds both calibrations where there are two."""
     known = grown_mm[np.isfinite(grown_mm)]
-    independent = max(len(known) * pair.now.step_mm / _CORRELATED_MM, 1.0)
-    wander = float(known.std()) / np.sqrt(independent)
+    wander = float(known.std()) * np.sqrt(np.pi / 2 / independent_count(known))  # π/2: of a median
     systematic = 0.0 if is_one_calibration else 2 * np.sqrt(2) * pair.calibration_mm
     return Value(float(np.median(known)), float(np.hypot(wander, systematic)))
+
+
+def independent_count(values: Float) -> float:
+    """Return how many independent values have a mean as uncertain as these (n,), which follow each other.
+
+    Their autocorrelation is summed up to where it is first negative (C. Geyer, "Practical Markov chain Monte
+    Carlo", 1992).
+    """
+    off = values - values.mean()
+    alike = np.fft.irfft(np.abs(np.fft.rfft(off, 2 * len(off))) ** 2)[: len(off)]
+    positive = alike[: int(np.argmax(alike < 0)) or len(off)]
+    return max(len(off) / max(2 * float(positive.sum() / max(alike[0], 1e-300)) - 1, 1.0), 1.0)
 
 
 def _typical_sigma(pair: PairedWalls) -> float:

@@ -40,7 +40,7 @@ class Pictures:
     files: tuple[InputFile, ...]
 
     def source(self) -> Source:
-        """Return the pictures as a source of a job; their names stand in the results and count too."""
+        """Return the pictures as a source of a job; their names count in the key, since results name them."""
         names = "\0".join(file.path.name for file in self.files)
         key = hashlib.sha256(f"{content_key(self.files)} {names}".encode()).hexdigest()
         return Source(Pictures, self, key, self.refuse_changed)

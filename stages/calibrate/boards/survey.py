@@ -40,7 +40,7 @@ _QUARTER_TURNS = tuple(rotation_from_vector(np.array([0.0, 0.0, k * np.pi / 2]))
 
 
 def nominal_board(views: Sequence[BoardView]) -> BoardSurvey:
-    """Return the board that the views show, as it is meant to be."""
+    """Return the board that the views show, with its corners where the pattern is meant to have them."""
     points = np.unique(np.round(np.concatenate([v.xyz_b for v in views]) / _SAME_MM), axis=0) * _SAME_MM
     return BoardSurvey(points, np.zeros_like(points))
 
@@ -54,7 +54,7 @@ def applied(survey: BoardSurvey, view: BoardView) -> BoardView:
 
 
 def placed(survey: BoardSurvey, view: BoardView, camera: Camera, huber_px: float) -> BoardView:
-    """Return a view at the place on the board, of all that its grid fits, where it agrees best.
+    """Return a view at the place on the board where it agrees best, of all places that its grid fits.
 
     A chessboard may be seen upside down or in part, and a part turned sideways; which, only its own
     irregularities tell.

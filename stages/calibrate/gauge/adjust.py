@@ -121,7 +121,7 @@ def spread(equations: Equations) -> float:
 
 
 def instrument_covariance(solution: Solution) -> Float:
-    """Return (Q, Q), true also where neighbours err alike.
+    """Return the covariance (Q, Q) of the instrument, true also where errors of neighbours are correlated.
 
     The variance of each correction is widened to that of the scores summed over cells of wall and edges of
     fiducials (cluster-robust; H. White, "Asymptotic theory for econometricians", 1984, ch. 6), never

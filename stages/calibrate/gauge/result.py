@@ -17,7 +17,7 @@ _AZIMUTHS = 72
 
 @dataclass(frozen=True)
 class RadiusError:
-    """A bore of ``radius_mm`` with the probe centred, by azimuth (A,).
+    """Error of the radius by azimuth (A,), in a bore of ``radius_mm`` with the probe on its axis.
 
     ``before_mm`` is what the stated probe would measure too much, ``sigma_mm`` the result's own 1 σ.
     """

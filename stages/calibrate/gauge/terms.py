@@ -33,7 +33,7 @@ class Equations:
 
 
 def edge_equations(state: Unknowns, edges: Edges) -> Equations:
-    """Lead each border's image through where it was measured; an edge may be a little off its place."""
+    """Return the equations of borders: each is seen where it was measured; its edge may be a little off."""
     T = state.T_pc[edges.frame]
     xyz_p = edges.xyz_p + state.edge_mm[edges.marker, edges.side][:, None] * edges.outward_p
     xyz_c = transform(inverse(T), xyz_p)
@@ -111,7 +111,7 @@ def wall_cells(wall_mm: Float, size_mm: float = 10.0) -> Int:
 def encoder_equations(
     state: Unknowns, time_s: Float, encoder: Encoder, parameters: GaugeParameters
 ) -> tuple[Rows, Rows]:
-    """Equate distance with scale × reading a delay ago + offset + slip, which hardly changes."""
+    """Return the equations distance = scale × reading one delay ago + offset + slip, and of a slow slip."""
     count = len(time_s)
     scale, offset, delay = state.encoder
     at_time = time_s - delay
@@ -132,7 +132,7 @@ def encoder_equations(
 
 
 def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:
-    """Start the slip at zero; without an encoder keep it there."""
+    """Return equations that start the slip at zero, and without an encoder keep it there."""
     frame = np.arange(1 if with_encoder else len(state.slip))
     by_frame = np.zeros((len(frame), 1, BLOCK))
     by_frame[:, 0, 6] = 1
@@ -141,7 +141,7 @@ def slip_origin(state: Unknowns, with_encoder: bool) -> Rows:
 
 
 def prior_rows(state: Unknowns, radius_sigma_mm: float, parameters: GaugeParameters) -> Rows:
-    """Hold the global numbers to what is believed of them beforehand."""
+    """Return the priors of the global unknowns."""
     at = state.layout
     value = np.concatenate(
         [state.encoder - [1.0, 0.0, 0.0], state.bore_mm, state.edge_mm.ravel(), state.instrument]

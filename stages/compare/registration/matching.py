@@ -116,7 +116,7 @@ def _place(stretch: Float32, wall: Float32, first: int) -> tuple[float, float, f
 
 
 def _agreeing_stretches(starts: Int, found: Float, radius_cells: float) -> Bool:
-    """Return which stretches agree with one of them, taking the one that most and best agree with.
+    """Return which stretches agree with the one that most others, and those best, agree with.
 
     All in cells; ``found`` (N, 3) are the rows at which they lie, columns by which they turn, correlations.
     """
