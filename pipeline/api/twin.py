@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +71,13 @@ def twin(
     return result_of(job, Twin)
 
 
+@dataclass(frozen=True)
+class TwinOf:
+    """The folder of the run whose frames are re-rendered."""
+
+    run: str
+
+
 def twin_job(
     run: Path, output: Path, diagnosis: Path | None, settings: Sequence[str], display: Display
 ) -> Job:
@@ -91,14 +98,16 @@ def twin_job(
     job = open_job(record.recording, output, probe, stages, EXPORTERS, configuration, "twin")
     if diagnosis is None:
         check_inputs_unchanged(record, {s.kind.__name__.lower(): s.key for s in job.sources})
-    return replace(job, sources=(*job.sources, value_source(tried)), lent=(run,))
+    more = value_source(tried), value_source(TwinOf(str(run.resolve())))
+    return replace(job, sources=(*job.sources, *more), lent=(run,))
 
 
-def twin_document(found: Twin, tried: DiagnosisTried) -> dict[str, Any]:
+def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, Any]:
     """Return a twin as plain data; what is not known is None."""
     gauge = None if tried.gauge is None else _gauge(tried.gauge)
     return {
         "format": 1,
+        "run": of.run,
         "frames": [int(f) for f in found.frame],
         "withheld": found.withheld,
         "noise": _figures(found.noise),
@@ -145,9 +154,9 @@ def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def write_twin(found: Twin, tried: DiagnosisTried, made_by: MadeBy, folder: Path) -> None:
+def write_twin(found: Twin, tried: DiagnosisTried, of: TwinOf, made_by: MadeBy, folder: Path) -> None:
     """Write twin.json and twin.html."""
-    document = twin_document(found, tried) | {"made_by": made_by.document()}
+    document = twin_document(found, tried, of) | {"made_by": made_by.document()}
     (folder / "twin.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
     views = [_shown(v) for v in found.views]
     maps = [{"name": m.name, "picture": jpeg_uri(m.picture, _JPEG_QUALITY)} for m in found.maps]

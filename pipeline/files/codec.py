@@ -25,6 +25,8 @@ from pydantic import BaseModel, ValidationError
 Json: TypeAlias = "bool | int | float | str | list[Json] | dict[str, Json] | None"
 # Packages of this program.
 OWN_PACKAGES = ("pipeline", "stages")
+# Modules of classes in stored results, and where they are today.
+_MOVED = {"pipeline.recording.checked_frames": "pipeline.recording.checks"}
 Array = NDArray[Any]
 NOT_STORED: Mapping[str, bool] = MappingProxyType({"stored": False})
 """``metadata`` of a dataclass' field that belongs to the computation, not to its result."""
@@ -156,14 +158,16 @@ def _decode(tree: Json, array: Callable[[str], Array], packages: set[str]) -> An
         case {"model": str(name), "values": values}:
             return _class_named(name, packages).model_validate_json(json.dumps(values))
         case {"class": str(name), "fields": dict(content)}:
-            values = {k: _decode(v, array, packages) for k, v in content.items()}
-            return _class_named(name, packages)(**values)
+            kind = _class_named(name, packages)
+            known = {f.name for f in fields(kind)}  # an older result may hold more
+            return kind(**{k: _decode(v, array, packages) for k, v in content.items() if k in known})
     raise CodecError(f"neither a value nor an array: {sorted(tree)}")
 
 
 def _class_named(name: str, packages: set[str]) -> Any:
     """Return the class ``module:name`` of one of the packages; nothing but data classes is ever called."""
     module, _, path = name.partition(":")
+    module = _MOVED.get(module, module)
     if _package(module) not in packages:
         raise CodecError(f"{name} is no class of this program")
     found: Any = import_module(module)

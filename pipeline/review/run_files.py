@@ -118,10 +118,9 @@ class RunFiles:
         # Of the files alone: a run may have been given other readings of the encoder beside them.
         made_from = record["recording"].get("files_sha256", record["input_sha256"]["recording"])
         _refuse_other(path, "recording", content_key(opened.files), made_from)
-        try:
-            return self.artefact(CheckedFrames).applied_to(opened)
-        except InputError:  # of a run made before its premises were checked
+        if not self.stage_key(CheckedFrames):  # a run made before its premises were checked
             return opened
+        return self.artefact(CheckedFrames).applied_to(opened)
 
     def pipe(self) -> PipeFacts | None:
         """Return what the recording says of the pipe, None when there is no `recording` any more."""

@@ -16,7 +16,7 @@ def to_json(found: Diagnosis) -> dict[str, object]:
         "global_p": _number(found.global_p),
         "location": None if found.location is None else _location(found.location),
         "effects": [_effect(e) for e in found.effects],
-        "class": list(found.members), "identifiable": found.identifiable,
+        "class": list(found.members), "identifiable": found.identifiable, "discrepancy": None,
         "remainder": None if found.remainder is None else _remainder(found.remainder),
         "fit": None if found.fit is None else _plain(found.fit),
         "record_next": found.record_next,

@@ -18,10 +18,11 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from pipeline.errors import InputError
-from pipeline.files.codec import NOT_STORED, canonical, digest, encode, is_digest_of
+from pipeline.files.codec import NOT_STORED, canonical, decode, digest, encode, is_digest_of
 from pipeline.machine.outcome import Number
 from pipeline.machine.stage import Parameters
 from pipeline.machine.store import Provenance, Store
+from pipeline.recording.checks import CheckedFrames
 from tests.disk_limit import file_size_limit
 from tests.toy_stages import DrawParameters, Mood
 
@@ -184,6 +185,19 @@ def test_a_result_whose_class_has_moved_since_is_not_there_and_breaks_nothing(
     assert store.read("grow", KEY, Tree) is None
 
 
+def test_a_result_with_fields_that_its_class_has_lost_is_read_without_them(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.write(tree(), PROVENANCE)
+    file = next(tmp_path.rglob("manifest.json"))
+    older = json.loads(file.read_text().replace('"fields": {', '"fields": {"gone": 3.5, '))
+    del older["sha256"]
+    file.write_text(json.dumps(older | {"sha256": hashlib.sha256(canonical(older)).hexdigest()}))
+    assert "gone" in file.read_text()
+    found = store.look("grow", KEY, Tree)
+    assert found is not None
+    assert digest(found) == digest(tree())
+
+
 @pytest.mark.parametrize("limit", [0, 100, 5000])
 def test_a_full_disk_is_told_and_leaves_nothing_that_looks_whole(tmp_path: Path, limit: int) -> None:
     store = Store(tmp_path)
@@ -232,3 +246,11 @@ def test_what_belongs_to_the_computation_is_not_stored(tmp_path: Path) -> None:
     stored = Store(tmp_path).read("grow", KEY, Watched)
     assert stored is not None
     assert stored.artefact.watch is print
+
+
+def test_a_result_of_before_its_class_moved_is_read() -> None:
+    frames = CheckedFrames(np.arange(3), np.arange(3.0), np.array(["led"] * 3))
+    stored, arrays = encode(frames)
+    older = json.loads(json.dumps(stored).replace("recording.checks:", "recording.checked_frames:"))
+    assert older != stored
+    assert digest(decode(older, arrays.__getitem__, CheckedFrames)) == digest(frames)

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.run import configuration, dirt_of
-from pipeline.api.twin import twin_document, write_twin
+from pipeline.api.twin import TwinOf, twin_document, write_twin
 from pipeline.artefacts.measured import RingValidity
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, RegionFit, Twin, TwinView
 from pipeline.errors import InputError
@@ -249,13 +249,16 @@ def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
     tilt = Mismatch("laser_tilt", "line", "laser", (), (), 1.0, 9.0, 0.9, "Laser tilt: pictures fit better.")
     gauge = GaugeTwin(np.array([2]), ("laser_tilt=0.6@40",), 9, 9.0, 0.9, 0.8, 2.0, 0.1, 0.09, 16.0, (True,))
     tried = DiagnosisTried(gauge, (tilt,))
-    write_twin(_twin(), tried, MadeBy("twin", {}, {}), tmp_path)
+    of = TwinOf("/runs/one")
+    write_twin(_twin(), tried, of, MadeBy("twin", {}, {}), tmp_path)
     document = json.loads((tmp_path / "twin.json").read_text("utf-8"))
     assert document["noise"]["white_dn"]["value"] is None
     assert document["regions"]["wall"]["chi2_after"] is None
     assert [found["name"] for found in document["found"]] == ["laser_tilt", None]
     assert document["gauge"]["chi2_diagnosed"] == 0.9
-    assert document | {"made_by": 0} == json.loads(json.dumps(twin_document(_twin(), tried))) | {"made_by": 0}
+    said = json.loads(json.dumps(twin_document(_twin(), tried, of)))
+    assert document | {"made_by": 0} == said | {"made_by": 0}
+    assert said["run"] == "/runs/one"
     page = (tmp_path / "twin.html").read_text("utf-8")
     assert page.count("data:image/jpeg;base64") == 3
     assert page.count("</script>") == 1
