@@ -76,14 +76,14 @@ def _by_course(
 ) -> Float:  # fmt: skip
     """Return columns; what a static law does, which all its courses share, is made once for these points."""
     factored = model.factored(points, shape)
-    if factored is None:
+    if factored is None and not model.linear:
         return made(model, points, shape)
-    size, static, own = factored
+    static, own = (model, shape) if factored is None else factored[1:]
     key = (static.name, own, made is _line_columns)
     if key not in points.patterns:
         points.patterns[key] = made(static, points, own)
     pattern = points.patterns[key]
-    return size.reshape(-1, *[1] * (pattern.ndim - 1)) * pattern
+    return pattern if factored is None else factored[0].reshape(-1, *[1] * (pattern.ndim - 1)) * pattern
 
 
 def _line_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
@@ -124,6 +124,8 @@ def _slope(prediction: Callable[[Float], Float], model: EffectModel, k: int) -> 
     """Return the central difference over ± the plausible size of one amplitude."""
     step = np.zeros(len(model.amplitudes))
     step[k] = model.amplitudes[k].plausible
+    if model.linear:
+        return prediction(step) / step[k]
     return np.asarray((prediction(step) - prediction(-step)) / (2 * step[k]))
 
 

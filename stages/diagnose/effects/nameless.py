@@ -27,6 +27,7 @@ class Nameless(EffectModel):
     """A pattern of m waves around the ring, with a cosine and a sine part; m = 0 has the first part only."""
 
     harmonic: int
+    linear = True
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the amplitude and the direction of a crest; with m = 0 the signed size alone."""
@@ -153,6 +154,10 @@ class GenericTerm(Nameless):
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return constant and linear in time."""
         return ((0.0,), (1.0,))
+
+    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape] | None:
+        """Return the course and the steady pattern."""
+        return None if shape == STEADY else (self._course(points, shape), self, STEADY)
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a cos m(ψ_P − ψ₀)."""

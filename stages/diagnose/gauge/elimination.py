@@ -156,34 +156,40 @@ def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> tuple[Marginal, flo
     return left, reduced.misfit + float(own.value @ own.pull) - left.gain
 
 
-def score_inflation(equations: Equations, reduced: Reduced, left: Marginal, group: Int) -> Float:
+def score_inflation(equations: Equations, reduced: Reduced, left: Marginal, out: Int, group: Int) -> Float:
     """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1.
 
+    ``out`` (O,) are the globals that were eliminated, ``left`` what is left without them.
     Columns of one ``group`` (K,) are one effect: what they explain together is no error of theirs, else a
     large effect would hide itself. −1 is none.
     """
     pose_by_kept = reduced.pose_by_global @ left.follow
-    follow, step = np.zeros((len(equations.frame), left.follow.shape[1])), np.zeros(len(equations.frame))
+    # An effect's column is gone through again and again, so that it lies in one piece.
+    follow, step = np.zeros((left.follow.shape[1], len(equations.frame))), np.zeros(len(equations.frame))
+    kept = np.setdiff1d(np.arange(len(left.step)), out)
     for rows, used in _by_kind(equations):
-        by_used = equations.by_global[rows][:, used]
-        follow[rows], step[rows] = by_used @ left.follow[used], by_used @ left.step[used]
+        gone = np.intersect1d(used, out)
+        by_gone = equations.by_global[rows][:, gone]
+        # What is kept follows itself alone.
+        follow[:, rows] = (equations.by_global[rows][:, kept] + by_gone @ left.follow[gone]).T
+        step[rows] = by_gone @ left.step[gone]
     for k, (own, by_pose) in enumerate(_by_frame(equations, len(pose_by_kept))):
-        follow[own] -= by_pose @ pose_by_kept[k]
+        follow[:, own] -= (by_pose @ pose_by_kept[k]).T
         step[own] += by_pose @ (reduced.pose_step[k] - reduced.pose_by_global[k] @ left.step)
     residual = equations.residual + step
-    plain = equations.weight @ follow**2
-    scores = follow * (equations.weight[:, None] * _unexplained(equations.weight, follow, residual, group))
-    robust = two_way_variance(scores, equations.cell, equations.frame)
+    plain = follow**2 @ equations.weight
+    scores = follow * equations.weight * _unexplained(equations.weight, follow, residual, group)
+    robust = two_way_variance(np.ascontiguousarray(scores.T), equations.cell, equations.frame)
     return np.asarray(np.sqrt(np.maximum(robust / np.maximum(plain, 1e-300), 1.0)))
 
 
 def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> Float:
-    """Return (M, K) the residual that each column's own group leaves."""
-    out = np.repeat(residual[:, None], follow.shape[1], axis=1)
+    """Return (K, M) the residual that each column's own group leaves; ``follow`` is (K, M) too."""
+    out = np.tile(residual, (len(follow), 1))
     for own in (np.flatnonzero(group == g) for g in np.unique(group[group >= 0])):
-        columns = follow[:, own]
-        best = np.linalg.lstsq((columns.T * weight) @ columns, columns.T @ (weight * residual))[0]
-        out[:, own] -= (columns @ best)[:, None]
+        columns = follow[own]
+        weighted = columns * weight
+        out[own] -= np.linalg.lstsq(weighted @ columns.T, weighted @ residual)[0] @ columns
     return out
 
 

@@ -88,9 +88,11 @@ def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int =
         information = found.reduced.information + prior
         downhill = found.reduced.right - pull
         step = np.asarray(np.linalg.solve(information, downhill), np.float64)
-        if float(step @ downhill) < _CONVERGED and _still(found):
+        little = float(step @ downhill) < _CONVERGED
+        if little and _still(found):
             break
-        better = _shortened(run, found, step)
+        # Where only poses are left to move, a shorter step gains nothing that a full one does not.
+        better = _shortened(run, found, step, _PARTS[:1] if little else _PARTS)
         if better is None:
             return found
         gain, found = found.cost - better.cost, better
@@ -106,9 +108,9 @@ def _still(found: Fit) -> bool:
     return bool(np.abs(found.reduced.pose_step[measured]).max(initial=0.0) < _STILL)
 
 
-def _shortened(run: GaugeRun, found: Fit, step: Float) -> Fit | None:
-    """Return the fit after the step, halved until the cost falls; None when it never does."""
-    for part in _PARTS:
+def _shortened(run: GaugeRun, found: Fit, step: Float, parts: Sequence[float]) -> Fit | None:
+    """Return the fit after the first part of the step with which the cost falls; None when it never does."""
+    for part in parts:
         better = _at(run, *_moved(found, part * step))
         if better.cost < found.cost:
             return better
@@ -148,7 +150,7 @@ def _reduced(
     own = own_unknowns(run, found, equations.by_global.shape[1])
     left, misfit = eliminate_globals(reduced, own)
     names, value = kept_columns(found, asked)
-    inflation = score_inflation(equations, reduced, left, _by_effect(names))
+    inflation = score_inflation(equations, reduced, left, own.out, _by_effect(names))
     information, right = left.information, left.right
     # From the linearisation's place back to nothing beyond the stated.
     misfit += float(2 * right @ value + value @ information @ value)

@@ -13,6 +13,7 @@ from scipy.signal import savgol_filter
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
+from pipeline.instrument.probe import Probe
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import Unknowns
@@ -23,6 +24,8 @@ BASELINE_SIGMA_PX = 0.01
 _RING_HARMONICS = (0, 1, 2, 3, 4)
 _EDGE_HARMONICS = (0, 1, 2)
 _MIDDLE_THETA = 1.1
+# Half the step of a derivative along the image radius, px: its error is of the third order, below 1e-6.
+_APART = 0.1
 BASELINE_SIZE = 2 * (2 * len(_RING_HARMONICS) - 1) + 4 * (2 * len(_EDGE_HARMONICS) - 1)
 
 
@@ -53,7 +56,7 @@ def ring_points(state: Unknowns, rings: BoreRings, time_s: Float, width_px: Floa
     xyz_c = state.probe.triangulate(rings.uv)
     xyz_p = transform(T, xyz_c)
     normal_c, along_c = _wall_directions(xyz_p, T)
-    along_ray = np.einsum("mij,mj->mi", state.probe.triangulate_jacobian(rings.uv)[0], rings.outward)
+    along_ray = way_per_px(state.probe, rings.uv, rings.outward)
     passing = _passing(state, time_s, rings.frame, xyz_c)
     rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
     return ImagePoints(
@@ -61,6 +64,12 @@ def ring_points(state: Unknowns, rings: BoreRings, time_s: Float, width_px: Floa
         rate[:, None] * rings.outward, speed_along(state, time_s)[rings.frame], True, width_px,
         np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2], per_px_c=along_ray,
     )  # fmt: skip
+
+
+def way_per_px(probe: Probe, uv: Float, outward: Float) -> Float:
+    """Return the way (M, 3) of the line's points in C, mm per px that they are found farther ``outward``."""
+    farther, nearer = (probe.triangulate(uv + way * outward) for way in (_APART, -_APART))
+    return np.asarray((farther - nearer) / (2 * _APART))
 
 
 def edge_points(state: Unknowns, edges: Edges, time_s: Float) -> ImagePoints:

@@ -18,7 +18,7 @@ from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
-from stages.calibrate.gauge.terms import edge_equations, expected_ring, ring_equations
+from stages.calibrate.gauge.terms import edge_equations, ring_equations, ring_residual
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.library import (
     columns,
@@ -29,7 +29,14 @@ from stages.diagnose.effects.library import (
 )
 from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
-from stages.diagnose.gauge.points import edge_baseline, edge_points, ring_baseline, ring_points, speed_along
+from stages.diagnose.gauge.points import (
+    BASELINE_SIZE,
+    edge_baseline,
+    edge_points,
+    ring_baseline,
+    ring_points,
+    speed_along,
+)
 
 _ROUNDS = 2
 _FAR_PX = 1.0
@@ -98,7 +105,7 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     run.watch()
     edges, edge_at = _without_edge_shift(run, state, terms)
     rings, ring_at = _without_ring_shift(run, state, terms)
-    residual = expected_ring(state, rings)[0]
+    residual = ring_residual(state, rings, rings.uv)
     rings = _on_bore(rings, ring_at, residual)
     ring_at = ring_points(state, rings, run.time_s, run.width_px)
     parts = [_edge_part(run, state, edges, edge_at, terms)]
@@ -121,29 +128,33 @@ def asking(
     """
     run.watch()
     equations, mm_per_px = at.equations, ring_mm_per_px(at.rings)
-    travel = travel_of(run, run.encoder, state) if run.encoder is not None else None
-    each = [_asked_column(run, at, mm_per_px, travel, state.encoder[0], *one) for one in asked]
-    more = np.concatenate([np.zeros((len(equations.frame), 0)), *each], 1)
-    bad = ~np.isfinite(more).all(1)
+    own, count = equations.by_global.shape[1], sum(len(model.amplitudes) for model, _ in asked)
+    size = own + count + BASELINE_SIZE * with_baseline
+    by_global = np.zeros((len(equations.frame), size))
+    by_global[:, :own] = equations.by_global
+    _ask(run, state, at, mm_per_px, asked, by_global[:, own : own + count])
+    bad = ~np.isfinite(by_global[:, own : own + count]).all(1)
     if with_baseline:
-        more = np.concatenate([more, _baseline(run, at, mm_per_px)], 1)
-    by_global = np.concatenate([equations.by_global, more], 1)
+        by_global[:, own + count :] = _baseline(run, at, mm_per_px)
     by_global[bad] = 0.0
     return replace(equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight))
 
 
-def _asked_column(
-    run: GaugeRun, at: Linearised, mm_per_px: Float, travel: Travel | None, scale: float, model: EffectModel,
-    shape: Shape,
-) -> Float:  # fmt: skip
-    """Return (M, Q) derivatives of the residuals by an effect's amplitudes."""
-    parts = [
-        _across(texture_columns(model, at.edges, shape), run.edges),
-        -mm_per_px[:, None] * columns(model, at.rings, shape),
-    ]
-    if travel is not None:
-        parts.append(scale * reading_columns(model, travel, shape))
-    return np.concatenate(parts)
+def _ask(
+    run: GaugeRun, state: Unknowns, at: Linearised, mm_per_px: Float,
+    asked: Sequence[tuple[EffectModel, Shape]], out: Float,
+) -> None:  # fmt: skip
+    """Write the derivatives of the residuals by the effects' amplitudes into ``out`` (M, Q)."""
+    edges, rings = len(at.edges.uv), len(at.edges.uv) + len(at.rings.uv)
+    travel = travel_of(run, run.encoder, state) if run.encoder is not None else None
+    first = 0
+    for model, shape in asked:
+        own = slice(first, first + len(model.amplitudes))
+        out[:edges, own] = _across(texture_columns(model, at.edges, shape), run.edges)
+        out[edges:rings, own] = -mm_per_px[:, None] * columns(model, at.rings, shape)
+        if travel is not None:
+            out[rings:, own] = state.encoder[0] * reading_columns(model, travel, shape)
+        first = own.stop
 
 
 def _across(shift: Float, edges: Edges) -> Float:
