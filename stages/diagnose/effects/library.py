@@ -125,7 +125,7 @@ def _slope(prediction: Callable[[Float], Float], model: EffectModel, k: int) -> 
     step = np.zeros(len(model.amplitudes))
     step[k] = model.amplitudes[k].plausible
     if model.linear:
-        return prediction(step) / step[k]
+        return np.asarray(prediction(step) / step[k])
     return np.asarray((prediction(step) - prediction(-step)) / (2 * step[k]))
 
 
