@@ -13,7 +13,7 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Float, Image, Int
+from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.files.disk import InputFile
 from pipeline.system.parallel import in_threads
 
@@ -245,6 +245,9 @@ class Recording:
         For whom, where and how it was recorded, for the report.
     imu
         None where there is none.
+    stays : (h, w) bool or None
+        Where something stays in the lit pictures, reduced by a whole factor, while the wall moves; None:
+        nowhere, or not looked for.
     """
 
     name: str
@@ -262,6 +265,7 @@ class Recording:
     listed: FrameTable | None = None
     inspection: InspectionFacts = InspectionFacts()
     imu: Imu | None = None
+    stays: Bool | None = None
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`."""

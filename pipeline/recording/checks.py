@@ -120,6 +120,8 @@ class CheckedFrames:
     withheld : (N,) bool or None
         Frames whose pictures no stage of the run may measure, so that `boresight twin` can compare with them
         what the run predicts; None where there are none.
+    stays : (h, w) bool or None
+        As in `Recording`.
     """
 
     frame: Int
@@ -129,6 +131,7 @@ class CheckedFrames:
     relabelled: int = 0
     retimed: int = 0
     withheld: Bool | None = None
+    stays: Bool | None = None
 
     def applied_to(self, recording: Recording) -> Recording:
         """Return the recording with these frames, and its encoder in mm and with the motion's sign.
@@ -140,7 +143,7 @@ class CheckedFrames:
         encoder = recording.encoder
         if encoder is not None and self.encoder_factor != 1.0:
             encoder = Encoder(encoder.time_s, encoder.distance_mm * self.encoder_factor)
-        return replace(recording, frames=table, encoder=encoder)
+        return replace(recording, frames=table, encoder=encoder, stays=self.stays)
 
 
 def withheld_frames(label: NDArray[np.str_], every: int) -> Bool:

@@ -24,19 +24,22 @@ from pipeline.recording.checks import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
-from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames
+from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
 from stages.motion.events import find_events
 from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.parameters import MotionParameters
-from stages.motion.report import report_motion, report_steps
 from stages.motion.rings import BoreSteps, RingCircles, circles_in_rings
 from stages.motion.route.laying import lay_route
 from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.tracking.prediction import PosePredictor
 from stages.motion.tracking.strips import StripGrid, WallView
 from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track_texture
-from stages.motion.trajectory import report_instrument, trajectory_of
+from stages.motion.trajectory import (
+    report_instrument,
+    report_motion,
+    report_steps,
+    trajectory_of,
+)
 from stages.motion.windows.sliding_window import MeasuredRun, adjust_run, joined_at_once
 
 _LARGEST_CHANGE = 0.1
@@ -195,7 +198,7 @@ def _track(
 ) -> tuple[TrackedTexture, PosePredictor]:
     frames, lit = view.recording.frames, view.lit
     predictor = PosePredictor(frames.time_s, encoder, circles.centre_at(frames.frame))
-    tracker = TextureTracker(view.probe, view.grid, parameters, view.blocked_mm, context.scratch)
+    tracker = TextureTracker(view.probe, view.grid, parameters, view.hidden, context.scratch)
     images = view.images(lit)
     found = track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
     return found, predictor
@@ -241,7 +244,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "12",
+    "13",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

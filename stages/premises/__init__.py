@@ -31,6 +31,7 @@ from stages.premises.light import (
 from stages.premises.pictures import Pictures, look_at_pictures
 from stages.premises.rows import Lights, Story, cheapest_story
 from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm
+from stages.premises.stays import places_that_stay
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
@@ -78,6 +79,10 @@ def check_premises(
     pictures = look_at_pictures(recording, probe, context)
     table = _table(recording)
     light = _light(recording.frames, pictures)
+    shown = light if np.any(light == Light.WALL) else _lights_of(recording.frames.illumination)
+    stays = places_that_stay(recording, probe, recording.frames.frame[shown == Light.WALL], context)
+    if stays is not None:
+        pictures = look_at_pictures(recording, probe, context, stays)
     story = _story(recording.frames, table, pictures, light)
     label = _labels(table, story, light, pictures)
     copy = copies(pictures, light, _lights_of(_stated(table, story.row)), story.row)
@@ -103,15 +108,16 @@ def check_premises(
     context.report("frames withheld from measurement", int(withheld.sum()), "frames")
     return CheckedFrames(
         recording.frames.frame[keep], time_s[keep], label[keep], factor,
-        int(changes.relabelled.sum()), int(changes.retimed.sum()), withheld if withheld.any() else None,
+        int(changes.relabelled.sum()), int(changes.retimed.sum()),
+        withheld if withheld.any() else None, stays,
     )  # fmt: skip
 
 
 def _table(recording: Recording) -> FrameTable:
     """Return all rows of the table of frames, where those of the pictures are its first."""
-    frames, listed = recording.frames, recording.listed
-    whole = listed is not None and np.array_equal(listed.frame[: len(frames.frame)], frames.frame)
-    return listed if whole and listed is not None else frames
+    frame, listed = recording.frames.frame, recording.listed
+    whole = listed is not None and np.array_equal(listed.frame[: len(frame)], frame)
+    return listed if whole and listed is not None else recording.frames
 
 
 def _lights_of(illumination: Labels) -> Int:
@@ -235,8 +241,8 @@ def _warn_of_frames(
     wrong = frame[changes.relabelled & ~changes.retimed]
     if wrong.size:
         context.warn(
-            f"the illumination in frames.csv is not what {len(wrong)} pictures show: {_numbers(wrong)}. The "
-            "pictures are believed. What to do: correct the column illumination"
+            f"the illumination in frames.csv is not what {len(wrong)} pictures show: frame {_listed(wrong)}. "
+            "The pictures are believed. What to do: correct the column illumination"
         )
     again = frame[np.diff(changes.row, prepend=-1) < 1]
     left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
@@ -256,15 +262,12 @@ def _warn_of_frames(
 
 def _warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
     if frame.size:
-        context.warn(f"{len(frame)} pictures {what}: {_numbers(frame)}. What to do: {hint}")
+        context.warn(f"{len(frame)} pictures {what}: frame {_listed(frame)}. What to do: {hint}")
 
 
-def _numbers(frame: Int) -> str:
-    return f"frame {_listed([str(f) for f in frame])}"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
+def _listed(names: Sequence[str] | Int) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(map(str, names[:_SHOWN])) + more
 
 
 def _warn_of_clock(time_s: Float, recording: Recording, context: Context) -> None:
@@ -289,7 +292,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: _Changes, context: Co
 
 PREMISES = Stage(
     "premises",
-    "3",
+    "4",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -13,6 +13,7 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
+from stages.premises.stays import in_full
 
 # Rays of the polar picture: a line that closes is told from chance by tens of them already.
 _RAYS = 128
@@ -30,6 +31,8 @@ _ROWS, _COLUMNS = 128, 256
 _LEAST_ROWS, _MOST_COVERED, _BROAD = 24, 0.1, 8.0
 # A light that comes round again within so many frames finds the picture it is to be compared with.
 _KEPT = 8
+# Brightness is told where this share of the surroundings is known. Not measured.
+_LEAST_KNOWN = 0.05
 # Two pictures are taken in the same light when their brightness differs by less than this part.
 _SAME_LIGHT = 0.3
 
@@ -71,10 +74,12 @@ class Pictures:
         return np.isfinite(self.brightness)
 
 
-def look_at_pictures(recording: Recording, probe: Probe, context: Context) -> Pictures:
-    """Look once at every picture of a recording."""
+def look_at_pictures(
+    recording: Recording, probe: Probe, context: Context, stays: Bool | None = None
+) -> Pictures:
+    """Look once at every picture of a recording; motion is not told where something ``stays`` (h, w)."""
     polar = _PolarView(recording.source.image_size, probe.camera.centre_px)
-    motion = _AxialMotion(probe.camera, polar.line_width_px)
+    motion = _AxialMotion(probe.camera, polar.line_width_px, stays)
     count = len(recording.frames.frame)
     seen = _empty(count, polar.azimuth_rad)
     for place, (_, image) in enumerate(recording.read(recording.frames.frame, "grey")):
@@ -135,7 +140,7 @@ class _Strip:
 class _AxialMotion:
     """How far the unrolled wall moves between pictures in like light."""
 
-    def __init__(self, camera: Camera, line_width_px: int) -> None:
+    def __init__(self, camera: Camera, line_width_px: int, stays: Bool | None) -> None:
         near, far = (1 / np.tan(np.radians(a)) for a in (_NEAR_DEG, _FAR_DEG))
         z = np.linspace(near, far, _ROWS)
         psi = np.linspace(-np.pi, np.pi, _COLUMNS, endpoint=False)
@@ -145,6 +150,7 @@ class _AxialMotion:
         self._radius_px = np.hypot(from_centre[..., 0], from_centre[..., 1])
         self._ray = np.arange(_COLUMNS) * _RAYS // _COLUMNS
         self._line_width_px = line_width_px
+        self._moves = _moving(stays, camera.image_size, self._uv)
         self._radii_per_row = float(z[1] - z[0])
         self._kept: deque[_Strip] = deque(maxlen=_KEPT)
 
@@ -165,10 +171,23 @@ class _AxialMotion:
         rows = slice(max(strip.first, before.first), min(strip.end, before.end))
         if rows.stop - rows.start < _LEAST_ROWS:
             return before.place, change, np.nan
-        one, other = (_levelled(s.grey[rows]) for s in (before, strip))
+        one, other = (self._levelled(s, rows) for s in (before, strip))
         window = cv2.createHanningWindow(one.shape[::-1], cv2.CV_32F)
         (_, moved), _ = cv2.phaseCorrelate(one, other, window)
         return before.place, change, -moved * self._radii_per_row
+
+    def _levelled(self, strip: _Strip, rows: slice) -> Float32:
+        """Return rows of a strip freed of the lamps' light, every row of spread 1.
+
+        Where something stays there is noise instead: gaps of one shape would say that the wall stands still.
+        """
+        grey, moves = strip.grey[rows], self._moves[rows]
+        light, known = (cv2.GaussianBlur(p, (0, 0), _BROAD) for p in (grey * moves, moves))
+        fine = (grey - light / np.maximum(known, _LEAST_KNOWN)) * moves
+        fine -= fine.mean(1, keepdims=True)
+        fine /= np.maximum(fine.std(1, keepdims=True), 1.0)
+        noise = np.random.default_rng(strip.place).standard_normal(fine.shape)
+        return np.where(moves > 0, fine, noise).astype(np.float32)
 
     def _free_rows(self, line_px: Float32 | None) -> tuple[int, int]:
         """Return the longest run of rows of which the laser line covers a tenth at most."""
@@ -186,8 +205,9 @@ def _in_like_light(one: _Strip, other: _Strip) -> bool:
     return abs(one.brightness - other.brightness) < _SAME_LIGHT * brighter
 
 
-def _levelled(strip: Float32) -> Float32:
-    """Return a strip freed of the lamps' light: without what is broad, every row of spread 1."""
-    fine = strip - cv2.GaussianBlur(strip, (0, 0), _BROAD)
-    fine -= fine.mean(1, keepdims=True)
-    return np.asarray(fine / np.maximum(fine.std(1, keepdims=True), 1.0), np.float32)
+def _moving(stays: Bool | None, image_size: tuple[int, int], uv: Float32) -> Float32:
+    """Return 1 where pixels (r, c, 2) see what moves, and 0 where something ``stays`` (h, w)."""
+    whole = in_full(stays, image_size)
+    if whole is None:
+        return np.ones(uv.shape[:2], np.float32)
+    return np.equal(cv2.remap(whole, uv[..., 0], uv[..., 1], cv2.INTER_NEAREST), 0).astype(np.float32)

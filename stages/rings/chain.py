@@ -17,7 +17,7 @@ import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
-from stages.rings.around import slow_around
+from stages.rings.kernels import slow_around
 from stages.rings.search import Candidates
 
 # 1 σ by which the curve goes aside from one sector to the next, and by which it leaves the ring expected

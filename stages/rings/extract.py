@@ -9,17 +9,17 @@ from itertools import chain, islice
 import numpy as np
 from pydantic import Field
 
-from pipeline.arrays import Byte, Float, Image, Int
+from pipeline.arrays import Byte, Float, Float32, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
-from stages.rings.colour import discriminant_weights, excess_weights, mix
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
-from stages.rings.noise import clip_level_of, noise_response
+from stages.rings.noise import QUANTISATION_VARIANCE, clip_level_of, noise_response
+from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
 from stages.rings.validity import contradicted, wander_px
@@ -28,6 +28,8 @@ Images = Iterator[tuple[int, Image | None]]
 Found = tuple[int, RingTrace | None]
 _LEARNING_FRAMES = 4
 _AT_ONCE = 512
+_BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
+_LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
 _PER_RING = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
 
 
@@ -189,3 +191,34 @@ def _report(context: Context, samples: RingSamples, wander: float) -> None:
             else f"ring samples rejected: {reason.name.lower()}"
         )
         context.report(name, int((samples.validity == reason).sum()), "samples")
+
+
+def excess_weights(wavelength_nm: float) -> Float:
+    """Return (3,) B, G, R weights: the channel nearest to the laser's wavelength minus half of the others."""
+    channel = 0 if wavelength_nm < _BLUE_GREEN_NM else 1 if wavelength_nm < _GREEN_RED_NM else 2
+    weights = np.full(3, -0.5)
+    weights[channel] = 1.0
+    return weights
+
+
+def mix(bgr: Byte, weights: Float) -> Float32:
+    """Return the (H, W) mixture of an image (H, W, 3)."""
+    return np.asarray(bgr @ weights.astype(np.float32), np.float32)
+
+
+def discriminant_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float) -> Float:
+    """Return (3,) Fisher discriminant weights between line and wall beside it.
+
+    The wall's colour covariance holds both its reflectance and the sensor's noise, so the mixture has the
+    best ratio of line height to what is not line. Scaled so that the line keeps its height in the strongest
+    channel; ``otherwise`` is returned where line and wall do not differ in colour.
+    """
+    radius, width = trace.radius_everywhere(), trace.width_px
+    line = bgr.reshape(-1, 3)[sectors.pixels_near(radius, 0, _LINE_WIDTHS * width)].astype(float)
+    wall = bgr.reshape(-1, 3)[sectors.pixels_near(radius, _WALL_WIDTHS * width, BAND_WIDTHS * width)].astype(
+        float
+    )
+    rise = line.mean(0) - wall.mean(0)
+    weights = np.linalg.solve(np.cov(wall.T) + np.eye(3) * QUANTISATION_VARIANCE, rise)
+    gain = float(weights @ rise / rise.max())
+    return weights / gain if gain > 0 else otherwise

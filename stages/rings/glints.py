@@ -14,8 +14,7 @@ import numpy as np
 
 from pipeline.adjustment.robust import robust_spread, robust_spreads
 from pipeline.arrays import Bool, Float, Float32, Int
-from stages.rings.around import slow_around
-from stages.rings.kernels import median
+from stages.rings.kernels import median, slow_around
 
 # Rings on either side that have a say: two of five may be wrong, and a run is confirmed by a next one, which
 # itself is measured against two more; how much clutter there is, is counted over two on either side.

@@ -10,6 +10,9 @@ FAST = {"reassoc", "contract", "arcp", "nsz"}
 UNKNOWNS = 5
 # A sector that is narrower, px, has radii without a pixel: pixels are a unit apart, askew up to √2.
 _LEAST_ARC_PX = 1.2
+# What varies slowly around the ring is told by thirty degrees: far wider than a glint, so that it has no say;
+# a move across the pipe, one wave around the ring, is followed to 3 % (the square of half a block, over 2).
+_BLOCKS = 12
 
 
 @numba.njit(cache=True, nogil=True)
@@ -39,6 +42,34 @@ def take_finite(values, out):  # type: ignore[no-untyped-def]
             out[count] = x
             count += 1
     return out[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def slow_around(values):  # type: ignore[no-untyped-def]
+    """Return ``values`` (A,) without what is narrower than half a block; 0 when none is finite.
+
+    Medians of twelve blocks of sectors, linear from the middle of one to the next around the circle; blocks
+    of which less than a quarter is finite take the value of the block before.
+    """
+    sectors = values.size
+    level, last, out = np.full(_BLOCKS, np.nan), np.nan, np.zeros(sectors)
+    for b in range(_BLOCKS):
+        block = values[b * sectors // _BLOCKS : (b + 1) * sectors // _BLOCKS]
+        finite = take_finite(block, out)
+        if finite.size > 0 and 4 * finite.size >= block.size:
+            level[b] = last = median(finite)
+    out[:] = 0.0
+    if np.isnan(last):
+        return out
+    for b in range(_BLOCKS):
+        last = level[b] if np.isfinite(level[b]) else last
+        level[b] = last
+    for a in range(sectors):
+        place = (a + 0.5) * _BLOCKS / sectors - 0.5
+        b = int(np.floor(place))
+        part = place - b
+        out[a] = (1 - part) * level[b % _BLOCKS] + part * level[(b + 1) % _BLOCKS]
+    return out
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

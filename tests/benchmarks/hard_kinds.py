@@ -97,6 +97,18 @@ def text_overlay(image: Image, laser: bool, k: int, random: np.random.Generator)
     return drawn.astype(np.float32)
 
 
+def clock_and_logo(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """A clock that counts, at the left; at the lower right a logo that lets the wall through by a third."""
+    drawn = np.clip(image, 0, 255).astype(np.uint8)
+    clock = f"{k // 1800:02d}:{k // 30 % 60:02d}.{100 * (k % 30) // 30:02d}"
+    cv2.putText(drawn, clock, (290, 560), cv2.FONT_HERSHEY_DUPLEX, 1.4, (60, 220, 255), 4, cv2.LINE_AA)
+    logo = np.zeros_like(drawn)
+    cv2.circle(logo, (1060, 880), 75, (200, 120, 40), -1, cv2.LINE_AA)
+    cv2.putText(logo, "KR", (1010, 905), cv2.FONT_HERSHEY_TRIPLEX, 2.2, (255, 255, 255), 6, cv2.LINE_AA)
+    opaque = 0.67 * (logo.max(2, keepdims=True) > 0)
+    return (drawn * (1 - opaque) + logo * opaque).astype(np.float32)
+
+
 def cable(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
     """A cable at 4 o'clock hides 7 degrees of the wall; the laser draws an arc on it well inside the ring."""
     psi, away = _azimuth(image), _distance(image)
@@ -256,8 +268,8 @@ PAINTED: dict[str, Paint] = {
     f.__name__.replace("_", "-"): f
     for f in (
         hot_pixels, static_reflection, droplet, banding, interlaced, dim_sector, second_ring, sliding_drop,
-        text_overlay, cable, debris, black_frames, fog, grey_camera, standing_water, shake, dark_edges,
-        exposure_pumping, fouled_lens, lamp_out, laser_flicker, mirrored, half_size,
+        text_overlay, clock_and_logo, cable, debris, black_frames, fog, grey_camera, standing_water, shake,
+        dark_edges, exposure_pumping, fouled_lens, lamp_out, laser_flicker, mirrored, half_size,
     )
 }  # fmt: skip
 # Frames whose pictures all are the one before the first of them.

@@ -6,7 +6,7 @@ import pytest
 
 from pipeline.artefacts.measured import RingValidity
 from pipeline.instrument.camera.fisheye import KannalaBrandt
-from stages.rings.colour import excess_weights, mix
+from stages.rings.extract import excess_weights, mix
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 from tests.shared_data import shared

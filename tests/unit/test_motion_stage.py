@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
+from pipeline.recording.base import Illumination
 from stages.motion import MotionParameters, adjust_at_once, estimate_motion, measure_run
+from stages.premises.stays import places_that_stay
 from tests.drawn_run import DrawnRun, drawn_run, without_encoder
 from tests.quiet import quiet_context
+from tests.ring_images import MemorySource
 
 STEP = 0.8
 PARAMETERS = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
@@ -134,3 +140,22 @@ def test_no_rings_are_refused(steady: DrawnRun) -> None:
     points = type(steady.points)(**{**vars(steady.points), "xyz_c": blind})
     with pytest.raises(UnusableError, match="0 laser frames"):
         estimate_motion(steady.recording, steady.probe, steady.rings, points, PARAMETERS, quiet_context())
+
+
+def test_text_burnt_in_is_not_followed() -> None:
+    k = np.arange(72)
+    run = drawn_run(STEP * k, 0.004 * k, encoder=False)
+    sign = np.sign(np.random.default_rng(3).standard_normal((20, 100))).astype(np.float32)
+    sign = cv2.resize(sign, (300, 60), interpolation=cv2.INTER_NEAREST)
+    assert isinstance(run.recording.source, MemorySource)
+    for image in run.recording.source.images.values():
+        assert image is not None
+        image[200:260, 50:350] = np.where(sign > 0, 230, 15)
+    z, _, sigma = errors(estimated(run), run)
+    assert abs(z[-1]) > 3 * sigma[-1, 0] + 0.02, "the control: text is followed as if it were the wall"
+    told: list[str] = []
+    context = replace(quiet_context(), warn=told.append)
+    stays = places_that_stay(run.recording, run.probe, run.recording.frames.of(Illumination.LED), context)
+    assert "burnt in" in told[0]
+    z, _, sigma = errors(estimated(replace(run, recording=replace(run.recording, stays=stays))), run)
+    assert abs(z[-1]) < 3 * sigma[-1, 0] + 0.02

@@ -13,7 +13,7 @@ from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion import MotionParameters
 from stages.motion.tracking.normalisation import without_illumination
 from stages.motion.tracking.patches import cut
-from stages.motion.tracking.strips import Strip, StripGrid, sample, softened, unroll
+from stages.motion.tracking.strips import Hidden, Strip, StripGrid, sample, softened, unroll
 from stages.motion.tracking.tracker import TextureTracker
 from tests.unit.drawn_pipe import RADIUS, draw, led_light, reflectance, small_probe, wall_hits
 
@@ -153,7 +153,7 @@ def true_contrast(strip: Strip, wall: StripGrid) -> Float32:
 def test_unrolled_texture_lies_where_the_wall_has_it() -> None:
     probe, wall = small_probe(), grid()
     image = draw(probe, pose())[..., 1]
-    strip = unroll(image, probe, pose(), wall, (0.0, 0.0))
+    strip = unroll(image, probe, pose(), wall, Hidden())
     wanted = true_contrast(strip, wall)
     inner = (slice(22, -22), slice(22, -22))
     assert strip.usable.mean() > 0.9
@@ -169,7 +169,7 @@ def test_a_plain_wall_seen_from_off_the_axis_is_even_but_for_wrong_lamps() -> No
     light = led_light(probe, T, wall_hits(probe, T))
     image = np.clip(160 * light / np.percentile(light, 99), 0, 255).astype(np.uint8)
     other = replace(probe, lighting=replace(probe.lighting, z_mm=-15.0))
-    even, uneven = (unroll(image, lit_by, T, wall, (0.0, 0.0)) for lit_by in (probe, other))
+    even, uneven = (unroll(image, lit_by, T, wall, Hidden()) for lit_by in (probe, other))
     assert even.usable.mean() > 0.8
     assert np.abs(even.contrast[even.usable]).max() < 0.04
     assert np.abs(uneven.contrast[uneven.usable]).max() > 2 * np.abs(even.contrast[even.usable]).max()
@@ -177,9 +177,9 @@ def test_a_plain_wall_seen_from_off_the_axis_is_even_but_for_wrong_lamps() -> No
 
 def test_patches_are_looked_for_only_where_they_may_err_and_still_be_seen_whole() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, (20.0, 24.0))
+    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, Hidden((20.0, 24.0)))
     tracker = TextureTracker(
-        probe, wall, MotionParameters.model_validate({"patch_half_px": HALF}), (20.0, 24.0)
+        probe, wall, MotionParameters.model_validate({"patch_half_px": HALF}), Hidden((20.0, 24.0))
     )
     row = np.arange(strip.contrast.shape[0])
     looked_for = tracker._in_view(strip, np.stack([row, np.full(len(row), 100.3)], -1))
@@ -191,7 +191,7 @@ def test_patches_are_looked_for_only_where_they_may_err_and_still_be_seen_whole(
 
 def test_the_strip_knows_the_pixels_it_looked_at() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, (0.0, 0.0))
+    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, Hidden())
     row, column = strip.first_row + np.array([5.0, 30.3, 50.9]), np.array([2.0, 100.7, 479.5])
     T = pose()
     xyz_c = (wall.wall(row, column) - T[:3, 3]) @ T[:3, :3]
@@ -200,7 +200,7 @@ def test_the_strip_knows_the_pixels_it_looked_at() -> None:
 
 def test_the_wall_under_the_laser_line_is_not_usable() -> None:
     probe, wall = small_probe(), grid()
-    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, (20.0, 24.0))
+    strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, Hidden((20.0, 24.0)))
     ahead = (strip.first_row + np.arange(strip.usable.shape[0])) * wall.step_mm - 7.0
     hidden = (ahead > 20.0) & (ahead < 24.0)
     assert hidden.any()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -242,3 +243,27 @@ def test_a_repeated_picture_in_one_light_is_left_out(good, run, replaced):
     behind = time_s[13:] if replaced else time_s[12:-1]
     np.testing.assert_allclose(found.time_s[12:], behind)
     assert any("repeat the picture before" in t for t in told)
+
+
+def scratches(size):
+    """Nine thin bright strokes on the window, as bright as the lamps make them."""
+    drawn, random = np.zeros(size[::-1], np.uint8), np.random.default_rng(2)
+    for _ in range(9):
+        at, way = random.uniform(0.2, 0.8, 2) * size, random.uniform(-60, 60, 2)
+        cv2.line(drawn, at.astype(int).tolist(), (at + way).astype(int).tolist(), 240, 3, cv2.LINE_AA)
+    return drawn
+
+
+def test_scratches_on_the_window_are_not_taken_for_the_wall(good, run, monkeypatch):
+    """A wrong unit of the encoder is seen by how the wall moves; scratches stand still."""
+    size, light = run.probe.camera.image_size, good.frames.illumination
+    by_light = {"led": scratches(size), "laser": scratches(size) // 20}
+    images = {n: cv2.add(image, by_light[light[n]]) for n, image in good.source.images.items()}
+    encoder = Encoder(good.encoder.time_s, good.encoder.distance_mm / 25.4)
+    scratched = replace(good, source=MemorySource(images, size), encoder=encoder)
+    found, told = checked(scratched, run.probe)
+    assert "scratches" in told[0]
+    assert found.encoder_factor == 25.4
+    assert found.applied_to(scratched).stays is not None
+    monkeypatch.setattr("stages.premises.places_that_stay", lambda *parts: None)
+    assert checked(scratched, run.probe)[0].encoder_factor == 1, "the control: scratches are followed"

@@ -25,7 +25,7 @@ from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
 from stages.calibrate.boards.pictures import read_picture
 from stages.calibrate.boards.start import pose
 from stages.calibrate.laser.line import LaserPlaneParameters, measure_line, patch_around
-from stages.rings.colour import excess_weights, mix
+from stages.rings.extract import excess_weights, mix
 
 __all__ = ["LASER_PLANE", "LaserCalibration"]
 

@@ -14,7 +14,7 @@ import cv2
 import numba
 import numpy as np
 
-from pipeline.arrays import Bool, Float, Float32, Image, Int
+from pipeline.arrays import Bool, Byte, Float, Float32, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording, in_background
@@ -24,6 +24,7 @@ from stages.motion.tracking.normalisation import (
     noise_of_rows,
     without_illumination,
 )
+from stages.premises.stays import darkest_channel, in_full
 from stages.texture.light import irradiance
 
 _COARSE = 4
@@ -36,9 +37,6 @@ _DARKEST, _BRIGHTEST = 5.0, 250.0
 _LINE_HALF_WIDTH_SIGMA = 12
 """Half width, in σ of the laser line, of the wall hidden under it: the line is below 1e-4 of its peak beyond
 4.3 σ; what reaches farther is its glow, a gradient that `without_illumination` removes. Not measured."""
-_BLUE, _RED = 0, 2
-_YELLOW_NM = 575.0
-"""Lasers of a shorter wavelength reach the red channel least, others the blue one."""
 _DECODED_AHEAD = 4
 
 
@@ -119,8 +117,24 @@ class Strip:
 
 
 @dataclass(frozen=True)
+class Hidden:
+    """What hides the wall.
+
+    Attributes
+    ----------
+    line_mm : (float, float)
+        Range of wall ahead of the camera under the laser line; empty if equal.
+    stays : (H, W) uint8 or None
+        Above 0 where something stays in the picture while the wall moves.
+    """
+
+    line_mm: tuple[float, float] = (0.0, 0.0)
+    stays: Byte | None = None
+
+
+@dataclass(frozen=True)
 class WallView:
-    """The lit frames of a recording: pictures of the wall, and how they are unrolled."""
+    """The lit frames of a recording, how they are unrolled, and what hides the wall in them."""
 
     recording: Recording
     probe: Probe
@@ -133,10 +147,12 @@ class WallView:
         return self._place(frames.of(Illumination.LED, Illumination.BOTH))
 
     @property
-    def blocked_mm(self) -> tuple[float, float]:
-        """Return the range of wall ahead of the camera hidden under the laser line; empty if equal."""
+    def hidden(self) -> Hidden:
+        """Return what hides the wall."""
         half = _LINE_HALF_WIDTH_SIGMA * self.probe.laser.line_sigma_mm if self._both else 0.0
-        return self.probe.laser.baseline_mm - half, self.probe.laser.baseline_mm + half
+        at_mm = self.probe.laser.baseline_mm
+        stays = in_full(self.recording.stays, self.recording.source.image_size)
+        return Hidden((at_mm - half, at_mm + half), stays)
 
     def images(self, place: Int) -> Iterator[tuple[int, Image | None]]:
         """Yield places and softened grey pictures; with the laser on, the colour its light reaches least.
@@ -149,7 +165,7 @@ class WallView:
     def strips(self, place: Int, T_pc: Float) -> Iterator[Strip | None]:
         """Yield frames (n,), ascending, unrolled from poses (n, 4, 4) in the straightened pipe."""
         for (_, image), T in zip(self.images(place), T_pc, strict=True):
-            yield None if image is None else unroll(image, self.probe, T, self.grid, self.blocked_mm)
+            yield None if image is None else unroll(image, self.probe, T, self.grid, self.hidden)
 
     @property
     def _both(self) -> bool:
@@ -160,7 +176,7 @@ class WallView:
         return np.asarray(np.searchsorted(self.recording.frames.frame, frame))
 
     def _softened(self, frame: Int) -> Iterator[tuple[int, Image | None]]:
-        channel = _RED if self.probe.laser.wavelength_nm < _YELLOW_NM else _BLUE
+        channel = darkest_channel(self.probe.laser)
         for number, image in self.recording.read(frame, "bgr" if self._both else "grey"):
             grey = np.ascontiguousarray(image[..., channel]) if image is not None and self._both else image
             yield number, None if grey is None else softened(grey)
@@ -171,18 +187,15 @@ def softened(image: Image) -> Image:
     return np.asarray(cv2.GaussianBlur(image, (0, 0), SOFTENING_PX), np.uint8)
 
 
-def unroll(
-    image: Image, probe: Probe, T_pc: Float, grid: StripGrid, blocked_mm: tuple[float, float]
-) -> Strip:
-    """Unroll a `softened` grey image (H, W) as seen from pose ``T_pc`` (4, 4) in the straightened pipe.
-
-    ``blocked_mm`` is the range of wall ahead of the camera hidden under the laser line; empty if equal.
-    """
+def unroll(image: Image, probe: Probe, T_pc: Float, grid: StripGrid, hidden: Hidden) -> Strip:
+    """Unroll a `softened` grey image (H, W) as seen from pose ``T_pc`` (4, 4) in the straightened pipe."""
     first_row = int(np.ceil((T_pc[2, 3] + grid.near_mm) / grid.step_mm))
     coarse_uv, light = _coarse_view(probe, T_pc, grid, first_row)
     grey, seen = sample(image, coarse_uv, _COARSE)
     ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
-    seen[(ahead > blocked_mm[0]) & (ahead < blocked_mm[1])] = False
+    seen[(ahead > hidden.line_mm[0]) & (ahead < hidden.line_mm[1])] = False
+    if hidden.stays is not None:
+        seen &= sample(hidden.stays, coarse_uv, _COARSE)[0] == 0
     usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST)
     contrast = without_illumination(grey / _refined(light, _COARSE), usable)
     contrast = equally_sharp(contrast, coarse_uv, _COARSE)

@@ -12,11 +12,11 @@ from pipeline.arrays import Bool, Float, Float32, Image, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
+from stages.motion.encoder import PosePredictor
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import LandmarkMap, ObservationStore, TrackedPoses, Tracks
 from stages.motion.tracking.patches import cornerness, cut, whole_patches
-from stages.motion.tracking.prediction import PosePredictor
-from stages.motion.tracking.strips import Strip, StripGrid, unroll
+from stages.motion.tracking.strips import Hidden, Strip, StripGrid, unroll
 
 _FEWEST = 12
 """Landmarks found below which a frame's displacement, their median, is not believed. Not measured."""
@@ -115,10 +115,10 @@ class TextureTracker:
         probe: Probe,
         grid: StripGrid,
         parameters: MotionParameters,
-        blocked_mm: tuple[float, float],
+        hidden: Hidden,
         scratch: Scratch | None = None,
     ) -> None:
-        self._probe, self._grid, self._parameters, self._blocked = probe, grid, parameters, blocked_mm
+        self._probe, self._grid, self._parameters, self._hidden = probe, grid, parameters, hidden
         self._map = LandmarkMap(parameters.patch_half_px)
         self._store = ObservationStore.on(scratch or Scratch(), parameters.most_observations)
         self._poses: list[tuple[int, Float, bool]] = []
@@ -149,11 +149,11 @@ class TextureTracker:
 
         Where few are found at the predicted pose, the last strip as a whole tells where to look instead.
         """
-        strip = unroll(image, self._probe, T_pc, self._grid, self._blocked)
+        strip = unroll(image, self._probe, T_pc, self._grid, self._hidden)
         found = self._matched(strip, frame)
         if found.agreeing < _FEWEST_AGREEING and self._last is not None:
             T_moved = self._shifted(T_pc, _displacement(self._last, strip))
-            other = unroll(image, self._probe, T_moved, self._grid, self._blocked)
+            other = unroll(image, self._probe, T_moved, self._grid, self._hidden)
             found_there = self._matched(other, frame)
             if found_there.agreeing > max(found.agreeing, _FEWEST_AGREEING):
                 return T_moved, other, found_there

@@ -1,0 +1,142 @@
+"""Places of the picture where something stays while the wall moves: it is not the wall.
+
+Text and logos burnt in, dirt and reflections on the window, lamps and parts of the probe keep their place in
+the picture. Followed as if they were the wall, they say that it stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+
+from pipeline.arrays import Bool, Byte, Float32, Image, Int
+from pipeline.instrument.camera import Camera
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
+from pipeline.recording.base import Illumination, Recording
+
+_LOOKED_AT = 40
+"""Lit pictures, spread over the run, that are looked at. Of 24, the same text was found in open-1-field."""
+_HEIGHT_PX = 600
+"""Pictures are reduced by a whole factor to about this height: finer things are noise to those who follow the
+wall."""
+_FARTHEST_DEG, _NEAREST_DEG = 35.0, 80.0
+"""Polar angles between which the wall is looked at, by motion too."""
+_FINE, _CELL, _BOX, _GAP = 4 / 600, 16 / 600, 9 / 600, 15 / 600
+"""In heights of the picture: σ of the brightness about which contrast is taken, cells by which motion is
+told, box over which what stays is summed, gap between two places that count as one. A choice: a patch that
+motion tracks is some 20/600 high."""
+_STILL = 0.15
+"""Correlation, in the median cell, with the picture before, above which the wall did not move. It is below
+`_STAYS`, so that a noisy picture of a wall at rest is not taken for things that stay on a moving one."""
+_FEWEST = 12
+"""Pictures with a moved wall from which what stays is told: the mean of 12 keeps 1/12 of the wall's power."""
+_STAYS = 0.3
+"""Share of the power of contrast that stays, from which a place counts: in open-1, 2 and 3 the 999th of 1000
+places shows .02 to .13, burnt-in text .98."""
+_FAINTEST = 0.02
+"""Contrast that stays and is fainter is no harm: a third of what an open recording's wall has."""
+_MOST = 0.5
+"""Where more than half would count, the wall cannot be told from what stays."""
+_DARK = 8.0
+"""Grey values added where contrast is taken, so that black has none. Not measured."""
+_BLUE, _RED = 0, 2
+_YELLOW_NM = 575.0
+"""Lasers of a shorter wavelength reach the red channel least, others the blue one."""
+_WORTH_A_WORD = 0.01
+"""Share of the picture of the wall that is told: no open recording has any."""
+
+
+def places_that_stay(recording: Recording, probe: Probe, lit: Int, context: Context) -> Bool | None:
+    """Return where something stays (h, w), on the picture reduced by a whole factor, or None; warn of it.
+
+    Parameters
+    ----------
+    lit : (N,) int
+        Frames that show the wall; with the laser on, the colour that its light reaches least is looked at.
+    """
+    both = bool(np.any(recording.frames.illumination == Illumination.BOTH.value))
+    wall, channel = _wall_in(probe.camera), darkest_channel(probe.laser)
+    few = recording.read(lit[:: max(-(-len(lit) // _LOOKED_AT), 1)], "bgr" if both else "grey")
+    seen = (image for _, image in few if image is not None)
+    places = what_stays((np.ascontiguousarray(i[..., channel]) for i in seen) if both else seen, wall)
+    share = float(places.sum() / max(wall.sum(), 1))
+    context.report("picture that stays while the wall moves", 100 * share, "%")
+    if share > _WORTH_A_WORD:
+        context.warn(
+            f"{100 * share:.1f} % of the picture of the wall stays in place while the wall moves: text or a "
+            "logo burnt in, dirt, scratches or reflections on the window, a part of the probe. Motion does "
+            "not rest on it, but it hides the wall. What to do: switch the text off, clean the window"
+        )
+    return places if places.any() else None
+
+
+def in_full(stays: Bool | None, image_size: tuple[int, int]) -> Byte | None:
+    """Return places (h, w) of the reduced picture on the whole one (H, W): 1 where something stays."""
+    if stays is None:
+        return None
+    whole = cv2.resize(stays.astype(np.uint8), image_size, interpolation=cv2.INTER_NEAREST)
+    return np.asarray(whole, np.uint8)
+
+
+def darkest_channel(laser: LaserSheet) -> int:
+    """Return the colour, of blue, green and red, that a laser's light reaches least."""
+    return _RED if laser.wavelength_nm < _YELLOW_NM else _BLUE
+
+
+def what_stays(images: Iterable[Image], wall: Bool) -> Bool:
+    """Return where (h, w) something stays in grey pictures (H, W), while the ``wall`` (h, w) moves."""
+    last, count = None, 0
+    total, power = (np.zeros(wall.shape, np.float32) for _ in range(2))
+    for image in images:
+        fine = _fine(image, wall.shape)
+        if last is None or _moved(last, fine, wall):
+            total, power, last, count = total + fine, power + fine * fine, fine, count + 1
+    if count < _FEWEST:
+        return np.zeros_like(wall)
+    steady = (total / count) ** 2
+    moving = (power / count - steady) * (count / (count - 1))
+    box, gap = (_odd(part, wall.shape) for part in (_BOX, _GAP))
+    stays, varies = (cv2.blur(p, (box, box)) for p in (steady - moving / count, moving))
+    places = (stays > _STAYS * (stays + varies)) & (stays > _FAINTEST**2) & wall
+    joined = cv2.morphologyEx(places.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((gap, gap)))
+    places = (joined > 0) & wall
+    return places if places.sum() <= _MOST * wall.sum() else np.zeros_like(places)
+
+
+def _wall_in(camera: Camera) -> Bool:
+    """Return where (h, w), on the reduced picture, the wall is looked at."""
+    width, height = camera.image_size
+    by = max(round(min(width, height) / _HEIGHT_PX), 1)
+    v, u = np.mgrid[: height // by, : width // by]
+    z = camera.unproject((np.stack([u, v], -1) + 0.5) * by - 0.5).ray[..., 2]
+    near, far = np.cos(np.radians([_NEAREST_DEG, _FARTHEST_DEG]))
+    return np.asarray((z > near) & (z < far))
+
+
+def _fine(image: Image, shape: tuple[int, ...]) -> Float32:
+    """Return the fine contrast (h, w) of a picture (H, W)."""
+    grey = cv2.resize(image, shape[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
+    light = cv2.GaussianBlur(grey, (0, 0), _FINE * min(shape))
+    return np.asarray((grey - light) / (light + _DARK), np.float32)
+
+
+def _moved(before: Float32, now: Float32, wall: Bool) -> bool:
+    """Tell whether most cells of two pictures (h, w) show something else."""
+    cell = _odd(_CELL, before.shape)
+    size = (before.shape[1] // cell, before.shape[0] // cell)
+    both, one, other, seen = (
+        cv2.resize(p, size, interpolation=cv2.INTER_AREA)
+        for p in (before * now, before * before, now * now, wall.astype(np.float32))
+    )
+    on_wall = seen > 0.5
+    alike = both[on_wall] / np.sqrt(one[on_wall] * other[on_wall] + 1e-12)
+    return bool(alike.size and np.median(alike) < _STILL)
+
+
+def _odd(part: float, shape: tuple[int, ...]) -> int:
+    """Return a part of the picture's height as an odd number of pixels."""
+    return 2 * round(part * min(shape) / 2) + 1
