@@ -163,11 +163,13 @@ class Steps:
 def steps_of_wall(pictures: Pictures, light: Int, copy: Bool) -> Steps:
     """Return the steps between pictures that both show the lit wall; all there are where light is unknown.
 
-    A picture that is a ``copy`` (F,) of the one before has the place of the first of its copies.
+    A picture that is a ``copy`` (F,) has the place of the one that it repeats.
     """
     known = bool(np.any(light != Light.UNKNOWN))
     end = np.flatnonzero((pictures.partner >= 0) & ~copy)
-    start = np.maximum.accumulate(np.where(copy, 0, np.arange(len(copy))))[pictures.partner[end]]
+    start = pictures.partner[end]
+    while np.any(copy[start]):
+        start = np.where(copy[start], pictures.partner[start], start)
     use = ((light[end] == Light.WALL) & (light[start] == Light.WALL)) | np.full(len(end), not known)
     use &= np.isfinite(pictures.step[end])
     return Steps(start[use], end[use], pictures.step[end[use]])
@@ -265,13 +267,28 @@ def repeated(pictures: Pictures, light: Int) -> Bool:
 
 
 def copies(pictures: Pictures, light: Int, stated: Int, row: Int) -> Bool:
-    """Return (F,) true for pictures that are the one before once more, in place of their own.
+    """Return (F,) true for pictures that are one before once more, in place of their own.
 
     A recorder that hangs stores one picture for some frames, and the table goes on. ``stated`` (F,) is the
     light that the ``row`` (F,) of every picture states: where lights take turns, a run of copies contradicts
-    it. Where the probe merely stands, each light repeats its own picture and nothing is contradicted.
+    it. Where the probe merely stands, each light repeats its own picture and nothing is contradicted. One
+    that repeats the last picture of its light, while those about it change, is a copy too.
     """
     again = repeated(pictures, light) & (np.diff(row, prepend=-1) > 0)
     runs, _ = label(again)
     contradicted = np.unique(runs[again & (light != stated)])
-    return np.asarray(again & np.isin(runs, contradicted))
+    return np.asarray((again & np.isin(runs, contradicted)) | _repeated_alone(pictures, light))
+
+
+def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
+    """Return (F,) true for pictures that repeat the last one of their light while those about them change."""
+    out = np.zeros(len(light), bool)
+    for kind in (Light.LINE, Light.WALL):
+        place = np.flatnonzero((light == kind) & (pictures.partner >= 0))
+        if len(place) < _AROUND_STEP:
+            continue
+        change = pictures.change[place]
+        usual = median_filter(change, _AROUND_STEP, mode="nearest")
+        changes = np.pad(change > 2 * _STANDS * usual, 1)
+        out[place] = (change < _STANDS * usual) & changes[:-2] & changes[2:]
+    return out

@@ -229,6 +229,28 @@ def test_pictures_of_a_recorder_that_hung_are_left_out_and_all_times_stay(first,
     assert f"{count} pictures show the picture before once more" in told[0]
 
 
+@pytest.mark.parametrize("repeats", [slice(19, -4, 20), slice(18, -4, 20), slice(9, -4, 7)])
+def test_pictures_that_repeat_the_last_one_of_their_light_are_left_out(repeats, good, run):
+    frame, again = np.arange(COUNT), np.zeros(COUNT, bool)
+    again[repeats] = True
+    shown = {k: good.source.images[k - 2 if again[k] else k] for k in frame}
+    spoiled = replace(good, source=MemorySource(shown, run.probe.camera.image_size))
+    found, told = checked(spoiled, run.probe)
+    assert found.frame.tolist() == frame[~again].tolist()
+    np.testing.assert_allclose(found.time_s, good.frames.time_s[~again])
+    assert len(told) == 1
+    assert f"{again.sum()} pictures show" in told[0]
+
+
+def test_pictures_of_a_probe_that_stops_are_no_repeats():
+    z = np.concatenate([np.arange(20), np.full(20, 20), 20 + np.arange(20)])
+    halting = drawn_run(STEP_MM * z, 0.0 * z)
+    lines = {int(f): ring_image(halting.probe, seed=int(f)) for f in halting.rings.frame}
+    source = MemorySource({**halting.recording.source.images, **lines}, halting.probe.camera.image_size)
+    found, _ = checked(replace(halting.recording, source=source), halting.probe)
+    assert len(found.frame) == COUNT
+
+
 @pytest.mark.parametrize("replaced", [False, True])
 def test_a_repeated_picture_in_one_light_is_left_out(good, run, replaced):
     lit = np.flatnonzero(good.frames.illumination == "led")
