@@ -12,7 +12,6 @@ from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge.confirm import Sized, quantities
 from stages.diagnose.gauge.elimination import Reduced, score_inflation
 from stages.diagnose.gauge.run import Term
-from stages.diagnose.gauge.scan import FreeShape
 from tests.unit.test_diagnose_inference import FRAMES, GLOBALS, equations
 from tests.unit.wall_points import Bore, plain_probe, ring_points
 
@@ -25,16 +24,19 @@ def points_of_a_bore() -> ImagePoints:
 
 def test_a_free_shape_is_the_effect_at_that_shape():
     points = points_of_a_bore()
-    free = FreeShape(DRIFT, (3.0,), 0.9, (0.5, 40.0))
-    moved = free.image_shift_px(points, (), np.array([0.002, 0.6]))
+    free = Term(DRIFT, (3.0,), np.array([0.002, 0.6]), (0.5, 40.0))
+    assert len(free.amplitudes) == 2
+    shape, amplitude = free.at(free.amplitude)
+    moved = DRIFT.image_shift_px(points, shape, amplitude)
     assert moved == pytest.approx(DRIFT.image_shift_px(points, (3.6,), np.array([0.002])))
-    assert free.quantities((), np.array([0.002, 0.6])) == {"relative": 0.002, "time_s": 3.6}
-    assert free.quantities((), np.array([0.002, -10.0]))["time_s"] == 0.5
+    assert DRIFT.quantities(shape, amplitude) == {"relative": 0.002, "time_s": 3.6}
+    assert free.at(np.array([0.002, -10.0]))[0] == (0.5,)
+    assert replace(free, amplitude=np.array([0.002]), bounds=None).at(np.array([0.002]))[0] == (3.0,)
 
 
 def test_a_time_constant_carries_the_uncertainty_of_its_shape():
-    free = FreeShape(DRIFT, (3.0,), 0.9, (0.5, 40.0))
-    found = quantities(Sized(Term(free, (), np.array([0.002, 0.0])), np.diag([1e-5, 0.2]) ** 2))
+    free = Term(DRIFT, (3.0,), np.array([0.002, 0.0]), (0.5, 40.0))
+    found = quantities(Sized(free, np.diag([1e-5, 0.2]) ** 2))
     assert found["time_s"].value == 3.0
     assert found["time_s"].sd == pytest.approx(0.2, rel=0.15)
     assert found["relative"].sd == pytest.approx(1e-5, rel=0.15)

@@ -54,7 +54,7 @@ def confirmations(
 def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: Stated) -> Partial | None:
     """Return the term's estimate from a part of the measurements, the other terms being free."""
     result = estimate(part, stated, 10 * prior_sigma(part, judged.fit.terms))
-    wanted = [(term.model.name, a.name, term.shape) for a in term.model.amplitudes]
+    wanted = [(term.model.name, a.name, term.shape) for a in term.amplitudes]
     keys = [(c.effect, c.amplitude, c.shape) for c in part.columns]
     at = [keys.index(w) for w in wanted]
     inflation = np.sqrt(
@@ -188,8 +188,8 @@ def _drawn(sized: Sized, numbers: Callable[[Shape, Float], dict[str, float]]) ->
     """Return numbers of a term with 1 σ, by draws of the amplitudes."""
     term, random = sized.term, np.random.default_rng(0)
     draws = random.multivariate_normal(term.amplitude, sized.covariance, _DRAWS, check_valid="ignore")
-    middle = numbers(term.shape, term.amplitude)
-    drawn = [numbers(term.shape, a) for a in draws]
+    middle = numbers(*term.at(term.amplitude))
+    drawn = [numbers(*term.at(a)) for a in draws]
     out = {}
     for name, value in middle.items():
         apart = np.array([d[name] for d in drawn]) - value

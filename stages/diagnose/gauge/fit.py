@@ -194,7 +194,7 @@ def kept_columns(found: Fit, asked: Sequence[tuple[EffectModel, Shape]]) -> tupl
         names.append(Column(INSTRUMENT, name) if known > 0 else None)
         value.append(here)
     for t in found.terms:
-        names += [Column(t.model.name, a.name, t.shape) for a in t.model.amplitudes]
+        names += [Column(t.model.name, a.name, t.shape) for a in t.amplitudes]
         value += list(t.amplitude)
     for model, shape in asked:
         names += [Column(model.name, a.name, shape) for a in model.amplitudes]
@@ -228,7 +228,7 @@ def _prior(state: Unknowns, terms: Sequence[Term], run: GaugeRun) -> tuple[Float
     sigma[at.marker] = _PLACEMENT_SIGMA_MM
     information[: at.size, : at.size] = np.diag(sigma**-2)
     information[at.instrument, at.instrument] = instrument_information(state.stated)
-    plausible = [a.plausible for t in terms for a in t.model.amplitudes]
+    plausible = [a.plausible for t in terms for a in t.amplitudes]
     wide = np.arange(at.size, size)
     information[wide, wide] = (_WIDE * np.array(plausible)) ** -2.0
     value = np.concatenate(

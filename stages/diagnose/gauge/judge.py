@@ -255,7 +255,7 @@ def judged_of(
 
 def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
     """Return (K,) 1 σ of amplitudes beforehand; infinite for the instrument, which has its own."""
-    plausible = {(t.model.name, a.name): a.plausible for t in terms for a in t.model.amplitudes}
+    plausible = {(t.model.name, a.name): a.plausible for t in terms for a in t.amplitudes}
     return np.array(
         [
             np.inf if c.effect == INSTRUMENT else PRIOR_PLAUSIBLE * plausible[c.effect, c.amplitude]

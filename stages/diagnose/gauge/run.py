@@ -19,7 +19,7 @@ from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.calibrate.gauge.terms import edge_equations, ring_equations, ring_residual
-from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.library import (
     columns,
     reading_columns,
@@ -47,11 +47,31 @@ _ENCODER_CELL = 8
 
 @dataclass(frozen=True)
 class Term:
-    """An effect taken into the model: at one shape, with amplitudes (Q,)."""
+    """An effect taken into the model: at one shape, with amplitudes (Q,).
+
+    With ``bounds`` its shape, a continuous number, is free within them: how far it is off ``shape`` is one
+    more amplitude, the last.
+    """
 
     model: EffectModel
     shape: Shape
     amplitude: Float
+    bounds: tuple[float, float] | None = None
+
+    @property
+    def amplitudes(self) -> tuple[Amplitude, ...]:
+        """The model's, and that of a free shape."""
+        step = self.model.shape_step(self.shape) if self.bounds is not None else None
+        more = () if step is None else (Amplitude("shape", "", step),)
+        return (*self.model.amplitudes, *more)
+
+    def at(self, amplitude: Float) -> tuple[Shape, Float]:
+        """Return the model's own shape and amplitudes at the term's."""
+        if self.bounds is None:
+            return self.shape, amplitude
+        low, high = self.bounds
+        first = min(max(self.shape[0] + float(amplitude[-1]), low), high)
+        return (first, *self.shape[1:]), amplitude[:-1]
 
 
 @dataclass(frozen=True)
@@ -191,7 +211,7 @@ def _without_ring_shift(
     uv = run.rings.uv
     for _ in range(_ROUNDS if terms else 0):
         points = ring_points(state, replace(run.rings, uv=uv), run.time_s, run.width_px)
-        shift = np.sum([ring_shift_px(t.model, points, t.shape, t.amplitude) for t in terms], 0)
+        shift = np.sum([ring_shift_px(t.model, points, *t.at(t.amplitude)) for t in terms], 0)
         uv = run.rings.uv - shift[:, None] * run.rings.outward
     rings = replace(run.rings, uv=uv)
     return rings, ring_points(state, rings, run.time_s, run.width_px)
@@ -212,7 +232,7 @@ def _without_edge_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -
     points = replace(points, uv=points.projected_uv)
     uv = run.edges.uv
     for t in terms:
-        uv = uv - texture_shift_px(t.model, points, t.shape, t.amplitude)
+        uv = uv - texture_shift_px(t.model, points, *t.at(t.amplitude))
     return replace(run.edges, uv=uv), points
 
 
@@ -233,7 +253,7 @@ def _edge_part(
     made = edge_equations(state, edges)
 
     def texture_shift(term: Term, amplitude: Float) -> Float:
-        return _across(texture_shift_px(term.model, points, term.shape, amplitude), edges)
+        return _across(texture_shift_px(term.model, points, *term.at(amplitude)), edges)
 
     shift = [_term_slope(t, partial(texture_shift, t)) for t in terms]
     # Cells of fiducials count on where those of wall end.
@@ -258,14 +278,18 @@ def _with_effects(
     )  # fmt: skip
 
 
+def _reading_shift(term: Term, travel: Travel, amplitude: Float) -> Float:
+    return term.model.reading_shift_mm(travel, *term.at(amplitude))
+
+
 def _ring_shift(term: Term, points: ImagePoints, amplitude: Float) -> Float:
-    return ring_shift_px(term.model, points, term.shape, amplitude)
+    return ring_shift_px(term.model, points, *term.at(amplitude))
 
 
 def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
     """Return (M, Q) derivatives of a shift by the term's amplitudes, where they are."""
     out = []
-    for k, amplitude in enumerate(term.model.amplitudes):
+    for k, amplitude in enumerate(term.amplitudes):
         step = np.zeros(len(term.amplitude))
         step[k] = 0.05 * amplitude.plausible
         out.append((shift_of(term.amplitude + step) - shift_of(term.amplitude - step)) / (2 * step[k]))
@@ -278,12 +302,12 @@ def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Seque
     travel = travel_of(run, encoder, state)
     reading = np.interp(run.time_s - delay, encoder.time_s, encoder.distance_mm)
     for t in terms:
-        reading = reading - t.model.reading_shift_mm(travel, t.shape, t.amplitude)
+        reading = reading - t.model.reading_shift_mm(travel, *t.at(t.amplitude))
     by_pose = np.zeros((count, POSE))
     by_pose[:, 2] = 1
     by_border = np.zeros((count, state.border_size))
     by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
-    shift = [_term_slope(t, partial(t.model.reading_shift_mm, travel, t.shape)) for t in terms]
+    shift = [_term_slope(t, partial(_reading_shift, t, travel)) for t in terms]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
     cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
     # The weight is small: the encoder is examined separately, and a slip must not move the poses.

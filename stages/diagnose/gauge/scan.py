@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.inference import Score, Stated, places_of, score, stated_belief
@@ -119,70 +119,6 @@ def span(run: GaugeRun) -> tuple[float, float]:
     return duration, (len(run.time_s) - 1) / max(duration, 1e-9)
 
 
-@dataclass(frozen=True)
-class FreeShape(EffectModel):
-    """An effect whose shape, a continuous number, is one more amplitude: its way off ``middle``."""
-
-    model: EffectModel
-    middle: Shape
-    step: float
-    bounds: tuple[float, float]
-    name: str = field(init=False)
-    kind: CourseKind = field(init=False)
-    amplitudes: tuple[Amplitude, ...] = field(init=False)
-    law_sigma: float = field(init=False)
-
-    def __post_init__(self) -> None:
-        off = Amplitude("shape off the middle", "", self.step)
-        object.__setattr__(self, "name", self.model.name)
-        object.__setattr__(self, "kind", self.model.kind)
-        object.__setattr__(self, "amplitudes", (*self.model.amplitudes, off))
-        object.__setattr__(self, "law_sigma", self.model.law_sigma)
-
-    @property
-    def law(self) -> str:
-        """See `EffectModel.law`."""
-        return self.model.law
-
-    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the effect's."""
-        return self.model.course(*self.at(amplitude))
-
-    def at(self, amplitude: Float) -> tuple[Shape, Float]:
-        """Return the effect's own shape, within bounds, and its amplitudes."""
-        low, high = self.bounds
-        shape = min(max(self.middle[0] + float(amplitude[-1]), low), high)
-        return (shape, *self.middle[1:]), amplitude[:-1]
-
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the effect's."""
-        return self.model.image_shift_px(points, *self.at(amplitude))
-
-    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the effect's."""
-        return self.model.sheet_shift_mm(points, *self.at(amplitude))
-
-    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the effect's."""
-        return self.model.line_shift_px(points, *self.at(amplitude))
-
-    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the effect's."""
-        return self.model.wall_shift_mm(points, *self.at(amplitude))
-
-    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
-        """Return the effect's."""
-        return self.model.reading_shift_mm(travel, *self.at(amplitude))
-
-    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the effect's."""
-        return self.model.quantities(*self.at(amplitude))
-
-    def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return the effect's."""
-        return self.model.statement(*self.at(amplitude))
-
-
 def freed(run: GaugeRun, found: Fit) -> Fit:
     """Return the fit as it is, with continuous shapes as amplitudes, within what was searched.
 
@@ -198,23 +134,15 @@ def refined(run: GaugeRun, found: Fit) -> Fit:
     if free.terms == found.terms:
         return found
     better = fit(run, found.state, free.terms)
-    bound = fit(run, better.state, tuple(_bound(t) for t in better.terms), 1)
+    bound = fit(run, better.state, tuple(Term(t.model, *t.at(t.amplitude)) for t in better.terms), 1)
     return bound if bound.cost < found.cost else found
 
 
 def _freed(run: GaugeRun, term: Term) -> Term:
-    step = term.model.shape_step(term.shape)
-    if step is None or isinstance(term.model, FreeShape):
+    if term.model.shape_step(term.shape) is None or term.bounds is not None:
         return term
     searched = [shape[0] for shape in term.model.shapes(*span(run))]
-    bounds = min(searched), max(searched)
-    return Term(FreeShape(term.model, term.shape, step, bounds), (), np.append(term.amplitude, 0.0))
-
-
-def _bound(term: Term) -> Term:
-    if not isinstance(term.model, FreeShape):
-        return term
-    return Term(term.model.model, *term.model.at(term.amplitude))
+    return replace(term, amplitude=np.append(term.amplitude, 0.0), bounds=(min(searched), max(searched)))
 
 
 def retimed(run: GaugeRun, found: Fit) -> Fit:
