@@ -28,8 +28,7 @@ from pipeline.files.installed import PRIORS, file_or_shipped
 from pipeline.files.provenance import MadeBy
 from pipeline.pages import page_template
 from stages.diagnose.drill.cases import find_cases
-from stages.diagnose.drill.figures import Figure, figures
-from stages.diagnose.drill.score import Trial, calibration, confusion, shuffled
+from stages.diagnose.drill.score import Figure, Trial, calibration, confusion, figures, shuffled
 
 
 def write_report(done: Sequence[Worked], folder: Path) -> None:

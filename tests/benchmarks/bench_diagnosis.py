@@ -28,8 +28,7 @@ from stages.diagnose.channels import TRAVEL_EFFECTS, Seen, gauge_travel
 from stages.diagnose.compose import composed
 from stages.diagnose.document import to_json
 from stages.diagnose.drill.answer import Answer, Concealed
-from stages.diagnose.drill.figures import figures
-from stages.diagnose.drill.score import Trial, shuffled
+from stages.diagnose.drill.score import Trial, figures, shuffled
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without

@@ -1,7 +1,9 @@
 """Scores of diagnoses: each rate counts what it says, and broken files are refused."""
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -17,8 +19,20 @@ from stages.diagnose.drill.answer import (
     read_answer,
     read_concealed,
 )
-from stages.diagnose.drill.figures import figures
-from stages.diagnose.drill.score import Rate, Trial, calibration, confusion, heldout_removed, score, shuffled
+from stages.diagnose.drill.score import (
+    Rate,
+    Trial,
+    calibration,
+    confusion,
+    figures,
+    heldout_removed,
+    shuffled,
+)
+
+
+def score(trials: Iterable[Trial]) -> SimpleNamespace:
+    return SimpleNamespace(**{figure.name: figure for figure in figures(trials)})
+
 
 TILT = Concealed(name="laser_tilt", values=(0.6, 40.0))
 CONE = Concealed(name="laser_cone", values=(0.1,))
@@ -95,7 +109,7 @@ def test_sizes_are_judged_in_their_own_sigma():
     close, far = named("laser_tilt", value=0.61), named("laser_tilt", value=0.65)
     result = score([Trial("a", (TILT,), close), Trial("b", (TILT,), far)])
     assert result.size_in_95.count == 1
-    assert result.size_bias_sigma == pytest.approx(3.0)
+    assert result.size_bias_sigma.value == pytest.approx(3.0)
 
 
 def test_probabilities_are_held_against_how_often_they_are_right():
@@ -188,8 +202,8 @@ def test_with_answers_of_other_cases_every_score_collapses():
     cone = Trial("b", (CONE,), named("laser_cone").model_copy(update={"feasibility": feasibility}))
     null = Trial("c", (), CONSISTENT)
     true, swapped = score([tilt, cone, null]), score(shuffled([tilt, cone, null]))
-    assert (true.false_alarms.count, true.named_exactly.share, true.misnamed.count) == (0, 1.0, 0)
-    assert (swapped.false_alarms.count, swapped.named_exactly.share, swapped.misnamed.count) == (1, 0.0, 2)
+    assert (true.false_alarms.count, true.named_exactly.value, true.misnamed.count) == (0, 1.0, 0)
+    assert (swapped.false_alarms.count, swapped.named_exactly.value, swapped.misnamed.count) == (1, 0.0, 2)
     assert swapped.contained.count == 0
 
 
@@ -228,4 +242,4 @@ def test_an_effect_on_pictures_alone_is_scored_without_a_channel():
         flicker, answer=Answer(verdict="named", effects=(NamedEffect(name="light_flicker", probability=1),))
     )
     assert score([named]).named_exactly.count == 1
-    assert score([named]).size_count == 0
+    assert score([named]).size_in_95.of == 0

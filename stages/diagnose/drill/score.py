@@ -1,9 +1,9 @@
-"""Scores of diagnoses: rates with their intervals, sizes, probabilities, and the confusion of names."""
+"""Scores of diagnoses: rates with goals and intervals, sizes, probabilities, and the confusion of names."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -118,6 +118,10 @@ class Rate:
         return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
 
 
+def _number(value: float | np.floating) -> float | None:
+    return None if np.isnan(value) else float(value)
+
+
 def rate(hits: Iterable[bool]) -> Rate:
     """Return the share of true among ``hits``."""
     listed = list(hits)
@@ -125,66 +129,92 @@ def rate(hits: Iterable[bool]) -> Rate:
 
 
 @dataclass(frozen=True)
-class Scores:
-    """All rates of a drill; each over the trials that it concerns."""
+class Figure:
+    """One row: a share with its interval, or another number with ``interval`` None and ``of`` its count."""
 
-    false_alarms: Rate
-    detected: Rate
-    detected_any: Rate
-    located: Rate
-    channel_right: Rate
-    fixed_to_right: Rate
-    time_right: Rate
-    named_identifiable: Rate
-    named_exactly: Rate
-    contained: Rate
-    misnamed: Rate
-    pairs_named: Rate
-    pairs_identifiable: Rate
-    unknown_owned: Rate
-    unknown_misnamed: Rate
-    size_in_95: Rate
-    size_count: int
-    size_bias_sigma: float
-    heldout_removed: float
-    heldout_count: int
+    name: str
+    words: str
+    goal: str
+    value: float | None
+    of: int
+    interval: tuple[float, float] | None
+
+    @property
+    def count(self) -> int:
+        """How many of a share's trials."""
+        return round((self.value or 0.0) * self.of)
+
+    @property
+    def text(self) -> str:
+        """The row in one line."""
+        goal = f" (goal {self.goal})" if self.goal else ""
+        if self.value is None:
+            return f"{self.words}: none to count{goal}"
+        if self.interval is None:
+            return f"{self.words}: {self.value:+.2f} of {self.of}{goal}"
+        low, high = self.interval
+        return f"{self.words}: {self.count} of {self.of}, {self.value:.1%} [{low:.1%}, {high:.1%}]{goal}"
 
 
-def score(trials: Iterable[Trial]) -> Scores:
-    """Score diagnoses against what was concealed."""
+# Each share, its meaning, its goal (those without are only reported), the trials that it is of, and its hits.
+_RATES: tuple[tuple[str, str, str, str, Callable[[Trial], bool]], ...] = (
+    ("false_alarms", "False alarms where nothing is hidden", "0", "null", lambda t: t.found),
+    ("detected", "Detected at SNR ≥ 8", "≥ 99 %", "clear", lambda t: t.found),
+    ("detected_any", "Detected at any size", "", "known", lambda t: t.found),
+    ("located", "Located: channel, what it is fixed to and time behaviour", "≥ 97 %", "found",
+     lambda t: all(_located(t, what) for what in ("channel", "fixed_to", "time"))),
+    ("channel_right", "Located: channel", "", "found", lambda t: _located(t, "channel")),
+    ("fixed_to_right", "Located: what it is fixed to", "", "found", lambda t: _located(t, "fixed_to")),
+    ("time_right", "Located: behaviour in time", "", "found", lambda t: _located(t, "time")),
+    ("named_identifiable", "Named exactly where identifiable (single effects)", "≥ 95 %",
+     "single identifiable", lambda t: t.exact),
+    ("named_exactly", "Named exactly (all single effects)", "", "single", lambda t: t.exact),
+    ("contained", "Name or class contains the truth (found single effects)", "≥ 99 %", "single found",
+     lambda t: t.contained),
+    ("misnamed", "Confident wrong name", "≤ 0.5 %", "null or known", lambda t: t.misnamed),
+    ("pairs_named", "Pairs: both named", "≥ 90 %", "pairs", lambda t: t.exact),
+    ("pairs_identifiable", "Pairs: both named, where both are identifiable", "", "pairs identifiable",
+     lambda t: t.exact),
+    ("unknown_owned", "Left out of the library (SNR ≥ 8): unexplained or a class of its likes", "≥ 90 %",
+     "unknown", lambda t: owned(t)),
+    ("unknown_misnamed", "Left out of the library (SNR ≥ 8): confidently misnamed", "≤ 5 %", "unknown",
+     lambda t: t.misnamed),
+)  # fmt: skip
+
+
+def _sorted(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
+    """Return the trials that shares are of."""
     listed = list(trials)
     null = [t for t in listed if not t.concealed]
     known = [t for t in listed if t.concealed and not t.truth & set(t.left_out)]
-    # An effect too small even for an oracle cannot be expected to be called unexplained.
-    unknown = [t for t in listed if t.truth & set(t.left_out) and (t.snr is None or t.snr >= SNR)]
-    single = [t for t in known if len(t.concealed) == 1]
-    # What is on pictures alone is not in the catalogue: it has no channel, and no size to be compared.
-    found = [t for t in single if t.found and t.truth <= EFFECTS.keys()]
-    clear = [t for t in known if t.snr is not None and t.snr >= SNR]
-    z = [s for t in known for s in size_errors(t)]
-    removed = [r for t in known if (r := heldout_removed(t.answer)) is not None]
-    return Scores(
-        false_alarms=rate(t.found for t in null),
-        detected=rate(t.found for t in clear),
-        detected_any=rate(t.found for t in known),
-        located=rate(all(_located(t, what) for what in ("channel", "fixed_to", "time")) for t in found),
-        channel_right=rate(_located(t, "channel") for t in found),
-        fixed_to_right=rate(_located(t, "fixed_to") for t in found),
-        time_right=rate(_located(t, "time") for t in found),
-        named_identifiable=rate(t.exact for t in single if t.identifiable),
-        named_exactly=rate(t.exact for t in single),
-        contained=rate(t.contained for t in single if t.found),
-        misnamed=rate(t.misnamed for t in [*null, *known]),
-        pairs_named=rate(t.exact for t in known if len(t.concealed) > 1),
-        pairs_identifiable=rate(t.exact for t in known if len(t.concealed) > 1 and t.identifiable),
-        unknown_owned=rate(owned(t) for t in unknown),
-        unknown_misnamed=rate(t.misnamed for t in unknown),
-        size_in_95=rate(abs(s) < _95 for s in z),
-        size_count=len(z),
-        size_bias_sigma=float(np.mean(z)) if z else float("nan"),
-        heldout_removed=float(np.median(removed)) if removed else float("nan"),
-        heldout_count=len(removed),
-    )
+    single, pairs = ([t for t in known if (len(t.concealed) > 1) == several] for several in (False, True))
+    return {
+        "null": null, "known": known, "null or known": [*null, *known], "single": single, "pairs": pairs,
+        # An effect too small even for an oracle cannot be expected to be called unexplained.
+        "unknown": [t for t in listed if t.truth & set(t.left_out) and (t.snr is None or t.snr >= SNR)],
+        "clear": [t for t in known if t.snr is not None and t.snr >= SNR],
+        "single found": [t for t in single if t.found],
+        # What is on pictures alone is not in the catalogue: it has no channel.
+        "found": [t for t in single if t.found and t.truth <= EFFECTS.keys()],
+        "single identifiable": [t for t in single if t.identifiable],
+        "pairs identifiable": [t for t in pairs if t.identifiable],
+    }  # fmt: skip
+
+
+def figures(trials: Iterable[Trial]) -> tuple[Figure, ...]:
+    """Return the scores of diagnoses against what was concealed, in the demand's order."""
+    given = _sorted(trials)
+    rates = [(name, words, goal, rate(map(hit, given[of]))) for name, words, goal, of, hit in _RATES]
+    z = [error for t in given["known"] for error in size_errors(t)]
+    rates.append(("size_in_95", "Sizes within their 95 % interval", "93–97 %", rate(abs(x) < _95 for x in z)))
+    removed = [r for t in given["known"] if (r := heldout_removed(t.answer)) is not None]
+    return (
+        *(Figure(name, words, goal, _number(r.share), r.of, r.interval) for name, words, goal, r in rates),
+        Figure("size_bias_sigma", "Mean error of sizes in σ", "within ±0.2", _number(np.mean(z or [np.nan])),
+               len(z), None),
+        Figure("heldout_removed", "Held-out discrepancy above the noise floor removed, median", "≥ 0.97",
+               _number(np.median(removed or [np.nan])), len(removed), None),
+    )  # fmt: skip
 
 
 def shuffled(trials: Sequence[Trial]) -> tuple[Trial, ...]:
