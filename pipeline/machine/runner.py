@@ -21,7 +21,7 @@ from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, plain
 from pipeline.machine.store import Provenance, Store, Stored
 from pipeline.system.native import give_back_memory
-from pipeline.system.parallel import one_blas_thread
+from pipeline.system.parallel import one_library_thread
 
 _LONGEST_PROBLEM = 300
 _LOOK_S = 0.2  # a signal that reaches another thread is seen after so long
@@ -88,7 +88,7 @@ class Runner:
         self._over = threading.Event()
         self._at = ""
 
-    @one_blas_thread()
+    @one_library_thread()
     def run(self, selection: Selection) -> RunOutcome:
         """Run the stages selected.
 

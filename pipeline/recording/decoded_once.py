@@ -17,12 +17,14 @@ from pipeline.arrays import Byte, Image, Int
 from pipeline.errors import InputError
 from pipeline.machine.scratch import Scratch
 from pipeline.recording.base import Illumination, Planes, Recording, ascending, in_background
-from pipeline.recording.images import plane_of, shown
+from pipeline.recording.images import FULL_CHROMA, bgr_444, plane_of, shown
 from pipeline.recording.video import AHEAD, FEW, VideoSource
 
 # Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
 # Frames beyond it are decoded again. A disk that is nearly full is left to the results.
 _MOST_BYTES, _SHARE_OF_FREE = 4 << 30, 0.25
+# Bytes taken of the disk at a time: room found block by block as it is written takes the system twice as long.
+_GROWTH = 1 << 27
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class FrameStore:
     stream: IO[bytes]
     room: int
     _end: int = 0
+    _taken: int = 0
     _kept: dict[int, Kept | None] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -92,7 +95,10 @@ class FrameStore:
             return None
         if planes == "grey":
             return self._read(kept, 1)[0]
-        return shown(_rebuilt(kept, self._read(kept, len(kept.planes))), planes)
+        content = self._read(kept, len(kept.planes))
+        if kept.pixel_format in FULL_CHROMA:
+            return bgr_444(content, kept.pixel_format, kept.color_range, kept.colorspace)
+        return shown(_rebuilt(kept, content), planes)
 
     def _write(self, number: int, frame: av.VideoFrame, planes: list[Byte]) -> None:
         size = sum(p.nbytes for p in planes)
@@ -102,6 +108,7 @@ class FrameStore:
                 return
             self.room, self._end = self.room - size, offset + size
         try:
+            self._take_room(offset + size)
             written = os.pwritev(self.stream.fileno(), [p.data for p in planes], offset)
         except OSError:  # the disk is full or takes no file of this size: go on without
             written = 0
@@ -112,6 +119,13 @@ class FrameStore:
             offset, tuple((p.shape[0], p.shape[1]) for p in planes), len(planes) == len(frame.planes),
             (frame.width, frame.height), frame.format.name, int(frame.color_range), int(frame.colorspace),
         )  # fmt: skip
+
+    def _take_room(self, end: int) -> None:
+        with self._lock:
+            if end > self._taken:
+                growth = max(min(_GROWTH, self.room), end - self._taken)
+                os.posix_fallocate(self.stream.fileno(), self._taken, growth)
+                self._taken += growth
 
     def _read(self, kept: Kept, count: int) -> list[Byte]:
         planes = [np.empty(shape, np.uint8) for shape in kept.planes[:count]]

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import ParamSpec, TypeVar, cast
 
+import cv2
 from threadpoolctl import threadpool_limits
 
 Item = TypeVar("Item")
@@ -38,14 +39,21 @@ def in_threads(function: Callable[[Item], Made], items: Iterable[Item], threads:
 
 
 @contextmanager
-def one_blas_thread() -> Iterator[None]:
-    """Let linear algebra run on one thread meanwhile.
+def one_library_thread() -> Iterator[None]:
+    """Let linear algebra and OpenCV run on one thread meanwhile.
 
     BLAS splits sums among its threads, so that their number would show in a result's last digits: the
-    covariance of a corrected probe has other bytes with two threads than with one.
+    covariance of a corrected probe has other bytes with two threads than with one. OpenCV's results are the
+    same, but for pictures this small waking its threads costs more than they save: stages work in threads
+    themselves.
     """
-    with threadpool_limits(1, "blas"):
-        yield
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        with threadpool_limits(1, "blas"):
+            yield
+    finally:
+        cv2.setNumThreads(threads)
 
 
 P = ParamSpec("P")

@@ -14,6 +14,7 @@ down.
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import os
 import subprocess
@@ -87,6 +88,7 @@ def main() -> None:
 def run(recording: Path, folder: Path, apart: bool) -> None:
     """Run a recording from nothing."""
     job = prepare(recording, folder, probe=None, configuration=configuration())
+    gc.freeze()  # as the command does
     run_job(replace(job, at_once=1 if apart else job.at_once), Selection(resume=False), SilentDisplay())
 
 
