@@ -23,7 +23,7 @@ from pipeline.recording.video import AHEAD, FEW, VideoSource
 # Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
 # Frames beyond it are decoded again. A disk that is nearly full is left to the results.
 _MOST_BYTES, _SHARE_OF_FREE = 4 << 30, 0.25
-# Bytes taken of the disk at a time: room found block by block as it is written costs the system twice as much.
+# Bytes taken of the disk at a time: room found block by block while writing costs the system twice as much.
 _GROWTH = 1 << 27
 
 
