@@ -8,7 +8,7 @@ import numpy  # noqa: F401  NumPy and SciPy each bring a BLAS of their own, whos
 import pytest
 import scipy.linalg  # noqa: F401
 
-from pipeline.system.parallel import one_blas_thread
+from pipeline.system.parallel import one_library_thread
 from tests.patience import patience
 
 
@@ -19,7 +19,7 @@ def blas_as_in_a_run() -> Iterator[None]:
     With a thread for each core in each of two processes, threads wait for each other: a small Cholesky
     factorisation then takes up to a hundred times as long.
     """
-    with one_blas_thread():
+    with one_library_thread():
         yield
 
 
