@@ -16,7 +16,7 @@ import numpy as np
 from pipeline.arrays import Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
-from pipeline.geometry.axis import distance_along
+from pipeline.geometry.axis import distance_along, frames_at
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import FrameTable, Recording
@@ -47,6 +47,10 @@ _LARGEST_CHANGE = 0.1
 median radius errs by far less. Not measured."""
 _LEAST_TRACKED = 0.5
 """Share of the lit frames that texture must be followed in where there is no encoder. Not measured."""
+_MOST_TURNED = np.radians(45)
+"""Largest angle between the optical axis and the pipe's: the laser would draw an ellipse of 1.4 to 1 there.
+In the sharpest elbow (short radius, a diameter, by ASME B16.9) a probe as long as the pipe is wide turns
+by 30°."""
 _FEWEST_COLUMNS = 240
 """Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
 _OBSERVATIONS_AT_ONCE = 1 << 16
@@ -87,6 +91,7 @@ def estimate_motion(
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     report_motion(context, estimate, run.texture, trajectory)
+    require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
     return replace(trajectory, events=events)
@@ -249,3 +254,26 @@ MOTION = Stage(
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",
 )
+
+
+def require_along_pipe(trajectory: Trajectory) -> None:
+    """Refuse a motion in which the camera looks at the wall and not along the pipe.
+
+    Raises
+    ------
+    UnusableError
+        When the optical axis leaves the pipe's by more than a ring that is seen all round allows.
+    """
+    T_pc, limit_deg = trajectory.T_pc, np.degrees(_MOST_TURNED)
+    _, R_pa = frames_at(trajectory.axis, distance_along(trajectory.axis, T_pc))
+    turned = np.arccos(np.clip(np.einsum("ni,ni->n", T_pc[:, :3, 2], R_pa[:, :, 2]), -1, 1))
+    lost = turned > _MOST_TURNED
+    if lost.any():
+        raise UnusableError(
+            "motion",
+            f"the camera comes out turned by {np.degrees(turned.max()):.0f}° from the pipe's axis",
+            limit=f"{limit_deg:.0f}°",
+            frames=trajectory.frame[lost].tolist(),
+            hint="see the warnings before: what moves with the probe (a reflection, text, the line in lit "
+            "pictures) may have been taken for the wall. Record with less compression, or cut the recording",
+        )

@@ -13,6 +13,7 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Illumination
 from stages.motion import MotionParameters, adjust_at_once, estimate_motion, measure_run
+from stages.motion.estimate import require_along_pipe
 from stages.premises.stays import places_that_stay
 from tests.drawn_run import DrawnRun, drawn_run, without_encoder
 from tests.quiet import quiet_context
@@ -159,3 +160,19 @@ def test_text_burnt_in_is_not_followed() -> None:
     assert "burnt in" in told[0]
     z, _, sigma = errors(estimated(replace(run, recording=replace(run.recording, stays=stays))), run)
     assert abs(z[-1]) < 3 * sigma[-1, 0] + 0.02
+
+
+@pytest.mark.parametrize(("turned_deg", "wrong"), [(30, False), (80, True)])
+def test_a_camera_that_looks_at_the_wall_ends_the_run(
+    steady: DrawnRun, turned_deg: float, wrong: bool
+) -> None:
+    got = estimated(steady)
+    angle = np.radians(turned_deg)
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    T_pc = got.T_pc.copy()
+    T_pc[20:, :3, :3] = T_pc[20:, :3, :3] @ turn
+    if not wrong:
+        require_along_pipe(replace(got, T_pc=T_pc))
+        return
+    with pytest.raises(UnusableError, match=r"turned by 80°[^$]*Frames: 20, 21"):
+        require_along_pipe(replace(got, T_pc=T_pc))
