@@ -153,6 +153,10 @@ CAMERA_EFFECTS = (
 
 # The dome of the catalogue's typical figures; only the product (n − 1) t / (n ρ²) has an effect.
 GLASS_INDEX, DOME_THICKNESS_MM, DOME_RADIUS_MM = 1.5, 2.0, 14.0
+DOME_POWER = (GLASS_INDEX - 1) * DOME_THICKNESS_MM / (GLASS_INDEX * DOME_RADIUS_MM**2)
+# A tube that nobody stated: 30 mm outside and 2 mm thick, the typical size of `housing_glass` below. The
+# simulator, the error budget and the diagnosis suppose the same.
+TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM = 15.0, 2.0
 
 WINDOW_EFFECTS = (
     Effect(

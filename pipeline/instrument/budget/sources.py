@@ -17,6 +17,7 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
+from pipeline.physics.instrument import DOME_POWER, TUBE_OUTER_RADIUS_MM
 
 _DEG = math.radians(1)
 
@@ -153,11 +154,8 @@ def typical_probe(baseline_mm: float = 22.0) -> Probe:
     return Probe(camera, laser, covariance)
 
 
-# Refractive index of crown glass, and outer radius of the tube that the budget supposes. Debt: data/debts.md.
-TUBE_INDEX = 1.51
-TUBE_RADIUS_MM = 14.0
-# (n − 1) t / (n ρ²) of an acrylic dome 1.5 mm thick with a radius of 12 mm, 1/mm
-_DOME_POWER = 0.49 * 1.5 / (1.49 * 12.0**2)
+# Crown glass, with which PHYSICS.md's 0.74 mm for 2 mm of glass in a 4 inch pipe holds; 1.5 gives 0.73 mm.
+_GLASS_INDEX = 1.51
 
 
 @dataclass(frozen=True)
@@ -220,16 +218,16 @@ def observe_jacobian(camera: Camera, xyz_c: Float) -> Float:
     size = np.linalg.norm(m, axis=-1, keepdims=True)
     tilt_x, tilt_y = (theta[:, None] * (2 * m * m[:, [i]] / size + size * np.eye(2)[i]) for i in (0, 1))
     reach, tangent = np.linalg.norm(xyz_c[:, :2], axis=-1), _tan_inside(xyz_c)
-    index = ((reach - TUBE_RADIUS_MM) * tangent * (1 + tangent**2))[:, None] * along_axis
+    index = ((reach - TUBE_OUTER_RADIUS_MM) * tangent * (1 + tangent**2))[:, None] * along_axis
     columns = [
         -(theta / np.sin(theta) - 1)[:, None] * along_axis,
         tilt_x, tilt_y,
         m * np.array([0.5, -0.5]),
         glass, glass * c[:, None], glass * s[:, None],
         index,
-        _DOME_POWER * np.sin(theta)[:, None] * outward,
-        _DOME_POWER * (np.cos(theta) * c)[:, None] * outward,
-        _DOME_POWER * (np.cos(theta) * s)[:, None] * outward,
+        DOME_POWER * np.sin(theta)[:, None] * outward,
+        DOME_POWER * (np.cos(theta) * c)[:, None] * outward,
+        DOME_POWER * (np.cos(theta) * s)[:, None] * outward,
     ]  # fmt: skip
     return np.stack(columns, -1)
 
@@ -244,13 +242,13 @@ def _apparent(xyz_c: Float, d: Disturbance) -> Float:
         tangent = z / reach
         theta = np.arctan2(reach, z)
         outside = _refracted(tangent, 1 + d.outside_index)
-        lift = glass * (tangent - _tan_glass(tangent)) + (reach - TUBE_RADIUS_MM) * (tangent - outside)
+        lift = glass * (tangent - _tan_glass(tangent)) + (reach - TUBE_OUTER_RADIUS_MM) * (tangent - outside)
         before, z = z, xyz_c[:, 2] + lift - d.pupil_mm * (theta / np.sin(theta) - 1)
         if np.abs(z - before).max() < 1e-12:
             break
     theta = np.arctan2(reach, z)
     lateral = d.dome_x_mm * c + d.dome_y_mm * s
-    theta = theta + _DOME_POWER * (d.dome_axial_mm * np.sin(theta) + lateral * np.cos(theta))
+    theta = theta + DOME_POWER * (d.dome_axial_mm * np.sin(theta) + lateral * np.cos(theta))
     return np.concatenate([unit * np.sin(theta)[:, None], np.cos(theta)[:, None]], -1)
 
 
@@ -275,7 +273,7 @@ def _tan_inside(xyz_c: Float) -> Float:
 
 
 def _tan_glass(tangent: Float) -> Float:
-    return _refracted(tangent, TUBE_INDEX)
+    return _refracted(tangent, _GLASS_INDEX)
 
 
 def _refracted(tangent: Float, index: float) -> Float:

@@ -15,7 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.instrument.laser import LaserSheet
-from pipeline.physics.instrument import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
+from pipeline.physics.instrument import (
+    DOME_RADIUS_MM,
+    DOME_THICKNESS_MM,
+    GLASS_INDEX,
+    TUBE_OUTER_RADIUS_MM,
+    TUBE_THICKNESS_MM,
+)
 from pipeline.simulator.instrument import SheetWave, TrueInstrument
 from pipeline.simulator.truth import SceneTruth, cartesian, with_camera, with_laser
 from pipeline.simulator.window import CylinderWindow, SphereWindow, Window
@@ -98,8 +104,6 @@ def tilted(sheet: LaserSheet, tilt_rad: float, direction_deg: float) -> LaserShe
     return replace(sheet, tilt_x=sheet.tilt_x + x, tilt_y=sheet.tilt_y + y)
 
 
-# Outer radius of the sealed probe, and the glass of the tube that tilts (catalogue, PHYSICS notes).
-TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM = 15.0, 2.0
 # Refractive index of air, taken as that of vacuum: the difference, 2.7e-4, is the effect `outside_index`.
 _AIR = 1.0
 

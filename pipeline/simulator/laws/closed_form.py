@@ -12,12 +12,10 @@ from types import MappingProxyType
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.instrument import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
-from pipeline.simulator.effects.laser_and_window import TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
+from pipeline.physics.instrument import DOME_POWER, GLASS_INDEX, TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
 from pipeline.simulator.laws import BASELINE_MM, FOCAL_PX
 
 Law = Callable[..., Float]
-_DOME_POWER = (GLASS_INDEX - 1) * DOME_THICKNESS_MM / (GLASS_INDEX * DOME_RADIUS_MM**2)
 
 
 def theta_of(r: float) -> float:
@@ -115,12 +113,12 @@ def tube_tilt(r: float, psi: Float, tilt_deg: float, direction_deg: float) -> Fl
 
 def dome_axial(r: float, psi: Float, offset_mm: float) -> Float:
     """S (n−1) t d sin θ / (n ρ²)."""
-    return np.full_like(psi, lever_of(r) * _DOME_POWER * offset_mm * np.sin(theta_of(r)))
+    return np.full_like(psi, lever_of(r) * DOME_POWER * offset_mm * np.sin(theta_of(r)))
 
 
 def dome_lateral(r: float, psi: Float, offset_mm: float, direction_deg: float) -> Float:
     """S (n−1) t d cos θ / (n ρ²) c₁."""
-    size = lever_of(r) * _DOME_POWER * offset_mm * np.cos(theta_of(r))
+    size = lever_of(r) * DOME_POWER * offset_mm * np.cos(theta_of(r))
     return np.asarray(size * crest(psi, direction_deg))
 
 

@@ -10,14 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.instrument import DOME_RADIUS_MM, DOME_THICKNESS_MM, GLASS_INDEX
+from pipeline.physics.instrument import DOME_POWER, GLASS_INDEX, TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.camera import image_shift
 from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, cosine, one
 
-_TUBE_THICKNESS_MM = 2.0
-_TUBE_RADIUS_MM = 15.0
-_DOME_POWER_PER_MM = (GLASS_INDEX - 1) * DOME_THICKNESS_MM / (GLASS_INDEX * DOME_RADIUS_MM**2)
 # Glasses and clear plastics of windows have an index of 1.45 to 1.55 (fused silica 1.458, PMMA 1.491, BK7
 # 1.517), here evenly. The shift grows as 1 − 1/n, so that a size found with n = 1.5 errs
 # by the share dn / (n (n − 1)).
@@ -57,8 +54,8 @@ class TubeWedge(Directed):
         """
         sine = np.sin(points.theta)
         bent = np.sqrt(GLASS_INDEX**2 - 1 + sine**2) - sine
-        flank = cosine(points.azimuth_rad - np.pi / 2, amplitude) / _TUBE_RADIUS_MM
-        turn = bent * flank / sine * (1 - _TUBE_RADIUS_MM / points.radius_mm)
+        flank = cosine(points.azimuth_rad - np.pi / 2, amplitude) / TUBE_OUTER_RADIUS_MM
+        turn = bent * flank / sine * (1 - TUBE_OUTER_RADIUS_MM / points.radius_mm)
         steep = _steepness(points, *_layers(points, cosine(points.azimuth_rad, amplitude)), GLASS_INDEX)
         return _seen_under(points, points.azimuth_rad + turn, steep)
 
@@ -98,7 +95,7 @@ class TubeTilt(Directed):
         """Return the laser's displacement by the leaning glass."""
         sine = np.sin(cosine(points.azimuth_rad, np.radians(amplitude)))
         glass = np.sqrt(GLASS_INDEX**2 - sine**2)
-        return np.asarray(shape[0] * _TUBE_THICKNESS_MM * sine * (1 - np.sqrt(1 - sine**2) / glass))
+        return np.asarray(shape[0] * TUBE_THICKNESS_MM * sine * (1 - np.sqrt(1 - sine**2) / glass))
 
 
 class DomeAxial(Scalar):
@@ -138,7 +135,7 @@ class OutsideIndex(Scalar):
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the medium, less that without."""
-        plain, dense = _layers(points, points.radius_mm - _TUBE_RADIUS_MM)
+        plain, dense = _layers(points, points.radius_mm - TUBE_OUTER_RADIUS_MM)
         steep = _steepness(points, plain, dense, 1 + float(amplitude[0]))
         return _seen_under(points, points.azimuth_rad, steep)
 
@@ -175,7 +172,7 @@ def _displacement_c(ray_c: Float, axis_c: Float) -> Float:
     normal = across / incidence
     glass = np.sqrt(1 - (1 - incidence**2) / GLASS_INDEX**2)
     inside = ray_c / GLASS_INDEX + (glass - incidence / GLASS_INDEX) * normal
-    return np.asarray(_TUBE_THICKNESS_MM * (inside / glass - ray_c / incidence))
+    return np.asarray(TUBE_THICKNESS_MM * (inside / glass - ray_c / incidence))
 
 
 def _through_dome(points: ImagePoints, centre_c: Float) -> Float:
@@ -190,7 +187,7 @@ def _through_dome(points: ImagePoints, centre_c: Float) -> Float:
         ray = seen / np.linalg.norm(seen, axis=1)[:, None]
         aside = -centre_c + (ray @ centre_c)[:, None] * ray
         turned = _along(ray, from_centre) * aside - _along(aside, from_centre) * ray
-        seen = points.xyz_c - _DOME_POWER_PER_MM * turned
+        seen = points.xyz_c - DOME_POWER * turned
     return image_shift(points, seen)
 
 
