@@ -47,9 +47,9 @@ def third_difference_growth(stride: float) -> float:
 
 
 def third_difference_sigma(T_pc: Float, known: Int) -> Float:
-    """Return the robust 1 σ (6,) of the third differences of position, mm, and turn, rad,.
+    """Return the robust 1 σ (6,) of the third differences of position, mm, and turn, rad.
 
-    With fewer than eight frames that know their pose it is `LOOSE`.
+    With fewer than eight frames of known pose it is `LOOSE`.
 
     Parameters
     ----------

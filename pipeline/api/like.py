@@ -50,7 +50,7 @@ _DEFECT = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth
 
 @dataclass(frozen=True)
 class Changed:
-    """What is to be other than in the run.
+    """What differs from the run.
 
     Attributes
     ----------

@@ -218,7 +218,7 @@ class Run:
         return review.state().findings
 
     def probe(self) -> Probe:
-        """Return the probe with its parameters as this run bears them out.
+        """Return the probe with its parameters as this run estimated them.
 
         Raises
         ------

@@ -46,7 +46,7 @@ class ModelChoice(StrEnum):
 
 
 class BoardShape(StrEnum):
-    """What the board is taken for."""
+    """The shape that the board is assumed to have."""
 
     BEST = "best"
     FLAT = "flat"

@@ -171,7 +171,7 @@ def _sealed_and_worked(
 
 
 def _shuffled(done: Sequence[Worked]) -> list[Worked]:
-    """Return all trials, each with the answer to a case that conceals something else; of walls nothing."""
+    """Return all trials, each with the answer to a case that conceals something else, without wall errors."""
     trials = shuffled([trial for case in done for trial in case.trials])
     return [Worked(trials, seconds=None, failures=(), wall=None)]
 

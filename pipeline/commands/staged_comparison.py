@@ -39,7 +39,7 @@ class StagedComparison:
 
     @classmethod
     def configured(cls, config: Path | None, assignments: Sequence[str]) -> StagedComparison:
-        """Return a comparison with the parameters of a file, which may be that of a whole run, and words."""
+        """Return a comparison with the parameters of a file, which may be a whole run's, and assignments."""
         return cls(resolve((*PIPELINE, *COMPARISON), config, assignments))
 
     def __call__(self, pair: RunPair) -> tuple[RegisteredWalls, Comparison]:

@@ -1,1 +1,1 @@
-"""Rigid motion, pipe coordinates and robust fits."""
+"""Rigid motions, and pipe coordinates about a straight or curved axis."""

@@ -16,7 +16,7 @@ _NOTEBOOKS = ("dash", "plotly", "plotly.graph_objects")
 
 
 def give_back_memory() -> None:
-    """Return to the system what was freed: the GNU C library keeps it for each thread by itself."""
+    """Return freed memory to the system; the GNU C library would keep it, for each thread apart."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
     if trim is not None:
         trim(0)

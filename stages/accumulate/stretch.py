@@ -12,15 +12,16 @@ from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
 from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
-from stages.accumulate.grid import MapGrid, gridded, rings_on_columns
+from stages.accumulate.grid import WIDTH_IN_RINGS, MapGrid, gridded, rings_on_columns
 from stages.accumulate.survey import RingsOnWall, RingSurvey, WallSamples, centred, some_at_a_time
 
 # Rows of a stretch, for memory's sake.
 _ROWS = 1000
-# A stretch is computed from the rings within so many reaches of it. Debt: data/debts.md.
+# A stretch is computed from the rings within so many reaches of it. In stretches of a tenth of the length
+# 1 to 16 reaches change no radius of open-1 by more than 6 µm; its random σ is 20 µm.
 _REACHES = 4.0
-# Reach of the kernel in its σ, and its least σ in ring spacings, as in `grid`.
-_WIDTHS, _WIDTH_IN_RINGS = 3.0, 0.4
+# Reach of the kernel in its σ, as in `grid`.
+_WIDTHS = 3.0
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def cut_stretches(grid: MapGrid, survey: RingSurvey, smoothing_mm: float, gap_mm
     s, rows = grid.distance_mm, len(grid.distance_mm)
     seen = survey.count > 0
     usual = float(np.median(np.abs(np.diff(survey.middle_mm[seen])))) if seen.sum() > 1 else 0.0
-    reach = _REACHES * max(_WIDTHS * max(smoothing_mm, _WIDTH_IN_RINGS * usual), gap_mm)
+    reach = _REACHES * max(_WIDTHS * max(smoothing_mm, WIDTH_IN_RINGS * usual), gap_mm)
     row = np.clip(np.nan_to_num(np.rint((survey.middle_mm - s[0]) / (s[1] - s[0]))), 0, rows - 1)
     home = np.where(seen, row.astype(np.int64) // _ROWS, -1)
     return [_stretch(grid, survey, k, np.flatnonzero(home == k), reach) for k in range(-(-rows // _ROWS))]

@@ -14,14 +14,16 @@ from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, T
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.probe import Probe
 
-# Times the weights are computed anew. Debt: data/debts.md.
+# Times the weights are computed anew: 24 change no radius of open-1 and open-3 by 0.1 µm, 6 by 2 µm at most.
 _ITERATIONS = 12
-# Robust spreads at which a sample's weight falls to a quarter. Debt: data/debts.md.
+# Robust spreads at which a sample's weight falls to a quarter. Half and twice as many change radii of open-1
+# and open-3 by 7 µm at most, by an eighth of their random σ in r.m.s.
 _REDESCENT = 2.5
 # Share of the circle that must be seen for a first harmonic to be told from shape.
 _FEWEST = 0.5
-# Rings of the running median and of the mean after it. Debt: data/debts.md.
+# Rings of the running median. Debt: data/debts.md.
 _RINGS = 31
+# Rings of the mean after it: 3 and 15 change no radius of open-1 and open-3 by more than 3 µm.
 _SMOOTH_RINGS = 7
 # Rings worked out at a time, for memory's sake.
 _AT_ONCE = 512

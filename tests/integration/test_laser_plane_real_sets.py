@@ -10,8 +10,9 @@ from pipeline.instrument.camera.formats import read_camera
 from stages.calibrate.boards import calibrate_boards
 from stages.calibrate.boards.detect import Chessboard, detect
 from stages.calibrate.boards.fit import BoardCalibrationParameters
-from stages.calibrate.laser import LaserPicture, calibrate_laser_plane, fit_plane, line_on_board
+from stages.calibrate.laser import LaserPicture, calibrate_laser_plane, line_on_board
 from stages.calibrate.laser.line import LaserPlaneParameters
+from stages.calibrate.laser.plane import fit_plane
 from tests.quiet import quiet_context
 from tests.shared_data import shared
 

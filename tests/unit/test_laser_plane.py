@@ -6,20 +6,21 @@ import pytest
 
 from pipeline.commands.calibrate_laser import with_plane
 from pipeline.errors import UnusableError
+from pipeline.geometry.rigid import from_parts
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserPlane, LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe, write_probe
-from stages.calibrate.boards.detect import Chessboard, detect
+from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, pose_covariances, solve
+from stages.calibrate.boards.detect import Chessboard, detect, grid
 from stages.calibrate.laser import (
     LaserPicture,
     calibrate_laser_plane,
-    fit_plane,
-    fit_plane_robustly,
     line_on_board,
 )
 from stages.calibrate.laser.line import LaserPlaneParameters, fit_peaks
-from tests.board_scene import chessboard_picture, facing_pose, render
+from stages.calibrate.laser.plane import BoardErrors, fit_plane, fit_plane_robustly
+from tests.board_scene import chessboard_picture, facing_pose, render, views_of
 from tests.quiet import quiet_context
 
 CAMERA = KannalaBrandt((640, 480), (230.0, 229.5), (318.3, 241.2), (-0.0118, 0.0008, -0.0008, 0.0001))
@@ -85,6 +86,41 @@ def test_covariance_without_groups_would_be_too_small():
     points, group = _plane_points(np.random.default_rng(3), 12, 40, picture_mm=0.1)
     apart = fit_plane(points, np.arange(len(points)))
     assert fit_plane(points, group).tilt_sigma_rad > 2 * apart.tilt_sigma_rad
+
+
+def _drawn(random, poses):
+    """Return points on the sheet as boards of noisy corners place them, and the boards' errors."""
+    points, arms, spread = [], [], []
+    for view, T_centre in zip(views_of(CAMERA, poses, random, sigma_px=0.2), poses, strict=True):
+        T_true = T_centre @ from_parts(np.eye(3), -grid(9, 6, 20.0).mean(0))
+        corners = Corners.of([view])
+        posed = solve(Estimate(CAMERA, T_true[None], np.zeros(3)), corners, POSES_ONLY, 1.0)
+        upright = np.array([-SHEET.tilt_x, -SHEET.tilt_y, 1.0])
+        across = (upright @ T_true[:3, :3])[:2]
+        nearest = across * (SHEET.baseline_mm - upright @ T_true[:3, 3]) / (across @ across)
+        line = np.array([-across[1], across[0]]) / np.linalg.norm(across)
+        xyz_b = np.column_stack([nearest + np.linspace(-40, 40, 60)[:, None] * line, np.zeros(60)])
+        arms.append(xyz_b @ posed.T_cb[0, :3, :3].T)
+        points.append(arms[-1] + posed.T_cb[0, :3, 3] + random.normal(0, 0.01, (60, 3)))
+        spread.append(pose_covariances(posed, corners, 1.0)[0])
+    group = np.repeat(np.arange(len(points)), 60)
+    return np.concatenate(points), group, BoardErrors(np.concatenate(arms), np.stack(spread))
+
+
+def test_covariance_holds_what_the_boards_poses_err():
+    """Of 60 draws; without the poses the plane is told half as unsure as it is."""
+    squares = {True: [], False: []}
+    poses = [facing_pose(*pose) for pose in POSES]
+    for seed in range(60):
+        points, group, boards = _drawn(np.random.default_rng(seed), poses)
+        for knows in squares:
+            plane = fit_plane(points, group, boards if knows else None)
+            sheet = plane.sheet(0.15, 520.0)
+            error = np.array([sheet.baseline_mm - 90, sheet.tilt_x - 0.21, sheet.tilt_y + 0.13])
+            squares[knows].append(error @ np.linalg.solve(plane.sheet_covariance(), error))
+    # Median of χ² with 3 degrees of freedom: 2.37; four boards leave the scatter of their lines unsure.
+    assert 1.2 < np.median(squares[True]) < 3.3
+    assert np.median(squares[False]) > 4
 
 
 def test_probe_takes_the_plane_with_its_covariance(tmp_path):

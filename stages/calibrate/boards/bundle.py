@@ -23,6 +23,8 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView
 
 POSE = 6
+# Corners beyond the model's reach count as so far off. A tenth and ten times of it, half and twice the trials
+# and a tenth and ten times of the gain at which a fit stops move no Kannala-Brandt camera by 1e-6 of its σ.
 _OUT_OF_MODEL_PX = 1e4
 _STOP = Stop(trials=300, enough=1e-10)
 
@@ -210,6 +212,19 @@ def covariance(estimate: Estimate, corners: Corners, free: Free, huber_px: float
     information, gradients = linearise(estimate, corners, free, huber_px).marginal()
     inverse = covariance_of(information)
     return variance * _togetherness(gradients, inverse, variance) * inverse, float(np.sqrt(variance))
+
+
+def pose_covariances(estimate: Estimate, corners: Corners, huber_px: float) -> Float:
+    """Return the covariance (V, 6, 6) of the poses' tangents, rad and mm, with the camera held.
+
+    Each is that of independent corners which scatter as those of its own picture do.
+    """
+    residual = estimate.residuals(corners)
+    weight = weights(residual, huber_px)
+    squares = np.nan_to_num(weight * np.sum(residual**2, -1))
+    variance = [squares[p].sum() / max(2 * np.count_nonzero(weight[p]) - POSE, 1) for p in corners.slices()]
+    block = linearise(estimate, corners, POSES_ONLY, huber_px).block
+    return np.stack([v * covariance_of(b) for v, b in zip(variance, block, strict=True)])
 
 
 def _togetherness(gradients: Float, inverse: Float, variance: float) -> float:

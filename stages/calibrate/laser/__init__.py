@@ -1,9 +1,4 @@
-"""The laser plane from boards with the laser line across them: board pose, line on the board, plane.
-
-The plane of least squared distances passes through the centroid, square to the direction of least scatter
-(K. Pearson, "On lines and planes of closest fit to systems of points in space", 1901). Outliers are weighted
-down after Tukey by iterated reweighting.
-"""
+"""The laser plane from boards with the laser line across them: board pose, line on the board, plane."""
 
 from __future__ import annotations
 
@@ -12,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.robust import TUKEY, cluster_sums, robust_spread, root_mean_square
-from pipeline.arrays import Float, Image, Int
+from pipeline.arrays import Float, Image
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera import Camera
@@ -21,89 +15,14 @@ from pipeline.instrument.camera.calibration import BoardView, rms
 from pipeline.instrument.laser import NAME, LaserPlane
 from pipeline.machine.stage import Context, Stage
 from stages.calibrate.boards import CameraFile, FoundBoards, Pictures
-from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, solve
+from stages.calibrate.boards.bundle import POSES_ONLY, Corners, Estimate, pose_covariances, solve
 from stages.calibrate.boards.pictures import read_picture
 from stages.calibrate.boards.start import pose
 from stages.calibrate.laser.line import LaserPlaneParameters, measure_line, patch_around
+from stages.calibrate.laser.plane import BoardErrors, fit_plane_robustly
 from stages.rings.extract import excess_weights, mix
 
 __all__ = ["LASER_PLANE", "LaserCalibration"]
-
-_MOST_STEPS, _SETTLED = 50, 1e-9
-# A straight line in a picture has two numbers; the plane takes three of all of them.
-_NUMBERS_PER_LINE, _UNKNOWNS = 2, 3
-
-
-def fit_plane(xyz_c: Float, group: Int) -> LaserPlane:
-    """Return the plane of least squared distances of points (N, 3), mm.
-
-    Parameters
-    ----------
-    group : (N,)
-        Which points err together, such as the number of the picture that each comes from: 0, 1, ...
-    """
-    return _weighted(xyz_c, group, np.ones(len(xyz_c)))
-
-
-def fit_plane_robustly(xyz_c: Float, group: Int) -> LaserPlane:
-    """Return the plane through points (N, 3), mm, of which a minority lies off it: see `fit_plane`."""
-    weight = np.ones(len(xyz_c))
-    for _ in range(_MOST_STEPS):
-        distance = np.abs(_weighted(xyz_c, group, weight).distances(xyz_c))
-        following = _tukey(distance / max(robust_spread(distance), 1e-12))
-        moved = float(np.abs(following - weight).max())
-        weight = following
-        if moved < _SETTLED:
-            break
-    return _weighted(xyz_c, group, weight)
-
-
-def _weighted(xyz_c: Float, group: Int, weight: Float) -> LaserPlane:
-    centroid = weight @ xyz_c / weight.sum()
-    centred = xyz_c - centroid
-    axes = np.linalg.eigh((centred * weight[:, None]).T @ centred)[1]
-    normal = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
-    residual = centred @ normal
-    used = weight > 0
-    return LaserPlane(
-        normal,
-        float(normal @ centroid),
-        _covariance(xyz_c, group, weight, residual, axes[:, 1:]),
-        root_mean_square(residual[used]),
-        int(np.count_nonzero(used)),
-    )
-
-
-def _covariance(xyz_c: Float, group: Int, weight: Float, residual: Float, tangents: Float) -> Float:
-    """Return the covariance (4, 4) of (n, d) from the residuals' own spread.
-
-    It is scaled up by the factor by which the groups' gradients scatter more than independent points make
-    them: an error of a board's pose displaces all points of its picture.
-    """
-    jacobian = np.concatenate([xyz_c @ tangents, -np.ones((len(xyz_c), 1))], 1)
-    inverse = np.linalg.pinv((jacobian * weight[:, None]).T @ jacobian, hermitian=True)
-    variance = float(weight @ residual**2) / max(int(np.count_nonzero(weight)) - _UNKNOWNS, 1)
-    spread = (
-        variance * _togetherness(jacobian * (weight * residual)[:, None], group, inverse, variance) * inverse
-    )
-    embedding = np.zeros((4, 3))
-    embedding[:3, :2], embedding[3, 2] = tangents, 1.0
-    return np.asarray(embedding @ spread @ embedding.T)
-
-
-def _togetherness(gradient: Float, group: Int, inverse: Float, variance: float) -> float:
-    """Return the scatter of the groups' gradients (N, 3) against that of independent points, at least 1."""
-    summed = cluster_sums(gradient, group)
-    groups = len(summed)
-    freedom = _NUMBERS_PER_LINE * groups - _UNKNOWNS
-    if groups == 1 or freedom < 1 or variance == 0:
-        return 1.0
-    scatter = float(np.einsum("gi,ij,gj->", summed, inverse, summed)) / variance / _UNKNOWNS
-    return max(scatter * _NUMBERS_PER_LINE * groups / freedom, 1.0)
-
-
-def _tukey(ratio: Float) -> Float:
-    return np.asarray(np.where(ratio < TUKEY, (1 - (ratio / TUKEY) ** 2) ** 2, 0.0))
 
 
 @dataclass(frozen=True)
@@ -124,6 +43,8 @@ class BoardLine:
         Of the picture.
     T_cb : (4, 4)
         Board to camera, mm.
+    pose_covariance : (6, 6)
+        Of its rotation vector, rad, and translation, mm, in C, by the scatter of the board's corners.
     pose_rms_px : float
         Root mean square distance of the board's corners from their projection.
     xyz_c : (N, 3)
@@ -132,6 +53,7 @@ class BoardLine:
 
     name: str
     T_cb: Float
+    pose_covariance: Float
     pose_rms_px: float
     xyz_c: Float
 
@@ -206,7 +128,9 @@ def calibrate_laser_plane(
     group = np.repeat(np.arange(len(lines)), [len(line.xyz_c) for line in lines])
     xyz_c = np.concatenate([line.xyz_c for line in lines])
     _refuse_one_line(xyz_c, parameters)
-    plane = fit_plane_robustly(xyz_c, group)
+    arms = np.concatenate([line.xyz_c - line.T_cb[:3, 3] for line in lines])
+    boards = BoardErrors(arms, np.stack([line.pose_covariance for line in lines]))
+    plane = fit_plane_robustly(xyz_c, group, boards)
     _refuse_undetermined(plane, parameters)
     return LaserCalibration(plane, tuple(lines), tuple(rejected), parameters.wavelength_nm)
 
@@ -222,7 +146,8 @@ def line_on_board(picture: LaserPicture, camera: Camera, parameters: LaserPlaneP
     excess = mix(picture.image, excess_weights(parameters.wavelength_nm))
     xy_b = measure_line(excess, camera, patch, parameters)
     xyz_b = np.concatenate([xy_b, np.zeros((len(xy_b), 1))], 1)
-    return BoardLine(view.name, T_cb, rms(posed.residuals(corners)), transform(T_cb, xyz_b))
+    spread = pose_covariances(posed, corners, parameters.huber_px)[0]
+    return BoardLine(view.name, T_cb, spread, rms(posed.residuals(corners)), transform(T_cb, xyz_b))
 
 
 def _square_mm(view: BoardView) -> float:
@@ -278,5 +203,5 @@ def _refuse_undetermined(plane: LaserPlane, parameters: LaserPlaneParameters) ->
 
 
 LASER_PLANE = Stage(
-    "laser_plane", "1", LaserPlaneParameters, calibrate_laser, "laser lines on boards to the laser's plane"
+    "laser_plane", "2", LaserPlaneParameters, calibrate_laser, "laser lines on boards to the laser's plane"
 )

