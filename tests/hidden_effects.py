@@ -140,7 +140,54 @@ def effects(scene: Scene, frame: Int, random: np.random.Generator) -> list[Hidde
                 {},
             )
         )
+        found += _whole_pictures(kind, weak, int(frame.max()) + 1, scene, random)
     return found
+
+
+def _whole_pictures(
+    kind: str, weak: bool, frames: int, scene: Scene, random: np.random.Generator
+) -> list[Hidden]:
+    """Return effects that change whole pictures: motion, stray light, bloom, a second line."""
+    blur, light, leak, ghost = (1.2, 3.0, 0.1, 0.05) if weak else (2.5, 12.0, 0.4, 0.2)
+    turn = random.uniform(0, np.pi, frames)
+    v, u = np.mgrid[0 : scene.polar[0].shape[0], 0 : scene.polar[0].shape[1]].astype(np.float32)
+    away = np.nan_to_num(scene.polar[0])
+    shade = (light * np.exp(-0.5 * ((away - 1.0) / 0.3) ** 2)).astype(np.float32)
+
+    def moved(number: int, kind: str, image: Float32) -> Float32:
+        c, s = np.cos(turn[number]), np.sin(turn[number])
+        steps = blur * np.sqrt(3) * np.linspace(-1, 1, 9)
+        return np.mean(
+            [
+                cv2.warpAffine(image, np.float32([[1, 0, d * c], [0, 1, d * s]]), image.shape[::-1])
+                for d in steps
+            ],
+            axis=0,
+        ).astype(np.float32)
+
+    def bloomed(number: int, kind: str, image: Float32) -> Float32:
+        over = np.maximum(1.6 * image - 160, 0)
+        tail = np.exp(-np.abs(np.arange(-48, 49)) / 6.0)
+        return np.minimum(1.6 * image + leak * cv2.sepFilter2D(over, -1, np.ones(1), tail / 2), 160)
+
+    def doubled(number: int, kind: str, image: Float32) -> Float32:
+        (cu, cv), scale = scene.ring.centre_px, np.float32(1 / 0.8)
+        other = cv2.remap(image, cu + (u - cu) * scale, cv + (v - cv) * scale, cv2.INTER_LINEAR)
+        return image + np.float32(ghost) * other if kind == "laser" else image
+
+    nowhere: dict[str, tuple[float, float]] = {}
+    return [
+        Hidden(f"motion blur, {kind}", moved, ("motion_blur",), "time", nowhere, blur),
+        Hidden(
+            f"ambient light, {kind}",
+            lambda n, k, i: i + shade * (k == "laser"),
+            ("ambient_light", "interreflection"),
+            "wall",
+            nowhere,
+        ),
+        Hidden(f"bloom, {kind}", bloomed, ("bloom",), "image", nowhere),
+        Hidden(f"second line, {kind}", doubled, ("second_line",), "line", nowhere, ghost),
+    ]
 
 
 def _times(factor: Float32) -> Change:

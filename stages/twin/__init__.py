@@ -19,15 +19,25 @@ from stages.twin.causes import causes
 from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, block_contrasts, block_ratios, exposure_of
 from stages.twin.locate import LEAST_CONTRAST, ImagePlace, beside, full_size, places_in_image
-from stages.twin.name import cannot_tell, clipped, noise_figures, not_sharp, state_figures
+from stages.twin.name import (
+    cannot_tell,
+    clipped,
+    left_over,
+    maps_of,
+    noise_figures,
+    of_texture,
+    state_figures,
+    worst_places,
+)
+from stages.twin.picture import WholePictures
 from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image, unnamed
-from stages.twin.render import Region, render_frame
 from stages.twin.scene import Scene, scene_of
-from stages.twin.shown import maps_of, worst_places
-from stages.twin.state import PhotometricState, Sampled, estimate_state, sample_frames
-from stages.twin.window import WindowPlace
+from stages.twin.state import PhotometricState, Region, Sampled, estimate_state, render_frame, sample_frames
+from stages.twin.window import WindowPlace, told_once
 
 _EVERY = 10
+_MOST_STRAY = 8
+"""Laser frames that are looked at for stray light: each takes as long as a lit frame."""
 
 
 class PhotometryParameters(Parameters):
@@ -147,16 +157,18 @@ def compared_with(
     comparison = sums.comparison
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
-    state, samples = photometry.state, sums.blocks.samples()
+    state, samples, whole = photometry.state, sums.blocks.samples(), sums.whole.found()
     found: tuple[Mismatch, ...] = (
         *causes(*sums.cells(), scene.probe.lighting, scene.ring),
-        *sums.on_window(samples), *unnamed(samples), *not_sharp(state.line),
+        *sums.on_window(samples), *unnamed(samples), *whole, *of_texture(state, samples, whole, scene.ring),
         *clipped(rings, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
+    fall, unnamed_map = left_over(samples)
+    comparison.after[Region.WALL] -= fall
     _report(comparison, found, context)
     return Twin(
         np.array([v.frame for v in comparison.views]), frames.withheld is not None,
-        noise_figures(state.noise), state_figures(state), comparison.regions(), found,
+        noise_figures(state.noise), (*state_figures(state), *unnamed_map), comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
         maps_of(samples), comparison.levels(), worst_places(samples),
@@ -172,6 +184,7 @@ class Sums:
         self.window = [WindowPlace(p) for p in (*photometry.places, *photometry.blurred)]
         self.blocks = BlocksOfFrames(scene.surface.mean_radius_mm)
         self.lit, self.line = CellsOfFrames(), CellsOfFrames()
+        self.whole = WholePictures(scene)
         self._sector = sectors_of(scene.polar[1])
 
     def add(self, frame: int, kind: Illumination, image: Image) -> None:
@@ -191,17 +204,22 @@ class Sums:
             self.blocks.add(frame, above, before, noise.white - noise.black.value)
         exposure = float(np.exp(exposure_of(above, after)))
         after = after.brighter(exposure, noise)
-        if kind == Illumination.LED and self.window:
+        if kind == Illumination.LED:
             exposed = before.brighter(exposure, noise)
             for place in self.window:
                 place.add(frame, above, exposed, free)
+            self.whole.add_lit(frame, above, after, free)
+        if kind == Illumination.LASER and len(self.whole.stray) < _MOST_STRAY:
+            lit = render_frame(self._scene, self._state, frame, Illumination.LED)
+            self.whole.add_laser(frame, above, after, free, lit)
+        self.whole.add_clipped(frame, above, after, free)
         self.comparison.add(frame, kind, above, before, after, noise)
 
     def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
         """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
-        return tuple(m for m in judged if m is not None)
+        return told_once([m for m in judged if m is not None])
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
         """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser."""

@@ -11,7 +11,7 @@ from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import NamedFigure, RegionFit, TwinView
 from pipeline.recording.base import Illumination
 from stages.twin.noise import CameraNoise
-from stages.twin.render import Region, TwinFrame
+from stages.twin.state import Region, TwinFrame
 
 BLOCK_PX = 8
 """Side of the blocks in which a difference is looked for that stays in one place of the image."""
@@ -176,30 +176,28 @@ def exposure_of(above_black: Float32, twin: TwinFrame) -> float:
     return float(np.log(max(ratio, 1e-3)))
 
 
+def of_blocks(values: Float32 | Bool) -> Float32:
+    """Return the means (rows, columns) of whole blocks of a picture (H, W)."""
+    rows, columns = (n // BLOCK_PX for n in values.shape)
+    inside = values[: rows * BLOCK_PX, : columns * BLOCK_PX].astype(np.float32)
+    return np.asarray(cv2.resize(inside, (columns, rows), interpolation=cv2.INTER_AREA))
+
+
 def block_ratios(above_black: Float32, twin: TwinFrame, white_above_black: float) -> Float32:
     """Return by how much each block is brighter than its twin; NaN where not all of it is lit wall."""
     use = (twin.region == Region.WALL) & (above_black < white_above_black)
-    rows, columns = (n // BLOCK_PX for n in use.shape)
-
-    def summed(values: Float32 | Bool) -> Float32:
-        inside = values[: rows * BLOCK_PX, : columns * BLOCK_PX].astype(np.float32)
-        return np.asarray(cv2.resize(inside, (columns, rows), interpolation=cv2.INTER_AREA))
-
     level = np.where(use, twin.level, np.float32(0))
-    above, below = summed(level * above_black), summed(level * level)
+    above, below = of_blocks(level * above_black), of_blocks(level * level)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(summed(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)
+        return np.where(of_blocks(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)
 
 
 def block_contrasts(above_black: Float32, twin: TwinFrame, white_above_black: float) -> Float32:
     """Return which share of its twin's texture each block shows; NaN without lit wall and texture about."""
     use = (twin.region == Region.WALL) & (above_black < white_above_black)
-    rows, columns = (n // BLOCK_PX for n in use.shape)
 
     def about(values: Float32 | Bool) -> Float32:
-        inside = values[: rows * BLOCK_PX, : columns * BLOCK_PX].astype(np.float32)
-        small = cv2.resize(inside, (columns, rows), interpolation=cv2.INTER_AREA)
-        return np.asarray(cv2.blur(small, (3, 3)), np.float32)
+        return np.asarray(cv2.blur(of_blocks(values), (3, 3)), np.float32)
 
     fine = [
         np.where(use, a - cv2.GaussianBlur(a, (0, 0), BLOCK_PX), np.float32(0))

@@ -1,17 +1,29 @@
-"""What is counted or read off the photometric state, and what cannot be told."""
+"""What is counted or read off the photometric state, what cannot be told, and what is shown of lit wall."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from pipeline.arrays import Bool, Byte, Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
-from pipeline.artefacts.twin import Mismatch, NamedFigure
+from pipeline.artefacts.twin import Look, Mismatch, NamedFigure, TwinMap
+from stages.twin.cells import sigmas
+from stages.twin.compare import BLOCK_PX
 from stages.twin.line_light import LineLight
+from stages.twin.locate import FALSE_ALARM
 from stages.twin.noise import CameraNoise
+from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, chance_of
+from stages.twin.reference import SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
+from stages.twin.scene import Ring
 from stages.twin.state import PhotometricState
 
 _CLIPPED, _CLIPPED_WALL = 0.05, 0.01
 """Share of ring samples, and of pixels of lit wall, from which clipping is told."""
+_LEAST_POWER, _SURE_OF_POWER = 0.06, 3.0
+"""Least departure of an exponent from 1: a photo a little blurred loses as much contrast; and in σ."""
+_MAP_BLOCKS, _USUAL_GAIN, _USUAL_OFFSET, _MEDIAN_OF_SQUARE = 4, 0.02, 1.0, 0.455
+"""Blocks to a cell of the map of gain and offset; what a cell usually has: as much as no law names; median of
+the square of a normal number."""
 _IN_FOCUS_PX = 1.2
 """1 σ of lens and pixel that lenses in focus stay below: a pixel's own is 0.29, and a spot two pixels wide at
 half height has 0.85."""
@@ -37,7 +49,7 @@ def clipped(rings: RingSamples, wall_share: float) -> tuple[Mismatch, ...]:
     return tuple(found)
 
 
-def not_sharp(line: LineLight | None) -> tuple[Mismatch, ...]:
+def _not_sharp(line: LineLight | None) -> tuple[Mismatch, ...]:
     """Return a line that is wider than its sheet and a lens in focus make it.
 
     Its width is held against a fixed limit, not against other frames: the run's photo is as blurred as its
@@ -54,6 +66,110 @@ def not_sharp(line: LineLight | None) -> tuple[Mismatch, ...]:
             "is out of focus, or the sheet is thicker than stated. In one diameter the two look alike.",
         ),
     )  # fmt: skip
+
+
+def of_texture(
+    state: PhotometricState, samples: BlockSamples | None, others: tuple[Mismatch, ...], ring: Ring
+) -> tuple[Mismatch, ...]:
+    """Return response and focus; ``others`` are laws of whole pictures that were found."""
+    power = _response(samples, ring)
+    if power is not None:  # where contrast follows another power, its curvature tells nothing of blur
+        return (power,)
+    moved = [m.parameters[0].value for m in others if m.name == "motion_blur"]
+    lit = samples is not None and state.lamp is not None
+    blurred = _defocus(state.sharpness, sum(moved), ring.whole(samples.number[0])) if lit and samples else ()
+    return blurred or _not_sharp(state.line)
+
+
+def _defocus(sharpness: Float, motion_px: float, look: Look) -> tuple[Mismatch, ...]:
+    """Return a blur that all zones of the picture have beyond that of the photo, and beyond that of motion.
+
+    ``sharpness`` (Z,) is half the variance, px², by which lit frames are blurrier.
+    """
+    beyond = sharpness - motion_px**2 / 2
+    if beyond.min() < LEAST_BLUR_PX**2 / 2:
+        return ()
+    zones, nan = np.sqrt(2 * beyond), float("nan")
+    size = NamedFigure("blur", float(zones.mean()), float(np.ptp(zones)) / 2, "px")
+    return (
+        Mismatch(
+            "defocus", "intensity", "image", (), (size,), nan, nan, nan,
+            f"Lit frames are blurred by {size.value:.1f} px (1 σ) beyond the wall's photo in all directions.",
+            look,
+        ),
+    )  # fmt: skip
+
+
+def _response(samples: BlockSamples | None, ring: Ring) -> Mismatch | None:
+    """Return a response whose contrast differs from the photo's, from the blocks of lit frames.
+
+    What stays at one place of the image is taken off: light, vignette and dirt are no response.
+    """
+    if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
+        return None
+    recorded, foretold = np.log1p(samples.change) + samples.log_level, samples.log_level
+    x, y = (_centred(v, samples.orders["image"], samples.frame) for v in (foretold, recorded))
+    above, below = (np.bincount(samples.frame, v) for v in (x * y, x * x))
+    each = above / np.maximum(below, 1e-9)
+    power, chance = float(above.sum() / below.sum()), chance_of(each - 1)
+    if (
+        chance > FALSE_ALARM
+        or abs(power - 1) < _LEAST_POWER
+        or sigmas((each - 1) * np.sign(power - 1)) < _SURE_OF_POWER
+    ):
+        return None
+    figure, nan = NamedFigure("exponent", power, float(each.std()) / np.sqrt(len(each))), float("nan")
+    return Mismatch(
+        "response", "intensity", "image", (), (figure,), chance, nan, nan,
+        f"Recorded wall has the contrast of its photo to the power {power:.2f}: the response is another "
+        "than the photo's.", ring.whole(int(samples.number[0])),
+    )  # fmt: skip
+
+
+def left_over(samples: BlockSamples | None) -> tuple[float, tuple[NamedFigure, ...]]:
+    """Return by how much χ² falls with a map of gain and offset that stays in the image, and its size.
+
+    The map stands for what nobody named. That of every other frame is tried on those between; where they fit
+    no better, there is none. Blocks of the map are drawn to 0 by their usual size and the blocks' own spread.
+    """
+    if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
+        return 0.0, ()
+    x, half = np.exp(samples.log_level), samples.frame % 2
+    y, cell = samples.change * x, (samples.row // _MAP_BLOCKS) * 10_000 + samples.column // _MAP_BLOCKS
+    cell = np.unique(cell, return_inverse=True)[1]
+    spread = float(np.median(samples.weight * y**2)) / _MEDIAN_OF_SQUARE
+    maps = [_gain_and_offset(x, y, samples.weight / spread * (half == h), cell) for h in (0, 1)]
+    gain, offset = (np.where(half == 0, maps[1][k][cell], maps[0][k][cell]) for k in (0, 1))
+    rest = y - gain * x - offset
+    fall = np.asarray(np.bincount(samples.frame, samples.weight * (y**2 - rest**2)), float)
+    if sigmas(fall) < _SURE_OF_POWER:
+        return 0.0, ()
+    figures = [
+        NamedFigure(n, float(np.sqrt(np.mean(a * b))), float(np.std(a - b) / 2), u)
+        for n, u, a, b in zip(
+            ("unnamed_gain", "unnamed_offset"), ("relative", "grey levels"), *maps, strict=True
+        )
+        if (a * b).mean() > 0
+    ]
+    return float(fall.sum()), tuple(figures)
+
+
+def _gain_and_offset(x: Float, y: Float, weight: Float, cell: Int) -> tuple[Float, Float]:
+    """Return gain and offset of cells that make y (N,) of x (N,) best."""
+    sums = (weight * x * x, weight * x, weight, weight * x * y, weight * y)
+    xx, x1, one, xy, y1 = (np.asarray(np.bincount(cell, v), float) for v in sums)
+    xx, one = xx + 1 / _USUAL_GAIN**2, one + 1 / _USUAL_OFFSET**2
+    whole = xx * one - x1**2
+    return (xy * one - y1 * x1) / whole, (y1 * xx - xy * x1) / whole
+
+
+def _centred(value: Float, *groups: Int) -> Float:
+    """Return values (N,) less their means over each of the groupings (N,), in turns."""
+    for _ in range(4):
+        for group in groups:
+            count = np.bincount(group)
+            value = value - (np.bincount(group, value) / np.maximum(count, 1))[group]
+    return value
 
 
 def noise_figures(noise: CameraNoise) -> tuple[NamedFigure, ...]:
@@ -121,3 +237,55 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
             "The sheet's thickness is the stated one: in one diameter it cannot be told from the lens' blur."
         )
     return tuple(said)
+
+
+_SHOWN, _WORST = 8.0, 6
+"""Standard deviations that the maps reach, and places that are shown."""
+
+
+def worst_places(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
+    """Return the places where lit wall differs most, whether or not something else explains them."""
+    if samples is None:
+        return ()
+    left, found = np.abs(samples.strength), []
+    for _ in range(_WORST):
+        k = int(np.argmax(left))
+        if left[k] <= 0:
+            break
+        image, wall = samples.near(k)
+        found.append(_worst(samples, k, image, wall))
+        left = np.where(image | wall, 0.0, left)
+    return tuple(found)
+
+
+def _worst(samples: BlockSamples, k: int, image: Bool, wall: Bool) -> Mismatch:
+    at = samples.look(np.arange(len(samples.change)) == k, SHOWN_PX)
+    fixed = next((w for w, use in (("image", image), ("wall", wall)) if samples.fixed_to(use) == w), "")
+    change, times, nan = float(samples.change[k]), abs(float(samples.strength[k])), float("nan")
+    why = {"image": "It stays there in other frames.", "wall": "It moves with the wall."}.get(
+        fixed, "Other frames do not show it, or too few see this wall."
+    )
+    size = NamedFigure("change", change, abs(change) / max(times, 1e-9), "relative")
+    place = tuple(NamedFigure(n, v, BLOCK_PX / 2, "px") for n, v in (("u_px", at.u_px), ("v_px", at.v_px)))
+    return Mismatch(
+        "", "intensity", fixed, place, (size,), nan, nan, nan,
+        f"In frame {at.frame} at ({at.u_px:.0f}, {at.v_px:.0f}) the wall is {100 * abs(change):.0f} % "
+        f"{'brighter' if change > 0 else 'darker'} than re-rendered, {times:.0f} times what blocks usually "
+        f"differ by there. {why}",
+        at,
+    )  # fmt: skip
+
+
+def maps_of(samples: BlockSamples | None) -> tuple[TwinMap, ...]:
+    """Return maps over the image and over the unrolled wall."""
+    if samples is None:
+        return ()
+    return tuple(TwinMap(order, _picture(samples, order)) for order in ("image", "wall"))
+
+
+def _picture(samples: BlockSamples, order: str) -> Byte:
+    rows = samples.along if order == "wall" else samples.row
+    columns = WALL_COLUMNS if order == "wall" else int(samples.column.max()) + 1
+    mean, sd = map_of(samples, order, (int(rows.max()) + 1, columns))
+    z = np.clip(np.nan_to_num(mean / np.maximum(sd, 1e-12)), -_SHOWN + 0.1, _SHOWN - 0.1)
+    return np.where(np.isfinite(mean), 128 + 127 / _SHOWN * z, 0).astype(np.uint8)

@@ -19,9 +19,9 @@ from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
-from stages.twin.compare import BLOCK_PX, block_ratios
+from stages.twin.compare import BLOCK_PX, block_ratios, of_blocks
 from stages.twin.locate import FALSE_ALARM, ImagePlace
-from stages.twin.render import TwinFrame
+from stages.twin.state import TwinFrame
 
 _SURE, _FEWEST_FRAMES, _FEWEST_CELLS = 3.0, 4, 2
 """σ from frame to frame by which an order must predict better, frames for that, and cells of a region."""
@@ -43,6 +43,10 @@ class BlockSamples:
     ----------
     change : float
         Recorded over re-rendered brightness less 1, the median of the frame taken off.
+    log_level : float
+        Logarithm of the re-rendered brightness, grey levels above black.
+    weight : float
+        Pixels of a block over their variance.
     frame : int
         Counted from 0.
     row, column : int
@@ -56,6 +60,8 @@ class BlockSamples:
     """
 
     change: Float
+    log_level: Float
+    weight: Float
     frame: Int
     row: Int
     column: Int
@@ -136,7 +142,7 @@ class BlocksOfFrames:
     """Collects the blocks of compared lit frames."""
 
     mean_radius_mm: float
-    parts: list[tuple[Float32, Float32, Float32]] = field(default_factory=list)
+    parts: list[tuple[Float32, ...]] = field(default_factory=list)
     number: list[int] = field(default_factory=list)
 
     def add(self, frame: int, above: Float32, twin: TwinFrame, white: float) -> None:
@@ -145,27 +151,32 @@ class BlocksOfFrames:
         middle = (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2
         rows, columns = ratio.shape
         distance, azimuth = (a[middle][:rows, :columns] for a in (twin.distance_mm, twin.azimuth_rad))
-        self.parts.append((ratio, distance, azimuth))
+        level, variance = (of_blocks(a) for a in (twin.level, twin.variance))
+        self.parts.append((ratio, level, variance, distance, azimuth))
         self.number.append(frame)
 
     def samples(self) -> BlockSamples | None:
         """Return all blocks; None where there are none."""
         found, cell_mm = [], 2 * np.pi * self.mean_radius_mm / WALL_COLUMNS
-        for k, (ratio, distance, azimuth) in enumerate(self.parts):
+        for k, (ratio, level, variance, distance, azimuth) in enumerate(self.parts):
             row, column = np.nonzero(np.isfinite(ratio) & np.isfinite(distance))
             if not len(row):
                 continue
             change = ratio[row, column] / np.median(ratio[row, column]) - 1
             along = np.floor(distance[row, column] / cell_mm)
             around = np.floor((azimuth[row, column] / (2 * np.pi)) % 1 * WALL_COLUMNS) % WALL_COLUMNS
-            found.append((change, np.full(len(row), k), row, column, along, around))
+            bright = np.log(np.maximum(level[row, column], 1))
+            weight = BLOCK_PX**2 / variance[row, column]
+            found.append((change, bright, weight, np.full(len(row), k), row, column, along, around))
         if not found:
             return None
-        change, *place = (np.concatenate(c) for c in zip(*found, strict=True))
+        change, bright, weight, *place = (np.concatenate(c) for c in zip(*found, strict=True))
         frame, row, column, along, around = (p.astype(np.int64) for p in place)
         first = int(along.min())
         return BlockSamples(
             change.astype(float),
+            bright.astype(float),
+            weight.astype(float),
             frame,
             row,
             column,

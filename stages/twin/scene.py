@@ -14,8 +14,7 @@ from pipeline.artefacts.twin import Look
 from pipeline.instrument.probe import Lighting, Probe
 from stages.texture.surface import WallSurface, wall_surface
 from stages.texture.views import sheet_distance_mm
-from stages.twin.reflectance import Reflectance, reflectance_of
-from stages.twin.sight import wall_seen
+from stages.twin.reflectance import Reflectance, reflectance_of, wall_seen
 
 _STEP_PX = 4
 """Spacing of the pixels whose rays are met with the wall; between them places are interpolated."""

@@ -10,23 +10,27 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.stats import t
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
+from stages.twin.compare import BLOCK_PX
 from stages.twin.locate import FALSE_ALARM, ImagePlace
-from stages.twin.render import Region, TwinFrame
+from stages.twin.state import Region, TwinFrame
 
 _POWER_STEP = 0.4
 _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0, 1.2, 1.4, 1.7, 2.0))
 """Bending and radius, in radii of the place, of the drops that are tried."""
-_SPOTS = (0.4, 0.6, 0.8, 1.2, 1.8)
-"""1 σ of the spots of dirt and scatter that are tried, in radii of the place."""
-_LEAST_REACH_PX = 24.0
+_LEAST_REACH_PX = 48.0
 """A place is looked at so far about its middle, or over two radii if that is more."""
 _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 4
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
+_LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
+"""Narrowest spot, 1 σ; the middle of a spot reaches to where a quarter of its depth is gone."""
+_PARTS = 6
+"""Parts of the frames of which each is left out once, for the σ of a spot: neighbours in time go together."""
 _STATED = {
     "window_dirt": "dust or dirt on the window or the lens takes away",
     "window_scatter": "something on the window or the lens scatters",
@@ -45,15 +49,18 @@ class WindowPlace:
     Attributes
     ----------
     place : ImagePlace
-    sums : list of (2, L)
-        Of each frame: Σ (recorded − twin)(law − twin)/σ² and Σ (law − twin)²/σ² of dirt, scatter, drops
-        of each width.
+    spots : list of (2, 2, h, w)
+        Of each frame and pixel (recorded − twin)(law − twin)/σ² and (law − twin)²/σ² of dirt and of scatter
+        that takes or mixes all light; 0 where a pixel does not count.
+    drops : list of (2, L)
+        Of each frame the same of drops, summed over pixels.
     square, pixels, frame : list
         Of each frame: Σ (recorded − twin)²/σ², pixels, number.
     """
 
     place: ImagePlace
-    sums: list[Float] = field(default_factory=list)
+    spots: list[Float32] = field(default_factory=list)
+    drops: list[Float] = field(default_factory=list)
     square: list[float] = field(default_factory=list)
     pixels: list[int] = field(default_factory=list)
     frame: list[int] = field(default_factory=list)
@@ -68,10 +75,13 @@ class WindowPlace:
         if use.sum() < _WHOLE * inside.sum():
             return
         filled = np.where(part, level, level[use].mean()).astype(np.float32)
-        rest, weight = (above[box] - level)[use], 1 / twin.variance[box][use]
-        changes = np.stack([(made - level)[use] for made in self._laws(filled, away, u, v)])
+        rest, weight = above[box] - level, np.where(use, 1 / twin.variance[box], np.float32(0))
+        whole = np.stack([-level, cv2.GaussianBlur(filled, (0, 0), _AROUND_PX) - level])
+        self.spots.append(np.stack([whole * (rest * weight), whole**2 * weight], 1))
+        rest, weight = rest[use], weight[use]
+        changes = np.stack([(made - level)[use] for made in self._drops(filled, u, v)])
         sums = [(changes * (rest * weight)).sum(1), (changes**2 * weight).sum(1)]
-        self.sums.append(np.asarray(np.stack(sums), float))
+        self.drops.append(np.asarray(np.stack(sums), float))
         self.square.append(float((rest**2 * weight).sum()))
         self.pixels.append(int(use.sum()))
         self.frame.append(frame)
@@ -89,14 +99,10 @@ class WindowPlace:
         v, u = np.mgrid[rows, columns].astype(np.float32)
         return (rows, columns), v, u
 
-    def _laws(self, level: Float32, away: Float, u: Float32, v: Float32) -> list[Float32]:
-        """Return what dirt and scatter of size 1 and each drop make of grey levels (h, w)."""
-        mean = cv2.GaussianBlur(level, (0, 0), _AROUND_PX)
+    def _drops(self, level: Float32, u: Float32, v: Float32) -> list[Float32]:
+        """Return what each drop makes of grey levels (h, w)."""
+        away = np.hypot(u - self.place.u_px, v - self.place.v_px)
         made: list[Float32] = []
-        for other in (np.zeros_like(level), mean):
-            for width in _SPOTS:
-                spot = np.exp(-0.5 * (away / (width * self.place.radius_px)) ** 2).astype(np.float32)
-                made.append(np.asarray(level + spot * (other - level), np.float32))
         for power, size in _DROPS:
             near = 1 - np.minimum((away / (size * self.place.radius_px)) ** 2, 1)
             at = [
@@ -114,11 +120,14 @@ class WindowPlace:
         """Return what is at the place; None where other frames fit no better with any law."""
         if len(self.frame) < _FEWEST_FRAMES:
             return None
-        sums = np.stack(self.sums)
+        spots = np.stack(self.spots)
+        reach = int(self._reach_px + 2 * _AROUND_PX)
+        middle = [at - max(int(at) - reach, 0) for at in (self.place.u_px, self.place.v_px)]
+        start = np.array([[0.3, *middle, f * self.place.radius_px] for f in (0.5, 1.5)])
         tried = {
-            "window_dirt": _fall(sums[:, :, : len(_SPOTS)], False),
-            "window_scatter": _fall(sums[:, :, len(_SPOTS) : 2 * len(_SPOTS)], False),
-            "droplet": _fall(sums[:, :, 2 * len(_SPOTS) :], True),
+            "window_dirt": _fall_of_spot(spots[:, 0], start),
+            "window_scatter": _fall_of_spot(spots[:, 1], start),
+            "droplet": _fall_of_drop(np.stack(self.drops)),
         }
         name = max(tried, key=lambda n: tried[n][0].sum())
         fall, size, sd = tried[name]
@@ -156,25 +165,72 @@ class WindowPlace:
         return f"{at}, in all frames, {_STATED[names[0]]} {share}{others}."
 
 
-def _fall(sums: Float, drops: bool) -> tuple[Float, float, float]:
-    """Return by how much χ² of each frame (F,) falls, width and size from the others, the size and its 1 σ.
+def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
+    """Return what is on the window without what names the same spot a second time, and less well."""
+    kept: list[tuple[Float, Mismatch]] = []
+    for one in sorted(found, key=lambda m: m.chi2_after - m.chi2_before):
+        at = np.array([p.value for p in one.place])
+        same = [np.hypot(*(at - o)[:2]) < at[2] + o[2] + 2 * BLOCK_PX for o, m in kept if m.name == one.name]
+        if not any(same):
+            kept.append((at, one))
+    return tuple(m for _, m in kept)
 
-    ``sums`` is (F, 2, L) for laws of L widths, of which the best is taken; the size of ``drops`` is fixed.
+
+def _fall_of_drop(sums: Float) -> tuple[Float, float, float]:
+    """Return by how much χ² of each frame (F,) falls with the drop that other frames choose; power and 1 σ.
+
+    ``sums`` is (F, 2, L) of drops of every power and width.
     """
     frames, fall = np.arange(len(sums)), np.zeros(len(sums))
+    gain = 2 * sums[:, 0] - sums[:, 1]
     for half in (frames % 2 == 0, frames % 2 == 1):
-        k, size = _best(sums[half], drops)
-        fall[~half] = 2 * size * sums[~half, 0, k] - size**2 * sums[~half, 1, k]
-    k, size = _best(sums, drops)
-    if drops:
-        return fall, _DROPS[k][0], _POWER_STEP / 2
-    left = sums[:, 0, k] - size * sums[:, 1, k]
-    return fall, size, float(np.sqrt((left**2).sum())) / max(float(sums[:, 1, k].sum()), 1e-9)
+        fall[~half] = gain[~half, int(np.argmax(gain[half].sum(0)))]
+    return fall, _DROPS[int(np.argmax(gain.sum(0)))][0], _POWER_STEP / 2
 
 
-def _best(sums: Float, drops: bool) -> tuple[int, float]:
-    """Return which law lets χ² fall most over frames, and its size."""
-    cross, own = sums.sum(0)
-    sizes = np.ones(len(own)) if drops else cross / np.maximum(own, 1e-9)
-    k = int(np.argmax(2 * sizes * cross - sizes**2 * own))
-    return k, float(sizes[k])
+def _fall_of_spot(sums: Float32, start: Float) -> tuple[Float, float, float]:
+    """Return by how much χ² of each frame (F,) falls with the spot fitted to others; its depth and 1 σ.
+
+    ``sums`` is (F, 2, h, w); ``start`` (K, 4) holds spots that the search starts from.
+    The σ holds what leaving out parts of the frames changes, and by how much the spot's middle differs from
+    the fitted shape.
+    """
+    frames, fall = np.arange(len(sums)), np.zeros(len(sums))
+    whole = sums.sum(0)
+    best = _fitted_spot(whole, start)
+    for half in (frames % 2 == 0, frames % 2 == 1):
+        shape = _spot(_fitted_spot(sums[half].sum(0), best[None]), sums.shape[2:])
+        fall[~half] = (2 * shape * sums[~half, 0] - shape**2 * sums[~half, 1]).sum((1, 2))
+    parts = np.array_split(frames, min(_PARTS, len(frames)))
+    without = np.array([_fitted_spot(whole - sums[p].sum(0), best[None])[0] for p in parts])
+    spread = (len(parts) - 1) / len(parts) * float(((without - without.mean()) ** 2).sum())
+    shape = _spot(best, sums.shape[2:])
+    middle = np.exp(-0.5 * ((1 - shape / max(abs(best[0]), 1e-9)) / _MIDDLE) ** 2) * (shape != 0)
+    weight = max(float((middle * whole[1]).sum()), 1e-9)
+    off = float((middle * (whole[0] - shape * whole[1])).sum()) / weight
+    return fall, float(best[0]), float(np.hypot(np.sqrt(spread), off))
+
+
+def _spot(place: Float, shape: tuple[int, ...]) -> Float:
+    """Return a Gaussian spot (h, w) of depth, column, row and 1 σ."""
+    v, u = np.mgrid[: shape[0], : shape[1]]
+    depth, at_u, at_v, width = place
+    return np.asarray(depth * np.exp(-0.5 * ((u - at_u) ** 2 + (v - at_v) ** 2) / width**2))
+
+
+def _fitted_spot(sums: Float32, start: Float) -> Float:
+    """Return depth, column, row and 1 σ of the spot that lets χ² fall most; ``sums`` is (2, h, w)."""
+    rows, columns = np.nonzero(sums[1] > 0)
+    weight = np.sqrt(sums[1][rows, columns].astype(float))
+    value = sums[0][rows, columns] / weight
+
+    def rest(p: Float) -> Float:
+        spot = p[0] * np.exp(-0.5 * ((columns - p[1]) ** 2 + (rows - p[2]) ** 2) / p[3] ** 2)
+        return np.asarray(spot * weight - value)
+
+    reach = start[:, 3].max()
+    low = np.array([-3.0, *(start[0, 1:3] - reach), _LEAST_WIDTH_PX])
+    high = np.array([3.0, *(start[0, 1:3] + reach), 2 * max(reach, _LEAST_REACH_PX)])
+    begin = np.clip(start, low + 1e-3, high - 1e-3)
+    made = [least_squares(rest, s, bounds=(low, high), x_scale=[0.1, 1, 1, 3]) for s in begin]
+    return np.asarray(min(made, key=lambda r: r.cost).x)

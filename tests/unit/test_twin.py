@@ -22,12 +22,12 @@ from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import LineSamples
 from stages.twin.locate import ImagePlace, full_size, places_in_image
-from stages.twin.name import clipped, not_sharp
+from stages.twin.name import _not_sharp, clipped
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
 from stages.twin.reference import BlockSamples, in_image, unnamed
-from stages.twin.render import Region, TwinFrame
+from stages.twin.reflectance import wall_seen
 from stages.twin.scene import LineSight
-from stages.twin.sight import wall_seen
+from stages.twin.state import Region, TwinFrame
 
 BLACK = Figure(16.0, 0.1)
 NOISE = CameraNoise(BLACK, 255.0, Figure(4.0, 0.1), Figure(0.0, 0.0), Figure(0.0, 0.0), Figure(1.0, 0.1))
@@ -143,7 +143,9 @@ def _samples(change, frames=8, still=False):
     frame, row, column = (a.ravel() for a in np.mgrid[0:frames, 0:40, 0:60])
     along = row + (0 if still else 2 * frame)
     value = 0.01 * random.standard_normal(len(frame)) + change(frame, row, column, along)
-    return BlockSamples(value, frame, row, column, along, column, 100.0, 2.5, np.arange(frames))
+    return BlockSamples(
+        value, 4 + 0 * value, 32 + 0 * value, frame, row, column, along, column, 100.0, 2.5, np.arange(frames)
+    )
 
 
 def _near(a, b, c, d):
@@ -228,10 +230,10 @@ def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
     assert (line.fixed_to, line.parameters[0].value) == ("line", 0.2)
     assert (wall.fixed_to, wall.parameters[0].value) == ("image", 0.3)
     assert not clipped(SimpleNamespace(validity=np.array([RingValidity.VALID])), 0.001)
-    assert not not_sharp(None)
+    assert not _not_sharp(None)
     for blur, told in ((0.8, 0), (2.2, 1)):
         line_light = SimpleNamespace(blur_px=Figure(blur, 0.1 * blur))
-        assert len(not_sharp(line_light)) == told
+        assert len(_not_sharp(line_light)) == told
 
 
 def _twin():

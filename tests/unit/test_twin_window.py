@@ -6,7 +6,7 @@ import pytest
 
 from stages.twin.compare import block_contrasts
 from stages.twin.locate import ImagePlace
-from stages.twin.render import Region, TwinFrame
+from stages.twin.state import Region, TwinFrame
 from stages.twin.window import WindowPlace
 
 

@@ -1,0 +1,124 @@
+"""Laws of whole pictures, on made pictures: named where they act, and nothing where nothing does."""
+
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+
+from stages.twin.name import of_texture
+from stages.twin.picture import WholePictures
+from stages.twin.reference import BlocksOfFrames
+from stages.twin.scene import Ring
+from stages.twin.state import Region, TwinFrame
+
+SHAPE, FRAMES, WHITE = (240, 320), 8, 200.0
+V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
+AWAY, PHI = np.hypot(V - 120, U - 160), np.arctan2(V - 120, U - 160)
+RING = Ring((160.0, 120.0), 70.0, 50.0, 25.0)
+SCENE = SimpleNamespace(
+    polar=(AWAY / 70, PHI, AWAY > 0), ring=RING, surface=SimpleNamespace(mean_radius_mm=50.0)
+)
+
+
+def _twin(level, region):
+    place = (50.0 * 70 / np.maximum(AWAY, 20)).astype(np.float32)
+    return TwinFrame(level, np.full(SHAPE, 2.0, np.float32), region.astype(np.uint8), place, PHI)
+
+
+def _lit(random):
+    fine = cv2.GaussianBlur(random.standard_normal(SHAPE).astype(np.float32), (0, 0), 2.5)
+    wide = cv2.GaussianBlur(random.standard_normal(SHAPE).astype(np.float32), (0, 0), 12)
+    level = 90 + 20 * fine / fine.std() + 15 * wide / wide.std()
+    return _twin(np.clip(level, 15, 180).astype(np.float32), np.full(SHAPE, Region.WALL))
+
+
+def _line():
+    level = 150 * np.exp(-0.5 * ((AWAY - 70) / 1.5) ** 2)
+    region = np.where(abs(AWAY - 70) < 1.5, Region.LINE_CORE, Region.DARK)
+    return _twin(
+        level.astype(np.float32),
+        np.where((region == Region.DARK) & (abs(AWAY - 70) < 9), Region.LINE_FLANK, region),
+    )
+
+
+def _noisy(picture, random):
+    return (picture + 1.4 * random.standard_normal(SHAPE)).astype(np.float32)
+
+
+def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0):
+    random, whole, blocks = np.random.default_rng(2), WholePictures(SCENE), BlocksOfFrames(50.0)
+    for frame in range(FRAMES):
+        twin, line = _lit(random), _line()
+        seen = np.minimum(_noisy(lit(twin.level, random), random), WHITE)
+        free = seen < WHITE
+        whole.add_lit(frame, seen, twin, free)
+        whole.add_clipped(frame, seen, twin, free)
+        blocks.add(frame, seen, twin, WHITE)
+        seen = _noisy(laser(line.level, random), random)
+        whole.add_laser(frame, seen, line, seen < WHITE, twin)
+    state = SimpleNamespace(sharpness=np.full(4, of_sharpness), lamp=True, line=None)
+    found = whole.found()
+    return [m.name for m in (*found, *of_texture(state, blocks.samples(), found, RING))]
+
+
+def _moved(picture, random):
+    angle = random.uniform(0, np.pi)
+    steps = [
+        np.float32([[1, 0, d * np.cos(angle)], [0, 1, d * np.sin(angle)]]) for d in np.linspace(-3, 3, 9)
+    ]
+    return np.mean([cv2.warpAffine(picture, m, SHAPE[::-1], borderMode=cv2.BORDER_REFLECT) for m in steps], 0)
+
+
+def _bloomed(picture, random):
+    spot = 300 * np.exp(-0.5 * (((U - 160) / 12) ** 2 + ((V - 50) / 8) ** 2))
+    over = np.maximum(picture + spot - WHITE, 0).astype(np.float32)
+    tail = np.exp(-np.abs(np.arange(-40, 41)) / 6.0)
+    leaked = cv2.sepFilter2D(over, -1, np.ones(1), tail / tail.sum())
+    return np.where(over > 0, WHITE + 50, picture + leaked)
+
+
+def _clipped(picture, random):
+    return np.where(np.hypot(U - 160, V - 50) < 15, WHITE + 50, picture)
+
+
+def test_nothing_is_named_where_noise_alone_differs():
+    assert _named() == []
+    assert _named(_clipped) == []
+
+
+def test_motion_blur_is_told_from_defocus():
+    assert _named(_moved) == ["motion_blur"]
+    assert _named(lambda p, r: cv2.GaussianBlur(p, (0, 0), 2), of_sharpness=2.0) == ["defocus"]
+
+
+def test_a_displaced_photo_is_no_motion_blur():
+    def displaced(picture, random):
+        shift = np.float32([[1, 0, random.normal(0, 0.6)], [0, 1, random.normal(0, 0.6)]])
+        return cv2.warpAffine(picture, shift, SHAPE[::-1], borderMode=cv2.BORDER_REFLECT)
+
+    assert _named(displaced) == []
+
+
+@pytest.mark.parametrize("power", [0.7, 1.3])
+def test_a_response_is_named_and_light_that_falls_off_is_none(power):
+    assert _named(lambda p, r: 100 * (p / 100) ** power) == ["response"]
+    assert _named(lambda p, r: p * (1 - 0.3 * (AWAY / 200) ** 2)) == []
+
+
+def test_bloom_runs_along_columns_only():
+    assert _named(_bloomed) == ["bloom"]
+
+
+def test_stray_light_is_named_for_what_it_falls_on():
+    glow = 8 * np.exp(-0.5 * ((AWAY - 70) / 25) ** 2)
+    (name,) = _named(laser=lambda p, r: p + glow)
+    assert "interreflection" in name
+    assert _named(laser=lambda p, r: p + 5) == []
+
+
+def test_a_second_ring_is_found_and_a_glint_is_none():
+    second = 150 * 0.1 * np.exp(-0.5 * ((AWAY - 92) / 1.5) ** 2)
+    assert _named(laser=lambda p, r: p + second) == ["second_line"]
+    glint = 60 * np.exp(-0.5 * (((U - 240) / 6) ** 2 + ((V - 120) / 6) ** 2))
+    assert "second_line" not in _named(laser=lambda p, r: p + glint)
