@@ -157,7 +157,11 @@ def compared_with(
     comparison = sums.comparison
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
-    state, samples, whole = photometry.state, sums.blocks.samples(), sums.whole.found()
+    state, samples, whole = (
+        photometry.state,
+        sums.blocks.samples(),
+        sums.whole.found(photometry.state.sharpness),
+    )
     found: tuple[Mismatch, ...] = (
         *causes(*sums.cells(), scene.probe.lighting, scene.ring),
         *sums.on_window(samples), *unnamed(samples), *whole, *of_texture(state, samples, whole, scene.ring),

@@ -27,6 +27,8 @@ _SURE, FEWEST_FRAMES, _STEP, _TILE = 3.0, 6, 2, 16
 """σ by which laws are told apart; frames; every second pixel; side of tiles that halve a picture."""
 LEAST_BLUR_PX = 0.7
 """Least motion blur that is named, 1 σ: as much as a sharp lens and a pixel blur by themselves."""
+_ONE_WAY = 0.6
+"""Least share of a blur that has a direction: 1 for motion alone; of defocus a quarter seems to have one."""
 _OF_LAW = 0.2
 """Relative 1 σ of a blur for want of its shape: texture as fine as the blur is long bends more than by its
 second derivative."""
@@ -34,8 +36,8 @@ _LEAST_LEVEL = 1.0
 """Least stray light that is named, grey levels: what rounding alone cannot make."""
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
 """Rounds of leaving out blocks that differ, and least spread of blocks, grey levels."""
-_BLOOM_PX, _CLIPPED, _LEAST_BLOOM = 6.0, 200, 0.01
-"""Way along a column that leaves 1/e of the bloom, pixels that must clip, least share that leaks."""
+_BLOOM_PX, _CLIPPED, _LEAST_BLOOM, _NEAR = 6.0, 200, 0.02, 0.02
+"""Way along a column that leaves 1/e of the bloom, pixels that must clip, least leak, least spread that counts."""
 _RATIOS, _REACH, _FAR_WIDTHS, _LEAST_LINE, _AROUND = 400, 0.8, 14.0, 0.01, 25
 """Bins and reach of ln(radius over the line's), px that belong to the line, least share of a second one,
 and bins about each that tell what it stands out from."""
@@ -158,26 +160,22 @@ class WholePictures:
             return
         reach = np.arange(-int(4 * _BLOOM_PX), int(4 * _BLOOM_PX) + 1)
         tail, one = np.exp(-np.abs(reach) / _BLOOM_PX), np.ones(1)
-        full = (~free).astype(np.float32)
+        full, tail = (~free).astype(np.float32), tail / tail.sum()
         spread = [cv2.sepFilter2D(full, -1, *k) for k in ((one, tail), (tail, one))]
-        near = (
-            free
-            & (spread[0] + spread[1] > 0.1)
-            & (twin.region != Region.UNSEEN)
-            & (twin.region != Region.EDGE)
-        )
+        known = (twin.region != Region.UNSEEN) & (twin.region != Region.EDGE)
+        near = free & known & (spread[0] + spread[1] > _NEAR)
         columns = np.stack([*(s[near] for s in spread), twin.level[near]]).astype(float)
         rest = (above - twin.level)[near].astype(float)
         own = columns @ columns.T + 1e-6 * np.eye(3)
         self.bloom.append(np.linalg.solve(own, columns @ rest)[:2])
         self._note("bloom", frame)
 
-    def found(self) -> tuple[Mismatch, ...]:
-        """Return what frames agree on."""
-        made = (self._motion_blur(), self._stray(), self._bloom(), self._second())
+    def found(self, sharpness: Float) -> tuple[Mismatch, ...]:
+        """Return what frames agree on; ``sharpness`` (Z,) is half the variance by which they are blurrier."""
+        made = (self._motion_blur(float(np.mean(sharpness))), self._stray(), self._bloom(), self._second())
         return tuple(m for m in made if m is not None)
 
-    def _motion_blur(self) -> Mismatch | None:
+    def _motion_blur(self, sharpness: float) -> Mismatch | None:
         if len(self.blur) < FEWEST_FRAMES:
             return None
         each = np.stack([[_blur_of(o, c) for o, c in zip(*frame, strict=True)] for frame in self.blur])
@@ -188,6 +186,9 @@ class WholePictures:
         )
         size = float(np.sqrt(2 * np.sqrt(max(product.mean(), 0.0))))
         chance = chance_of(product)
+        even = sharpness + float(each[:, :, 0].mean())
+        if size**2 / 2 < _ONE_WAY * even:
+            return None  # blur in all directions, which fine texture of one direction shows more
         if size < LEAST_BLUR_PX or chance > FALSE_ALARM or sigmas(product) < _SURE:
             return None
         sd = float(product.std() / np.sqrt(len(product))) / max(float(product.mean()), 1e-12) * size / 4

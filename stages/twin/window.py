@@ -27,6 +27,8 @@ _LEAST_REACH_PX = 48.0
 """A place is looked at so far about its middle, or over two radii if that is more."""
 _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 4
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
+_OF_LIGHT = 0.005
+"""1 σ of a share of the light for want of knowing the light about the spot: half of what photos err by."""
 _LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
 """Narrowest spot, 1 σ; the middle of a spot reaches to where a quarter of its depth is gone."""
 _PARTS = 6
@@ -208,7 +210,7 @@ def _fall_of_spot(sums: Float32, start: Float) -> tuple[Float, float, float]:
     middle = np.exp(-0.5 * ((1 - shape / max(abs(best[0]), 1e-9)) / _MIDDLE) ** 2) * (shape != 0)
     weight = max(float((middle * whole[1]).sum()), 1e-9)
     off = float((middle * (whole[0] - shape * whole[1])).sum()) / weight
-    return fall, float(best[0]), float(np.hypot(np.sqrt(spread), off))
+    return fall, float(best[0]), float(np.sqrt(spread + off**2 + _OF_LIGHT**2))
 
 
 def _spot(place: Float, shape: tuple[int, ...]) -> Float:

@@ -34,6 +34,8 @@ from pipeline.recording.checks import CheckedFrames
 from stages.twin import PhotometryParameters, Sums, TwinParameters, compared_with, photometry_of
 from stages.twin.causes import causes
 from stages.twin.locate import places_in_image
+from stages.twin.name import of_texture
+from stages.twin.picture import WholePictures
 from stages.twin.reference import BlocksOfFrames, in_image, unnamed
 from stages.twin.scene import Scene, scene_of
 from tests.hidden_effects import Change, Hidden, effects
@@ -180,6 +182,15 @@ def _is_there(case: Hidden, found: Mismatch) -> bool:
     return named or (bool(case.place) and case.fixed_to in found.fixed_to)
 
 
+def part_of(whole: WholePictures, random: np.random.Generator) -> WholePictures:
+    """Return two thirds of what was kept of each law."""
+    part = WholePictures(whole.scene, frame=whole.frame)
+    for name in ("blur", "stray", "bloom", "ghost"):
+        kept = getattr(whole, name)
+        setattr(part, name, [kept[k] for k in np.sort(random.permutation(len(kept))[: 2 * len(kept) // 3])])
+    return part
+
+
 def nulls(run: Opened, count: int, seed: int) -> tuple[int, int]:
     """Return subsets of a run's compared frames that were looked at, and those with a false alarm."""
     random, scene = np.random.default_rng(seed), run.scene
@@ -208,7 +219,11 @@ def nulls(run: Opened, count: int, seed: int) -> tuple[int, int]:
         samples = blocks.samples()
         places, _ = places_in_image([p[0] for p in blocks.parts])
         on_window = [p for p, to in zip(places, in_image(samples, places), strict=True) if "image" in to]
-        found = (*causes(*few, scene.probe.lighting, scene.ring), *unnamed(samples))
+        pictures = part_of(sums.whole, random).found(photometry.state.sharpness)
+        found = (
+            *causes(*few, scene.probe.lighting, scene.ring), *unnamed(samples), *pictures,
+            *of_texture(photometry.state, samples, pictures, scene.ring),
+        )  # fmt: skip
         false += bool(on_window or found)
         for m in found:
             print(f"  false: {m.statement} p {m.probability:.1e}")

@@ -58,7 +58,7 @@ def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0):
         seen = _noisy(laser(line.level, random), random)
         whole.add_laser(frame, seen, line, seen < WHITE, twin)
     state = SimpleNamespace(sharpness=np.full(4, of_sharpness), lamp=True, line=None)
-    found = whole.found()
+    found = whole.found(state.sharpness)
     return [m.name for m in (*found, *of_texture(state, blocks.samples(), found, RING))]
 
 
