@@ -37,7 +37,7 @@ _LEAST_LEVEL = 1.0
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
 """Rounds of leaving out blocks that differ, and least spread of blocks, grey levels."""
 _BLOOM_PX, _CLIPPED, _LEAST_BLOOM, _NEAR = 6.0, 200, 0.02, 0.02
-"""Way along a column that leaves 1/e of the bloom, pixels that must clip, least leak, least spread that counts."""
+"""Way along a column that leaves 1/e of the bloom, pixels that must clip, least leak and spread."""
 _RATIOS, _REACH, _FAR_WIDTHS, _LEAST_LINE, _AROUND = 400, 0.8, 14.0, 0.01, 25
 """Bins and reach of ln(radius over the line's), px that belong to the line, least share of a second one,
 and bins about each that tell what it stands out from."""
