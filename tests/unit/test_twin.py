@@ -22,7 +22,7 @@ from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import LineSamples
 from stages.twin.locate import ImagePlace, full_size, places_in_image
-from stages.twin.name import _not_sharp, clipped
+from stages.twin.name import _not_sharp, clipped, left_over
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
 from stages.twin.reference import BlockSamples, in_image, unnamed
 from stages.twin.reflectance import wall_seen
@@ -308,3 +308,12 @@ def test_the_line_follows_the_colours_of_the_wall_by_the_shares_that_it_has(colo
     np.testing.assert_allclose(light.colour, colour, atol=0.03)
     assert (np.abs(light.colour - colour) < 4 * light.colour_sd).all()
     assert (light.colour_sd < 0.02).all()
+
+
+def test_what_nobody_named_is_a_map_only_where_frames_in_between_fit_better():
+    uneven = _samples(lambda f, r, c, s: 0.03 * np.sin(r / 4) * np.cos(c / 5))
+    fall, figures = left_over(uneven)
+    assert fall > 0
+    assert figures[0].name == "unnamed_gain"
+    assert left_over(_samples(lambda f, r, c, s: 0.0)) == (0.0, ())
+    assert left_over(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 4 + 2.1 * f))) == (0.0, ())

@@ -4,10 +4,11 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.compare import block_contrasts
 from stages.twin.locate import ImagePlace
 from stages.twin.state import Region, TwinFrame
-from stages.twin.window import WindowPlace
+from stages.twin.window import WindowPlace, told_once
 
 
 def _frame(level):
@@ -66,3 +67,16 @@ def test_faint_texture_is_found_where_brightness_is_even():
     share = np.nanmedian(shares, axis=0)
     assert share[12, 14] < 0.7
     assert share[3, 3] == pytest.approx(1, abs=0.1)
+
+
+def test_one_spot_is_told_once_and_two_are_told_twice():
+    def spot(u, fall):
+        place = tuple(
+            NamedFigure(n, v, 4.0, "px") for n, v in (("u_px", u), ("v_px", 50.0), ("radius_px", 9.0))
+        )
+        return Mismatch("window_scatter", "intensity", "image", place, (), 0.0, 5.0, 5.0 - fall, "")
+
+    assert [m.place[0].value for m in told_once([spot(100, 1.0), spot(112, 3.0), spot(300, 2.0)])] == [
+        112,
+        300,
+    ]
