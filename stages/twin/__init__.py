@@ -288,7 +288,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "7",
+    "8",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

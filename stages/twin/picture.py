@@ -126,7 +126,7 @@ class WholePictures:
         self._add_ghost(frame, above, twin, free & (twin.region != Region.EDGE))
 
     def _bounced(self, twin: TwinFrame, lit: TwinFrame) -> Float32:
-        """Return light of the line bounced once in a round bore, times the wall's photo, up to a factor."""
+        """Return light of the line bounced once in a round bore, up to a factor."""
         on_line = twin.distance_mm[twin.region == Region.LINE_CORE]
         middle = float(np.nanmedian(on_line)) if len(on_line) else np.nan
         x = np.abs(lit.distance_mm - np.float32(middle)) / np.float32(2 * self.scene.surface.mean_radius_mm)
