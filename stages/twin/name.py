@@ -225,8 +225,8 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
     """Return what such recordings do not tell, as sentences."""
     said = [
         "Vignetting cannot be told from the LEDs' lobe: both change brightness with the polar angle alone.",
-        "A power response cannot be told from the wall's contrast, since the run's photo has it, too; gamma is "
-        "read off the noise, which a video codec changes: it is no proof of a response that is not linear.",
+        "A power response cannot be told from the wall's contrast, since the photo has it, too; gamma is read "
+        "off the noise, which a video codec changes: it is no proof of a response that is not linear.",
     ]
     if state.lamp is None:
         said.append("No lit frame could be used: nothing is known of lamps, vignetting and photon transfer.")
