@@ -164,7 +164,7 @@ def compared_with(
     )
     found: tuple[Mismatch, ...] = (
         *causes(*sums.cells(), scene.probe.lighting, scene.ring),
-        *sums.on_window(samples), *unnamed(samples), *whole, *of_texture(state, samples, whole, scene.ring),
+        *sums.on_window(samples), *unnamed(samples), *whole, *of_texture(state, samples, sums.whole, whole),
         *clipped(rings, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(samples)

@@ -6,13 +6,13 @@ import numpy as np
 
 from pipeline.arrays import Bool, Byte, Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
-from pipeline.artefacts.twin import Look, Mismatch, NamedFigure, TwinMap
+from pipeline.artefacts.twin import Mismatch, NamedFigure, TwinMap
 from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX
 from stages.twin.line_light import LineLight
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.noise import CameraNoise
-from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, chance_of
+from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, OF_LAW, WholePictures, chance_of
 from stages.twin.reference import SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
 from stages.twin.scene import Ring
 from stages.twin.state import PhotometricState
@@ -21,6 +21,8 @@ _CLIPPED, _CLIPPED_WALL = 0.05, 0.01
 """Share of ring samples, and of pixels of lit wall, from which clipping is told."""
 _LEAST_POWER, _SURE_OF_POWER = 0.06, 3.0
 """Least departure of an exponent from 1: a photo a little blurred loses as much contrast; and in σ."""
+_OF_BLOCKS = 0.005
+"""1 σ of an exponent since the mean of powers over a block is not the power of its mean."""
 _MAP_BLOCKS, _USUAL_GAIN, _USUAL_OFFSET, _MEDIAN_OF_SQUARE = 4, 0.02, 1.0, 0.455
 """Blocks to a cell of the map of gain and offset; what a cell usually has: as much as no law names; median of
 the square of a normal number."""
@@ -69,33 +71,29 @@ def _not_sharp(line: LineLight | None) -> tuple[Mismatch, ...]:
 
 
 def of_texture(
-    state: PhotometricState, samples: BlockSamples | None, others: tuple[Mismatch, ...], ring: Ring
+    state: PhotometricState, samples: BlockSamples | None, whole: WholePictures, others: tuple[Mismatch, ...]
 ) -> tuple[Mismatch, ...]:
     """Return response and focus; ``others`` are laws of whole pictures that were found."""
-    power = _response(samples, ring)
+    power = _response(samples, whole.scene.ring)
     if power is not None:  # where contrast follows another power, its curvature tells nothing of blur
         return (power,)
-    moved = [m.parameters[0].value for m in others if m.name == "motion_blur"]
-    lit = samples is not None and state.lamp is not None
-    blurred = _defocus(state.sharpness, sum(moved), ring.whole(samples.number[0])) if lit and samples else ()
-    return blurred or _not_sharp(state.line)
+    moved = sum(m.parameters[0].value for m in others if m.name == "motion_blur")
+    return _defocus(whole, whole.even_blur(state.sharpness) - moved**2 / 2) or _not_sharp(state.line)
 
 
-def _defocus(sharpness: Float, motion_px: float, look: Look) -> tuple[Mismatch, ...]:
-    """Return a blur that all zones of the picture have beyond that of the photo, and beyond that of motion.
-
-    ``sharpness`` (Z,) is half the variance, px², by which lit frames are blurrier.
-    """
-    beyond = sharpness - motion_px**2 / 2
-    if beyond.min() < LEAST_BLUR_PX**2 / 2:
+def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Mismatch, ...]:
+    """Return a blur beyond that of the photo and of motion, by half its variance (F,), px²."""
+    if len(half_variance) < FEWEST_FRAMES or half_variance.mean() < LEAST_BLUR_PX**2 / 2:
         return ()
-    zones, nan = np.sqrt(2 * beyond), float("nan")
-    size = NamedFigure("blur", float(zones.mean()), float(np.ptp(zones)) / 2, "px")
+    each, nan = np.sqrt(2 * np.maximum(half_variance, 0)), float("nan")
+    blur = float(each.mean())
+    sd = float(np.hypot(each.std() / np.sqrt(len(each)), OF_LAW * blur))
     return (
         Mismatch(
-            "defocus", "intensity", "image", (), (size,), nan, nan, nan,
-            f"Lit frames are blurred by {size.value:.1f} px (1 σ) beyond the wall's photo in all directions.",
-            look,
+            "defocus", "intensity", "image", (), (NamedFigure("blur", blur, sd, "px"),),
+            chance_of(half_variance), nan, nan,
+            f"Lit frames are blurred by {blur:.1f} px (1 σ) beyond the wall's photo in all directions.",
+            whole.scene.ring.whole(whole.frame["blur"][0]),
         ),
     )  # fmt: skip
 
@@ -118,7 +116,8 @@ def _response(samples: BlockSamples | None, ring: Ring) -> Mismatch | None:
         or sigmas((each - 1) * np.sign(power - 1)) < _SURE_OF_POWER
     ):
         return None
-    figure, nan = NamedFigure("exponent", power, float(each.std()) / np.sqrt(len(each))), float("nan")
+    sd = float(np.hypot(each.std() / np.sqrt(len(each)), _OF_BLOCKS))
+    figure, nan = NamedFigure("exponent", power, sd), float("nan")
     return Mismatch(
         "response", "intensity", "image", (), (figure,), chance, nan, nan,
         f"Recorded wall has the contrast of its photo to the power {power:.2f}: the response is another "
@@ -225,7 +224,7 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
     """Return what such recordings do not tell, as sentences."""
     said = [
         "Vignetting cannot be told from the LEDs' lobe: both change brightness with the polar angle alone.",
-        "A power response cannot be told from the wall's contrast, since the photo has it, too; gamma is read "
+        "A power response cannot be told from the wall's contrast: the photo has it, too; gamma is read "
         "off the noise, which a video codec changes: it is no proof of a response that is not linear.",
     ]
     if state.lamp is None:

@@ -29,11 +29,12 @@ LEAST_BLUR_PX = 0.7
 """Least motion blur that is named, 1 σ: as much as a sharp lens and a pixel blur by themselves."""
 _ONE_WAY = 0.6
 """Least share of a blur that has a direction: 1 for motion alone; of defocus a quarter seems to have one."""
-_OF_LAW = 0.2
+OF_LAW = 0.2
 """Relative 1 σ of a blur for want of its shape: texture as fine as the blur is long bends more than by its
 second derivative."""
 _LEAST_LEVEL = 1.0
 """Least stray light that is named, grey levels: what rounding alone cannot make."""
+_DIRECTIONS = ("even", "across", "slanted", "radial")
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
 """Rounds of leaving out blocks that differ, and least spread of blocks, grey levels."""
 _BLOOM_PX, _CLIPPED, _LEAST_BLOOM, _NEAR = 6.0, 200, 0.02, 0.02
@@ -92,7 +93,7 @@ class WholePictures:
         self._note("blur", frame)
 
     def _columns(self, level: Float32, inner: tuple[slice, slice]) -> Float32:
-        """Return exposure and displacements, then blurs: even, across, slanted, radial."""
+        """Return exposure and displacements, then blurs in `_DIRECTIONS`."""
 
         def at(down: int, right: int) -> Float32:
             rows, columns = (
@@ -172,13 +173,22 @@ class WholePictures:
 
     def found(self, sharpness: Float) -> tuple[Mismatch, ...]:
         """Return what frames agree on; ``sharpness`` (Z,) is half the variance by which they are blurrier."""
-        made = (self._motion_blur(float(np.mean(sharpness))), self._stray(), self._bloom(), self._second())
+        made = (self._motion_blur(sharpness), self._stray(), self._bloom(), self._second())
         return tuple(m for m in made if m is not None)
 
-    def _motion_blur(self, sharpness: float) -> Mismatch | None:
+    def _blurs(self) -> Float:
+        """Half the variances (F, 2, 4) that frames are blurred by, of both halves."""
+        each = [[_blur_of(o, c) for o, c in zip(*frame, strict=True)] for frame in self.blur]
+        return np.array(each).reshape(-1, 2, len(_DIRECTIONS))
+
+    def even_blur(self, sharpness: Float) -> Float:
+        """Return half the variance (F,) by which each lit frame is blurrier than the photo in all directions."""
+        return np.asarray(self._blurs()[:, :, 0].mean(1) + np.mean(sharpness))
+
+    def _motion_blur(self, sharpness: Float) -> Mismatch | None:
         if len(self.blur) < FEWEST_FRAMES:
             return None
-        each = np.stack([[_blur_of(o, c) for o, c in zip(*frame, strict=True)] for frame in self.blur])
+        each = self._blurs()
         uniform = (each[:, 0, 1:3] * each[:, 1, 1:3]).sum(1)
         radial = np.maximum(each[:, :, 3].mean(1), 0) ** 2 * np.sign(each[:, :, 3].mean(1))
         product, way = max(
@@ -186,13 +196,12 @@ class WholePictures:
         )
         size = float(np.sqrt(2 * np.sqrt(max(product.mean(), 0.0))))
         chance = chance_of(product)
-        even = sharpness + float(each[:, :, 0].mean())
-        if size**2 / 2 < _ONE_WAY * even:
+        if size**2 / 2 < _ONE_WAY * self.even_blur(sharpness).mean():
             return None  # blur in all directions, which fine texture of one direction shows more
         if size < LEAST_BLUR_PX or chance > FALSE_ALARM or sigmas(product) < _SURE:
             return None
         sd = float(product.std() / np.sqrt(len(product))) / max(float(product.mean()), 1e-12) * size / 4
-        sd = float(np.hypot(sd, _OF_LAW * size))
+        sd = float(np.hypot(sd, OF_LAW * size))
         return self._mismatch(
             "motion_blur", "time", NamedFigure("blur", size, sd, "px"), chance, "blur",
             f"Frames are blurred by {size:.1f} px (1 σ) {way}, and less across: they move while exposed.",

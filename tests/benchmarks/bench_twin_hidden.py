@@ -219,10 +219,11 @@ def nulls(run: Opened, count: int, seed: int) -> tuple[int, int]:
         samples = blocks.samples()
         places, _ = places_in_image([p[0] for p in blocks.parts])
         on_window = [p for p, to in zip(places, in_image(samples, places), strict=True) if "image" in to]
-        pictures = part_of(sums.whole, random).found(photometry.state.sharpness)
+        part = part_of(sums.whole, random)
+        pictures = part.found(photometry.state.sharpness)
         found = (
             *causes(*few, scene.probe.lighting, scene.ring), *unnamed(samples), *pictures,
-            *of_texture(photometry.state, samples, pictures, scene.ring),
+            *of_texture(photometry.state, samples, part, pictures),
         )  # fmt: skip
         false += bool(on_window or found)
         for m in found:

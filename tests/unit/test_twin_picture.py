@@ -59,7 +59,7 @@ def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0):
         whole.add_laser(frame, seen, line, seen < WHITE, twin)
     state = SimpleNamespace(sharpness=np.full(4, of_sharpness), lamp=True, line=None)
     found = whole.found(state.sharpness)
-    return [m.name for m in (*found, *of_texture(state, blocks.samples(), found, RING))]
+    return [m.name for m in (*found, *of_texture(state, blocks.samples(), whole, found))]
 
 
 def _moved(picture, random):
