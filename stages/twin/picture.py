@@ -37,7 +37,7 @@ _LEAST_LEVEL = 1.0
 _DIRECTIONS = ("even", "across", "slanted", "radial")
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
 """Rounds of leaving out blocks that differ, and least spread of blocks, grey levels."""
-_BLOOM_PX, _CLIPPED, _LEAST_BLOOM, _NEAR = 6.0, 200, 0.02, 0.02
+_BLOOM_PX, _CLIPPED, _LEAST_BLOOM, _NEAR = 6.0, 200, 0.01, 0.02
 """Way along a column that leaves 1/e of the bloom, pixels that must clip, least leak and spread."""
 _RATIOS, _REACH, _FAR_WIDTHS, _LEAST_LINE, _AROUND = 400, 0.8, 14.0, 0.01, 25
 """Bins and reach of ln(radius over the line's), px that belong to the line, least share of a second one,
@@ -182,7 +182,7 @@ class WholePictures:
         return np.array(each).reshape(-1, 2, len(_DIRECTIONS))
 
     def even_blur(self, sharpness: Float) -> Float:
-        """Return half the variance (F,) by which each lit frame is blurrier than the photo in all directions."""
+        """Return half the variance (F,), px², by which lit frames are blurrier than the photo all round."""
         return np.asarray(self._blurs()[:, :, 0].mean(1) + np.mean(sharpness))
 
     def _motion_blur(self, sharpness: Float) -> Mismatch | None:
