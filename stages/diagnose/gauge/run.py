@@ -18,7 +18,7 @@ from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
-from stages.calibrate.gauge.terms import edge_equations, ring_equations, ring_residual
+from stages.calibrate.gauge.terms import edge_equations, expected_ring, ring_equations, ring_residual
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.library import (
     columns,
@@ -39,7 +39,6 @@ from stages.diagnose.gauge.points import (
 )
 
 _ROUNDS = 2
-_FAR_PX = 1.0
 _ENCODER_SIGMA_MM = 1.0
 # Encoder readings this many frames apart are taken as independent. Debt: data/debts.md.
 _ENCODER_CELL = 8
@@ -124,10 +123,11 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     """Return the equations with columns for globals and terms."""
     run.watch()
     edges, edge_at = _without_edge_shift(run, state, terms)
-    rings, ring_at = _without_ring_shift(run, state, terms)
+    ring_at = ring_points(state, _on_bore(run, state), run.time_s, run.width_px)
+    each = (ring_shift_px(t.model, ring_at, *t.at(t.amplitude)) for t in terms)
+    shift = sum(each, np.zeros(len(run.rings.uv)))
+    rings = replace(run.rings, uv=run.rings.uv - shift[:, None] * run.rings.outward)
     residual = ring_residual(state, rings, rings.uv)
-    rings = _on_bore(rings, ring_at, residual)
-    ring_at = ring_points(state, rings, run.time_s, run.width_px)
     parts = [_edge_part(run, state, edges, edge_at, terms)]
     parts.append(_ring_part(run, state, rings, ring_at, residual, terms))
     if run.encoder is not None:
@@ -204,26 +204,15 @@ def ring_mm_per_px(points: ImagePoints) -> Float:
     return np.asarray(np.sum(points.normal_c * points.per_px_c, axis=1))
 
 
-def _without_ring_shift(
-    run: GaugeRun, state: Unknowns, terms: Sequence[Term]
-) -> tuple[BoreRings, ImagePoints]:
-    """Return the ring bins where they would be without the terms, and the points there."""
-    uv = run.rings.uv
-    for _ in range(_ROUNDS if terms else 0):
-        points = ring_points(state, replace(run.rings, uv=uv), run.time_s, run.width_px)
-        shift = np.sum([ring_shift_px(t.model, points, *t.at(t.amplitude)) for t in terms], 0)
-        uv = run.rings.uv - shift[:, None] * run.rings.outward
-    rings = replace(run.rings, uv=uv)
-    return rings, ring_points(state, rings, run.time_s, run.width_px)
-
-
-def _on_bore(rings: BoreRings, points: ImagePoints, residual: Float) -> BoreRings:
-    """Return the ring bins where they are predicted.
+def _on_bore(run: GaugeRun, state: Unknowns) -> BoreRings:
+    """Return the ring bins where the state without any effect has them.
 
     Derivatives taken where a ring was measured would share its noise, and scores would be off for it.
     """
-    step = np.clip(residual / ring_mm_per_px(points), -_FAR_PX, _FAR_PX)
-    return replace(rings, uv=rings.uv - step[:, None] * rings.outward)
+    rings = run.rings
+    for _ in range(_ROUNDS):
+        rings = replace(rings, uv=expected_ring(state, rings)[1])
+    return rings
 
 
 def _without_edge_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> tuple[Edges, ImagePoints]:
