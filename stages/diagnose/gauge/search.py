@@ -19,7 +19,7 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
 from stages.diagnose.gauge.fit import Fit, fit, own_parameters
 from stages.diagnose.gauge.points import bin_widths
-from stages.diagnose.gauge.run import GaugeRun, Term, linearise
+from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
 from stages.diagnose.gauge.scan import Scored, refined, scan
 from stages.diagnose.inference import Stated
 
@@ -75,7 +75,7 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
         max(measured.bore_sigma_mm, _LEAST_BORE_SIGMA_MM), _LOOSER * sigma,
         measured.edges.sigma_px**-2, np.ones(len(rings.frame)), watch,
     )  # fmt: skip
-    return weighed(run, smooth, ()), stated_start(smooth)
+    return weighed(run, linearise(run, smooth, ())), stated_start(smooth)
 
 
 def stated_start(state: Unknowns) -> Unknowns:
@@ -85,16 +85,16 @@ def stated_start(state: Unknowns) -> Unknowns:
     )
 
 
-def weighed(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> GaugeRun:
+def weighed(run: GaugeRun, found: Linearised) -> GaugeRun:
     """Return the run with weights by the residuals' spread frame by frame, outliers counting little."""
-    plain = replace(run, edge_weight=np.ones(len(run.edges.uv)), ring_weight=np.ones(len(run.rings.uv)))
-    found = linearise(plain, state, terms).equations
-    count = len(run.edges.uv)
+    assert found.rings.per_px_c is not None
+    of, count = found.equations, len(run.edges.uv)
     edges, rings = slice(0, count), slice(count, count + len(run.rings.uv))
+    sigma_mm = run.rings.sigma_px * np.linalg.norm(found.rings.per_px_c, axis=1)
     return replace(
         run,
-        edge_weight=_weight(found.frame[edges], found.residual[edges], run.edges.sigma_px),
-        ring_weight=_weight(found.frame[rings], found.residual[rings], _ring_sigma_mm(run.rings, state)),
+        edge_weight=_weight(of.frame[edges], of.residual[edges], run.edges.sigma_px),
+        ring_weight=_weight(of.frame[rings], of.residual[rings], sigma_mm),
     )
 
 
@@ -105,12 +105,6 @@ def _between(rings: BoreRings, posed: Int) -> BoreRings:
 def _freed(state: Unknowns) -> Unknowns:
     unsure = prior_directions(state.stated, SheetModel.DECENTRED_WAVY, _FREE)
     return replace(state, unsure=unsure, instrument=np.zeros(unsure.shape[1]))
-
-
-def _ring_sigma_mm(rings: BoreRings, state: Unknowns) -> Float:
-    by_pixel = state.probe.triangulate_jacobian(rings.uv)[0]
-    way = np.einsum("mij,mj->mi", by_pixel, rings.outward)
-    return np.asarray(rings.sigma_px * np.linalg.norm(way, axis=1))
 
 
 def _weight(frame: Int, residual: Float, sigma: Float) -> Float:
@@ -185,8 +179,9 @@ def _weighed_anew(
     near = [f for f in tried if f.cost < found.cost + _FAR * ratio]
     others = [f for f in near if [t.model.name for t in f.terms] != names]
     for _ in range(_WEIGHINGS):
-        run = weighed(run, found.state, found.terms)
-        found = refined(run, fit(run, found.state, found.terms, _RIVAL_ITERATIONS))
+        run = weighed(run, found.linearised)
+        found = fit(run, found.state, found.terms, 1)
+    found = refined(run, fit(run, found.state, found.terms, _RIVAL_ITERATIONS))
     rest = (
         refined(run, fit(run, f.state, f.terms, _RIVAL_ITERATIONS))
         for f in sorted(others, key=lambda f: f.cost)[:_REWEIGHED]

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
-from stages.diagnose.travel.events import SHORTEST_S, chance
+from stages.diagnose.travel.events import LONGEST_S, SHORTEST_S, chance
 from stages.diagnose.travel.model import EventKind, TravelFit, candidate_columns, fitted, moment
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 
@@ -166,12 +166,38 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     if again is not None and again.confirmation.agrees:
         # Errors of pictures cannot make the encoder's reading jump.
         rivals, within_s = (), jumps_s
+    elif not event.during and event.kind is EventKind.STEP:
+        gain_mm, lasting = _over_durations(fit, place_in_list, encoder)
+        sigma = float(np.hypot(lasting, rounding))
     count = len(sight.time_s)
     z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
     return StepFound(
         event.place, time_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
         lasting_s, () if again is None else (again,),
     )  # fmt: skip
+
+
+def _over_durations(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[float, float]:
+    """Return a step's size and 1 σ where it is not known when it came and how long it took.
+
+    Every moment near it and every duration that a wheel may slip for is as likely as another beforehand. What
+    is taken for a step all at once is too small where the wheel slips for a few pictures.
+    """
+    event, sight = fit.events[place_in_list], fit.sight
+    others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
+    rest = fitted(sight, encoder, others, fit.noise, fit.without)
+    steps = np.arange(int(np.ceil(LONGEST_S / sight.frame_time_s)) + 1)
+    middle = sight.time_s[event.place] + sight.frame_time_s * 0.5 * np.append(-steps[:0:-1], steps)
+    lasts, at = (x.ravel() for x in np.meshgrid(np.maximum(sight.frame_time_s * steps, SHORTEST_S), middle))
+    value, gain = rest.whitened.gain(np.clip((sight.time_s[:, None] - at) / lasts + 0.5, 0.0, 1.0))
+    # Noise is measured from the pictures' usual steps; what is left may be more.
+    left = rest.whitened.residual @ rest.whitened.weighted
+    more = max(float(left) / max(len(sight.time_s) - len(rest.values), 1), 1.0)
+    weight = np.exp(0.5 * (gain - gain.max()) / more)
+    weight /= weight.sum()
+    mean = float(weight @ value)
+    own = more * np.where(gain > 0, value**2 / np.maximum(gain, 1e-12), 0.0)
+    return mean, float(np.sqrt(weight @ (own + (value - mean) ** 2)))
 
 
 def _middle_and_duration(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
