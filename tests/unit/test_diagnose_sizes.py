@@ -1,6 +1,7 @@
 """Sizes of effects: shapes set free, laws that are not exact, scores that no large effect may widen."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge.confirm import Sized, quantities
 from stages.diagnose.gauge.elimination import Reduced, score_inflation
+from stages.diagnose.gauge.fit import Fit
 from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.scan import freed
 from tests.unit.test_diagnose_inference import FRAMES, GLOBALS, equations
 from tests.unit.wall_points import Bore, plain_probe, ring_points
 
-DRIFT = LIBRARY["focal_drift"]
+DRIFT, TILT = LIBRARY["focal_drift"], LIBRARY["laser_tilt"]
 
 
 def points_of_a_bore() -> ImagePoints:
@@ -72,3 +75,12 @@ def test_a_swing_repeats_after_its_period_and_is_nothing_off_the_line(swing):
     assert later == pytest.approx(here)
     assert half == pytest.approx(-here)
     assert not swing.wall_shift_mm(replace(points, on_line=False), (4.0,), amplitude).any()
+
+
+def test_a_fit_whose_shapes_are_choices_stays_as_it_is_and_others_get_one_more_amplitude():
+    found = Fit(SimpleNamespace(time_s=np.linspace(0, 8, 81)), None, (Term(TILT, (), np.zeros(2)),), 1.0)
+    assert freed(found.run, found) is found
+    drifting = replace(found, terms=(*found.terms, Term(DRIFT, (3.0,), np.array([0.002]))))
+    tilt, drift = freed(found.run, drifting).terms
+    assert tilt is found.terms[0]
+    assert (drift.shape, list(drift.amplitude), len(drift.amplitudes)) == ((3.0,), [0.002, 0.0], 2)

@@ -155,7 +155,7 @@ class Sized:
 def sizes_of(run: GaugeRun, judged: Judged, stated: Stated, alike: float) -> tuple[Sized, ...]:
     """Return the terms of a hypothesis with covariances: by the data, shapes, and laws."""
     free = freed(run, judged.fit)
-    whole = judged.evidence if free.terms == judged.fit.terms else evidence(run, free, ())[0]
+    whole = judged.evidence if free is judged.fit else evidence(run, free, ())[0]
     about = replace(judged, fit=free, evidence=whole)
     sized = [_sized(about, term, stated) for term in free.terms]
     return tuple(

@@ -124,14 +124,15 @@ def freed(run: GaugeRun, found: Fit) -> Fit:
 
     A drift quicker than all that were searched is none: it is what it comes to.
     """
-    return replace(found, terms=tuple(_freed(run, t) for t in found.terms))
+    terms = tuple(_freed(run, t) for t in found.terms)
+    return replace(found, terms=terms) if any(t.bounds is not None for t in terms) else found
 
 
 def refined(run: GaugeRun, found: Fit) -> Fit:
     """Return the fit with steps and continuous shapes at their best, unless it then fits worse."""
     found = retimed(run, found)
     free = freed(run, found)
-    if free.terms == found.terms:
+    if free is found:
         return found
     better = fit(run, found.state, free.terms)
     bound = fit(run, better.state, tuple(Term(t.model, *t.at(t.amplitude)) for t in better.terms), 1)
