@@ -13,6 +13,7 @@ from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.events import LONGEST_S, SHORTEST_S, chance
 from stages.diagnose.travel.model import EventKind, TravelFit, candidate_columns, fitted, moment
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
+from stages.diagnose.travel.solve import whitened_fit
 
 # Explanations whose χ² differs by less than this (3 σ squared) are both kept.
 _APART = 9.0
@@ -166,8 +167,8 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     if again is not None and again.confirmation.agrees:
         # Errors of pictures cannot make the encoder's reading jump.
         rivals, within_s = (), jumps_s
-    elif not event.during and event.kind is EventKind.STEP:
-        gain_mm, lasting = _over_durations(fit, place_in_list, encoder)
+    elif not event.during and event.kind is EventKind.STEP and np.isfinite(sigma):
+        gain_mm, lasting = _over_durations(fit, place_in_list)
         sigma = float(np.hypot(lasting, rounding))
     count = len(sight.time_s)
     z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
@@ -177,27 +178,28 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     )  # fmt: skip
 
 
-def _over_durations(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[float, float]:
+def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
     """Return a step's size and 1 σ where it is not known when it came and how long it took.
 
     Every moment near it and every duration that a wheel may slip for is as likely as another beforehand. What
     is taken for a step all at once is too small where the wheel slips for a few pictures.
     """
-    event, sight = fit.events[place_in_list], fit.sight
-    others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
-    rest = fitted(sight, encoder, others, fit.noise, fit.without)
+    own, event, sight = 4 + place_in_list, fit.events[place_in_list], fit.sight
+    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
+    others = np.delete(fit.columns, own, axis=1)
+    rest = whitened_fit(difference, others, fit.noise.covariance(sight.path_mm))
     steps = np.arange(int(np.ceil(LONGEST_S / sight.frame_time_s)) + 1)
     middle = sight.time_s[event.place] + sight.frame_time_s * 0.5 * np.append(-steps[:0:-1], steps)
     lasts, at = (x.ravel() for x in np.meshgrid(np.maximum(sight.frame_time_s * steps, SHORTEST_S), middle))
-    value, gain = rest.whitened.gain(np.clip((sight.time_s[:, None] - at) / lasts + 0.5, 0.0, 1.0))
+    value, gain = rest.gain(np.clip((sight.time_s[:, None] - at) / lasts + 0.5, 0.0, 1.0))
     # Noise is measured from the pictures' usual steps; what is left may be more.
-    left = rest.whitened.residual @ rest.whitened.weighted
-    more = max(float(left) / max(len(sight.time_s) - len(rest.values), 1), 1.0)
+    more = float(fit.covariance[own, own] / fit.whitened.covariance[own, own])
     weight = np.exp(0.5 * (gain - gain.max()) / more)
     weight /= weight.sum()
     mean = float(weight @ value)
-    own = more * np.where(gain > 0, value**2 / np.maximum(gain, 1e-12), 0.0)
-    return mean, float(np.sqrt(weight @ (own + (value - mean) ** 2)))
+    variance = more * np.where(gain > 0, value**2 / np.maximum(gain, 1e-12), 0.0)
+    jump = float(fit.values[own] - fit.whitened.estimate[own])
+    return mean + jump, float(np.sqrt(weight @ (variance + (value - mean) ** 2)))
 
 
 def _middle_and_duration(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
