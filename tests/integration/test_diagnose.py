@@ -27,6 +27,8 @@ from tests.shared_data import PROJECT_ROOT
 from tests.simulated import SCENES, rendered, shipped, smaller
 
 pytestmark = pytest.mark.slow
+# A third of the usual samples a ring: enough for a tilt of 0.8°, and what a run of the field hands on.
+QUICK = ["--set", "rings.azimuths=480"]
 TILT = {"laser_tilt": {"tilt_deg": 0.8, "direction_deg": 40.0}}
 
 
@@ -54,12 +56,25 @@ def pair(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def diagnosed(pair, tmp_path_factory):
+def field_run(pair, tmp_path_factory):
+    run = tmp_path_factory.mktemp("field") / "run"
+    assert CliRunner().invoke(app, ["run", str(pair[0]), "-o", str(run), *QUICK]).exit_code == 0
+    return run
+
+
+@pytest.fixture(scope="module")
+def first_call(pair, field_run, tmp_path_factory):
+    """The folder of a diagnosis that takes over a run of the field, and how its stages stood."""
     out = tmp_path_factory.mktemp("out")
-    field, gauge = pair
-    done = CliRunner().invoke(app, ["diagnose", str(field), "--gauge", str(gauge), "-o", str(out)])
+    words = ["diagnose", "--run", str(field_run), "--gauge", str(pair[1]), "-o", str(out)]
+    done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
-    return out
+    return out, states(out)
+
+
+@pytest.fixture(scope="module")
+def diagnosed(first_call):
+    return first_call[0]
 
 
 def test_the_tilt_is_named_sized_and_borne_out(diagnosed):
@@ -109,9 +124,9 @@ def results(folder):
     return files
 
 
-def test_a_second_diagnosis_computes_nothing(diagnosed, pair):
+def test_a_second_diagnosis_computes_nothing(diagnosed, field_run, pair):
     before = contents(diagnosed)
-    words = ["diagnose", str(pair[0]), "--gauge", str(pair[1]), "-o", str(diagnosed)]
+    words = ["diagnose", "--run", str(field_run), "--gauge", str(pair[1]), "-o", str(diagnosed)]
     assert CliRunner().invoke(app, words).exit_code == 0
     assert set(states(diagnosed).values()) == {"reused"}
     assert len(states(diagnosed)) == 15
@@ -128,7 +143,7 @@ def test_killed_and_resumed_it_ends_in_the_same_bytes(diagnosed, pair, tmp_path)
     # Every call is in a process of its own, after `diagnosed` has compiled the kernels: what compiling in the
     # same process does to the last digits is another matter.
     # The inspection alone takes a third of the time; with a gauge the stages are resumed by the same runner.
-    words = [sys.executable, "-m", "pipeline.cli", "diagnose", str(pair[0]), "-o"]
+    words = [sys.executable, "-m", "pipeline.cli", "diagnose", str(pair[0]), *QUICK, "-o"]
     undisturbed, command = [*words, str(tmp_path / "whole")], [*words, str(tmp_path / "out")]
     subprocess.run(undisturbed, cwd=PROJECT_ROOT, stderr=subprocess.DEVNULL, check=True)
     first = subprocess.Popen(command, cwd=PROJECT_ROOT, stderr=subprocess.DEVNULL)
@@ -152,19 +167,22 @@ def test_ctrl_c_ends_it_with_130(pair, tmp_path):
     assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "cancelled"
 
 
-def test_what_a_run_of_the_field_holds_is_taken_over(pair, tmp_path):
-    run, out = tmp_path / "run", tmp_path / "out"
-    option = ["--set", "rings.azimuths=480"]
-    assert CliRunner().invoke(app, ["run", str(pair[0]), "-o", str(run), *option]).exit_code == 0
-    words = ["diagnose", "--run", str(run), "--gauge", str(pair[1]), "-o", str(out), "--apply"]
+def test_what_a_run_of_the_field_holds_is_taken_over(first_call):
+    out, stood = first_call
+    assert stood["field rings"] == stood["field triangulate"] == "reused"
+    assert stood["gauge rings"] == stood["diagnosis"] == "completed"
+    assert json.loads((out / "run.json").read_text())["configuration"]["rings"]["azimuths"] == 480
+
+
+def test_the_inspection_is_reconstructed_once_with_what_was_found(pair, field_run, diagnosed, tmp_path):
+    out = shutil.copytree(diagnosed, tmp_path / "out")
+    words = ["diagnose", "--run", str(field_run), "--gauge", str(pair[1]), "-o", str(out), "--apply"]
     for expected in ("completed", "reused"):
         done = CliRunner().invoke(app, words)
         assert done.exit_code == 0, done.output
-        assert states(out)["field rings"] == states(out)["field triangulate"] == "reused"
-        assert states(out)["diagnosis"] == expected
+        assert states(out)["diagnosis"] == "reused"
         assert set(states(out / "run").values()) == {expected}
     assert not (out / "run-stated").exists()
-    assert json.loads((out / "run.json").read_text())["configuration"]["rings"]["azimuths"] == 480
 
 
 def test_a_run_of_another_recording_is_refused_by_name(pair, tmp_path):
@@ -260,20 +278,22 @@ def field_alone(recording, folder, tmp_path):
     probe = read_probe(folder / "probe.yaml")
     stages = diagnosis_stages(with_field=True, with_gauge=False)
     sources = (recording_source(recording, "field"), probe_source(probe), Source(Noticed, Noticed(), ""))
-    job = Job("diagnose", sources, stages, (), resolve(stages), tmp_path / "out", at_once=1)
+    configuration = resolve(stages, None, QUICK[1:])
+    job = Job("diagnose", sources, stages, (), configuration, tmp_path / "out", at_once=1)
     run_job(job, Selection(), SilentDisplay())
     return result_of(job, Diagnosed).found
 
 
-def test_a_gauge_of_another_probe_is_left_out_and_said_to_be(pair, tmp_path):
+def test_a_gauge_of_another_probe_is_left_out_and_said_to_be(pair, diagnosed, tmp_path):
     field, gauge = pair
-    other = tmp_path / "gauge"
+    out, other = shutil.copytree(diagnosed, tmp_path / "out"), tmp_path / "gauge"
     shutil.copytree(gauge, other)
     text = (other / "probe.yaml").read_text()
     (other / "probe.yaml").write_text(text.replace("baseline_mm: 21.8", "baseline_mm: 25.8", 1))
-    done = CliRunner().invoke(app, ["diagnose", str(field), "--gauge", str(other), "-o", str(tmp_path / "o")])
+    words = ["diagnose", str(field), "--gauge", str(other), "-o", str(out), *QUICK]
+    done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
-    answer = json.loads((tmp_path / "o" / "diagnosis.json").read_text())
+    answer = json.loads((out / "diagnosis.json").read_text())
     assert answer["gauge"] == ""
     assert answer["effects"] == []
     assert any("another probe" in s and "baseline_mm" in s for s in answer["shortcomings"])

@@ -1,5 +1,6 @@
 """The gauge's diagnosis on runs traced ray by ray by the simulator, which shares no forward model with it."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,18 +17,25 @@ from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.formula import says_the_same
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.result import Verdict
-from tests.benchmarks.ring_level import ring_level_run
+from tests.benchmarks.ring_level import RingLevelRun, ring_level_run
 
 SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "gauge-4-inch.yaml"
+pytestmark = pytest.mark.slow
 # Few effects keep the test short; among them what a tilt is taken for.
 FEW = ("laser_tilt", "laser_cone", "baseline", "principal_point", "tube_tilt")
 
 
+@cache
+def measured(switches: tuple[str, ...], seed: int) -> RingLevelRun:
+    scene = read_scene(SCENE).model_copy(update={"seed": seed, "frames": 120, "frame_rate": 15.0})
+    return ring_level_run(scene, SCENE, parse_switches(switches) if switches else ())
+
+
+@cache
 def seen(
     switches: tuple[str, ...], names: tuple[str, ...], seed: int, courses: tuple[CourseKind, ...] = ()
 ) -> Examined:
-    scene = read_scene(SCENE).model_copy(update={"seed": seed, "frames": 120, "frame_rate": 15.0})
-    run = ring_level_run(scene, SCENE, parse_switches(switches) if switches else ())
+    run = measured(switches, seed)
     return examine(run.measured, {n: LIBRARY[n] for n in names}, run.truth.stated, courses=courses)
 
 

@@ -50,6 +50,17 @@ def page_parameters() -> str:
     )
 
 
+def in_node(program: str) -> object:
+    """Return what a program tells that knows the page's model as ``b``."""
+    node = shutil.which("node") or pytest.skip("node is not installed")
+    model = json.dumps(str(files("pipeline.pages") / "error_model.js"))
+    told = f"const b = require({model}); console.log(JSON.stringify({program}))"
+    done = subprocess.run(
+        [node, "-e", told], capture_output=True, text=True, check=True, timeout=patience(60)
+    )
+    return json.loads(done.stdout)
+
+
 def assert_same_as_python(computed: list[dict[str, float]]) -> None:
     assert len(computed) == len(SCANS)
     for scan, numbers in zip(SCANS, computed, strict=True):
@@ -114,17 +125,12 @@ def test_page_is_one_file_without_requests():
 
 
 def test_page_model_in_node_is_python():
-    node = shutil.which("node") or pytest.skip("node is not installed")
-    model = files("pipeline.pages") / "error_model.js"
-    program = (
-        f"const b = require({json.dumps(str(model))});"
-        f"console.log(JSON.stringify({page_parameters()}.map((p) => {{"
-        "const o = b.compute(p); delete o.ring; delete o.image; return o; })))"
+    assert_same_as_python(
+        in_node(
+            f"{page_parameters()}.map((p) => {{"
+            "const o = b.compute(p); delete o.ring; delete o.image; return o; })"
+        )
     )
-    done = subprocess.run(
-        [node, "-e", program], capture_output=True, text=True, check=True, timeout=patience(60)
-    )
-    assert_same_as_python(json.loads(done.stdout))
 
 
 def test_page_in_a_browser_is_python(tmp_path):
@@ -157,18 +163,8 @@ def test_page_in_a_browser_is_python(tmp_path):
 
 
 def test_page_reads_the_probe_file_as_python_does():
-    node = shutil.which("node") or pytest.skip("node is not installed")
     probe = shared("recordings", "open-1-field", "probe.yaml")
-    model = files("pipeline.pages") / "error_model.js"
-    program = (
-        f"const b = require({json.dumps(str(model))});"
-        f"const text = require('fs').readFileSync({json.dumps(str(probe))}, 'utf8');"
-        "console.log(JSON.stringify(b.parseProbe(text)))"
-    )
-    done = subprocess.run(
-        [node, "-e", program], capture_output=True, text=True, check=True, timeout=patience(60)
-    )
-    read = json.loads(done.stdout)
+    read = in_node(f"b.parseProbe(require('fs').readFileSync({json.dumps(str(probe))}, 'utf8'))")
     numbers = json.loads(run(str(probe), "--json").stdout)
     scan = MisalignedScan(101.6, read["laser"]["baseline_mm"], 0.6)
     assert numbers["paper_equation_mm"] == pytest.approx(misalignment_error(scan).paper_equation_mm)
@@ -177,21 +173,12 @@ def test_page_reads_the_probe_file_as_python_does():
 
 
 def test_any_other_camera_becomes_a_table_the_page_projects_with():
-    node = shutil.which("node") or pytest.skip("node is not installed")
-
     class Other(KannalaBrandt):
         model = "other"
 
     camera = page_camera(Other(CAMERA.image_size, (366.0, 364.0), CAMERA.centre, CAMERA.distortion))
-    model = files("pipeline.pages") / "error_model.js"
-    program = (
-        f"const b = require({json.dumps(str(model))});"
-        f"console.log(JSON.stringify(b.project({json.dumps(camera)}, 30.1, -40.3, 21.7)))"
-    )
-    done = subprocess.run(
-        [node, "-e", program], capture_output=True, text=True, check=True, timeout=patience(60)
-    )
+    told = in_node(f"b.project({json.dumps(camera)}, 30.1, -40.3, 21.7)")
     exact = KannalaBrandt(CAMERA.image_size, (366.0, 364.0), CAMERA.centre, CAMERA.distortion).project(
         (30.1, -40.3, 21.7)
     )
-    assert json.loads(done.stdout) == pytest.approx(exact.uv.tolist(), abs=0.02)
+    assert told == pytest.approx(exact.uv.tolist(), abs=0.02)

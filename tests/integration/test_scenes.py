@@ -17,6 +17,7 @@ from pipeline.simulator.scene import Scene
 from tests.scene_runs import run_scene
 from tests.simulated import SCENES, shipped, smaller
 
+pytestmark = pytest.mark.slow
 NAMES = sorted(file.stem for file in SCENES.glob("*.yaml") if not file.stem.startswith("gauge"))
 IN_WATER = "water-filled-3-inch"
 # A camera of a sixteenth of the pixels, and a few centimetres of pipe; maps as coarse as its rings.

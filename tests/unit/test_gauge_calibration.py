@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 import pytest
 from scipy.special import erf
-from threadpoolctl import threadpool_limits
 
 from pipeline.arrays import Image
 from pipeline.errors import InputError, UnusableError
@@ -35,12 +34,6 @@ from tests.gauge_runs import (
     rings_of,
     stated_probe,
 )
-
-
-@pytest.fixture(autouse=True)
-def _one_thread() -> Iterator[None]:
-    with threadpool_limits(1):
-        yield
 
 
 @pytest.fixture(scope="module")
