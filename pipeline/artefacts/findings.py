@@ -155,7 +155,7 @@ class Defects:
     items : tuple of Defect
         Each shown by two rings, or by one and the photo.
     false_alarm_rate : float
-        Expected number of false ones among them: by the wall's noise, and what their probabilities leave.
+        Expected number of false ones among them: what their probabilities leave.
     smallest_depth_mm : float
         Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
     unconfirmed : tuple of Defect

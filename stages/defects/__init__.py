@@ -7,8 +7,8 @@
 4. Depth as the extreme of a 1 mm mean of the points (`surface`), without what noise adds to it, ± 1 σ
 (`depth`).
 5. What neither a second ring nor the photo confirms, stays at one place of the image, lies where the line
-ends, or is rather false than real in such footage, is set apart with the reason (`corroborate`,
-`credibility`).
+ends, or is rather false than real by what the same recording shows where nothing is, is set apart with the
+reason (`corroborate`, `credibility`).
 6. Kind from named features as a probability, with codes and words (`describe`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import RingSamples, Wall, WallTexture
@@ -32,11 +32,11 @@ from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
-from stages.defects.corroborate import Evidence, evidence_for
-from stages.defects.credibility import COUNTED, NO_CLUTTER, Clutter, Credibility, clutter_of, credibility_of
+from stages.defects.corroborate import Evidence, Witnesses, evidence_for
+from stages.defects.credibility import COUNTED, Credibility, credibility_of
 from stages.defects.depth import allowed_by_neighbours, measure_depth
 from stages.defects.describe import Scene, describe
-from stages.defects.detect import Detection, detect
+from stages.defects.detect import Detection, NoiseTail, detect, noise_tail
 from stages.defects.grow import footprint, grown
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
@@ -59,9 +59,9 @@ def find_defects(
     texture: WallTexture,
     parameters: DefectParameters,
     context: Context,
-    clutter: Clutter = NO_CLUTTER,
+    rings: RingSamples | None = None,
 ) -> Defects:
-    """Find, outline, measure and name the defects of a wall whose rings held so much ``clutter``.
+    """Find, outline, measure and name the defects of a wall; its ``rings`` tell how bright the line was.
 
     Raises
     ------
@@ -75,15 +75,16 @@ def find_defects(
     relief = smooth_shape_removed(wall.radius_map, parameters, known)
     cells = grown(relief, seeds, parameters, context.scratch)
     regions = regions_of(relief, cells, parameters.join_mm, context.scratch)
-    scene = Scene(texture, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
+    scene = Scene(Witnesses(texture, rings), recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
-    found = tuple(_measured(measured, regions, scene, wall.fixed, parameters, context))
-    on_wall = [f.evidence for f in found if f.evidence.on_wall and not f.all_round]
-    credibility = credibility_of(on_wall, clutter, wall.cloud.frame)
+    found = tuple(_measured(measured, regions, seeds.score, scene, wall.fixed, parameters, context))
+    tail = noise_tail(relief, seeds, known)
+    credibility = _credibility(found, tail, measured)
+    context.report("peaks of noise expected above the threshold", tail.above(seeds.threshold), "")
     confirmed, unconfirmed = _judged(found, credibility, parameters.min_depth_mm)
     items, alone = _numbered(confirmed, 1), _numbered(unconfirmed, len(confirmed) + 1)
-    expected = parameters.false_alarms + sum(1 - d.probability for d in items)
+    expected = sum(1 - d.probability for d in items)
     _report(items, alone, len(regions) - len(found), expected, context)
     return Defects(items, expected, _smallest_depth(seeds, parameters), alone)
 
@@ -96,14 +97,24 @@ def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
 class _Found:
     """A region that is deep enough to be reported, described as if it were surely there."""
 
+    region: Region
     defect: Defect
     evidence: Evidence
-    all_round: bool
+
+
+def _credibility(found: Sequence[_Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:
+    """Return what is to be expected by the findings, welds and what is not on the wall left out."""
+    used = [f for f in found if f.evidence.on_wall and not f.region.all_round]
+    column = 2 * np.pi / wall.relief.shape[1]
+    widths = [f.region.mask.shape[1] * column for f in used]
+    rings = len(np.unique(wall.cloud.cloud.frame))
+    return credibility_of([f.evidence for f in used], widths, rings, tail)
 
 
 def _measured(
     wall: MeasuredWall,
     regions: tuple[Region, ...],
+    score: Float32,
     scene: Scene,
     fixed: FixedToProbe | None,
     parameters: DefectParameters,
@@ -120,8 +131,9 @@ def _measured(
             depth = measure_depth(here, surface, clean, parameters.draws, context.random)
             depth = allowed_by_neighbours(depth, here, surface)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
-                evidence = evidence_for(here, depth, surface, scene.texture, _fixed_in(region, fixed))
-                yield _Found(describe(here, depth, surface, scene), evidence, here.all_round)
+                top = float(region.cut(score.astype(float))[region.mask].max())
+                evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
+                yield _Found(region, describe(here, depth, surface, scene), evidence)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
 
@@ -141,9 +153,9 @@ def _judged(
     confirmed: list[Defect] = []
     unconfirmed: list[Defect] = []
     for f in found:
-        real = 1.0 if f.all_round else credibility.probability(f.evidence, f.defect, min_depth_mm)
+        real = 1.0 if f.region.all_round else credibility.probability(f.evidence, f.defect, min_depth_mm)
         real *= 1.0 if f.evidence.on_wall else _WALL_OR_NOT
-        counts = f.all_round or (f.evidence.corroborated and real >= COUNTED)
+        counts = f.region.all_round or (f.evidence.corroborated and real >= COUNTED)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
         if counts:
             confirmed.append(defect)
@@ -204,19 +216,6 @@ def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float
     return max(found, parameters.min_depth_mm + chance * detection.small_sigma_mm)
 
 
-def _defects_of_run(
-    recording: Recording,
-    rings: RingSamples,
-    wall: Wall,
-    texture: WallTexture,
-    parameters: DefectParameters,
-    context: Context,
-) -> Defects:
-    """Find the defects of a run; its rings tell how much in them was not the wall."""
-    around = 2 * np.pi * float(np.nanmedian(wall.radius_map.radius_mm))
-    return find_defects(recording, wall, texture, parameters, context, clutter_of(rings, around))
-
-
 DEFECTS = Stage(
-    "defects", "9", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "10", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
 )

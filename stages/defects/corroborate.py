@@ -15,17 +15,19 @@ import numpy as np
 from scipy.ndimage import label
 
 from pipeline.arrays import Bool, Float
-from pipeline.artefacts.measured import WallTexture
+from pipeline.artefacts.measured import RingSamples, RingValidity, WallTexture
 from stages.defects.depth import Depth
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of, sure_of_themselves
 
-_LEAST_RINGS = 2
+LEAST_RINGS = 2
 # A ring speaks for a defect where a fifth of its samples there are off the wall by a quarter of the depth, as
 # beside the deepest place of a bell, and by two σ of the wall's own unevenness.
 _TOP_SHARE, _DEPTH_SHARE, _NOISE_SIGMAS = 0.2, 0.25, 2.0
 _LEAST_SAMPLES = 3
+# Of any ten places of a ring one is as bright as this.
+_BRIGHT = 0.9
 # The photo speaks for it where it is darker or brighter there than at all of so many places beside it: by
 # chance once in 41 times for either.
 _PLACES = 40
@@ -47,19 +49,22 @@ class Evidence:
         How many show it.
     photo : bool
         Whether the photo does.
-    above_noise : float
-        Its depth in σ of the wall.
+    score : float
+        How far the search for it stands out, σ.
     fixed : bool
         Whether it stays at one place of the image while the wall goes by.
     edge : bool
         Whether it is deepest beside hidden wall.
+    bright : bool
+        Whether the line is brighter there than at nine of ten places of the ring that shows it deepest.
     """
 
     rings: int
     photo: bool
-    above_noise: float
+    score: float
     fixed: bool = False
     edge: bool = False
+    bright: bool = False
 
     @property
     def on_wall(self) -> bool:
@@ -69,7 +74,7 @@ class Evidence:
     @property
     def corroborated(self) -> bool:
         """Whether two rings, or one and the photo, show it on the wall."""
-        return self.on_wall and (self.rings >= _LEAST_RINGS or (self.photo and self.rings > 0))
+        return self.on_wall and (self.rings >= LEAST_RINGS or (self.photo and self.rings > 0))
 
     @property
     def doubt(self) -> str:
@@ -86,11 +91,24 @@ class Evidence:
             )
         if not self.corroborated:
             return "No second ring shows it, nor do one ring and the photo"
+        if self.bright:
+            return (
+                "The line is brighter there than at nine of ten places of its ring, as of a glint or a "
+                "reflection, and more findings are so than defects are by chance"
+            )
         return "Of findings like it, more are false than real in such footage"
 
 
+@dataclass(frozen=True)
+class Witnesses:
+    """What findings are held against: the wall's photo, and the rings, where they are known."""
+
+    texture: WallTexture
+    rings: RingSamples | None
+
+
 def evidence_for(
-    region: Region, depth: Depth, surface: Surface, texture: WallTexture, fixed_mm: Float
+    region: Region, depth: Depth, surface: Surface, seen_by: Witnesses, fixed_mm: Float, score: float
 ) -> Evidence:
     """Return what rings and photo say of a finding, and whether it is ``fixed_mm`` (H, W) to the image.
 
@@ -102,11 +120,33 @@ def evidence_for(
     shifted = abs(depth.depth_mm) > size
     return Evidence(
         rings_behind(region, depth.depth_mm, surface),
-        not shifted and photo_stands_out(texture, relief, region),
-        abs(depth.depth_mm) / relief.typical.sigma_mm,
+        not shifted and photo_stands_out(seen_by.texture, relief, region),
+        score,
         _is_fixed(region, surface, fixed_mm),
         lies_at_edge(region, relief),
+        seen_by.rings is not None and line_is_bright(region, depth.depth_mm, surface, seen_by.rings),
     )
+
+
+def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: RingSamples) -> bool:
+    """Whether the line is brighter in the region than at nine of ten places of the deepest ring there.
+
+    A glint or a reflection that was taken for the line is; a defect is one time in ten.
+    """
+    points = surface.near
+    i, j, inside = cells_of(points, surface.relief, region)
+    height = np.sign(depth_mm) * (points.radius_mm - surface.relief.shape_at(i, j))
+    if not inside.any():
+        return False
+    deepest = points.frame == points.frame[np.argmax(np.where(inside, height, -np.inf))]
+    ring = np.flatnonzero(rings.frame == points.frame[deepest][0])
+    used = np.flatnonzero(rings.validity[ring[0]] == RingValidity.VALID) if len(ring) else ring
+    if len(used) != deepest.sum():  # a part of the ring lies beyond these rows
+        return False
+    # points lie in the order of their ring's samples
+    line, there = rings.amplitude[ring[0], used], inside[deepest]
+    top = there & (height[deepest] >= height[deepest][there].max() / 2)
+    return float(np.mean(line < np.median(line[top]))) > _BRIGHT
 
 
 def lies_at_edge(region: Region, relief: Relief) -> bool:

@@ -1,16 +1,16 @@
-"""The probability that a finding is there: how many of its kind are real, how many arise in such footage.
+"""The probability that a finding is there: what the same recording shows where nothing is.
 
-Findings shown by equally many rings are real or false in the ratio of two expected numbers. False ones arise
-where clutter of neighbouring rings meets by chance, which follows from the clutter of the recording itself,
-and where the wall's texture draws the line aside. The number of real ones follows from those that many rings
-show, which hardly anything imitates, and from the counted ones less the false. Independent of that, a depth
-within its own σ of nothing may be nothing.
+Two things imitate defects, and of both the recording itself tells how often. Noise, compression and texture
+that draws the line aside make peaks of the wall: how their number falls off with height is counted over the
+wall without its findings (`stages.defects.detect.NoiseTail`). A glint or a splash stands in one ring at a
+place of its own; that neighbouring rings show some in one place is a meeting by chance, and its frequency
+follows from how many findings one ring alone shows, and how wide they are. Where the codec hands it on to
+other pictures, several rings show it; it is brighter than the line, as a defect is by chance only, and how
+many are brighter tells how many are glints.
 
-A glint, a splash or a ghost stands in one ring at a place of its own. That two neighbouring rings show one in
-the same place is a meeting by chance; the number of these follows from how many there are and how wide: over
-18 drawn recordings (`python -m tests.benchmarks.bench_findings`) and four of an open one, 541 meetings
-were counted among the rejected samples where 546 follow from that. What meets is not rejected as standing
-alone, so that some of it passes for a finding.
+A finding is real or false in the ratio of the numbers that are expected of its kind: of its height against
+the noise, and of so many rings against the meetings (local false discovery rate: B. Efron, Large-Scale
+Inference, 2010, ch. 5). Independent of that, a depth within its own σ of nothing may be nothing.
 """
 
 from __future__ import annotations
@@ -22,33 +22,24 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from pipeline.arrays import Bool, Int
 from pipeline.artefacts.findings import Defect
-from pipeline.artefacts.measured import RingSamples, RingValidity
-from stages.defects.corroborate import Evidence
+from stages.defects.corroborate import LEAST_RINGS, Evidence
+from stages.defects.detect import NoiseTail
 
-# From four rings on hardly anything imitates a defect. For each defect so long, so many are seen in two
-# rings, in three, and in four or any other number: 6, 17 and about 13 for 85 in the drawn recordings, whose
-# defects are 3 to 14 mm long and whose rings are 1.1 to 2.2 mm apart.
-_MANY_RINGS, _REAL_IN_RINGS, _REAL_IN_MANY = 4, {0: 0.07, 1: 0.07, 2: 0.07, 3: 0.2}, 0.15
-# So many of the chance meetings pass for a finding: 9 of 92 in the drawn recordings with glints, the rest
-# being on different sides of the wall or too shallow.
-_PASSING = 0.1
-# Findings that texture makes up, per ring of the recording: 7 of two rings, 5 of three and 5 of more in 21
-# drawn recordings of 50 rings. Up to five σ of the wall they are as frequent at any depth, beyond it rarer.
-_MADE_UP, _EACH_RING, _DEPTH_SIGMAS = 0.007, 0.6, 5.0
+# Real findings are as frequent at any score up to so many times the least, on a logarithmic scale.
+_SCORES = 20.0
+# Of the real ones, at least this share is taken to be shown by any number of rings.
+_LEAST_SHARE = 0.1
+# Noise has fewer peaks than this above the score of a finding that is counted as surely real.
+_SURE = 0.05
 # The photo stands out at a place by chance once in 41 times for darker and for brighter.
 _PHOTO_BY_CHANCE = 2 / 41
-# Where there are so many findings of equally many rings that their number itself tells, it counts: less this
-# many of its own σ, and less the false ones.
-_CERTAIN = 2.0
+# A defect lies at one of the tenth of all places at which the line is brightest, and one more may.
+_BRIGHT_BY_CHANCE, _UNTOLD = 0.1, 0.5
+# A codec hands a glint on to a picture or two after it and before it: up to four or five rings show it.
+_MANY_RINGS = 6
 # From here on a finding that is corroborated counts as one: rather real than not.
 COUNTED = 0.5
-_CLUTTER = (RingValidity.GLINT, RingValidity.GHOST, RingValidity.OUTLIER, RingValidity.WIDTH)
-# Some hundred rings show how much clutter there is as well as all of them.
-_ENOUGH_RINGS = 400
-# What is narrower than the millimetre over which a depth is a mean, or has fewer samples, makes no finding.
-_LEAST_MM, _LEAST_SAMPLES = 1.0, 3
 
 
 @dataclass(frozen=True)
@@ -57,84 +48,74 @@ class Credibility:
 
     Attributes
     ----------
-    clutter : Clutter
-    ring_count : int
-        Rings of the recording.
-    shown_by : Counter
-        How many findings are shown by 0, 1, 2, ... rings.
+    tail : NoiseTail
+    sure : Counter
+        How many findings that noise does not make are shown by 1 (or none), 2, 3, ... rings.
+    meets : float
+        Chance that a neighbouring ring shows, to the same side, something in the place of a given finding.
+    bright, dark : int
+        Of the sure ones of a few rings, those at which the line is bright, and the others.
     """
 
-    clutter: Clutter
-    ring_count: int
-    shown_by: Counter[int]
+    tail: NoiseTail
+    sure: Counter[int]
+    meets: float
+    bright: int
+    dark: int
 
     def probability(self, evidence: Evidence, defect: Defect, min_depth_mm: float) -> float:
         """Return the probability that a finding is there."""
         deep_enough = float(ndtr((abs(defect.depth_mm) - min_depth_mm / 2) / defect.depth_sigma_mm))
-        return deep_enough * self._real_share(evidence)
-
-    def _real_share(self, evidence: Evidence) -> float:
-        many = sum(n for rings, n in self.shown_by.items() if rings >= _MANY_RINGS)
-        counted = self.shown_by[evidence.rings]
-        false = self._false(evidence)
-        likely = _REAL_IN_RINGS.get(evidence.rings, _REAL_IN_MANY) * (1 + many)
-        real = max(likely, counted - _CERTAIN * counted**0.5 - false)
-        return float(real / (real + false))
-
-    def _false(self, evidence: Evidence) -> float:
-        """Return how many false ones of so many rings to expect; the photo shows texture, but no glint."""
-        rarer = min(1.0, (_DEPTH_SIGMAS / max(evidence.above_noise, 1e-9)) ** 2)
-        made_up = _MADE_UP * self.ring_count * _EACH_RING ** (evidence.rings - 2) * rarer
-        if evidence.rings >= 2:
-            return _PASSING * self.clutter.meetings(evidence.rings) + made_up
-        alone = self.shown_by[0] + self.shown_by[1]
-        return alone * (_PHOTO_BY_CHANCE if evidence.photo else 1.0) + made_up
-
-
-def credibility_of(found: Sequence[Evidence], clutter: Clutter, frames: Int) -> Credibility:
-    """Return what to expect of a recording with these findings and the ``frames`` (M,) of its points."""
-    return Credibility(clutter, len(np.unique(frames)), Counter(e.rings for e in found))
-
-
-@dataclass(frozen=True)
-class Clutter:
-    """Runs of rejected samples that are wide enough to make a finding.
-
-    Attributes
-    ----------
-    runs : float
-        In all rings together.
-    overlap : float
-        Chance that a neighbouring ring shows one in the place of a given one.
-    """
-
-    runs: float = 0.0
-    overlap: float = 0.0
+        return deep_enough / (1 + self._noise(evidence) + self._clutter(evidence) + self._glints(evidence))
 
     def meetings(self, rings: int) -> float:
         """Return how many places to expect in which so many neighbouring rings show clutter by chance."""
-        return self.runs * self.overlap ** max(rings - 1, 0)
+        return float(self._alone * self.meets ** (rings - 1))
+
+    def _noise(self, evidence: Evidence) -> float:
+        """Return how many peaks of noise there are to one real finding of such a score."""
+        real = self._real / (max(evidence.score, 1.0) * np.log(_SCORES))
+        return float(self.tail.density(evidence.score) / real)
+
+    def _clutter(self, evidence: Evidence) -> float:
+        """Return how much clutter there is to one real finding of so many rings."""
+        if evidence.rings < LEAST_RINGS:
+            chance = _PHOTO_BY_CHANCE if evidence.photo else 1.0
+            return float(chance * self._alone / max(self.sure[1] - self._alone, self._few))
+        false = self.meetings(evidence.rings)
+        return float(false / max(self.sure[evidence.rings] - false, self._few))
+
+    def _glints(self, evidence: Evidence) -> float:
+        """Return how many glints there are to one real finding at which the line is as bright."""
+        real = self.dark * _BRIGHT_BY_CHANCE / (1 - _BRIGHT_BY_CHANCE) + _UNTOLD
+        few = evidence.bright and evidence.rings < _MANY_RINGS
+        return max(self.bright - real, 0.0) / real if few else 0.0
+
+    @property
+    def _alone(self) -> float:
+        """What one ring shows beyond as many real findings as two rings show."""
+        return max(self.sure[1] - max(self.sure[2], self._few), 0.0)
+
+    @property
+    def _few(self) -> float:
+        """Least number of real findings to expect in any number of rings."""
+        return _LEAST_SHARE * (1.0 + sum(self.sure.values()))
+
+    @property
+    def _real(self) -> float:
+        """Real findings to be expected: those that are sure, and one more."""
+        return 1.0 + sum(self.sure.values())
 
 
-NO_CLUTTER = Clutter()
-
-
-def clutter_of(rings: RingSamples, around_mm: float) -> Clutter:
-    """Return the clutter of rings (F, A) on a wall of this circumference, mm."""
-    count, azimuths = rings.validity.shape
-    least = max(_LEAST_SAMPLES, int(np.ceil(_LEAST_MM * azimuths / around_mm)))
-    some = slice(None, None, max(count // _ENOUGH_RINGS, 1))
-    rejected = np.isin(rings.validity[some], _CLUTTER) & np.isfinite(rings.radius_px[some])
-    widths = np.concatenate([np.empty(0, int), *map(_run_lengths, rejected)])
-    widths = widths[widths >= least]
-    if not widths.size:
-        return NO_CLUTTER
-    a_ring = len(widths) / len(rejected)
-    overlap = min(a_ring * 2 * float(widths.mean()) / azimuths, 1.0)
-    return Clutter(a_ring * count, overlap)
-
-
-def _run_lengths(row: Bool) -> Int:
-    """Return the lengths of the runs of true cells in a row that is not periodic."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(row, np.int8), [0]])))
-    return np.asarray(edges[1::2] - edges[::2], np.int64)
+def credibility_of(
+    found: Sequence[Evidence], width_rad: Sequence[float], rings: int, tail: NoiseTail
+) -> Credibility:
+    """Return what to expect of so many rings with these findings, of each of which the width is known."""
+    certain = [e for e in found if tail.above(e.score) < _SURE]
+    sure = Counter(max(e.rings, 1) for e in certain)
+    bright = Counter(e.bright for e in certain if e.rings < _MANY_RINGS)
+    alone = [w for e, w in zip(found, width_rad, strict=True) if e.rings < LEAST_RINGS]
+    # Two meet where they overlap, each reaching half of its width to either side; half are on the same side.
+    overlap = 2 * float(np.mean(alone)) / (2 * np.pi) / 2 if alone else 0.0
+    meets = min(overlap * len(alone) / max(rings, 1), 1.0)
+    return Credibility(tail, sure, meets, bright[True], bright[False])

@@ -16,9 +16,9 @@ from pipeline.artefacts.findings import (
     pacp_suggestion,
     pof_class,
 )
-from pipeline.artefacts.measured import PointCloud, WallTexture
+from pipeline.artefacts.measured import PointCloud
 from pipeline.pages import notation
-from stages.defects.corroborate import darkness
+from stages.defects.corroborate import Witnesses, darkness
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief
@@ -143,7 +143,7 @@ def probabilities(features: Features, region: Region) -> dict[DefectKind, float]
 class Scene:
     """What every defect is described against."""
 
-    texture: WallTexture
+    seen_by: Witnesses
     wall_thickness_mm: float | None
     min_depth_mm: float
 
@@ -183,7 +183,7 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
         ),
         pacp_suggestion=pacp_suggestion(kind, features.direction_rad),
         en13508_suggestion=en13508_suggestion(kind),
-        statement=_statement(features, likely, depth, darkness(scene.texture, relief, region)),
+        statement=_statement(features, likely, depth, darkness(scene.seen_by.texture, relief, region)),
     )
 
 

@@ -4,11 +4,14 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
 from stages.defects.corroborate import Evidence
-from stages.defects.credibility import Clutter, clutter_of, credibility_of
+from stages.defects.credibility import credibility_of
+from stages.defects.detect import NoiseTail, detect, noise_tail
+from stages.defects.relief import smooth_shape_removed
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
@@ -80,40 +83,83 @@ def test_a_ridge_whose_top_is_seen_stays_a_finding_beside_hidden_wall(hidden):
     assert (len(told.items), len(told.unconfirmed)) == (1, 0)
 
 
-def rings_with(validity):
-    """Return rings of which only the validity (F, A) matters."""
-    radius = np.full(validity.shape, 100.0, np.float32)
-    azimuth = np.linspace(-np.pi, np.pi, validity.shape[1], endpoint=False)
-    frame = np.arange(len(validity))
-    return RingSamples(frame, azimuth, (0.0, 0.0), radius, radius, radius, radius, validity)
+def rings_of(wall, bright=()):
+    """Return the rings of a wall, brighter at the middle of each bright place (row, column)."""
+    shape = wall.radius_map.radius_mm.shape
+    amplitude = np.random.default_rng(3).uniform(60, 100, shape).astype(np.float32)
+    for row, column in bright:
+        amplitude[row : row + 2, column : column + 12] = 200
+    radius, valid = np.full(shape, 100.0, np.float32), np.full(shape, RingValidity.VALID, np.uint8)
+    frame = np.arange(shape[0])
+    rings = RingSamples(frame, AZIMUTH, (0.0, 0.0), radius, radius, radius, radius, valid)
+    return replace(rings, amplitude=amplitude)
 
 
-def test_clutter_meets_in_neighbouring_rings_as_often_as_what_is_drawn_at_random():
-    random, width = np.random.default_rng(1), 9
-    drawn = random.random((400, 720)) < 0.01
-    odd = np.zeros_like(drawn)
-    for k in range(width):
-        odd |= np.roll(drawn, k, 1)
-    validity = np.where(odd, RingValidity.GLINT, RingValidity.VALID).astype(np.uint8)
-    clutter = clutter_of(rings_with(validity), 720.0)
-    two = odd[1:] & odd[:-1]
-    assert clutter.meetings(2) == pytest.approx((two & ~np.roll(two, 1, 1)).sum(), rel=0.25)
-    narrow = np.where(drawn, RingValidity.GLINT, RingValidity.VALID).astype(np.uint8)
-    assert clutter_of(rings_with(narrow), 720.0).meetings(2) == 0.0
+SPOTS = [(row, column) for row in (6, 14, 22, 30, 38, 46) for column in (60, 240)]
 
 
-def evidence(rings, above_noise=8.0):
-    return Evidence(rings, False, above_noise)
+@pytest.mark.parametrize("bright", [0, 1, 10])
+def test_findings_at_which_the_line_is_bright_are_doubted_when_more_are_so_than_by_chance(bright):
+    random = np.random.default_rng(8)
+    radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
+    for row, column in SPOTS:
+        radius[row : row + 2, column : column + 12] -= 1.0
+    wall = wall_of(DISTANCE, AZIMUTH, radius, SIGMA)
+    told = find_defects(
+        bare_recording(2 * RADIUS, None), wall, grey_texture(wall), DefectParameters(), quiet_context(),
+        rings_of(wall, SPOTS[:bright]),
+    )  # fmt: skip
+    doubted = bright if bright > 1 else 0
+    assert (len(told.items), len(told.unconfirmed)) == (len(SPOTS) - doubted, doubted)
+    assert all("brighter" in d.statement for d in told.unconfirmed)
 
 
-def test_two_rings_in_much_clutter_are_rather_false_and_many_rings_stay_sure():
+def tail_of(radius):
+    """Return the tail of a wall's noise, and its score."""
+    wall = wall_of(DISTANCE, AZIMUTH, RADIUS + radius, SIGMA)
+    relief = smooth_shape_removed(wall.radius_map, DefectParameters())
+    context = quiet_context()
+    seeds = detect(relief, 0.05, context.scratch, context.progress)
+    return noise_tail(relief, seeds, np.zeros(radius.shape, bool)), seeds.score
+
+
+@pytest.mark.parametrize("heavy", [False, True])
+def test_the_tail_of_the_noise_tells_how_many_high_peaks_such_walls_show(heavy):
+    random, told, counted = np.random.default_rng(4), 0.0, 0
+    for _ in range(12):
+        noise = smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
+        if heavy:
+            noise *= np.exp(0.6 * smooth_noise(random, noise.shape, 1.0, 6.0))
+        tail, score = tail_of(noise)
+        told += tail.above(4.3)
+        top = score == maximum_filter(score, 9, mode="wrap")
+        counted += int((top & (score > 4.3)).sum())
+    assert counted > 3
+    assert counted / 2 < told < 2 * counted
+
+
+def evidence(rings, score=30.0, bright=False):
+    return Evidence(rings, False, score, bright=bright)
+
+
+def probability(of, among, tail=None, widths=None):
+    """Return the probability of a finding among others."""
     told = found(2).items[0]
-    several = [evidence(2)] * 4 + [evidence(8)] * 4
-    frames = np.arange(50)
-    quiet = credibility_of(several, Clutter(), frames)
-    hard = credibility_of(several, Clutter(300.0, 0.1), frames)
-    assert quiet.probability(evidence(2), told, 0.2) > 0.6 > 0.2 > hard.probability(evidence(2), told, 0.2)
-    assert hard.probability(evidence(8), told, 0.2) > 0.95
+    tail, widths = tail or NoiseTail(20.0, 1.2), widths or [0.03] * len(among)
+    return credibility_of(among, widths, 50, tail).probability(of, told, 0.2)
+
+
+def test_two_rings_among_many_single_ones_are_rather_false_and_many_rings_stay_sure():
+    quiet, hard = [evidence(8)] * 4 + [evidence(2)], [evidence(8)] * 4 + [evidence(2)] + [evidence(1)] * 300
+    assert probability(evidence(2), quiet) > 0.9 > 0.5 > probability(evidence(2), hard, widths=[0.3] * 305)
+    assert probability(evidence(8), hard, widths=[0.3] * 305) > 0.9
+
+
+def test_a_finding_no_higher_than_the_noise_of_its_recording_is_doubted():
+    several = [evidence(5)] * 4
+    heavy = NoiseTail(200.0, 6.0)
+    assert probability(evidence(5, 5.6), several) > 0.9 > 0.3 > probability(evidence(5, 5.6), several, heavy)
+    assert probability(evidence(5, 30.0), several, heavy) > 0.95
 
 
 def test_one_ring_is_not_deeper_than_its_neighbours_allow():
