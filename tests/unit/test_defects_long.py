@@ -9,7 +9,7 @@ from scipy.ndimage import label
 
 from pipeline.machine import scratch as scratch_module
 from pipeline.machine.scratch import Scratch
-from stages.defects import DefectParameters, find_defects, grow, segment, stretch
+from stages.defects import DefectParameters, along, find_defects, grow, segment
 from stages.defects.detect import detect
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Patches
@@ -47,7 +47,7 @@ def test_the_same_is_found_wherever_the_cuts_lie(monkeypatch):
     whole = search(wall)
     assert [d.kind for d in whole.items] == ["pit", "weld", "gouge", "dent"]
     for rows in (200, 101, 40):
-        monkeypatch.setattr(stretch, "_ROWS", rows)
+        monkeypatch.setattr(along, "_ROWS", rows)
         cut = search(wall)
         assert [d.statement for d in cut.items] == [d.statement for d in whole.items]
         for mine, its in zip(cut.items, whole.items, strict=True):
@@ -62,9 +62,9 @@ def test_it_does_matter_that_stretches_overlap(monkeypatch):
     wall = smooth_shape_removed(long_wall((drawn,), 100.0).radius_map, PARAMETERS)
     whole = detect(wall, 0.05, Scratch(), lambda done, total: None)
     for overlapping in (True, False):
-        monkeypatch.setattr(stretch, "_ROWS", 10)
+        monkeypatch.setattr(along, "_ROWS", 10)
         if not overlapping:
-            monkeypatch.setattr(stretch, "widened", lambda own, rows, overlap: stretch.Stretch(own, own))
+            monkeypatch.setattr(along, "widened", lambda own, rows, overlap: stretch.Stretch(own, own))
         cut = detect(wall, 0.05, Scratch(), lambda done, total: None)
         assert np.array_equal(cut.inward, whole.inward) == overlapping
 
@@ -74,7 +74,7 @@ def test_a_sample_of_a_long_wall_stands_for_all_of_it(monkeypatch):
     wall = long_wall(drawn)
     wall.radius_map.radius_mm[400:560] = np.nan  # a part that nobody saw is no sample
     whole = search(wall)
-    monkeypatch.setattr(stretch, "_SAMPLED_ROWS", 320)
+    monkeypatch.setattr(along, "_SAMPLED_ROWS", 320)
     sampled = search(wall)
     assert [d.kind for d in sampled.items] == [d.kind for d in whole.items] == ["pit", "dent"]
     for mine, its in zip(sampled.items, whole.items, strict=True):
@@ -86,7 +86,7 @@ def test_a_sample_of_a_long_wall_stands_for_all_of_it(monkeypatch):
 def test_memory_does_not_grow_with_length(monkeypatch, tmp_path):
     monkeypatch.setattr(scratch_module, "_MAP_FROM_BYTES", 1 << 10)
     for name, value in (("_ROWS", 100), ("_SAMPLED_ROWS", 64), ("_BLOCKS", 2)):
-        monkeypatch.setattr(stretch, name, value)
+        monkeypatch.setattr(along, name, value)
 
     def most(length_mm):
         wall = long_wall((DrawnDefect("pit", 100.0, 1.0, 8.0, 8.0, 0.6),), length_mm)
@@ -121,7 +121,7 @@ def test_what_is_longer_than_a_part_is_given_in_parts(monkeypatch):
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 40])
 def test_patches_are_those_of_the_whole_map_closed_around(monkeypatch, rows):
-    monkeypatch.setattr(stretch, "_ROWS", rows)
+    monkeypatch.setattr(along, "_ROWS", rows)
     mask = np.random.default_rng(rows).random((60, 30)) < 0.25
     patches = segment._patches(mask, (1.0, 1.0), 0.0, Scratch())
     there = np.concatenate([patches.of(slice(k, k + 9)) for k in range(0, 60, 9)])
