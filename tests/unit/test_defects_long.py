@@ -64,7 +64,7 @@ def test_it_does_matter_that_stretches_overlap(monkeypatch):
     for overlapping in (True, False):
         monkeypatch.setattr(along, "_ROWS", 10)
         if not overlapping:
-            monkeypatch.setattr(along, "widened", lambda own, rows, overlap: stretch.Stretch(own, own))
+            monkeypatch.setattr(along, "widened", lambda own, rows, overlap: along.Stretch(own, own))
         cut = detect(wall, 0.05, Scratch(), lambda done, total: None)
         assert np.array_equal(cut.inward, whole.inward) == overlapping
 
