@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.robust import spread_about_median
+from pipeline.adjustment.normal_equations import covariance_of
+from pipeline.adjustment.robust import independent_count, spread_about_median
 from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.instrument.misalignment import fit_circle
@@ -22,8 +23,8 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 # A quarter of the preview's 360 azimuths: a circle through less is badly determined.
 _LEAST_POINTS = 90
 _TRIANGULATE = TriangulateParameters(largest_departure=0.2)
-# Correlation length of a line's errors around the ring, degrees. Debt: data/debts.md.
-_ALIKE = 8.0
+# Harmonics of the shape that a radius does not follow: ovality and what pipes have beside it.
+_HARMONICS = 4
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,8 @@ class PreliminarySection:
     distance_mm : float
         By the encoder as it was read; NaN without one.
     diameter_mm, diameter_sigma_mm : float
-        σ from the scatter of the points about the circle; the calibration is not in it.
+        σ from the scatter of the points about the circle and from the probe's covariance; what a tilt of the
+        probe makes of the ring is not in it.
     seen : float
         Share of the ring with a usable line.
     """
@@ -61,8 +63,8 @@ def preliminary_sections(
     points = triangulate_rings(rings, probe, _TRIANGULATE, context)
     times = dict(zip(later.frames.frame.tolist(), later.frames.time_s.tolist(), strict=True))
     return tuple(
-        _section(int(frame), times[int(frame)], _reading(recording, times[int(frame)]), xyz)
-        for frame, xyz in zip(points.frame, points.xyz_c.astype(float), strict=True)
+        section_of(int(frame), times[int(frame)], _reading(recording, times[int(frame)]), xyz, uv, probe)
+        for frame, xyz, uv in zip(points.frame, points.xyz_c.astype(float), rings.pixels(), strict=True)
         if np.isfinite(xyz).all(-1).sum() >= _LEAST_POINTS
     )
 
@@ -73,18 +75,41 @@ def _behind(recording: Recording, after_frame: int) -> Recording:
     return replace(recording, frames=FrameTable(table.frame[new], table.time_s[new], table.illumination[new]))
 
 
-def _section(frame: int, time_s: float, distance_mm: float, xyz_c: Float) -> PreliminarySection:
+def section_of(
+    frame: int, time_s: float, distance_mm: float, xyz_c: Float, uv: Float, probe: Probe
+) -> PreliminarySection:
     """Fit the circle twice, the second time without what lies off the first: deposits, branches."""
-    xy = xyz_c[np.isfinite(xyz_c).all(-1), :2]
+    there = np.isfinite(xyz_c).all(-1)
+    xy = xyz_c[there, :2]
     centre, radius = fit_circle(xy)
     off = np.linalg.norm(xy - centre, axis=-1) - radius
-    spread = spread_about_median(off)
-    near = np.abs(off - np.median(off)) <= 3 * spread
-    _, radius = fit_circle(xy[near])
-    seen = len(xy) / len(xyz_c)
-    independent = max(360.0 * seen / _ALIKE, 1.0)
-    sigma = 2 * spread / float(np.sqrt(independent))
-    return PreliminarySection(frame, time_s, distance_mm, 2 * radius, sigma, seen)
+    near = np.abs(off - np.median(off)) <= 3 * spread_about_median(off)
+    centre, radius = fit_circle(xy[near])
+    arm = xy[near] - centre
+    sigma = 2 * float(np.hypot(_radius_sigma(arm), _calibration_sigma(probe, uv[there][near], arm)))
+    return PreliminarySection(frame, time_s, distance_mm, 2 * radius, sigma, len(xy) / len(xyz_c))
+
+
+def _radius_sigma(arm: Float) -> float:
+    """Return the 1 σ of a circle's radius, from points about its centre (N, 2) in the order of the ring.
+
+    The pipe's shape up to the fourth harmonic is taken out. It does not change the mean radius of a whole
+    ring; where part of the ring is missing, the harmonics' own uncertainty counts.
+    """
+    azimuth, radius = np.arctan2(arm[:, 1], arm[:, 0]), np.linalg.norm(arm, axis=-1)
+    shape = [f(k * azimuth) for k in range(1, _HARMONICS + 1) for f in (np.cos, np.sin)]
+    design = np.stack([np.ones_like(azimuth), *shape], -1)
+    noise = radius - design @ np.linalg.lstsq(design, radius, rcond=None)[0]
+    variance = float(noise @ noise) / (len(arm) - design.shape[1])
+    alike = len(noise) / independent_count(noise)
+    return float(np.sqrt(variance * alike * covariance_of(design.T @ design)[0, 0]))
+
+
+def _calibration_sigma(probe: Probe, uv: Float, arm: Float) -> float:
+    """Return the 1 σ of the mean radius of points (N, 2) about their centre from the probe's covariance."""
+    outward = arm / np.linalg.norm(arm, axis=-1, keepdims=True)
+    by_parameters = np.einsum("nj,njp->p", outward, probe.triangulate_jacobian(uv)[1][:, :2]) / len(uv)
+    return float(np.sqrt(by_parameters @ probe.covariance @ by_parameters))
 
 
 def _reading(recording: Recording, time_s: float) -> float:

@@ -72,6 +72,18 @@ def _few(clusters: int) -> float:
     return clusters / max(clusters - 1, 1)
 
 
+def independent_count(values: Float) -> float:
+    """Return how many independent values have a mean as uncertain as these (n,), which follow each other.
+
+    Their autocorrelation is summed up to where it is first negative (C. Geyer, "Practical Markov chain Monte
+    Carlo", 1992).
+    """
+    off = values - values.mean()
+    alike = np.fft.irfft(np.abs(np.fft.rfft(off, 2 * len(off))) ** 2)[: len(off)]
+    positive = alike[: int(np.argmax(alike < 0)) or len(off)]
+    return max(len(off) / max(2 * float(positive.sum() / max(alike[0], 1e-300)) - 1, 1.0), 1.0)
+
+
 def robust_spread(residual: Float | Float32) -> float:
     """Return 1 σ of residuals of any shape about zero, from their median size; NaN entries do not count."""
     size = np.abs(residual)

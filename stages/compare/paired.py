@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from pipeline.adjustment.robust import basis_of, ring_harmonics
+from pipeline.adjustment.robust import basis_of, independent_count, ring_harmonics
 from pipeline.arrays import Byte, Float
 from pipeline.artefacts.comparison import RegisteredWalls, Registration, Value
 from pipeline.artefacts.wall_map import WallMap
@@ -138,18 +138,6 @@ def _diameter(grown_mm: Float, pair: PairedWalls, is_one_calibration: bool) -> V
     wander = float(known.std()) * np.sqrt(np.pi / 2 / independent_count(known))  # π/2: of a median
     systematic = 0.0 if is_one_calibration else 2 * np.sqrt(2) * pair.calibration_mm
     return Value(float(np.median(known)), float(np.hypot(wander, systematic)))
-
-
-def independent_count(values: Float) -> float:
-    """Return how many independent values have a mean as uncertain as these (n,), which follow each other.
-
-    Their autocorrelation is summed up to where it is first negative (C. Geyer, "Practical Markov chain Monte
-    Carlo", 1992).
-    """
-    off = values - values.mean()
-    alike = np.fft.irfft(np.abs(np.fft.rfft(off, 2 * len(off))) ** 2)[: len(off)]
-    positive = alike[: int(np.argmax(alike < 0)) or len(off)]
-    return max(len(off) / max(2 * float(positive.sum() / max(alike[0], 1e-300)) - 1, 1.0), 1.0)
 
 
 def _typical_sigma(pair: PairedWalls) -> float:

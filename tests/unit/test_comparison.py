@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.adjustment.robust import independent_count
 from pipeline.artefacts.comparison import FAMILY_ERROR, Fate
 from pipeline.errors import UnusableError
 from stages.compare import changes, holm, put_together
-from stages.compare.paired import PairedWalls, independent_count
+from stages.compare.paired import PairedWalls
 from stages.compare.registration.by_marks import register
 from tests.two_walls import (
     FINE,
