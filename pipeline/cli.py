@@ -151,6 +151,7 @@ def run(
     from pipeline.api.run import configuration, dirt_of, prepare
     from pipeline.machine.display import ProgressDisplay
     from pipeline.machine.plan import Selection
+    from pipeline.system.kernels import compiled_ahead
 
     gc.freeze()  # what was imported stays: looking for garbage in it takes a fiftieth of a run
     console = Console(stderr=True)
@@ -163,7 +164,7 @@ def run(
     _warn(console, "Look at this first", job.recording.warnings)
     display = ProgressDisplay(console)
     try:
-        with display:
+        with display, compiled_ahead(_kernels()):
             outcome = run_job(job, Selection(from_stage, only, resume), display)
         _print_outcome(outcome, output)
     finally:
@@ -197,6 +198,16 @@ def config(
 
     text = default_text(PIPELINE) if default else resolved_text(configuration(file, assignments or ()))
     typer.echo(text, nl=False)
+
+
+def _kernels() -> dict[str, dict[str, str]]:
+    """Return the kernels of a run, by module and function."""
+    from pipeline.files.installed import KERNELS, file_or_shipped
+    from pipeline.files.json_yaml import read_yaml
+
+    listed = read_yaml(file_or_shipped(Path("run"), KERNELS))
+    modules = {module: listed.section(module) for module in map(str, listed.values)}
+    return {m: {f: part.text(f) for f in map(str, part.values)} for m, part in modules.items()}
 
 
 def main() -> None:

@@ -106,6 +106,8 @@ class GlbBuilder:
 HALF_TURN_ABOUT_X = [1.0, 0.0, 0.0, 0.0]
 # Quality of photo textures. Chosen by eye.
 _JPEG_QUALITY = 88
+# Of PNG: level 9 takes twice as long as 6 for 1 to 5 % less.
+_COMPRESSION = 6
 _VARIANTS = "KHR_materials_variants"
 _UNLIT = "KHR_materials_unlit"
 
@@ -198,5 +200,5 @@ def _palette_png(texture: ErrorTexture) -> bytes:
     picture = Image.fromarray(texture.level, mode="L")
     picture.putpalette(texture.palette_bgr[:, ::-1].tobytes())
     stream = io.BytesIO()
-    picture.save(stream, "PNG", compress_level=9)
+    picture.save(stream, "PNG", compress_level=_COMPRESSION)
     return stream.getvalue()

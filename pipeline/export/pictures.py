@@ -108,9 +108,10 @@ def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:
 
     distance = overlays.distance_mm
     width = float(np.clip(np.ptp(distance) / _MM_PER_INCH, 6, _LONGEST_INCH))
-    figure = Figure(figsize=(width + 2, 5), layout="constrained")
+    figure = Figure(figsize=(width + 2, 5))
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
+    # Places are fixed: a layout engine draws every figure three times to find them.
+    axes = figure.add_axes((0.75 / (width + 2), 0.6 / 5, width / (width + 2), 4.0 / 5))
     half = (distance[-1] - distance[0]) / max(len(distance) - 1, 1) / 2
     # No finer than the picture's own dots.
     every = max(len(distance) // int(_LONGEST_INCH * _DPI), 1)
@@ -143,5 +144,8 @@ def _add_colour_bar(figure: Figure, overlay: Overlay) -> None:
 
     colours = ListedColormap(overlay.palette_bgr[1:, ::-1] / 255.0)
     scale = ScalarMappable(Normalize(overlay.low_mm, overlay.high_mm), colours)
-    bar = figure.colorbar(scale, ax=figure.axes[0], extend="both" if overlay.low_mm < 0 else "max", pad=0.01)
+    left, bottom, wide, high = figure.axes[0].get_position().bounds
+    inch = 1 / figure.get_figwidth()
+    beside = figure.add_axes((left + wide + 0.15 * inch, bottom, 0.2 * inch, high))
+    bar = figure.colorbar(scale, cax=beside, extend="both" if overlay.low_mm < 0 else "max")
     bar.set_label(f"mm  (grey: not measured; {100 * overlay.beyond:.1f} % beyond the ends)")

@@ -23,7 +23,7 @@ def program_version() -> str:
 # In a checkout `pipeline/configs` is a link to the folder `configs`; a wheel holds the files themselves.
 _CONFIGS = Path(str(files("pipeline"))) / "configs"
 _SUFFIX = ".yaml"
-PARAMETERS, SCENES, PRIORS = "", "scenes", "priors"
+PARAMETERS, SCENES, PRIORS, KERNELS = "", "scenes", "priors", "kernels"
 
 
 def shipped_names(kind: str) -> tuple[str, ...]:
@@ -32,7 +32,7 @@ def shipped_names(kind: str) -> tuple[str, ...]:
     Parameters
     ----------
     kind : str
-        `PARAMETERS`, `SCENES` or `PRIORS`.
+        `PARAMETERS`, `SCENES`, `PRIORS` or `KERNELS`.
     """
     return tuple(sorted(file.stem for file in (_CONFIGS / kind).glob(f"*{_SUFFIX}")))
 
