@@ -134,3 +134,18 @@ def test_a_slip_where_the_probe_turns_is_no_play(lasts_s: float, at_s: float, ga
         assert fit.values[PLAY] == 0.0
         (found,) = steps_found(fit, slipped)
         assert found.gain_mm == pytest.approx(gain_mm, abs=4 * found.sigma_mm)
+
+
+def test_what_a_slow_slip_gains_at_its_ends_is_not_lost() -> None:
+    errors = []
+    for case in (3, 5, 7):
+        random = np.random.default_rng([5, case])
+        reverses, gain_mm = bool(random.integers(2)), float(np.exp(random.uniform(*np.log([0.3, 0.8]))))
+        gain_mm *= random.choice([-1, 1])
+        _, at_s, encoder = random.integers(6), random.uniform(1.5, 5.5), read(reverses)
+        part = np.clip((encoder.time_s - at_s) / 0.4, 0.0, 1.0)
+        slipped = replace(encoder, distance_mm=encoder.distance_mm + gain_mm * part)
+        sight = seen(np.random.default_rng(1000 + case), reverses)
+        (found,) = steps_found(with_events(sight, slipped), slipped)
+        errors.append((found.gain_mm - gain_mm) / found.sigma_mm)
+    assert np.sqrt(np.mean(np.square(errors))) < 1.2

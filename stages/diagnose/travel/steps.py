@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.stats import chi2
 
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
@@ -26,6 +27,8 @@ _AROUND = 8
 # Least number of other moments that tell how far a reading's own motion imitates a slip.
 _LEAST_OTHERS = 20
 _TAIL = 2.275
+# Chance of an even slip that is called uneven: its size then comes from single pictures, as for any slip.
+_EVEN = 1e-3
 
 
 def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: float) -> Agreement | None:
@@ -167,9 +170,11 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     if again is not None and again.confirmation.agrees:
         # Errors of pictures cannot make the encoder's reading jump.
         rivals, within_s = (), jumps_s
-    elif not event.during and event.kind is EventKind.STEP and np.isfinite(sigma):
-        gain_mm, lasting = _over_durations(fit, place_in_list)
-        sigma = float(np.hypot(lasting, rounding))
+    jumps = again is not None and again.confirmation.agrees and not event.during
+    if event.kind is EventKind.STEP and np.isfinite(sigma) and not jumps:
+        even = _over_durations(fit, place_in_list)
+        if even is not None:
+            gain_mm, sigma = even[0], float(np.hypot(even[1], rounding))
     count = len(sight.time_s)
     z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
     return StepFound(
@@ -178,22 +183,28 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     )  # fmt: skip
 
 
-def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
-    """Return a step's size and 1 σ where it is not known when it came and how long it took.
+def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float] | None:
+    """Return the size and 1 σ of an even slip where it is not known when it came and how long it took.
 
     Every moment near it and every duration that a wheel may slip for is as likely as another beforehand. What
-    is taken for a step all at once is too small where the wheel slips for a few pictures.
+    a slip gains where it begins and ends is lost among the noise of single pictures, and what is taken for a
+    step all at once or for a shorter one is too small. None where the slip is not even.
     """
     own, event, sight = 4 + place_in_list, fit.events[place_in_list], fit.sight
+    first = 4 + len(fit.events) + sum(e.during for e in fit.events[:place_in_list])
     difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
-    others = np.delete(fit.columns, own, axis=1)
+    others = np.delete(fit.columns, [own, *range(first, first + event.during)], axis=1)
     rest = whitened_fit(difference, others, fit.noise.covariance(sight.path_mm))
     steps = np.arange(int(np.ceil(LONGEST_S / sight.frame_time_s)) + 1)
-    middle = sight.time_s[event.place] + sight.frame_time_s * 0.5 * np.append(-steps[:0:-1], steps)
+    about_s = np.mean(sight.time_s[[event.place - event.during - 1, event.place]])
+    middle = about_s + sight.frame_time_s * 0.5 * np.append(-steps[:0:-1], steps)
     lasts, at = (x.ravel() for x in np.meshgrid(np.maximum(sight.frame_time_s * steps, SHORTEST_S), middle))
     value, gain = rest.gain(np.clip((sight.time_s[:, None] - at) / lasts + 0.5, 0.0, 1.0))
     # Noise is measured from the pictures' usual steps; what is left may be more.
     more = float(fit.covariance[own, own] / fit.whitened.covariance[own, own])
+    uneven = rest.residual @ rest.weighted - fit.whitened.residual @ fit.whitened.weighted - gain.max()
+    if event.during and uneven > more * chi2.isf(_EVEN, event.during):
+        return None
     weight = np.exp(0.5 * (gain - gain.max()) / more)
     weight /= weight.sum()
     mean = float(weight @ value)
