@@ -128,6 +128,11 @@ def test_turn_rows(given) -> None:
     check_rows(lambda s: residuals.turn_rows(s, 0.1), given[1], 1e-9, frame_atol=0.1 / 60)
 
 
+def test_view_rows(given) -> None:
+    # That the pipe turns when its axis is deflected, 1/30 rad per mm of a knot, is left out.
+    check_rows(residuals.view_rows, given[1], 0.05, frame_atol=1e-3)
+
+
 def test_axis_and_prior_rows(given) -> None:
     check_rows(lambda s: residuals.axis_rows(s, 2e-3), given[1], 1e-5)
     check_rows(lambda s: residuals.prior_rows(s, 0.002, 5.0), given[1], 1e-5)

@@ -13,9 +13,13 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Illumination
 from stages.motion import MotionParameters, adjust_at_once, estimate_motion, measure_run
+from stages.motion.bundle_adjustment import residuals
 from stages.motion.estimate import require_along_pipe
+from stages.motion.tracking.patches import cut
+from stages.motion.tracking.strips import Hidden, Strip, StripGrid
+from stages.motion.tracking.tracker import TextureTracker, _Matched
 from stages.premises.stays import places_that_stay
-from tests.drawn_run import DrawnRun, drawn_run, without_encoder
+from tests.drawn_run import RADIUS, DrawnRun, drawn_run, small_probe, without_encoder
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 
@@ -176,3 +180,42 @@ def test_a_camera_that_looks_at_the_wall_ends_the_run(
         return
     with pytest.raises(UnusableError, match=r"turned by 80°[^$]*Frames: 20, 21"):
         require_along_pipe(replace(got, T_pc=T_pc))
+
+
+def test_where_texture_is_lost_the_camera_goes_on_looking_along_the_pipe(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    k = np.arange(100)
+    run, plain = (drawn_run(STEP * k, 0.004 * k, contrast=c) for c in (0.35, 0.0))
+    sources = run.recording.source, plain.recording.source
+    assert isinstance(sources[0], MemorySource)
+    assert isinstance(sources[1], MemorySource)
+    images = {n: sources[int(n > 30)].images[n] for n in sources[0].images}
+    source = MemorySource(images, run.probe.camera.image_size)
+    faded = replace(run, recording=replace(run.recording, source=source))
+
+    def lean_deg() -> float:
+        along = np.einsum("ni,ni->n", estimated(faded).T_pc[:, :3, 2], run.T_pc[:, :3, 2])
+        return float(np.degrees(np.arccos(along.min())))
+
+    assert lean_deg() < 1.5
+    monkeypatch.setattr(residuals, "_VIEW_RAD", 1e3)
+    assert lean_deg() > 2, "the control: it turns on"
+
+
+def test_what_does_not_agree_is_followed_anew() -> None:
+    """Matches that go astray a little more in each frame must not end the tracking."""
+    grid = StripGrid(RADIUS, 400, 12.0, 60.0)
+    tracker = TextureTracker(small_probe(), grid, PARAMETERS, Hidden())
+    strip = np.random.default_rng(0).standard_normal((80, 400)).astype(np.float32)
+    patches = cut(strip, np.full(40, 40), np.arange(40) * 10, 8)
+    tracker._map.add(np.stack([np.full(40, 40.0), np.arange(40) * 10.0], -1), 0, patches)
+    away = 4 * np.random.default_rng(1).standard_normal((40, 2))
+    at = np.stack([np.full(40, 40.0), np.arange(40) * 10.0], -1)
+    found = _Matched(np.arange(40), np.ones(40, bool), at, away, np.full(40, 0.1))
+    seen = Strip(
+        0, strip, np.ones_like(strip, bool), np.zeros((21, 101, 2), np.float32), np.ones(80, np.float32)
+    )
+    assert tracker._record(found, seen, 1)[1]
+    assert tracker._map.retired.all()
+    assert not tracker._record(replace(found, offset=0 * away), seen, 1)[1], "the control: these agree"

@@ -185,6 +185,7 @@ def linearised(
         smooth_motion_rows(state.T_pc, measured.time_s, measured.smooth_sigma, state.border_size),
     ]
     rows.append(residuals.turn_rows(state, parameters.turn_sigma_rad))
+    rows.append(residuals.view_rows(state))
     if measured.encoder is None:
         rows.append(residuals.no_slip_rows(state))
     else:

@@ -78,10 +78,10 @@ def estimate_state(
     """
     with _refusing_undetermined():
         loose = adjust(start, measured, parameters, ROUGHLY, watch).state
-        sigma = _smoothness(loose.T_pc, measured.tracks.poses.frames)
+        sigma = _smoothness(loose.T_pc, measured.tracks.poses.known)
         smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         for _ in range(_ROUNDS):
-            looser = _looser(sigma, smooth.state.T_pc, measured.tracks.poses.frames)
+            looser = _looser(sigma, smooth.state.T_pc, measured.tracks.poses.known)
             if np.all(looser < _MORE * sigma):
                 break
             sigma = looser

@@ -106,6 +106,11 @@ class TrackedPoses:
     T_pc: Float
     lost: Bool
 
+    @property
+    def known(self) -> Int:
+        """Return the frames (k,) whose poses texture tells: not the lost ones, but the first."""
+        return self.frames[~self.lost | (np.arange(len(self.lost)) == 0)]
+
     def between(self, first: int, last: int) -> TrackedPoses:
         """Return those of frames ``first`` to ``last`` (exclusive), counted from ``first``."""
         inside = (self.frames >= first) & (self.frames < last)
