@@ -288,7 +288,7 @@ def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
         if len(place) < _AROUND_STEP:
             continue
         change = pictures.change[place]
-        usual = median_filter(change, _AROUND_STEP, mode="nearest")
-        changes = np.pad(change > 2 * _STANDS * usual, 1)
+        usual = median_filter(change, _AROUND_STEP, mode="mirror")
+        changes = np.pad(change > 2 * _STANDS * usual, 1, constant_values=True)
         out[place] = (change < _STANDS * usual) & changes[:-2] & changes[2:]
     return out

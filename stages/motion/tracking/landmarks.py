@@ -109,7 +109,7 @@ class TrackedPoses:
     @property
     def known(self) -> Int:
         """Return the frames (k,) whose poses texture tells: not the lost ones, but the first."""
-        return self.frames[~self.lost | (np.arange(len(self.lost)) == 0)]
+        return np.asarray(self.frames[~self.lost | (np.arange(len(self.lost)) == 0)])
 
     def between(self, first: int, last: int) -> TrackedPoses:
         """Return those of frames ``first`` to ``last`` (exclusive), counted from ``first``."""
