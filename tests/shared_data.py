@@ -1,6 +1,8 @@
 """Where the development data lies; a test that needs it skips, saying so, when it is absent."""
 
+import importlib.util
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -13,3 +15,13 @@ def shared(*parts: str) -> Path:
     if not path.exists():
         pytest.skip(f"development data {Path(*parts)} is not beside the project")
     return path
+
+
+def scorer() -> ModuleType:
+    """Return the scoring program of the development data."""
+    spec = importlib.util.spec_from_file_location("score_run", shared("score_run.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

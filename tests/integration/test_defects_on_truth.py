@@ -1,6 +1,5 @@
 """Defects on the true walls of the open recordings, on a half-millimetre grid with noise and an offset."""
 
-import importlib.util
 import json
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from pipeline.export.tables import write_defects
 from stages.defects import DefectParameters, find_defects
 from tests.quiet import quiet_context
-from tests.shared_data import shared
+from tests.shared_data import scorer, shared
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
 # the shared scorer leaves its files to the garbage collector
@@ -17,13 +16,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
-
-
-def scorer():
-    spec = importlib.util.spec_from_file_location("score_run", shared("score_run.py"))
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.mark.parametrize(("name", "nominal_mm"), [("open-1-field", 101.6), ("open-2-field", 101.6),

@@ -1,15 +1,14 @@
-"""Motion and wall of the sample recording against its truth, with and without its encoder."""
+"""Motion and wall of the sample's run against their truth; and without its encoder, from the same rings."""
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 
+from pipeline.api.run import open_run
 from pipeline.artefacts.measured import Trajectory, Wall
 from pipeline.export.arrays import write_radius_map
 from pipeline.export.tables import write_trajectory
@@ -17,34 +16,30 @@ from pipeline.instrument.probe_file import read_probe
 from pipeline.recording.folder import open_folder
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
-from stages.rings import RingParameters, extract_rings
-from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.quiet import quiet_context
-from tests.shared_data import PROJECT_ROOT, shared
+from tests.shared_data import PROJECT_ROOT, scorer
 from tests.truth_comparison import compare_motion, compare_wall
 
+pytestmark = pytest.mark.slow
 SAMPLE = PROJECT_ROOT / "data" / "sample"
 
 
 @dataclass(frozen=True)
 class Run:
-    """What the chain made of the sample."""
+    """What was made of the sample."""
 
     trajectory: Trajectory
     wall: Wall
 
 
 @pytest.fixture(scope="module")
-def runs() -> dict[str, Run]:
-    recording, probe, context = open_folder(SAMPLE), read_probe(SAMPLE / "probe.yaml"), quiet_context()
-    rings = extract_rings(recording, probe, RingParameters(), context)
-    points = triangulate_rings(rings, probe, TriangulateParameters(), context)
-    made = {}
-    for name, seen in {"encoder": recording, "no encoder": replace(recording, encoder=None)}.items():
-        trajectory = estimate_motion(seen, probe, rings, points, MotionParameters(), context)
-        wall = accumulate_wall(probe, rings, points, trajectory, AccumulateParameters(), context)
-        made[name] = Run(trajectory, wall)
-    return made
+def runs(sample: Path) -> dict[str, Run]:
+    finished, probe, context = open_run(sample), read_probe(SAMPLE / "probe.yaml"), quiet_context()
+    rings, points = finished.rings, finished.ring_points
+    blind = replace(open_folder(SAMPLE), encoder=None)
+    trajectory = estimate_motion(blind, probe, rings, points, MotionParameters(), context)
+    wall = accumulate_wall(probe, rings, points, trajectory, AccumulateParameters(), context)
+    return {"encoder": Run(finished.trajectory, finished.wall), "no encoder": Run(trajectory, wall)}
 
 
 @pytest.mark.parametrize(("name", "limit_percent"), [("encoder", 0.1), ("no encoder", 0.3)])
@@ -88,7 +83,7 @@ def test_encoder_scale_is_found(runs: dict[str, Run]) -> None:
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # it leaves files open
 def test_the_shared_score_agrees(runs: dict[str, Run], tmp_path: Path) -> None:
-    tool = _score_run()
+    tool = scorer()
     write_trajectory(runs["encoder"].trajectory, tmp_path)
     thin = _every_fourth_column(runs["encoder"].wall)
     write_radius_map(thin, tmp_path)
@@ -108,12 +103,3 @@ def _every_fourth_column(wall: Wall) -> Wall:
     full = wall.radius_map
     part = {n: v[:, ::4] for n, v in vars(full).items() if v.ndim == 2}
     return replace(wall, radius_map=replace(full, azimuth_rad=full.azimuth_rad[::4], **part))
-
-
-def _score_run() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("score_run", shared("score_run.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

@@ -1,6 +1,5 @@
 """The texture of short cuts of the open recordings, on true motion and wall, against the true reflectance."""
 
-import importlib.util
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +9,8 @@ from pipeline.export.pictures import write_unrolled
 from pipeline.recording.base import FrameTable
 from stages.texture.texture import TextureParameters, photograph_wall
 from tests.quiet import quiet_context
-from tests.shared_data import shared
+from tests.shared_data import scorer, shared
 from tests.truth_run import true_radius_map, truth_run
-
-
-def texture_score(*arguments):
-    spec = importlib.util.spec_from_file_location("score_run", shared("score_run.py"))
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.texture_score(*arguments)
 
 
 # The scorer leaves its files to the garbage collector.
@@ -39,7 +31,7 @@ def test_cut_meets_the_figures(name, frames, to_mm, tmp_path):
     texture = photograph_wall(cut, run.probe, run.trajectory, wall, TextureParameters(), context)
     write_unrolled(texture, tmp_path)
     known = {"axial_scale_error": 0.0, "axial_shift_mm": 0.0, "roll_shift_deg": 0.0}
-    score = texture_score(
+    score = scorer().texture_score(
         str(tmp_path), str(shared("recordings", name)), known | {"radius": run.trajectory.radius_mm}
     )
     assert score["psnr_db"] >= 30
