@@ -54,6 +54,13 @@ def test_every_decimal_constant_has_its_reason() -> None:
     assert found == [], "write its source beside it, or list it in data/debts.md"
 
 
+def test_every_debt_is_of_a_constant_that_is_there() -> None:
+    debts = (PROJECT_ROOT / "data" / "debts.md").read_text("utf-8")
+    files = [f for package in ("pipeline", "stages") for f in (PROJECT_ROOT / package).rglob("*.py")]
+    there = set(NAME.findall("\n".join(f.read_text("utf-8") for f in files)))
+    assert sorted(set(re.findall(r"`(_?[A-Z][A-Z0-9_]*)`", debts)) - there) == [], "take its row out"
+
+
 def test_a_planted_constant_is_found() -> None:
     assert list(unexplained("import math\n_LIMIT = 0.3\n", set())) == ["2: _LIMIT"]
     assert list(unexplained("_A, _B = 1, math.radians(1.2)\n", set())) == ["1: _A, _B"]

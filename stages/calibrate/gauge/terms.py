@@ -17,9 +17,9 @@ from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, GaugeParameters, Unknowns
 
-# Step of the encoder's speed: half and twice of it move no parameter of two drawn runs by 1e-9 of its σ.
-_STEP_S = 1e-3
-_ORIGIN_SIGMA_MM = 1e-3
+# Step of the encoder's speed, and σ of the slip of the first frame, which is 0: half and twice of them move
+# no parameter of drawn gauge runs by 1e-9 of its σ.
+_STEP_S, _ORIGIN_SIGMA_MM = 1e-3, 1e-3
 # A ring farther than this from where it is expected is an outlier, and its derivatives are of no interest.
 _FARTHEST_PX = 3.0
 # Half the step of a derivative along the image radius, px: its error is of the third order, below 1e-6.
