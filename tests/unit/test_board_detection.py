@@ -96,6 +96,14 @@ def test_corners_in_a_defocused_picture_are_better_than_detected_and_than_always
     assert rms["chosen"] < min(rms["detected"], rms["refined"]), (rms, errors)
 
 
+def test_corners_beside_the_picture_stay_where_they_were_detected():
+    image, uv = _chess_scene(facing_pose([0.0, 0.0, 1.0], 90.0, [0.1, 0.2, 0.0]))
+    uv = np.concatenate([uv, [[-0.4, 20.0], [799.6, 599.6], [800.3, 30.0]]])
+    refined = refine_in_windows(image, uv, WINDOW_SHARE)
+    assert refined[[-3, -1]] == pytest.approx(uv[[-3, -1]], abs=1e-4)
+    assert np.abs(refined[:-3] - uv[:-3]).max() < LIMIT_PX * 3
+
+
 def test_no_board_no_corners():
     random = _random()
     noise = random.integers(0, 255, (150, 200)).astype(np.uint8)

@@ -24,6 +24,7 @@ _SAMPLE_CORNERS = 24
 _START_HUBER_PX = 5.0
 # See above.
 _NEAR_FORWARD, _LEAST_POINTS = 0.3, 4
+# Up to where a first polynomial is fitted: 1.4 and 3.1 rad move no Scaramuzza camera by 1e-6 of its σ.
 _WIDEST_FIT_RAD = 2.8
 _FOCAL, _ALL = Free(np.arange(2), FLAT), Free(np.arange(4), FLAT)
 

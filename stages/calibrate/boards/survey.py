@@ -31,10 +31,12 @@ from stages.calibrate.boards.bundle import (
 from stages.calibrate.boards.fit import BoardCalibrationParameters
 from stages.calibrate.boards.start import model_start, pose
 
+# Corners of two views are one when their nominal places agree so well: squares are mm wide, rounding is nm.
 _SAME_MM = 1e-3
 _TURNS = 6
 _PLACINGS = 2
 _CAMERA = Free(np.arange(8), FLAT)
+# Up to where the first camera is like the equidistant one: 1 and 3 rad lead to the same board and camera.
 _WIDEST_RAD = 2.0
 _QUARTER_TURNS = tuple(rotation_from_vector(np.array([0.0, 0.0, k * np.pi / 2])).round() for k in range(4))
 
