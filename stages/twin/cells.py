@@ -246,3 +246,17 @@ def sigmas(fall: Sequence[float] | Float) -> float:
         return 0.0
     sd = float(np.std(fall, ddof=1)) / np.sqrt(len(fall))
     return float(np.mean(fall) / max(sd, 1e-12))
+
+
+def chance_of(size: Float) -> float:
+    """Return the probability that chance makes frames (F,) agree so well on a size other than 0."""
+    return float(2 * t.sf(abs(sigmas(size)), max(len(size) - 1, 1)))
+
+
+def centred(value: Float, *groups: Int) -> Float:
+    """Return values (N,) less their means over each of the groupings (N,), in turns."""
+    for _ in range(4):
+        for group in groups:
+            count = np.bincount(group)
+            value = value - (np.bincount(group, value) / np.maximum(count, 1))[group]
+    return value

@@ -7,20 +7,21 @@ import numpy as np
 from pipeline.arrays import Bool, Byte, Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.artefacts.twin import Mismatch, NamedFigure, TwinMap
-from stages.twin.cells import sigmas
+from stages.twin.cells import centred, chance_of, sigmas
 from stages.twin.compare import BLOCK_PX
 from stages.twin.line_light import LineLight
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.noise import CameraNoise
-from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, OF_LAW, WholePictures, chance_of
+from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, OF_LAW, WholePictures
 from stages.twin.reference import SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
 from stages.twin.scene import Ring
 from stages.twin.state import PhotometricState
 
 _CLIPPED, _CLIPPED_WALL = 0.05, 0.01
 """Share of ring samples, and of pixels of lit wall, from which clipping is told."""
-_LEAST_POWER, _SURE_OF_POWER = 0.06, 3.0
-"""Least departure of an exponent from 1: a photo a little blurred loses as much contrast; and in σ."""
+_LEAST_POWER, _SURE_OF_POWER, _ALIKE = 0.06, 3.0, 0.3
+"""Least departure of an exponent from 1: a photo a little blurred loses as much contrast; and in σ. By which
+share of it fine and coarse texture may differ."""
 _OF_BLOCKS = 0.005
 """1 σ of an exponent since the mean of powers over a block is not the power of its mean."""
 _MAP_BLOCKS, _USUAL_GAIN, _USUAL_OFFSET, _MEDIAN_OF_SQUARE = 4, 0.02, 1.0, 0.455
@@ -83,7 +84,11 @@ def of_texture(
 
 def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Mismatch, ...]:
     """Return a blur beyond that of the photo and of motion, by half its variance (F,), px²."""
-    if len(half_variance) < FEWEST_FRAMES or half_variance.mean() < LEAST_BLUR_PX**2 / 2:
+    if (
+        not whole.loses_texture
+        or len(half_variance) < FEWEST_FRAMES
+        or half_variance.mean() < LEAST_BLUR_PX**2 / 2
+    ):
         return ()
     each, nan = np.sqrt(2 * np.maximum(half_variance, 0)), float("nan")
     blur = float(each.mean())
@@ -101,20 +106,17 @@ def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Mismatch, ...]
 def _response(samples: BlockSamples | None, ring: Ring) -> Mismatch | None:
     """Return a response whose contrast differs from the photo's, from the blocks of lit frames.
 
-    What stays at one place of the image is taken off: light, vignette and dirt are no response.
+    Blocks and the means of sixteen must tell the same: a photo that is displaced or blurred loses contrast in
+    fine texture alone.
     """
     if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
         return None
-    recorded, foretold = np.log1p(samples.change) + samples.log_level, samples.log_level
-    x, y = (_centred(v, samples.orders["image"], samples.frame) for v in (foretold, recorded))
-    above, below = (np.bincount(samples.frame, v) for v in (x * y, x * x))
-    each = above / np.maximum(below, 1e-9)
-    power, chance = float(above.sum() / below.sum()), chance_of(each - 1)
-    if (
-        chance > FALSE_ALARM
-        or abs(power - 1) < _LEAST_POWER
-        or sigmas((each - 1) * np.sign(power - 1)) < _SURE_OF_POWER
-    ):
+    each, coarse = (_exponents(samples, side) for side in (1, _MAP_BLOCKS))
+    power, least = float(each.mean()), abs(float(coarse.mean()) - 1)
+    chance, way = max(chance_of(e - 1) for e in (each, coarse)), np.sign(power - 1)
+    sure = min(sigmas((e - 1) * way) for e in (each, coarse)) > _SURE_OF_POWER
+    alike = abs(float(coarse.mean()) - power) < _ALIKE * abs(power - 1)
+    if chance > FALSE_ALARM or least < _LEAST_POWER or not sure or not alike:
         return None
     sd = float(np.hypot(each.std() / np.sqrt(len(each)), _OF_BLOCKS))
     figure, nan = NamedFigure("exponent", power, sd), float("nan")
@@ -123,6 +125,21 @@ def _response(samples: BlockSamples | None, ring: Ring) -> Mismatch | None:
         f"Recorded wall has the contrast of its photo to the power {power:.2f}: the response is another "
         "than the photo's.", ring.whole(int(samples.number[0])),
     )  # fmt: skip
+
+
+def _exponents(samples: BlockSamples, side: int) -> Float:
+    """Return the exponent (F,) between recorded and foretold brightness of cells of so many blocks a side.
+
+    What stays at one place of the image is taken off: light, vignette and dirt are no response.
+    """
+    place = (samples.row // side) * 10_000 + samples.column // side
+    cell, of, count = np.unique(place + samples.frame * 10_000_000, return_inverse=True, return_counts=True)
+    whole = count >= side**2 / 2
+    logs = (samples.log_level, np.log1p(samples.change) + samples.log_level)
+    frame, place = cell[whole] // 10_000_000, np.unique(cell[whole] % 10_000_000, return_inverse=True)[1]
+    x, y = (centred((np.bincount(of, v) / count)[whole], place, frame) for v in logs)
+    above, below = (np.bincount(frame, v, samples.frame.max() + 1) for v in (x * y, x * x))
+    return np.asarray((above / np.maximum(below, 1e-9))[below > 0])
 
 
 def left_over(samples: BlockSamples | None) -> tuple[float, tuple[NamedFigure, ...]]:
@@ -162,15 +179,6 @@ def _gain_and_offset(x: Float, y: Float, weight: Float, cell: Int) -> tuple[Floa
     return (xy * one - y1 * x1) / whole, (y1 * xx - xy * x1) / whole
 
 
-def _centred(value: Float, *groups: Int) -> Float:
-    """Return values (N,) less their means over each of the groupings (N,), in turns."""
-    for _ in range(4):
-        for group in groups:
-            count = np.bincount(group)
-            value = value - (np.bincount(group, value) / np.maximum(count, 1))[group]
-    return value
-
-
 def noise_figures(noise: CameraNoise) -> tuple[NamedFigure, ...]:
     """Return the camera's noise as EMVA 1288 has it."""
     e, read = noise.electrons_per_level, noise.read_electrons
@@ -188,16 +196,11 @@ def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
     """Return what lamps, laser and lens do, in few numbers."""
     found: list[NamedFigure] = []
     if state.lamp is not None:
-        found.append(
-            NamedFigure(
-                "photo_place_px", float(np.median(state.place_px)), float(np.ptp(state.place_px)) / 2, "px"
-            )
-        )
-        found.append(
-            NamedFigure(
-                "exposure_spread", state.lamp.gain.spread, float(np.median(state.lamp.gain.sd)), "relative"
-            )
-        )
+        place, gain = state.place_px, state.lamp.gain
+        found += [
+            NamedFigure("photo_place_px", float(np.median(place)), float(np.ptp(place)) / 2, "px"),
+            NamedFigure("exposure_spread", gain.spread, float(np.median(gain.sd)), "relative"),
+        ]
         names = ("lamp_cos_1", "lamp_sin_1", "lamp_cos_2", "lamp_sin_2")
         found += [
             NamedFigure(n, float(v), float(s), "relative")

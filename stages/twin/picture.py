@@ -8,16 +8,16 @@ picture by σ²/2 · d²L/dα².
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from scipy.ndimage import median_filter
-from scipy.stats import t
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.cells import sigmas
+from stages.twin.cells import chance_of, sigmas
 from stages.twin.compare import of_blocks
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Scene
@@ -34,6 +34,8 @@ OF_LAW = 0.2
 second derivative."""
 _LEAST_LEVEL = 1.0
 """Least stray light that is named, grey levels: what rounding alone cannot make."""
+_FINE_PX, _KEPT = 9, 0.9
+"""Window that fine texture is held against, and share of its energy above which nothing is blurred."""
 _DIRECTIONS = ("even", "across", "slanted", "radial")
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
 """Rounds of leaving out blocks that differ, and least spread of blocks, grey levels."""
@@ -51,29 +53,28 @@ class WholePictures:
     Attributes
     ----------
     scene : Scene
-    blur, stray, bloom, ghost : list
-        Of each frame: own and cross sums of both halves; sizes of ambient and bounced light, their levels and
-        falls; leak along columns and along rows; brightness over ln of the ratio of radii in four quadrants.
+    blur, kept, stray, bloom, ghost : list
+        Of each frame: own and cross sums of both halves; share of the fine texture's energy; sizes of ambient
+        and bounced light, their levels and falls; leak along columns and rows; brightness over ln of the
+        ratio of radii in four quadrants.
     frame : dict of str to list of int
     """
 
     scene: Scene
     blur: list[tuple[Float, Float]] = field(default_factory=list)
+    kept: list[float] = field(default_factory=list)
     stray: list[Float] = field(default_factory=list)
     bloom: list[Float] = field(default_factory=list)
     ghost: list[Float] = field(default_factory=list)
-    frame: dict[str, list[int]] = field(default_factory=dict)
-
-    def _note(self, of: str, frame: int) -> None:
-        self.frame.setdefault(of, []).append(frame)
+    frame: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
 
     def _mismatch(
         self, name: str, fixed_to: str, size: NamedFigure, chance: float, of: str, said: str,
         place: tuple[NamedFigure, ...] = (),
     ) -> Mismatch:  # fmt: skip
-        channel, nan, look = "line" if fixed_to == "line" else "intensity", float("nan"), self.frame[of][0]
-        ring = self.scene.ring
-        return Mismatch(name, channel, fixed_to, place, (size,), chance, nan, nan, said, ring.whole(look))
+        channel, at = "line" if fixed_to == "line" else "intensity", self.frame[of][0]
+        look = self.scene.ring.whole(at)
+        return Mismatch(name, channel, fixed_to, place, (size,), chance, np.nan, np.nan, said, look)
 
     def add_lit(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped."""
@@ -83,24 +84,22 @@ class WholePictures:
         if len(at) < _TILE**2:
             return
         columns = self._columns(twin.level, inner).reshape(-1, use[inner].size)[:, at]
-        weight = 1 / np.sqrt(twin.variance[inner].ravel()[at])
-        rest = (above - twin.level)[inner].ravel()[at] * weight
-        columns *= weight
+        weight = np.asarray(1 / np.sqrt(twin.variance[inner].ravel()[at]), np.float32)
+        columns, rest = columns * weight, (above - twin.level)[inner].ravel()[at] * weight
         row, column = np.unravel_index(at, use[inner].shape)
         half = (row // _TILE + column // _TILE) % 2
         sums = [(c @ c.T, c @ rest[half == h]) for h in (0, 1) for c in [columns[:, half == h]]]
         self.blur.append((np.stack([s[0] for s in sums]).astype(float), np.stack([s[1] for s in sums])))
-        self._note("blur", frame)
+        fine = [(a - cv2.blur(a, (_FINE_PX, _FINE_PX)))[inner].ravel()[at] for a in (above, twin.level)]
+        self.kept.append(float((fine[0] ** 2).sum() / max(float((fine[1] ** 2).sum()), 1e-9)))
+        self.frame["blur"].append(frame)
 
     def _columns(self, level: Float32, inner: tuple[slice, slice]) -> Float32:
         """Return exposure and displacements, then blurs in `_DIRECTIONS`."""
 
         def at(down: int, right: int) -> Float32:
-            rows, columns = (
-                slice(_STEP + d, n - _STEP + d, _STEP)
-                for d, n in zip((down, right), level.shape, strict=True)
-            )
-            return np.asarray(level[rows, columns])
+            both = zip((down, right), level.shape, strict=True)
+            return np.asarray(level[tuple(slice(_STEP + d, n - _STEP + d, _STEP) for d, n in both)])
 
         here, phi = at(0, 0), self.scene.polar[1][inner]
         du, dv = (at(0, 1) - at(0, -1)) / 2, (at(1, 0) - at(-1, 0)) / 2
@@ -123,7 +122,7 @@ class WholePictures:
             return
         value, *columns = (a[whole].astype(float) for a in small[1:])
         self.stray.append(np.array([_size_beside_one(value, c) for c in columns]))
-        self._note("stray", frame)
+        self.frame["stray"].append(frame)
         self._add_ghost(frame, above, twin, free & (twin.region != Region.EDGE))
 
     def _bounced(self, twin: TwinFrame, lit: TwinFrame) -> Float32:
@@ -153,7 +152,7 @@ class WholePictures:
         total, pixels = (np.bincount(cell, w, 4 * _RATIOS) for w in (grey[inside], None))
         mean = np.where(pixels > 3, total / np.maximum(pixels, 1), np.nan)
         self.ghost.append(mean.reshape(4, _RATIOS))
-        self._note("ghost", frame)
+        self.frame["ghost"].append(frame)
 
     def add_clipped(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take any frame: what leaks from clipped pixels along columns, and along rows for comparison."""
@@ -169,7 +168,7 @@ class WholePictures:
         rest = (above - twin.level)[near].astype(float)
         own = columns @ columns.T + 1e-6 * np.eye(3)
         self.bloom.append(np.linalg.solve(own, columns @ rest)[:2])
-        self._note("bloom", frame)
+        self.frame["bloom"].append(frame)
 
     def found(self, sharpness: Float) -> tuple[Mismatch, ...]:
         """Return what frames agree on; ``sharpness`` (Z,) is half the variance by which they are blurrier."""
@@ -181,6 +180,11 @@ class WholePictures:
         each = [[_blur_of(o, c) for o, c in zip(*frame, strict=True)] for frame in self.blur]
         return np.array(each).reshape(-1, 2, len(_DIRECTIONS))
 
+    @property
+    def loses_texture(self) -> bool:
+        """Whether fine texture is fainter than the photo's: a photo displaced in itself only moves it."""
+        return bool(self.kept) and float(np.mean(self.kept)) < _KEPT
+
     def even_blur(self, sharpness: Float) -> Float:
         """Return half the variance (F,), px², by which lit frames are blurrier than the photo all round."""
         return np.asarray(self._blurs()[:, :, 0].mean(1) + np.mean(sharpness))
@@ -191,17 +195,16 @@ class WholePictures:
         each = self._blurs()
         uniform = (each[:, 0, 1:3] * each[:, 1, 1:3]).sum(1)
         radial = np.maximum(each[:, :, 3].mean(1), 0) ** 2 * np.sign(each[:, :, 3].mean(1))
-        product, way = max(
-            (uniform, "sideways"), (radial, "along the pipe"), key=lambda p: float(p[0].mean())
-        )
+        ways = ((uniform, "sideways"), (radial, "along the pipe"))
+        product, way = max(ways, key=lambda p: float(p[0].mean()))
         size = float(np.sqrt(2 * np.sqrt(max(product.mean(), 0.0))))
         chance = chance_of(product)
         if size**2 / 2 < _ONE_WAY * self.even_blur(sharpness).mean():
             return None  # blur in all directions, which fine texture of one direction shows more
-        if size < LEAST_BLUR_PX or chance > FALSE_ALARM or sigmas(product) < _SURE:
+        if not self.loses_texture or size < LEAST_BLUR_PX or chance > FALSE_ALARM or sigmas(product) < _SURE:
             return None
-        sd = float(product.std() / np.sqrt(len(product))) / max(float(product.mean()), 1e-12) * size / 4
-        sd = float(np.hypot(sd, OF_LAW * size))
+        spread = float(product.std() / np.sqrt(len(product))) / max(float(product.mean()), 1e-12) / 4
+        sd = size * float(np.hypot(spread, OF_LAW))
         return self._mismatch(
             "motion_blur", "time", NamedFigure("blur", size, sd, "px"), chance, "blur",
             f"Frames are blurred by {size:.1f} px (1 σ) {way}, and less across: they move while exposed.",
@@ -221,7 +224,8 @@ class WholePictures:
         sd = float(np.std(size[:, k])) / np.sqrt(len(size)) * float(level[:, k].mean())
         return self._mismatch(
             name, "wall", NamedFigure("level", float(grey.mean()), sd, "grey levels"), chance, "stray",
-            f"With the LEDs off the wall away from the line is up to {grey.mean():.1f} grey levels bright.",
+            f"With the LEDs off the wall away from the line is up to {grey.mean():.1f} grey levels bright: "
+            "other light, the line's own from wall to wall, or what a codec keeps of the frame before.",
         )  # fmt: skip
 
     def _bloom(self) -> Mismatch | None:
@@ -267,11 +271,6 @@ class WholePictures:
             f"A second ring lies at {radius.value:.2f} radii of the line, {100 * share:.0f} % as bright: "
             "a ghost of window or lens, or a second sheet.", (radius,),
         )  # fmt: skip
-
-
-def chance_of(size: Float) -> float:
-    """Return the probability that chance makes frames (F,) agree so well on a size other than 0."""
-    return float(2 * t.sf(abs(sigmas(size)), max(len(size) - 1, 1)))
 
 
 def _blur_of(own: Float, cross: Float) -> Float:

@@ -185,7 +185,7 @@ def _is_there(case: Hidden, found: Mismatch) -> bool:
 def part_of(whole: WholePictures, random: np.random.Generator) -> WholePictures:
     """Return two thirds of what was kept of each law."""
     part = WholePictures(whole.scene, frame=whole.frame)
-    for name in ("blur", "stray", "bloom", "ghost"):
+    for name in ("blur", "kept", "stray", "bloom", "ghost"):
         kept = getattr(whole, name)
         setattr(part, name, [kept[k] for k in np.sort(random.permutation(len(kept))[: 2 * len(kept) // 3])])
     return part

@@ -106,6 +106,17 @@ def test_a_response_is_named_and_light_that_falls_off_is_none(power):
     assert _named(lambda p, r: p * (1 - 0.3 * (AWAY / 200) ** 2)) == []
 
 
+def test_a_photo_that_is_displaced_within_itself_is_no_response():
+    def torn(picture, random):
+        shift = [
+            cv2.GaussianBlur(random.standard_normal(SHAPE).astype(np.float32), (0, 0), 4) for _ in range(2)
+        ]
+        at = [(a + 3 * s / s.std()).astype(np.float32) for a, s in zip((U, V), shift, strict=True)]
+        return cv2.remap(picture, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+
+    assert _named(torn) == []
+
+
 def test_bloom_runs_along_columns_only():
     assert _named(_bloomed) == ["bloom"]
 
