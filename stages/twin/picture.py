@@ -34,7 +34,7 @@ OF_LAW = 0.2
 second derivative."""
 _LEAST_LEVEL = 1.0
 """Least stray light that is named, grey levels: what rounding alone cannot make."""
-_FINE_PX, _KEPT = 9, 0.9
+_FINE_PX, _KEPT = 9, 1.0
 """Window that fine texture is held against, and share of its energy above which nothing is blurred."""
 _DIRECTIONS = ("even", "across", "slanted", "radial")
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
