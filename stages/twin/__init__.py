@@ -288,7 +288,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "8",
+    "9",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

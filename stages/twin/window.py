@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t
 
-from pipeline.arrays import Bool, Float, Float32
+from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX
@@ -27,8 +27,10 @@ _LEAST_REACH_PX = 48.0
 """A place is looked at so far about its middle, or over two radii if that is more."""
 _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 4
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
+_FLATNESS = (0.7, 5.0)
+"""Bounds of a spot's flatness: 1 is Gaussian, 2 has a flat middle and a steep rim, 5 is a disc."""
 _OF_LIGHT = 0.005
-"""1 σ of a share of the light for want of knowing the light about the spot: half of what photos err by."""
+"""1 σ of a share of the light for want of knowing the light about the spot: half of a photo's error."""
 _LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
 """Narrowest spot, 1 σ; the middle of a spot reaches to where a quarter of its depth is gone."""
 _PARTS = 6
@@ -125,7 +127,7 @@ class WindowPlace:
         spots = np.stack(self.spots)
         reach = int(self._reach_px + 2 * _AROUND_PX)
         middle = [at - max(int(at) - reach, 0) for at in (self.place.u_px, self.place.v_px)]
-        start = np.array([[0.3, *middle, f * self.place.radius_px] for f in (0.5, 1.5)])
+        start = np.array([[0.3, *middle, f * self.place.radius_px, 1.0] for f in (0.5, 1.5)])
         tried = {
             "window_dirt": _fall_of_spot(spots[:, 0], start),
             "window_scatter": _fall_of_spot(spots[:, 1], start),
@@ -193,7 +195,7 @@ def _fall_of_drop(sums: Float) -> tuple[Float, float, float]:
 def _fall_of_spot(sums: Float32, start: Float) -> tuple[Float, float, float]:
     """Return by how much χ² of each frame (F,) falls with the spot fitted to others; its depth and 1 σ.
 
-    ``sums`` is (F, 2, h, w); ``start`` (K, 4) holds spots that the search starts from.
+    ``sums`` is (F, 2, h, w); ``start`` (K, 5) holds spots that the search starts from.
     The σ holds what leaving out parts of the frames changes, and by how much the spot's middle differs from
     the fitted shape.
     """
@@ -214,25 +216,29 @@ def _fall_of_spot(sums: Float32, start: Float) -> tuple[Float, float, float]:
 
 
 def _spot(place: Float, shape: tuple[int, ...]) -> Float:
-    """Return a Gaussian spot (h, w) of depth, column, row and 1 σ."""
+    """Return a spot (h, w): d exp(−½ (r²/w²)^q) about a column and row, of depth d, width w, flatness q."""
     v, u = np.mgrid[: shape[0], : shape[1]]
-    depth, at_u, at_v, width = place
-    return np.asarray(depth * np.exp(-0.5 * ((u - at_u) ** 2 + (v - at_v) ** 2) / width**2))
+    return _spot_at(place, u, v)
+
+
+def _spot_at(place: Float, u: Int, v: Int) -> Float:
+    depth, at_u, at_v, width, flat = place
+    square = ((u - at_u) ** 2 + (v - at_v) ** 2) / width**2
+    return np.asarray(depth * np.exp(-0.5 * square**flat))
 
 
 def _fitted_spot(sums: Float32, start: Float) -> Float:
-    """Return depth, column, row and 1 σ of the spot that lets χ² fall most; ``sums`` is (2, h, w)."""
+    """Return depth, column, row, width and flatness of the spot that lets χ² fall most; ``sums`` is (2, h, w)."""
     rows, columns = np.nonzero(sums[1] > 0)
     weight = np.sqrt(sums[1][rows, columns].astype(float))
     value = sums[0][rows, columns] / weight
 
     def rest(p: Float) -> Float:
-        spot = p[0] * np.exp(-0.5 * ((columns - p[1]) ** 2 + (rows - p[2]) ** 2) / p[3] ** 2)
-        return np.asarray(spot * weight - value)
+        return np.asarray(_spot_at(p, columns, rows) * weight - value)
 
     reach = start[:, 3].max()
-    low = np.array([-3.0, *(start[0, 1:3] - reach), _LEAST_WIDTH_PX])
-    high = np.array([3.0, *(start[0, 1:3] + reach), 2 * max(reach, _LEAST_REACH_PX)])
+    low = np.array([-3.0, *(start[0, 1:3] - reach), _LEAST_WIDTH_PX, _FLATNESS[0]])
+    high = np.array([3.0, *(start[0, 1:3] + reach), 2 * max(reach, _LEAST_REACH_PX), _FLATNESS[1]])
     begin = np.clip(start, low + 1e-3, high - 1e-3)
-    made = [least_squares(rest, s, bounds=(low, high), x_scale=[0.1, 1, 1, 3]) for s in begin]
+    made = [least_squares(rest, s, bounds=(low, high), x_scale=[0.1, 1, 1, 3, 0.3]) for s in begin]
     return np.asarray(min(made, key=lambda r: r.cost).x)

@@ -80,3 +80,19 @@ def test_one_spot_is_told_once_and_two_are_told_twice():
         112,
         300,
     ]
+
+
+@pytest.mark.parametrize("flatness", [1.0, 2.0])
+def test_the_size_of_a_spot_holds_whatever_its_rim(flatness):
+    random = np.random.default_rng(5)
+    place = WindowPlace(ImagePlace(124.0, 97.0, 16.0, -0.3, 0.02, 1e-6))
+    v, u = np.mgrid[0:200, 0:240].astype(np.float32)
+    spot = 0.3 * np.exp(-0.5 * (((u - 120) ** 2 + (v - 100) ** 2) / 14**2) ** flatness)
+    for frame in range(9):
+        level = _textured(random)
+        recorded = level * (1 - spot) + 2 * random.standard_normal(level.shape)
+        place.add(frame, recorded.astype(np.float32), _frame(level), np.ones(level.shape, bool))
+    found = place.judged("image")
+    assert found.name == "window_dirt"
+    assert found.parameters[0].value == pytest.approx(0.3, abs=2 * found.parameters[0].sd)
+    assert found.parameters[0].sd < 0.015
