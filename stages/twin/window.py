@@ -228,7 +228,7 @@ def _spot_at(place: Float, u: Int, v: Int) -> Float:
 
 
 def _fitted_spot(sums: Float32, start: Float) -> Float:
-    """Return depth, column, row, width and flatness of the spot that lets χ² fall most; ``sums`` is (2, h, w)."""
+    """Return depth, column, row, width and flatness of the spot that fits best; ``sums`` is (2, h, w)."""
     rows, columns = np.nonzero(sums[1] > 0)
     weight = np.sqrt(sums[1][rows, columns].astype(float))
     value = sums[0][rows, columns] / weight
