@@ -27,8 +27,8 @@ from pipeline.machine.run_folder import Exporter
 from pipeline.machine.stage import Stage
 from pipeline.review.run_files import RunFiles
 from stages.catalogue import PIPELINE
+from stages.diagnose.compose import to_json
 from stages.diagnose.diagnose import Diagnosed, diagnosis_stages
-from stages.diagnose.document import to_json
 from stages.diagnose.drill.answer import Answer, read_answer
 from stages.diagnose.drill.cases import ANSWER
 from stages.diagnose.result import Diagnosis

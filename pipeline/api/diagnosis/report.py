@@ -16,7 +16,7 @@ from pipeline.arrays import Float
 from pipeline.files.disk import replace_text
 from pipeline.pages import page_template, rendered, tidy
 from stages.diagnose.compared import OnImage
-from stages.diagnose.document import to_json
+from stages.diagnose.compose import to_json
 from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import Candidate, Diagnosis, Picture, ReadingPicture, Verdict, WallPicture
 
