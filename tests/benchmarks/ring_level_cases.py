@@ -19,7 +19,7 @@ from tests.benchmarks.ring_level import Noise
 
 PRIOR = Path(__file__).with_name("ring_level.yaml")
 # Fewer frames at a lower rate: the same way and time, for less computing.
-_FRAMES = 1 / 2
+_FRAMES = 1 / 3
 _TEXEL_MM = 1.0
 _REPEATED = "sheet_waviness"
 
