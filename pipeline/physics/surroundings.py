@@ -85,7 +85,7 @@ PHOTOMETRIC_EFFECTS = (
         (Quantity("transport_mm", "mm", 0.3, 0.0, 3.0, "mean way of light within the wall"),),
         0, None, FixedTo.PIPE, Channel.PROFILE, "static",
         "one-sided exponential tail; bias about the transport length", 0.3,
-        ("line_skew",), "the tail of the profile, another wavelength",
+        ("line_skew",), "the line on a wall that no light enters (bare metal), another wavelength",
     ),
     Effect(
         "ghost_ring", "photometric",
