@@ -21,7 +21,7 @@ from stages.diagnose.result import Candidate, Confirmation, EffectFound, Picture
 # What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Under right
 # names, and where nothing is hidden, 25 runs at ring level come to 1.03–1.16 (mean 1.11, s.d. 0.04: samples
 # of one fiducial err alike, which the floor does not have), four rendered ones to 1.00–1.17; this is 5 s.d.
-# beyond.
+# beyond. A wrong explanation of four effects came to 1.36 (`bench_diagnosis --mode several`, case 1).
 _MOST_OF_FLOOR = 1.3
 
 
