@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,16 +77,12 @@ def _header(points: int) -> str:
 def write_radius_map(wall: Wall, folder: Path) -> None:
     """Write ``radius_map.npz``; NaN where nothing was seen."""
     radius = wall.radius_map
-    np.savez_compressed(
-        folder / "radius_map.npz",
-        distance_mm=radius.distance_mm,
-        azimuth_rad=radius.azimuth_rad,
-        radius_mm=radius.radius_mm,
-        sigma_mm=radius.sigma_mm,
-        count=radius.count,
-        sigma_random_mm=radius.sigma_random_mm,
-        misalignment_mm=radius.misalignment_mm,
-    )
+    names = "distance_mm azimuth_rad radius_mm sigma_mm count sigma_random_mm misalignment_mm".split()
+    # By level 1: the 6 that NumPy takes needs 2.5 times as long for 1 % less.
+    with ZipFile(folder / "radius_map.npz", "w", ZIP_DEFLATED, compresslevel=1) as archive:
+        for name in names:
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
+                np.lib.format.write_array(stream, np.asanyarray(getattr(radius, name)))
 
 
 if TYPE_CHECKING:
