@@ -77,10 +77,10 @@ def _header(points: int) -> str:
 def write_radius_map(wall: Wall, folder: Path) -> None:
     """Write ``radius_map.npz``; NaN where nothing was seen."""
     radius = wall.radius_map
-    names = "distance_mm azimuth_rad radius_mm sigma_mm count sigma_random_mm misalignment_mm".split()
+    places, measured = ("distance_mm", "azimuth_rad"), ("radius_mm", "sigma_mm", "count")
     # By level 1: the 6 that NumPy takes needs 2.5 times as long for 1 % less.
     with ZipFile(folder / "radius_map.npz", "w", ZIP_DEFLATED, compresslevel=1) as archive:
-        for name in names:
+        for name in (*places, *measured, "sigma_random_mm", "misalignment_mm"):
             with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
                 np.lib.format.write_array(stream, np.asanyarray(getattr(radius, name)))
 
