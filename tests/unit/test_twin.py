@@ -21,7 +21,7 @@ from stages.texture.views import clear_of
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import LineSamples
-from stages.twin.locate import ImagePlace, full_size, places_in_image
+from stages.twin.locate import ImagePlace
 from stages.twin.name import _not_sharp, clipped, left_over
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
 from stages.twin.reference import BlockSamples, in_image, unnamed
@@ -88,42 +88,6 @@ def test_photon_transfer_finds_the_noise_that_was_put_in():
 def test_other_noise_gives_another_answer():
     quiet, loud = (photon_transfer(list(_noisy_frames(1.0, e)), BLACK, 255.0) for e in (200.0, 20.0))
     assert loud.variance_per_level.value > 5 * quiet.variance_per_level.value
-
-
-def _ratios(random, spot=None, frames=8):
-    shape = (75, 100)
-    v, u = np.mgrid[0 : shape[0], 0 : shape[1]]
-    fixed = 1 + 0.002 * random.standard_normal(shape)
-    if spot is not None:
-        fixed -= spot[2] * np.exp(-0.5 * ((u - spot[0]) ** 2 + (v - spot[1]) ** 2) / 2.0**2)
-    return [(fixed + 0.004 * random.standard_normal(shape)).astype(np.float32) for _ in range(frames)]
-
-
-def test_clean_windows_show_no_dirt():
-    found = [places_in_image(_ratios(np.random.default_rng(k))) for k in range(30)]
-    assert [len(places) for places, _ in found] == [0] * 30
-
-
-def test_dirt_is_found_where_it_lies():
-    (place,), gain = places_in_image(_ratios(np.random.default_rng(3), (40, 30, 0.3)))
-    middle = (np.array([40, 30]) + 0.5) * BLOCK_PX - 0.5
-    assert np.hypot(place.u_px - middle[0], place.v_px - middle[1]) < BLOCK_PX
-    assert place.change == pytest.approx(-0.3, abs=0.02)
-    assert place.probability < 1e-6
-    whole = full_size(gain, (600, 800))
-    assert whole.shape == (600, 800)
-    assert whole.min() == pytest.approx(0.7, abs=0.03)
-    assert np.median(whole) == 1
-
-
-def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
-    random = np.random.default_rng(4)
-    ratios = _ratios(random, (80, 30, 0.4))
-    v, u = np.mgrid[0:75, 0:100]
-    far = np.hypot(v - 37, u - 49.5)
-    poor = np.where(far < 8, 0.1 * np.sin(0.7 * (u + 2 * v)), 0)
-    (place,), _ = places_in_image([r + poor.astype(np.float32) for r in ratios])
-    assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
 
 
 def _frame(level, region=Region.WALL):
