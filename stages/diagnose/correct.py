@@ -229,12 +229,12 @@ class _Parameters:
         """Return the columns' values (K,) of the instrument's corrections (P,) and the terms."""
         of_instrument = dict(zip(self.probe.parameter_names, instrument, strict=True))
         of_terms = {
-            (t.model.name, a.name): float(v)
+            _column(t, a): float(v)
             for t in self.terms
             for a, v in zip(t.model.amplitudes, t.amplitude, strict=True)
         }
         return np.array([
-            of_instrument.get(c.amplitude, 0.0) if c.effect == INSTRUMENT else of_terms[c.effect, c.amplitude]
+            of_instrument.get(c.amplitude, 0.0) if c.effect == INSTRUMENT else of_terms[c]
             for c in self.columns
         ])  # fmt: skip
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.physics.effect import CourseKind
-from pipeline.simulator.effects.switch import parse_switches
+from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.scene import read_scene
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import GENERIC, STEADY
@@ -123,3 +123,16 @@ def test_an_unknown_wave_in_the_fraction_of_a_pixel_is_found_and_described():
     found = seen(("pixel_locking=0.06",), FEW, 65)
     assert verdict_of(found) is Verdict.UNEXPLAINED
     assert "cos(2πρ" in formula(found)
+
+
+def test_waves_of_two_orders_are_two_effects():
+    scene = read_scene(SCENE).model_copy(update={"seed": 67, "frames": 80, "frame_rate": 10.0})
+    hidden = [Switch("sheet_waviness", (1.5, 2.0, 40.0)), Switch("sheet_waviness", (0.9, 3.0, 100.0))]
+    run = ring_level_run(scene, SCENE, hidden)
+    library = {n: LIBRARY[n] for n in ("sheet_waviness", "laser_tilt")}
+    found = examine(run.measured, library, run.truth.stated, courses=())
+    assert verdict_of(found) is Verdict.NAMED
+    sizes = {e.parameters["order"].value: e.parameters["amplitude_mrad"] for e in effects_found(found)}
+    for order, true in ((2.0, 1.5), (3.0, 0.9)):
+        assert sizes[order].value == pytest.approx(true, abs=4 * sizes[order].sd)
+        assert sizes[order].sd < 0.1

@@ -236,6 +236,8 @@ class EffectModel(ABC):
     kind: CourseKind = CourseKind.CONSTANT
     # 1 σ of what the law leaves out, as a part of the effect's size.
     law_sigma: float = 0.002
+    # Whether it may come more than once, at different shapes.
+    repeats: bool = False
     # Whether predictions are proportional to the amplitudes.
     linear: bool = False
 

@@ -167,6 +167,7 @@ class SheetWaviness(EffectModel):
     """The sheet's rays rise and fall m times around the ring; the shape is m."""
 
     name = "sheet_waviness"
+    repeats = True
     amplitudes = (Amplitude("cosine", "mrad", 0.3), Amplitude("sine", "mrad", 0.3))
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:

@@ -264,11 +264,16 @@ def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
     )
 
 
+def _by_shape(model: EffectModel) -> bool:
+    """Return whether another shape is another cause."""
+    return model.repeats or isinstance(model, Nameless)
+
+
 def _distinct(fits: Sequence[Fit]) -> list[Fit]:
     """Return the best fit of each set of effects."""
     best: dict[tuple[tuple[str, tuple[float, ...]], ...], Fit] = {}
     for f in fits:
-        shaped = ((t.model.name, t.shape if isinstance(t.model, Nameless) else ()) for t in f.terms)
+        shaped = ((t.model.name, t.shape if _by_shape(t.model) else ()) for t in f.terms)
         key = tuple(sorted(shaped))
         if key not in best or f.cost < best[key].cost:
             best[key] = f

@@ -49,8 +49,9 @@ class Scored:
 
 def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated) -> list[Scored]:
     """Return the scores of the effects not yet in the fit, the most telling first."""
-    models = [m for name, m in library.items() if name not in {t.model.name for t in found.terms}]
-    shapes = {m.name: m.shapes(*span(run)) for m in models}
+    known, there = {t.model.name for t in found.terms}, {(t.model.name, t.shape) for t in found.terms}
+    models = [m for name, m in library.items() if name not in known or m.repeats]
+    shapes = {m.name: [s for s in m.shapes(*span(run)) if (m.name, s) not in there] for m in models}
     few = [(m, s) for m in models if len(shapes[m.name]) <= _MANY for s in shapes[m.name]]
     best = _best(run, found, few, stated)
     many = [(m, s) for m in models if len(shapes[m.name]) > _MANY for s in shapes[m.name]]
