@@ -86,3 +86,19 @@ def from_parts(rotation: Float, translation: Float) -> Float:
 def transform(T_ba: Float, xyz_a: Float) -> Float:
     """Return points (..., 3) of A in B."""
     return np.asarray(np.einsum("...ij,...j->...i", T_ba[..., :3, :3], xyz_a) + T_ba[..., :3, 3])
+
+
+def perspective_pose(xyz: Float, plane: Float) -> Float | None:
+    """Return the pose (4, 4) of points (N, 3) seen at ``plane`` (N, 2), z = 1, by SQPnP; None without one.
+
+    OpenCV refuses points that are few or crowd together, as wrong focal lengths or detections make them.
+    """
+    import cv2  # who only moves points need not wait for it
+
+    try:
+        found, w, t = cv2.solvePnP(xyz, plane, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_SQPNP)
+    except cv2.error:
+        return None
+    if not found or not (np.isfinite(w).all() and np.isfinite(t).all()):
+        return None
+    return from_parts(rotation_from_vector(np.asarray(w[:, 0], float)), np.asarray(t[:, 0], float))

@@ -288,3 +288,10 @@ def test_fiducials_that_are_not_seen_are_refused_with_the_likely_cause(
     sightings = [s for s, _ in find_fiducials(recording.read(lit, "grey"), run.gauge)]
     with pytest.raises(UnusableError, match=said):
         premises.require_fiducials(recording, run.gauge, sightings, USUAL)
+
+
+@pytest.mark.parametrize("spread_px", [0.0, 1e-3])
+def test_fiducials_that_crowd_into_one_place_give_no_pose(spread_px: float) -> None:
+    random = np.random.default_rng(0)
+    crowded = Sighting(0, np.arange(6), 800 + random.normal(0, spread_px, (6, 4, 2)), np.zeros(0, np.int64))
+    assert first_pose(crowded, gauge_of(facts(), facts().fiducials), stated_probe().camera, random) is None

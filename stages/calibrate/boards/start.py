@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.geometry.rigid import from_parts
+from pipeline.geometry.rigid import from_parts, perspective_pose
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
@@ -54,23 +53,12 @@ def pose(view: BoardView, camera: Camera) -> Float:
     ahead = turned[:, 2] > _NEAR_FORWARD
     if np.count_nonzero(ahead) < _LEAST_POINTS:
         return from_parts(np.eye(3), np.array([0.0, 0.0, float(np.ptp(view.xyz_b))]) - view.xyz_b.mean(0))
-    T_fb = _pinhole_pose(xyz_b[ahead], turned[ahead, :2] / turned[ahead, 2:])
+    xyz_b, plane = xyz_b[ahead], turned[ahead, :2] / turned[ahead, 2:]
+    T_fb = perspective_pose(xyz_b, plane)
+    if T_fb is None:  # facing the camera
+        size, angle = np.ptp(xyz_b, axis=0).max(), max(float(np.ptp(plane)), 1e-6)
+        T_fb = from_parts(np.eye(3), np.array([0.0, 0.0, size / angle]) - xyz_b.mean(0))
     return from_parts(turn.T @ T_fb[:3, :3], turn.T @ T_fb[:3, 3])
-
-
-def _pinhole_pose(xyz_b: Float, plane: Float) -> Float:
-    """Return the pose (4, 4) of points seen at ``plane`` (N, 2), z = 1; facing the camera where it fails.
-
-    OpenCV refuses points that are few or crowd together, as wrong focal lengths make them.
-    """
-    try:
-        found, w, t = cv2.solvePnP(xyz_b, plane, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_SQPNP)
-    except cv2.error:
-        found = False
-    if found:
-        return from_parts(cv2.Rodrigues(w)[0].astype(float), t[:, 0].astype(float))
-    size, angle = np.ptp(xyz_b, axis=0).max(), max(float(np.ptp(plane)), 1e-6)
-    return from_parts(np.eye(3), np.array([0.0, 0.0, size / angle]) - xyz_b.mean(0))
 
 
 def model_start(model: str, estimate: Estimate, theta_max: float, degree: int) -> Camera:

@@ -8,14 +8,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, Slerp
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
-from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, skew, transform
+from pipeline.geometry.rigid import (
+    from_parts,
+    inverse,
+    perspective_pose,
+    rotation_from_vector,
+    skew,
+    transform,
+)
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Recording
@@ -92,12 +98,9 @@ def _tried(camera: Camera, uv: Float, xyz_p: Float, draw: Int) -> FirstPose | No
     if ok.sum() < 6:
         return None
     flat = ray[ok, :2] / ray[ok, 2:]
-    solved, turn, shift = cv2.solvePnP(
-        xyz_p[draw].reshape(-1, 3)[ok], flat, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_SQPNP
-    )
-    if not solved or not (np.isfinite(turn).all() and np.isfinite(shift).all()):
+    T_cp = perspective_pose(xyz_p[draw].reshape(-1, 3)[ok], flat)
+    if T_cp is None:
         return None
-    T_cp = from_parts(rotation_from_vector(np.asarray(turn[:, 0], float)), np.asarray(shift[:, 0], float))
     T_pc = inverse(T_cp)
     return FirstPose(T_pc, _fits(camera, uv, xyz_p, T_pc))
 
