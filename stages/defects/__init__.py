@@ -25,11 +25,13 @@ from scipy.special import ndtri
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
-from pipeline.artefacts.measured import RingSamples, Wall, WallTexture
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.errors import UnusableError
+from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
+from pipeline.recording.checks import CheckedFrames
 from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
 from stages.defects.corroborate import Evidence, Witnesses, evidence_for
@@ -38,6 +40,7 @@ from stages.defects.depth import allowed_by_neighbours, measure_depth
 from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, NoiseTail, detect, noise_tail
 from stages.defects.grow import footprint, grown
+from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
@@ -60,8 +63,11 @@ def find_defects(
     parameters: DefectParameters,
     context: Context,
     rings: RingSamples | None = None,
+    pictures: LitPictures | None = None,
 ) -> Defects:
-    """Find, outline, measure and name the defects of a wall; its ``rings`` tell how bright the line was.
+    """Find, outline, measure and name the defects of a wall.
+
+    Its ``rings`` tell how bright the line was, ``pictures`` whether the wall looks as it was measured.
 
     Raises
     ------
@@ -75,7 +81,9 @@ def find_defects(
     relief = smooth_shape_removed(wall.radius_map, parameters, known)
     cells = grown(relief, seeds, parameters, context.scratch)
     regions = regions_of(relief, cells, parameters.join_mm, context.scratch)
-    scene = Scene(Witnesses(texture, rings), recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
+    scene = Scene(
+        Witnesses(texture, rings, pictures), recording.pipe.wall_thickness_mm, parameters.min_depth_mm
+    )
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
     found = tuple(_measured(measured, regions, seeds.score, scene, wall.fixed, parameters, context))
@@ -216,6 +224,22 @@ def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float
     return max(found, parameters.min_depth_mm + chance * detection.small_sigma_mm)
 
 
+def _defects_of_run(
+    recording: Recording,
+    frames: CheckedFrames,
+    probe: Probe,
+    trajectory: Trajectory,
+    rings: RingSamples,
+    wall: Wall,
+    texture: WallTexture,
+    parameters: DefectParameters,
+    context: Context,
+) -> Defects:
+    """Find the defects of a run, with all that its rings and lit pictures say of them."""
+    pictures = LitPictures(frames.applied_to(recording), probe.as_found_in(trajectory), trajectory)
+    return find_defects(recording, wall, texture, parameters, context, rings, pictures)
+
+
 DEFECTS = Stage(
-    "defects", "10", DefectParameters, find_defects, "defects as instances with depth, clock and kind"
+    "defects", "10", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

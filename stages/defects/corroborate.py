@@ -17,6 +17,7 @@ from scipy.ndimage import label
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RingSamples, RingValidity, WallTexture
 from stages.defects.depth import Depth
+from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of, sure_of_themselves
@@ -57,6 +58,8 @@ class Evidence:
         Whether it is deepest beside hidden wall.
     bright : bool
         Whether the line is brighter there than at nine of ten places of the ring that shows it deepest.
+    contradicted : bool
+        Whether lit pictures, taken when the line was elsewhere, show the wall without it.
     """
 
     rings: int
@@ -65,11 +68,12 @@ class Evidence:
     fixed: bool = False
     edge: bool = False
     bright: bool = False
+    contradicted: bool = False
 
     @property
     def on_wall(self) -> bool:
         """Whether it is the wall's, and not as likely of the probe or of where the line ends."""
-        return not (self.fixed or self.edge)
+        return not (self.fixed or self.edge or self.contradicted)
 
     @property
     def corroborated(self) -> bool:
@@ -83,6 +87,11 @@ class Evidence:
             return (
                 "It stays at one place of the image while the wall goes by, as something on the window or on "
                 "the probe does: see the warnings of accumulate"
+            )
+        if self.contradicted:
+            return (
+                "Lit pictures taken before and after, when the line was elsewhere, show the wall without it: "
+                "a drop or dirt on the window may have moved the line while it passed"
             )
         if self.edge:
             return (
@@ -101,10 +110,11 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Witnesses:
-    """What findings are held against: the wall's photo, and the rings, where they are known."""
+    """What findings are held against: the wall's photo, and rings and lit pictures, where they are known."""
 
     texture: WallTexture
-    rings: RingSamples | None
+    rings: RingSamples | None = None
+    pictures: LitPictures | None = None
 
 
 def evidence_for(
@@ -125,6 +135,7 @@ def evidence_for(
         _is_fixed(region, surface, fixed_mm),
         lies_at_edge(region, relief),
         seen_by.rings is not None and line_is_bright(region, depth.depth_mm, surface, seen_by.rings),
+        seen_by.pictures is not None and seen_by.pictures.contradict(region, relief),
     )
 
 
