@@ -29,6 +29,7 @@ from pipeline.artefacts.measured import Trajectory, Wall
 from pipeline.geometry.axis import to_pipe
 from pipeline.review.run_files import RunFiles
 from pipeline.simulator.scene import read_scene, write_scene
+from tests.benchmarks.bench_findings import counted, true_wall
 from tests.benchmarks.long_scene import lengthened
 from tests.benchmarks.watch import Watch
 
@@ -146,7 +147,19 @@ def against_truth(place: Place) -> str:
     return (
         f"distance {off_mm[-1]:+.2f} mm at the end of {np.ptp(T_pc[:, 2, 3]):.0f} mm "
         f"(1 sigma {motion.distance_sigma_mm:.2f}), mean radius {bias_mm:+.4f} mm, "
-        f"seen {100 * np.mean(seen[seen.any(1)]):.1f} %"
+        f"seen {100 * np.mean(seen[seen.any(1)]):.1f} %; {findings(place)}"
+    )
+
+
+def findings(place: Place) -> str:
+    """Return how many findings are false, and how many of the drawn defects are found, in words."""
+    scene, wall = read_scene(place.scene), true_wall(place.truth)
+    found = counted(scene, place.run, wall)
+    sure = [c for c in found if c.confirmed]
+    expected = sum(1 - c.stated for c in sure)
+    return (
+        f"findings: {len(sure)} for {len(scene.pipe.defects)} drawn defects, {sum(not c.real for c in sure)} "
+        f"false where {expected:.2f} are expected, {len(found) - len(sure)} unconfirmed"
     )
 
 
