@@ -60,6 +60,8 @@ class WindowPlace:
         Of each frame the same of drops, summed over pixels.
     square, pixels, frame : list
         Of each frame: Σ (recorded − twin)²/σ², pixels, number.
+    corner : (2,)
+        Column and row of the first pixel of ``spots``.
     """
 
     place: ImagePlace
@@ -68,6 +70,7 @@ class WindowPlace:
     square: list[float] = field(default_factory=list)
     pixels: list[int] = field(default_factory=list)
     frame: list[int] = field(default_factory=list)
+    corner: tuple[float, float] = (0.0, 0.0)
 
     def add(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped."""
@@ -81,7 +84,9 @@ class WindowPlace:
         filled = np.where(part, level, level[use].mean()).astype(np.float32)
         rest, weight = above[box] - level, np.where(use, 1 / twin.variance[box], np.float32(0))
         whole = np.stack([-level, cv2.GaussianBlur(filled, (0, 0), _AROUND_PX) - level])
-        self.spots.append(np.stack([whole * (rest * weight), whole**2 * weight], 1))
+        near = [slice(k[0], k[-1] + 1) for k in (np.flatnonzero(inside.any(axis)) for axis in (1, 0))]
+        self.corner = float(u[0, near[1].start]), float(v[near[0].start, 0])
+        self.spots.append(np.stack([whole * (rest * weight), whole**2 * weight], 1)[..., near[0], near[1]])
         rest, weight = rest[use], weight[use]
         changes = np.stack([(made - level)[use] for made in self._drops(filled, u, v)])
         sums = [(changes * (rest * weight)).sum(1), (changes**2 * weight).sum(1)]
@@ -125,8 +130,7 @@ class WindowPlace:
         if len(self.frame) < _FEWEST_FRAMES:
             return None
         spots = np.stack(self.spots)
-        reach = int(self._reach_px + 2 * _AROUND_PX)
-        middle = [at - max(int(at) - reach, 0) for at in (self.place.u_px, self.place.v_px)]
+        middle = [self.place.u_px - self.corner[0], self.place.v_px - self.corner[1]]
         start = np.array([[0.3, *middle, f * self.place.radius_px, 1.0] for f in (0.5, 1.5)])
         tried = {
             "window_dirt": _fall_of_spot(spots[:, 0], start),
