@@ -25,7 +25,7 @@ _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0,
 """Bending and radius, in radii of the place, of the drops that are tried."""
 _LEAST_REACH_PX = 48.0
 """A place is looked at so far about its middle, or over two radii if that is more."""
-_AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 4
+_AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 3
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
 _FLATNESS = (0.7, 5.0)
 """Bounds of a spot's flatness: 1 is Gaussian, 2 has a flat middle and a steep rim, 5 is a disc."""
