@@ -53,7 +53,7 @@ from stages.motion.windows.sliding_window import adjust_run
 from stages.overlays import OverlayParameters, draw_overlays
 from stages.rings import RingParameters, extract_rings
 from stages.sections import SectionParameters, measure_sections
-from stages.texture.texture import TextureParameters, photograph_wall
+from stages.texture import TextureParameters, photograph_wall
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.benchmarks.long_inputs import (
     RepeatedFrames,

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.export.pictures import write_unrolled
 from pipeline.recording.base import FrameTable
-from stages.texture.texture import TextureParameters, photograph_wall
+from stages.texture import TextureParameters, photograph_wall
 from tests.quiet import quiet_context
 from tests.shared_data import scorer, shared
 from tests.truth_run import true_radius_map, truth_run

@@ -10,8 +10,7 @@ import pytest
 from pipeline.artefacts.measured import WallTexture
 from pipeline.errors import UnusableError
 from pipeline.export.pictures import write_unrolled
-from stages.texture import TEXTURE
-from stages.texture.texture import TextureParameters, photograph_wall
+from stages.texture import TEXTURE, TextureParameters, photograph_wall
 from tests.quiet import quiet_context
 from tests.unit.drawn_pipe import (
     RADIUS,

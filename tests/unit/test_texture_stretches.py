@@ -7,11 +7,11 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import WallTexture
-from stages.texture.chain import LightChain, cut_plan
+from stages.texture import TextureParameters, photograph_wall, quantile_of_counts
 from stages.texture.grid import FlatGrid
+from stages.texture.photometry import LightChain, cut_plan
 from stages.texture.sampling import LightSamples
 from stages.texture.surface import wall_surface
-from stages.texture.texture import TextureParameters, photograph_wall, quantile_of_counts
 from stages.texture.views import TileViews, plan_tiles
 from tests.quiet import quiet_context
 from tests.unit.drawn_pipe import draw, poses, recording_of, seen_wall, small_probe, trajectory_of
