@@ -17,7 +17,7 @@ from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
-from stages.motion.bundle_adjustment.solver import adjust, estimate_state, trembles
+from stages.motion.bundle_adjustment.solver import adjust, estimate_state, scale_between_halves, trembles
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 from tests.motion_scene import SHAKE, displaced, scene
@@ -282,3 +282,24 @@ def test_a_bias_of_far_matches_is_not_taken_for_distance(seed: int) -> None:
     sigma = np.sqrt(frame_covariance(found.equations.factor(), np.array([39]))[0, 2, 2])
     assert sigma < 0.1
     assert abs(found.state.T_pc[-1, 2, 3] - truth.T_pc[-1, 2, 3]) < 2 * sigma
+
+
+def test_what_shifts_near_matches_alone_makes_distances_unsure() -> None:
+    given = scene(40, 90, encoder=False, seed=1)
+    tracks, truth = given.measured.tracks, given.truth
+    away = tracks.uv - given.measured.probe.camera.centre_px
+    distance = np.linalg.norm(away, axis=1)
+    near = distance > np.median(distance)
+    shifted = tracks.uv + np.where(near, 1.0, 0.0)[:, None] * away / distance[:, None]
+    unsure = []
+    for uv in (tracks.uv, shifted):
+        measured, parameters = (
+            replace(given.measured, tracks=replace(tracks, uv=uv)),
+            MotionParameters(alike=1.0),
+        )
+        found = estimate_state(truth, measured, parameters)
+        unsure.append(scale_between_halves(found, measured, parameters))
+    way = np.ptp(truth.T_pc[:, 2, 3])
+    sigma = np.sqrt(frame_covariance(found.factor, np.array([39]))[0, 2, 2]) / way
+    assert unsure[0] < 2 * sigma
+    assert unsure[1] > 3 * unsure[0], unsure

@@ -14,6 +14,7 @@ from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, Watch, minimi
 from pipeline.adjustment.motion_priors import TREMBLING_GROWTH, third_difference_sigma, trembling
 from pipeline.arrays import Float, Int
 from pipeline.errors import UnusableError
+from pipeline.geometry.axis import distance_along
 from stages.motion.bundle_adjustment.equations import (
     Equations,
     Measurements,
@@ -43,6 +44,8 @@ err by, and smoothness may hold it down."""
 _LOOSER = 3.0
 """How much looser than its 1 σ trembling is held. All lengths shrink with what is held to 0 at its own 1 σ: a
 drawn shift of .4 px shortened the pipe by 1.4 %. At three times it the pull is a ninth."""
+_SHORTEST_MM = 1.0
+"""Ways are compared as if they were at least so long: a probe that stands has none."""
 _ROUNDS, _MORE = 3, 1.2
 """Times that the smoothness of trembling pictures is looked at again while it grows by a fifth: the prior of
 a motion not known yet holds down strong trembling. Not measured."""
@@ -87,6 +90,32 @@ def estimate_state(
             sigma = looser
             smooth = adjust(smooth.state, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         return Estimate(smooth, smooth.equations.factor(), sigma)
+
+
+def scale_between_halves(
+    estimate: Estimate, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
+) -> float:
+    """Return the 1 σ of distances, relative, by what near and far matches alone say of the way.
+
+    Compression and light shift matches alike that are seen under one polar angle. The residuals do not show
+    it, but the halves then differ from the whole (by chance as much as the whole's own σ): the farther one
+    counts.
+    """
+    tracks = measured.tracks
+    away = np.linalg.norm(tracks.uv - measured.probe.camera.centre_px, axis=1)
+    near, whole, apart = away > np.median(away), _way_mm(estimate.state), []
+    for half in (near, ~near):
+        part, seen = tracks.some(half)
+        start = replace(estimate.state, xyz_p=estimate.state.xyz_p[seen])
+        alone = replace(measured, tracks=part, smooth_sigma=estimate.smooth_sigma)
+        with _refusing_undetermined():
+            way = _way_mm(adjust(start, alone, parameters, CLOSELY, watch).state)
+        apart.append(way / max(whole, _SHORTEST_MM) - 1)
+    return float(np.abs(apart).max())
+
+
+def _way_mm(state: State) -> float:
+    return float(np.ptp(distance_along(state.axis, state.T_pc)))
 
 
 def _smoothness(T_pc: Float, known: Int) -> Float:

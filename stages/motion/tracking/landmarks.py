@@ -141,6 +141,14 @@ class Tracks:
     xyz: Float
     poses: TrackedPoses
 
+    def some(self, keep: Bool) -> tuple[Tracks, Bool]:
+        """Return some observations (M,), and which landmarks (L,) are left: those seen often enough."""
+        often = np.bincount(self.landmark[keep], minlength=len(self.xyz)) >= _FEWEST_SEEN
+        keep = keep & often[self.landmark]
+        landmark = (np.cumsum(often) - 1)[self.landmark[keep]]
+        parts = self.frame[keep], self.uv[keep], self.sigma_px[keep], self.xyz[often], self.poses
+        return Tracks(landmark, *parts), often
+
 
 @dataclass(frozen=True)
 class _Batch:

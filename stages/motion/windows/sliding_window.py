@@ -13,7 +13,12 @@ from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
-from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, estimate_with_shared
+from stages.motion.bundle_adjustment.solver import (
+    Estimate,
+    estimate_state,
+    estimate_with_shared,
+    scale_between_halves,
+)
 from stages.motion.bundle_adjustment.unknowns import State, straight_start
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
@@ -172,12 +177,14 @@ def adjust_run(
     steps = 2 * len(windows)
     watch = partial(progress, 0, steps)
     estimate, measured = _adjusted(run, windows[0], parameters, watch)
-    noisy = with_shared_error(parameters, estimate.adjusted.equations.reprojection_px)
+    noisy, unsure = with_shared_error(parameters, estimate.adjusted.equations.reprojection_px), 0.0
     if noisy is not parameters:
         parameters, estimate = noisy, estimate_state(estimate.state, measured, noisy, watch)
+        unsure = scale_between_halves(estimate, measured, parameters, watch)
     check(estimate)
     if len(windows) == 1:
-        return _run_estimate(joined_at_once(estimate), [_End.of(estimate, measured)])
+        joined = joined_at_once(estimate).with_scale_sigma(unsure)
+        return _run_estimate(joined, [_End.of(estimate, measured)])
     alone = [_alone(estimate, measured)]
     for window in windows[1:]:
         watch = partial(progress, len(alone), steps)
@@ -195,7 +202,8 @@ def adjust_run(
         )
         check(estimate)
         found.append((_submap(estimate, windows, k), _End.of(estimate, measured)))
-    return _run_estimate(join_submaps([f[0] for f in found], shared), [f[1] for f in found])
+    joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(unsure)
+    return _run_estimate(joined, [f[1] for f in found])
 
 
 def joined_at_once(estimate: Estimate) -> JoinedRun:

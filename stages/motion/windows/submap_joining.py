@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, to_pipe
+from pipeline.geometry.axis import PipeAxis, axis_through, distance_along, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from stages.motion.bundle_adjustment.residuals import ORIGIN_SIGMA
 from stages.motion.bundle_adjustment.unknowns import AXIS_STEP_MM
@@ -75,6 +75,15 @@ class JoinedRun:
     radius_sigma_mm: float
     shared: SharedParameters
     distance_sigma_mm: float
+
+    def with_scale_sigma(self, relative: float) -> JoinedRun:
+        """Return the run with distances that are unsure all together by a relative 1 σ more."""
+        way = np.zeros((len(self.T_pc), 6))
+        way[:, :3] = relative * (self.T_pc[:, :3, 3] - self.T_pc[0, :3, 3])
+        covariance = self.covariance + way[:, :, None] * way[:, None, :]
+        own = relative * float(np.ptp(distance_along(self.axis, self.T_pc)))
+        both = float(np.hypot(self.distance_sigma_mm, own))
+        return replace(self, covariance=covariance, distance_sigma_mm=both)
 
     @property
     def turn_variance(self) -> Float:
