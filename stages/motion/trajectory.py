@@ -21,13 +21,16 @@ from stages.motion.windows.submap_joining import JoinedRun
 
 _START_MM = 60.0
 """Length of pipe whose direction is the z-axis of P: two knots of the axis. Not measured."""
+_MIRROR = 0.3, 1.5
+"""Parts of the way to its mirror image that the principal point moves in mirrored pictures: the distortion
+takes the rest. In open-1-field, mirrored, 0.45."""
 _TOO_FAR = 5.0
 """A right probe moves farther than so many σ along one of its ten or so directions once in 10⁵ recordings."""
 _MOST_LOST = 0.05
 """Share of the lit frames without enough texture that is told; sound recordings have none. Not measured."""
-_MOST_EXCESS = 4.4
-"""Reprojection error in σ of matching that is told: 2.9 in open-1, 3.4 in open-3, 4.0 with seven glints in
-each frame, 4.9 at crf 30, where distance errs by 2.8 σ: the middle of the last two."""
+_MOST_EXCESS = 1.1
+"""Reprojection error in σ of matching that is told: 0.74 in open-1 and 0.78 at half its size, 1.23 at crf 30,
+where distance errs by 2.8 σ of the residuals alone."""
 
 
 def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder: bool) -> Trajectory:
@@ -76,10 +79,26 @@ def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) ->
         most = int(np.argmax(np.divide(np.abs(change), sigma, out=np.zeros_like(change), where=sigma > 0)))
         context.warn(
             f"the stated probe does not fit this recording: it had to be moved by {farthest:.0f} times its "
-            f"stated σ, most of all {probe.parameter_names[most]} by {change[most]:+.3g}; radii "
-            "and distances may be wrong by more than their σ. Run boresight diagnose, or "
+            f"stated σ, most of all {probe.parameter_names[most]} by {change[most]:+.3g}"
+            f"{_mirrored(probe, most, change[most])}; "
+            "radii and distances may be wrong by more than their σ. Run boresight diagnose, or "
             "calibrate the probe anew",
         )
+
+
+def _mirrored(probe: Probe, moved: int, by: float) -> str:
+    """Return a mirrored picture as a cause where the principal point moves towards its mirror image."""
+    name, camera = probe.parameter_names[moved], probe.camera
+    if name not in ("cx", "cy"):
+        return ""
+    axis = int(name == "cy")
+    mirrored = camera.image_size[axis] - 1 - 2 * float(camera.centre_px[axis])
+    if not _MIRROR[0] * abs(mirrored) < by * np.sign(mirrored) < _MIRROR[1] * abs(mirrored):
+        return ""
+    way = "upside down" if axis else "left to right"
+    return (
+        f" (a picture mirrored {way} would have it {mirrored:+.3g} aside: see whether the recorder mirrors)"
+    )
 
 
 def report_motion(
@@ -123,7 +142,7 @@ def _warn_of_texture(excess: float, tracked: TrackedPoses, context: Context) -> 
     if excess > _MOST_EXCESS:
         context.warn(
             f"matches of texture contradict each other by {excess:.1f} times their σ, where sound recordings "
-            "have 3 to 4: reflections, compression or lights that move with the probe are taken for the "
+            "have 0.7 to 0.9: reflections, compression or lights that move with the probe are taken for the "
             "wall. Distance and roll may be off by more than their σ. What to do: compare the distance with "
             "the encoder or a tape, record with less compression"
         )

@@ -11,7 +11,7 @@ import pytest
 from pipeline.arrays import Float32
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion import MotionParameters
-from stages.motion.tracking.normalisation import without_illumination
+from stages.motion.tracking.normalisation import SOFTENING_PX, alike_samples, without_illumination
 from stages.motion.tracking.patches import cut
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid, sample, softened, unroll
 from stages.motion.tracking.tracker import TextureTracker
@@ -237,3 +237,14 @@ def naive_shift(slope_per_px: float) -> float:
 def test_a_slope_of_the_light_does_not_shift_matches() -> None:
     assert abs(mean_shift(0.03)) < 0.02
     assert abs(naive_shift(0.03)) > 0.1, "the control must be shifted, or this test shows nothing"
+
+
+@pytest.mark.parametrize("px_per_sample", [0.7, 1.5])
+def test_blurred_samples_that_err_alike(px_per_sample: float) -> None:
+    """The mean of many blurred samples of noise is as unsure as that of so many fewer independent ones."""
+    blur, side = np.hypot(SOFTENING_PX / px_per_sample, 0.7), 64
+    noise = np.random.default_rng(0).standard_normal((64 * side, 64 * side)).astype(np.float32)
+    seen = cv2.GaussianBlur(noise, (0, 0), blur)
+    means = seen.reshape(64, side, 64, side).mean((1, 3))
+    wanted = side**2 * means.var() / seen.var()
+    assert alike_samples(np.array([px_per_sample]))[0] == pytest.approx(wanted, rel=0.15)

@@ -75,6 +75,12 @@ def equally_sharp(contrast: Float32, coarse_uv: Float32, step: int) -> Float32:
     return out
 
 
+def alike_samples(px_per_sample: Float) -> Float:
+    """Return how many samples (M,) of a strip err alike: a blur of 1 σ s makes 4πs² of them one."""
+    blur = (SOFTENING_PX / np.maximum(px_per_sample, 1e-3)) ** 2 + _LEAST_SMOOTHING**2
+    return np.asarray(1 + 4 * np.pi * blur)
+
+
 def noise_of_rows(contrast: Float32, usable: Bool) -> Float32:
     """Return the noise (H,), 1 σ from one sample to the next, of each row of contrast (H, W).
 

@@ -24,6 +24,7 @@ from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import BoreSteps, ring_bins
 from stages.motion.tracking.landmarks import Tracks
+from stages.motion.tracking.normalisation import alike_samples
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.submap_joining import JoinedRun, join_submaps
 from stages.motion.windows.submaps import (
@@ -123,7 +124,8 @@ class RunEstimate:
     reprojection_px : float
         Median over the windows of the median reprojection error.
     excess : float
-        Median over the windows of how many times the σ predicted by matching that error is.
+        Median over the windows of how many times the σ predicted by matching that error is; samples that are
+        blurred together count as one.
     """
 
     joined: JoinedRun
@@ -152,10 +154,12 @@ class _End:
     excess: float
 
     @staticmethod
-    def of(estimate: Estimate, measured: Measurements) -> _End:
+    def of(estimate: Estimate, measured: Measurements, step_mm: float) -> _End:
         adjusted = estimate.adjusted
         size = np.linalg.norm(adjusted.equations.texture.residual, axis=1)
-        in_sigma = size / (_RAYLEIGH_MEDIAN * measured.tracks.sigma_px)
+        away_px = np.linalg.norm(measured.tracks.uv - measured.probe.camera.centre_px, axis=1)
+        alike = alike_samples(away_px * step_mm / estimate.state.nominal_radius_mm)
+        in_sigma = size / (_RAYLEIGH_MEDIAN * measured.tracks.sigma_px * np.sqrt(alike))
         excess = float(np.median(in_sigma)) if size.size else 0.0
         return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, excess)
 
@@ -184,7 +188,7 @@ def adjust_run(
     check(estimate)
     if len(windows) == 1:
         joined = joined_at_once(estimate).with_scale_sigma(unsure)
-        return _run_estimate(joined, [_End.of(estimate, measured)])
+        return _run_estimate(joined, [_End.of(estimate, measured, run.texture.grid.step_mm)])
     alone = [_alone(estimate, measured)]
     for window in windows[1:]:
         watch = partial(progress, len(alone), steps)
@@ -201,7 +205,7 @@ def adjust_run(
             own.state, measured, shared.value, own.smooth_sigma, parameters, watch
         )
         check(estimate)
-        found.append((_submap(estimate, windows, k), _End.of(estimate, measured)))
+        found.append((_submap(estimate, windows, k), _End.of(estimate, measured, run.texture.grid.step_mm)))
     joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(unsure)
     return _run_estimate(joined, [f[1] for f in found])
 
