@@ -30,7 +30,7 @@ _BELL_UNKNOWN = 0.5
 _BESIDE, _TOP_QUANTILE, _LEAST_OF_RING = 1.6, 0.8, 3
 _SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 # Of its depth: without it 85 and 90 % of the depths of 88 defects painted into two open recordings were in
-# their 95 % interval, with it 94 % (`python -m tests.benchmarks.bench_painted_findings`).
+# their 95 % interval, with it 92 and 91 % of 82 (`python -m tests.benchmarks.bench_painted_findings`).
 _TOP_SHAPE = 0.04
 _MARGIN_MM = 2.5
 _LEAST = 24
