@@ -14,7 +14,7 @@ from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.channels import Seen
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
-from stages.diagnose.result import EffectFound, Location, Value
+from stages.diagnose.result import CourseFound, EffectFound, Location, Value
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
 from stages.diagnose.travel.steps import StepFound
@@ -114,7 +114,8 @@ class Claim:
             self.name, chance_of_name(self.p_value, len(self.alike), self.agreements, drilled),
             self.parameters, self.statement, effect(self.name).law,
             tuple(a.confirmation for a in self.agreements),
-            recording="gauge" if self.of_gauge_alone else "",
+            course=CourseFound("constant", {}), recording="gauge" if self.of_gauge_alone else "",
+            location=self.location,
         )  # fmt: skip
 
 

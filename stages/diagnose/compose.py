@@ -236,7 +236,7 @@ def to_json(found: Diagnosis) -> dict[str, object]:
         "format": _FORMAT, "recording": found.recording, "gauge": found.gauge, "verdict": str(found.verdict),
         "global_p": _number(found.global_p),
         "location": None if found.location is None else _place(found.location),
-        "effects": [_effect(e) for e in found.effects],
+        "effects": [_effect(e, found) for e in found.effects],
         "class": list(found.members), "identifiable": found.identifiable, "discrepancy": None,
         "remainder": None if found.remainder is None else _remainder(found.remainder),
         "fit": None if found.fit is None else _plain(found.fit),
@@ -249,13 +249,18 @@ def to_json(found: Diagnosis) -> dict[str, object]:
     return out
 
 
-def _effect(found: EffectFound) -> dict[str, object]:
+def _effect(found: EffectFound, answer: Diagnosis) -> dict[str, object]:
+    alone = answer.location if len(answer.effects) == 1 else None
+    place = found.location or alone
+    undecided = answer.verdict is Verdict.CLASS and found.name in answer.members
     return {
         "name": found.name, "probability": _number(found.probability),
         "parameters": {k: _plain(v) for k, v in found.parameters.items()},
         "statement": found.statement, "equation": found.equation,
         "confirmed_by": [_plain(c) for c in found.confirmed_by],
         "course": None if found.course is None else _course(found.course), "recording": found.recording,
+        "location": None if place is None else _place(place),
+        "credible_set": list(answer.members) if undecided else [found.name],
     }  # fmt: skip
 
 

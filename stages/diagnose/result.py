@@ -99,7 +99,8 @@ class CourseFound:
 class EffectFound:
     """An effect with its size, the chance that it is the right name, and what confirms it.
 
-    ``recording`` is ``gauge`` where it happened in the gauge run alone; else it is empty.
+    ``recording`` is ``gauge`` where it happened in the gauge run alone; else it is empty. ``location`` is
+    None where only that of all effects together was measured.
     """
 
     name: str
@@ -110,6 +111,7 @@ class EffectFound:
     confirmed_by: tuple[Confirmation, ...] = ()
     course: CourseFound | None = None
     recording: str = ""
+    location: Location | None = None
 
 
 @dataclass(frozen=True)

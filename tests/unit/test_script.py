@@ -16,7 +16,7 @@ from pipeline.machine.stage import Context, Of, Parameters, Stage
 from pipeline.recording.base import Recording
 from stages.diagnose.compose import to_json
 from stages.diagnose.diagnose import Diagnosed
-from stages.diagnose.result import Diagnosis, EffectFound, FitQuality, Value, Verdict
+from stages.diagnose.result import Diagnosis, EffectFound, FitQuality, Location, Value, Verdict
 from tests.bad_recordings import cut_sample
 
 TILT = EffectFound(
@@ -40,6 +40,22 @@ def test_a_diagnosis_is_read_as_it_was_written(tmp_path):
     tilt, direction = effect.parameters["tilt_deg"], effect.parameters["direction_deg"]
     assert (tilt.value, tilt.sd, direction.value) == (0.61, 0.01, 40.0)
     assert np.isnan(direction.sd), "what is not known is not taken for a number"
+
+
+def test_every_effect_has_its_place_and_the_names_it_cannot_be_told_from():
+    place = Location("motion", "time", "event", frames=(131, 133))
+    (alone,) = to_json(replace(FOUND, location=place))["effects"]
+    assert alone["location"] == {
+        "channel": "motion",
+        "fixed_to": "time",
+        "time": "event",
+        "frames": [131, 133],
+    }
+    assert alone["credible_set"] == ["laser_tilt"], "a name that is told is the only one"
+    (doubted,) = to_json(replace(FOUND, verdict=Verdict.CLASS))["effects"]
+    assert doubted["credible_set"] == ["laser_tilt", "principal_point"]
+    two = to_json(replace(FOUND, location=place, effects=(TILT, TILT)))["effects"]
+    assert [e["location"] for e in two] == [None, None], "of both together, it is of neither"
 
 
 def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
