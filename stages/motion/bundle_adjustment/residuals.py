@@ -15,7 +15,7 @@ from pipeline.adjustment.robust import Cauchy, Loss, Squares
 from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation
-from stages.motion.bundle_adjustment.unknowns import ENCODER_SCALE, GLOBALS, State
+from stages.motion.bundle_adjustment.unknowns import AXIS_STEP_MM, ENCODER_SCALE, GLOBALS, State
 from stages.motion.encoder import EncoderReadings
 from stages.motion.rings import RingBins
 
@@ -84,13 +84,18 @@ def turn_rows(state: State, sigma_rad: float) -> Rows:
 def view_rows(state: State) -> Rows:
     """Return the equations: the camera looks along the pipe."""
     n = len(state.T_pc)
-    section = state.section_frames(to_pipe(state.axis, state.T_pc[:, :3, 3])[0])
+    s = to_pipe(state.axis, state.T_pc[:, :3, 3])[0]
+    slope = (state.axis_basis(s + AXIS_STEP_MM) - state.axis_basis(s - AXIS_STEP_MM)) / (2 * AXIS_STEP_MM)
+    section, by_border = state.section_frames(s), np.zeros((n, 2, state.border_size))
+    for i in range(2):
+        first = GLOBALS + i * state.knots
+        by_border[:, i, first : first + state.knots] = -slope
     R_ac = np.swapaxes(section, 1, 2) @ state.T_pc[:, :3, :3]
     by_frame = np.zeros((n, 2, 1, BLOCK))
     by_frame[:, :, 0, 3], by_frame[:, :, 0, 4] = -R_ac[:, :2, 1], R_ac[:, :2, 0]
     return Rows(
         np.repeat(np.arange(n), 2)[:, None], by_frame.reshape(-1, 1, BLOCK),
-        np.zeros((2 * n, state.border_size)), R_ac[:, :2, 2].ravel(), np.full(2 * n, _VIEW_RAD),
+        by_border.reshape(2 * n, -1), R_ac[:, :2, 2].ravel(), np.full(2 * n, _VIEW_RAD),
     )  # fmt: skip
 
 
