@@ -35,7 +35,13 @@ from pipeline.recording.checks import CheckedFrames
 from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
 from stages.defects.corroborate import Evidence, Witnesses, evidence_for
-from stages.defects.credibility import COUNTED, Credibility, credibility_of
+from stages.defects.credibility import (
+    COUNTED,
+    Credibility,
+    chance_of_depth,
+    credibility_of,
+    is_depth_known,
+)
 from stages.defects.depth import allowed_by_neighbours, measure_depth
 from stages.defects.describe import Scene, describe
 from stages.defects.detect import Detection, NoiseTail, detect, noise_tail
@@ -54,6 +60,7 @@ _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
 _FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
 # Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
 _WALL_OR_NOT = 0.5
+_UNSURE = "Its depth is not known to twice its σ"
 
 
 def find_defects(
@@ -161,14 +168,16 @@ def _judged(
     confirmed: list[Defect] = []
     unconfirmed: list[Defect] = []
     for f in found:
-        real = 1.0 if f.region.all_round else credibility.probability(f.evidence, f.defect, min_depth_mm)
+        deep = chance_of_depth(f.defect, min_depth_mm)
+        real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
         real *= 1.0 if f.evidence.on_wall else _WALL_OR_NOT
-        counts = f.region.all_round or (f.evidence.corroborated and real >= COUNTED)
+        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.defect)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
         if counts:
             confirmed.append(defect)
         else:
-            words = f"{defect.statement} Not confirmed. {f.evidence.doubt}."
+            doubt = f.evidence.doubt if is_depth_known(defect) or not f.evidence.corroborated else _UNSURE
+            words = f"{defect.statement} Not confirmed. {doubt}."
             unconfirmed.append(replace(defect, statement=words))
     return confirmed, unconfirmed
 
@@ -241,5 +250,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "10", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "11", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -40,6 +40,8 @@ _BRIGHT_BY_CHANCE, _UNTOLD = 0.1, 0.5
 _MANY_RINGS = 6
 # From here on a finding that is corroborated counts as one: rather real than not.
 COUNTED = 0.5
+# A depth is known to be one from 1.96 σ: nothing lies outside its 95 % interval.
+_KNOWN = 1.96
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,9 @@ class Credibility:
     bright: int
     dark: int
 
-    def probability(self, evidence: Evidence, defect: Defect, min_depth_mm: float) -> float:
-        """Return the probability that a finding is there."""
-        deep_enough = float(ndtr((abs(defect.depth_mm) - min_depth_mm / 2) / defect.depth_sigma_mm))
-        return deep_enough / (1 + self._noise(evidence) + self._clutter(evidence) + self._glints(evidence))
+    def chance_against_clutter(self, evidence: Evidence) -> float:
+        """Return the probability that a finding is none of what imitates defects here."""
+        return 1 / (1 + self._noise(evidence) + self._clutter(evidence) + self._glints(evidence))
 
     def meetings(self, rings: int) -> float:
         """Return how many places to expect in which so many neighbouring rings show clutter by chance."""
@@ -105,6 +106,16 @@ class Credibility:
     def _real(self) -> float:
         """Real findings to be expected: those that are sure, and one more."""
         return 1.0 + sum(self.sure.values())
+
+
+def chance_of_depth(defect: Defect, min_depth_mm: float) -> float:
+    """Return the probability that a finding is deeper than half of what is reported."""
+    return float(ndtr((abs(defect.depth_mm) - min_depth_mm / 2) / defect.depth_sigma_mm))
+
+
+def is_depth_known(defect: Defect) -> bool:
+    """Return whether a depth lies outside its own 95 % interval about nothing."""
+    return abs(defect.depth_mm) >= _KNOWN * defect.depth_sigma_mm
 
 
 def credibility_of(

@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
 from stages.defects.corroborate import Evidence
-from stages.defects.credibility import credibility_of
+from stages.defects.credibility import chance_of_depth, credibility_of, is_depth_known
 from stages.defects.detect import NoiseTail, detect, noise_tail
 from stages.defects.relief import smooth_shape_removed
 from tests.quiet import quiet_context
@@ -146,7 +146,8 @@ def probability(of, among, tail=None, widths=None):
     """Return the probability of a finding among others."""
     told = found(2).items[0]
     tail, widths = tail or NoiseTail(20.0, 1.2), widths or [0.03] * len(among)
-    return credibility_of(among, widths, 50, tail).probability(of, told, 0.2)
+    here = credibility_of(among, widths, 50, tail)
+    return here.chance_against_clutter(of) * chance_of_depth(told, 0.2)
 
 
 def test_two_rings_among_many_single_ones_are_rather_false_and_many_rings_stay_sure():
@@ -166,3 +167,20 @@ def test_one_ring_is_not_deeper_than_its_neighbours_allow():
     alone = found(1, 9.0).unconfirmed[0]
     assert abs(alone.depth_mm) < 2.0
     assert found(3, 0.9).items[0].depth_mm == pytest.approx(0.9, abs=0.1)
+
+
+def test_a_depth_within_twice_its_sigma_is_not_counted():
+    told = found(2).items[0]
+    assert is_depth_known(told)
+    assert not is_depth_known(replace(told, depth_mm=-2.5, depth_sigma_mm=1.4))
+
+
+@pytest.mark.parametrize(("rings", "counted"), [(1, 0), (6, 1)])
+def test_what_goes_all_round_needs_two_rings_as_well(rings, counted):
+    random = np.random.default_rng(5)
+    radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
+    radius[30 : 30 + rings] -= 1.0
+    wall = wall_of(DISTANCE, AZIMUTH, radius, SIGMA)
+    recording = bare_recording(2 * RADIUS, None)
+    findings = find_defects(recording, wall, grey_texture(wall), DefectParameters(), quiet_context())
+    assert len(findings.items) == counted
