@@ -202,10 +202,10 @@ def config(
 
 def _kernels() -> dict[str, dict[str, str]]:
     """Return the kernels of a run, by module and function."""
-    from pipeline.files.installed import KERNELS, file_or_shipped
+    from pipeline.files.installed import KERNELS, shipped_file
     from pipeline.files.json_yaml import read_yaml
 
-    listed = read_yaml(file_or_shipped(Path("run"), KERNELS))
+    listed = read_yaml(shipped_file("run", KERNELS))
     modules = {module: listed.section(module) for module in map(str, listed.values)}
     return {m: {f: part.text(f) for f in map(str, part.values)} for m, part in modules.items()}
 

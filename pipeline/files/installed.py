@@ -56,4 +56,9 @@ def file_or_shipped(given: Path, kind: str) -> Path:
             f"is neither a file nor the name of one of the {kind or 'parameter files'} that are shipped",
             expected=f"a file, or one of: {', '.join(shipped_names(kind))}",
         )
-    return _CONFIGS / kind / f"{given.name}{_SUFFIX}"
+    return shipped_file(given.name, kind)
+
+
+def shipped_file(name: str, kind: str) -> Path:
+    """Return the shipped file of a name, whatever lies in the working folder."""
+    return _CONFIGS / kind / f"{name}{_SUFFIX}"

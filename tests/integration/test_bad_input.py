@@ -224,7 +224,7 @@ def test_a_full_disk_keeps_what_was_computed(
     good: Path, tmp_path: Path, boresight: Callable[..., Told]
 ) -> None:
     run = tmp_path / "run"
-    with file_size_limit(150_000):
+    with file_size_limit(600_000):
         told = boresight("run", good, "-o", run, *QUICK)
     assert told.code == REFUSED
     assert "cannot be written: File too large" in told.err

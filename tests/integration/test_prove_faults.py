@@ -116,7 +116,9 @@ def test_a_diagnosis_that_was_killed_is_no_failure_of_the_diagnosis(
 
 # Stands for a diagnosis that is killed after its first stage, and ends once it finds that stage's result.
 _KILLED_ONCE = """
-import os, pathlib, sys
+import os, pathlib, signal, sys
+if {signal} == signal.SIGINT:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # what a shell starts in the background ignores it
 answer = pathlib.Path(sys.argv[1])
 stage = answer / "stage"
 if not stage.exists():
