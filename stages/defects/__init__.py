@@ -37,6 +37,7 @@ from stages.defects.clean import clean_wall
 from stages.defects.corroborate import Evidence, Witnesses, evidence_for
 from stages.defects.credibility import (
     COUNTED,
+    MOST_SURE,
     Credibility,
     chance_of_depth,
     credibility_of,
@@ -170,7 +171,7 @@ def _judged(
     for f in found:
         deep = chance_of_depth(f.defect, min_depth_mm)
         real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
-        real *= 1.0 if f.evidence.on_wall else _WALL_OR_NOT
+        real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
         counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.defect)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
         if counts:
@@ -250,5 +251,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "11", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "12", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )
