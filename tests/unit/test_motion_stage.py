@@ -11,6 +11,7 @@ import pytest
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.errors import UnusableError
+from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination
 from stages.motion import MotionParameters, adjust_at_once, estimate_motion, measure_run
 from stages.motion.bundle_adjustment import residuals
@@ -27,9 +28,9 @@ STEP = 0.8
 PARAMETERS = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
 
 
-def estimated(run: DrawnRun, **parameters: int) -> Trajectory:
-    chosen = PARAMETERS.model_copy(update=parameters)
-    return estimate_motion(run.recording, run.probe, run.rings, run.points, chosen, quiet_context())
+def estimated(run: DrawnRun, context: Context | None = None, **parameters: int) -> Trajectory:
+    chosen, context = PARAMETERS.model_copy(update=parameters), context or quiet_context()
+    return estimate_motion(run.recording, run.probe, run.rings, run.points, chosen, context)
 
 
 def errors(got: Trajectory, run: DrawnRun) -> tuple[Float, Float, Float]:
@@ -60,6 +61,21 @@ def test_pose_lies_within_its_sigma(steady: DrawnRun, encoder: bool) -> None:
     assert got.radius_mm == pytest.approx(50, abs=0.05)
     assert np.isfinite(got.encoder_scale) == encoder
     assert got.events == ()
+
+
+@pytest.mark.parametrize("wrong", [1.0, 1.05])
+def test_encoder_of_another_scale_is_told_and_pulls_no_distance(steady: DrawnRun, wrong: float) -> None:
+    """Its scale is stated to .2 %: at 5 %, distance followed it by 4 of its stated σ, without a word."""
+    reading = steady.recording.encoder
+    assert reading is not None
+    encoder = replace(reading, distance_mm=wrong * reading.distance_mm)
+    run = replace(steady, recording=replace(steady.recording, encoder=encoder))
+    told: list[str] = []
+    got = estimated(run, replace(quiet_context(), warn=told.append))
+    z, _, sigma = errors(got, run)
+    assert abs(z[-1]) < 3 * sigma[-1, 0]
+    assert abs(got.encoder_scale * wrong - 1) < 3 * got.encoder_scale_sigma
+    assert any("wheel" in words for words in told) == (wrong != 1)
 
 
 def test_the_diagnosis_takes_the_same_way_as_the_run(steady: DrawnRun) -> None:

@@ -12,6 +12,7 @@ from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
+from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, scale_of_encoder
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
 from stages.motion.bundle_adjustment.solver import (
     Estimate,
@@ -126,6 +127,8 @@ class RunEstimate:
     excess : float
         Median over the windows of how many times the σ predicted by matching that error is; samples that are
         blurred together count as one.
+    encoder_scale : EncoderScale or None
+        As rings and texture of the first window alone have it; None without encoder.
     """
 
     joined: JoinedRun
@@ -133,6 +136,7 @@ class RunEstimate:
     unsettled: int
     reprojection_px: float
     excess: float
+    encoder_scale: EncoderScale | None
 
 
 @dataclass(frozen=True)
@@ -185,10 +189,15 @@ def adjust_run(
     if noisy is not parameters:
         parameters, estimate = noisy, estimate_state(estimate.state, measured, noisy, watch)
         unsure = scale_between_halves(estimate, measured, parameters, watch)
+    seen = scale_of_encoder(estimate, measured, unsure)
+    if seen is not None and seen.contradicted:
+        run = replace(run, probe=replace(run.probe, encoder_scale_sigma=abs(seen.scale - 1)))
+        measured = replace(measured, probe=run.probe)
+        estimate = estimate_state(estimate.state, measured, parameters, watch)
     check(estimate)
     if len(windows) == 1:
         joined = joined_at_once(estimate).with_scale_sigma(unsure)
-        return _run_estimate(joined, [_End.of(estimate, measured, run.texture.grid.step_mm)])
+        return _run_estimate(joined, [_End.of(estimate, measured, run.texture.grid.step_mm)], seen)
     alone = [_alone(estimate, measured)]
     for window in windows[1:]:
         watch = partial(progress, len(alone), steps)
@@ -207,7 +216,7 @@ def adjust_run(
         check(estimate)
         found.append((_submap(estimate, windows, k), _End.of(estimate, measured, run.texture.grid.step_mm)))
     joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(unsure)
-    return _run_estimate(joined, [f[1] for f in found])
+    return _run_estimate(joined, [f[1] for f in found], seen)
 
 
 def joined_at_once(estimate: Estimate) -> JoinedRun:
@@ -218,9 +227,10 @@ def joined_at_once(estimate: Estimate) -> JoinedRun:
     return join_submaps([_submap(estimate, [Window(0, len(state.T_pc))], 0)], shared)
 
 
-def _run_estimate(joined: JoinedRun, ends: Sequence[_End]) -> RunEstimate:
+def _run_estimate(joined: JoinedRun, ends: Sequence[_End], seen: EncoderScale | None) -> RunEstimate:
     error, excess = (float(np.median([getattr(e, n) for e in ends])) for n in ("reprojection_px", "excess"))
-    return RunEstimate(joined, sum(e.trials for e in ends), sum(not e.settled for e in ends), error, excess)
+    trials, unsettled = sum(e.trials for e in ends), sum(not e.settled for e in ends)
+    return RunEstimate(joined, trials, unsettled, error, excess, seen)
 
 
 def _adjusted(
