@@ -16,7 +16,7 @@ from stages.motion.rings import NO_STEPS
 from stages.motion.tracking.landmarks import OBSERVATION, ObservationStore, TrackedPoses
 from stages.motion.tracking.strips import StripGrid
 from stages.motion.tracking.tracker import TrackedTexture
-from stages.motion.windows.sliding_window import MeasuredRun
+from stages.motion.windows.measured_run import MeasuredRun
 from tests.drawn_run import RADIUS, rings_on_wall, small_probe
 
 SCALE, SIGMA_PX, ENCODER_SIGMA_MM = 1.001, 0.1, 0.005

@@ -49,14 +49,20 @@ def scene(
     encoder: bool = True,
     seed: int = 0,
     shake: float = 0.0,
+    swing_mm: float = 0.0,
 ) -> Scene:
-    """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`."""
+    """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`.
+
+    The way swings by ``swing_mm`` about one of even speed.
+    """
     random = np.random.default_rng(seed)
     instrument = probe()
     unsure = instrument.principal_uncertainties()
     k = np.arange(frames)
     turn = np.stack([0.02 * np.sin(0.3 * k), 0.015 * np.cos(0.4 * k) - 0.015, 0.01 * k], -1)
-    t = np.stack([1.0 * np.sin(0.2 * k), 0.8 * np.cos(0.25 * k) - 0.8, 1.2 * k], -1)
+    t = np.stack(
+        [1.0 * np.sin(0.2 * k), 0.8 * np.cos(0.25 * k) - 0.8, 1.2 * k + swing_mm * np.sin(k / 9)], -1
+    )
     move = shake * SHAKE * np.random.default_rng(seed + 1000).standard_normal((frames, 6))
     turn, t = turn + move[:, 3:], t + move[:, :3]
     T_pc = from_parts(rotation_from_vector(turn), t)

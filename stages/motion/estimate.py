@@ -40,7 +40,8 @@ from stages.motion.trajectory import (
     report_steps,
     trajectory_of,
 )
-from stages.motion.windows.sliding_window import MeasuredRun, adjust_run, joined_at_once
+from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.sliding_window import adjust_run, joined_at_once
 
 _LARGEST_CHANGE = 0.1
 """Share by which the radius may differ from the rings' before the adjustment counts as diverged: the rings'
@@ -249,7 +250,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "18",
+    "19",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -115,8 +115,7 @@ def report_motion(
     _warn_of_trembling(trembling(trajectory.T_pc, texture.poses.frames), context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
-    if estimate.encoder_scale is not None:
-        estimate.encoder_scale.warn(context)
+    estimate.encoder.warn(context)
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     context.report("distance travelled", travelled, "mm")
     context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")

@@ -1,0 +1,114 @@
+"""By how much the encoder's clock is late against the pictures', from the motion that it is compared with.
+
+The reading is the distance, scaled, at a shifted time; what is left is rounding, and a random walk that holds
+slips of the wheel and drifts of the estimate. Whitened by both, the difference is fitted robustly at every
+delay, and the strength of the walk is the likeliest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from pipeline.adjustment.robust import Cauchy, GemanMcClure
+from pipeline.arrays import Float
+from pipeline.geometry.axis import distance_along
+from pipeline.machine.stage import Context
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.solver import Estimate
+from stages.motion.encoder import EncoderReadings
+
+_LONGEST_S = 1.0
+"""Delays looked at, by whole frames, since between two frames the rounding of both is averaged: beyond a
+second the encoder is another motion's (`stages.motion.encoder.contradicted`)."""
+_WALKS_MM = np.geomspace(0.002, 0.064, 6)
+"""Strengths of the walk tried, mm a frame: motion by texture walks by .002 in open-1, slips are more."""
+_FRAMES = 400
+"""Frames compared at most: a matrix of that size takes a hundredth of a second."""
+_FEWEST = 30
+_SURE = 5.0
+"""Delays of fewer σ are none: by chance one in a million is more."""
+_SHORTEST_S = 0.02
+"""Delays that count: at speeds that vary by 1 mm/s, less is .02 mm, the rounding of a fine encoder."""
+_ROUNDS = 5
+_REDESCENT = 2.5
+"""Whitened differences of more pull less: those of a slip, which would else be taken for a delay."""
+
+
+@dataclass(frozen=True)
+class EncoderDelay:
+    """How late the encoder's times are against those of the pictures, s, with its 1 σ."""
+
+    delay_s: float
+    sigma_s: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether there is a delay, and one that moves distances."""
+        return abs(self.delay_s) > max(_SURE * self.sigma_s, _SHORTEST_S)
+
+    def taken_out(self, encoder: EncoderReadings, time_s: Float) -> EncoderReadings:
+        """Return the readings that belong to the times (N,) of the pictures; at an end they are unknown."""
+        then = time_s + self.delay_s
+        shown = encoder.known & (then >= time_s[0]) & (then <= time_s[-1])
+        at_frames = np.interp(then, time_s, encoder.distance_mm)
+        return EncoderReadings(at_frames - at_frames[0], encoder.sigma_mm, shown)
+
+    def warn(self, context: Context) -> None:
+        """Tell of clocks that differ."""
+        if not self.matters:
+            return
+        way = "late" if self.delay_s > 0 else "early"
+        context.warn(
+            f"the times in encoder.csv are {abs(self.delay_s):.3f} ± {self.sigma_s:.3f} s {way} against the "
+            "motion in the pictures; this is taken out. What to do: set both clocks by one, or correct time_s"
+        )
+
+
+def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay | None:
+    """Return the delay of the encoder against an estimate of the motion; None where nothing tells it."""
+    if measured.encoder is None:
+        return None
+    z = distance_along(estimate.state.axis, estimate.state.T_pc)
+    return find_delay(measured.time_s, z, measured.encoder)
+
+
+def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> EncoderDelay | None:
+    """Return the delay of readings (N,) against distances (N,); None where nothing tells it."""
+    inside = (time_s > time_s[0] + _LONGEST_S) & (time_s < time_s[-1] - _LONGEST_S) & encoder.known
+    used = np.flatnonzero(inside)
+    if len(used) < _FEWEST:
+        return None
+    used = used[:: -(-len(used) // _FRAMES)]
+    step = float(np.median(np.diff(time_s)))
+    delays = step * np.arange(-int(_LONGEST_S / step), int(_LONGEST_S / step) + 1)
+    reading = np.interp(time_s[used] + delays[:, None], time_s, encoder.distance_mm).T
+    costs = [_costs(distance_mm[used], reading, encoder.sigma_mm, walk) for walk in _WALKS_MM]
+    cost = min(costs, key=np.min)
+    best = int(np.argmin(cost))
+    if not 0 < best < len(cost) - 1:
+        return None
+    slope, bend = (cost[best + 1] - cost[best - 1]) / 2, cost[best + 1] - 2 * cost[best] + cost[best - 1]
+    return EncoderDelay(float(delays[best] - step * slope / bend), step / float(np.sqrt(bend)))
+
+
+def _costs(z: Float, reading: Float, sigma_mm: float, walk_mm: float) -> Float:
+    """Return minus the log likelihood (K,) of distances (M,) at readings (M, K) of each delay."""
+    count = np.arange(1.0, len(z) + 1)
+    root = np.linalg.cholesky(sigma_mm**2 * np.eye(len(z)) + walk_mm**2 * np.minimum(count[:, None], count))
+    white = solve_triangular(root, np.column_stack([z, np.ones_like(z), reading]), lower=True)
+    steps = np.log(np.diagonal(root)).sum()
+    misfit = [_misfit(white[:, 0], white[:, [1, 2 + k]]) for k in range(reading.shape[1])]
+    return np.asarray(np.array(misfit) + steps, float)
+
+
+def _misfit(z: Float, by: Float) -> float:
+    """Return the robust cost of whitened distances (M,) by origin and scale (M, 2)."""
+    one, redescending = np.ones_like(z), GemanMcClure(_REDESCENT)
+    weight = one
+    for loss in (Cauchy(),) * _ROUNDS + (redescending,) * _ROUNDS:
+        off = z - by @ np.linalg.lstsq(by * np.sqrt(weight)[:, None], z * np.sqrt(weight), rcond=None)[0]
+        weight = loss.weight(off, one)
+    return float(redescending.cost(off, one).sum())

@@ -1,0 +1,109 @@
+"""The first window of a run, which shows what the others rest on: errors of matches, the encoder's faults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from pipeline.adjustment.levenberg_marquardt import Watch
+from pipeline.machine.stage import Context
+from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of_encoder
+from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, scale_of_encoder
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, scale_between_halves
+from stages.motion.parameters import MotionParameters
+from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.submaps import Window
+
+_SHARED_ERROR = 1 / 3
+"""Radial error that matches share over their median reprojection error: against a calibrated probe 0.05 px of
+0.14 px in open-1-field, 0.2 px of 0.60 px in its copy at crf 30."""
+_MOST_SHARED_PX = 2.0
+"""Where matches disagree by more, the parameter's own limit holds."""
+
+
+@dataclass(frozen=True)
+class EncoderCheck:
+    """The encoder's delay and scale against rings and texture; None where nothing tells them."""
+
+    delay: EncoderDelay | None
+    scale: EncoderScale | None
+
+    def warn(self, context: Context) -> None:
+        """Tell of what was wrong with the encoder."""
+        for fault in (self.delay, self.scale):
+            if fault is not None:
+                fault.warn(context)
+
+
+@dataclass(frozen=True)
+class FirstWindow:
+    """The first window adjusted, and the run as it is to be adjusted from there.
+
+    Attributes
+    ----------
+    run : MeasuredRun
+        Its encoder in time with the pictures, its scale no surer than they allow.
+    parameters : MotionParameters
+        With the error that matches share in this recording.
+    estimate : Estimate
+    measured : Measurements
+    unsure : float
+        Relative 1 σ of distances by texture that its residuals do not show.
+    encoder : EncoderCheck
+    """
+
+    run: MeasuredRun
+    parameters: MotionParameters
+    estimate: Estimate
+    measured: Measurements
+    unsure: float
+    encoder: EncoderCheck
+
+
+def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters, watch: Watch) -> FirstWindow:
+    """Adjust the first window of a run, and again where it shows that something was not as stated.
+
+    Raises
+    ------
+    UnusableError
+        When the motion is not determined.
+    """
+    measured = run.measured(window, parameters)
+    estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch)
+    noisy, unsure = with_shared_error(parameters, estimate.adjusted.equations.reprojection_px), 0.0
+    if noisy is not parameters:
+        parameters, estimate = noisy, estimate_state(estimate.state, measured, noisy, watch)
+        unsure = scale_between_halves(estimate, measured, parameters, watch)
+    delay = delay_of_encoder(estimate, measured)
+    if delay is not None and run.encoder is not None and delay.matters:
+        free = _without_encoder(estimate, measured, parameters, watch)
+        delay = delay_of_encoder(free, measured) or delay
+        run = replace(run, encoder=delay.taken_out(run.encoder, run.time_s))
+        measured = run.measured(window, parameters)
+        estimate = estimate_state(free.state, measured, parameters, watch)
+    scale = scale_of_encoder(estimate, measured, unsure)
+    if scale is not None and scale.contradicted:
+        run = replace(run, probe=replace(run.probe, encoder_scale_sigma=abs(scale.scale - 1)))
+        measured = replace(measured, probe=run.probe)
+        estimate = estimate_state(estimate.state, measured, parameters, watch)
+    return FirstWindow(run, parameters, estimate, measured, unsure, EncoderCheck(delay, scale))
+
+
+def _without_encoder(
+    estimate: Estimate, measured: Measurements, parameters: MotionParameters, watch: Watch
+) -> Estimate:
+    """Return the motion that rings and texture alone show: a late encoder draws it along."""
+    start = replace(estimate.state, slip=0 * estimate.state.slip)
+    return estimate_state(start, replace(measured, encoder=None), parameters, watch)
+
+
+def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> MotionParameters:
+    """Return the parameters with the radial error that matches may share, as large as this recording's is.
+
+    What blurs or compresses pictures moves all matches near one polar angle alike, and a scale along the
+    pipe can take that up unseen; how much of it there is, is judged by what the matches do not agree on.
+    """
+    shared = _SHARED_ERROR * reprojection_px
+    if shared <= parameters.match_bias_px:
+        return parameters
+    return parameters.model_copy(update={"match_bias_px": min(shared, _MOST_SHARED_PX)})

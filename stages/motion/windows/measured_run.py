@@ -1,0 +1,101 @@
+"""What was measured over a whole run, of which every window has its part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.measured import RingSamples
+from pipeline.instrument.probe import Probe
+from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
+from stages.motion.bundle_adjustment.unknowns import State, straight_start
+from stages.motion.encoder import EncoderReadings
+from stages.motion.parameters import MotionParameters
+from stages.motion.rings import BoreSteps, ring_bins
+from stages.motion.tracking.landmarks import Tracks
+from stages.motion.tracking.tracker import TrackedTexture
+from stages.motion.windows.submaps import Window
+
+_MARGIN_MM = 20.0
+"""Length of axis before the first and beyond the last wall in view, for poses that move while adjusted."""
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """What was measured over a whole run; a window's part is worked out when it is needed.
+
+    Attributes
+    ----------
+    texture : TrackedTexture
+    rings : RingSamples
+    ring_place : (F,) int
+        Places of the rings' frames in the list of all frames.
+    time_s : (N,)
+    T_pc : (N, 4, 4)
+        First guess in the straightened pipe.
+    encoder : EncoderReadings or None
+    probe : Probe
+        As stated.
+    bore : BoreSteps
+        Of the straightened pipe.
+    """
+
+    texture: TrackedTexture
+    rings: RingSamples
+    ring_place: Int
+    time_s: Float
+    T_pc: Float
+    encoder: EncoderReadings | None
+    probe: Probe
+    bore: BoreSteps
+
+    @property
+    def whole(self) -> Window:
+        """Return the window of all frames."""
+        return Window(0, len(self.time_s))
+
+    def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
+        """Return what was measured in a window, frames and distance counted from its first."""
+        part = slice(window.first, window.last)
+        rows = slice(*np.searchsorted(self.ring_place, [window.first, window.last]))
+        rings, place = _some_rings(self.rings, rows), self.ring_place[rows] - window.first
+        bins = ring_bins(rings, place, self.probe, parameters.ring_bins, parameters.surface_sigma_mm)
+        tracks = _behind(self.texture.between(window.first, window.last), self._start_mm(window))
+        encoder = _since_first(self.encoder, part)
+        return Measurements.of(tracks, bins, self.time_s[part], encoder, self.probe)
+
+    def start(self, window: Window, measured: Measurements, parameters: MotionParameters) -> State:
+        """Return the first guess in a window: a straight pipe, as long as its wall was seen."""
+        T_pc = self.T_pc[window.first : window.last].copy()
+        T_pc[:, 2, 3] -= self._start_mm(window)
+        z, grid = T_pc[:, 2, 3], self.texture.grid
+        span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
+        corrections = measured.unsure.shape[1] + MATCH_BIASES
+        straight = straight_start(
+            T_pc, measured.tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, corrections
+        )
+        return replace(straight, bore=self.bore.behind(self._start_mm(window)))
+
+    def _start_mm(self, window: Window) -> float:
+        return float(self.T_pc[window.first, 2, 3]) if window.first else 0.0
+
+
+def _some_rings(rings: RingSamples, rows: slice) -> RingSamples:
+    per_frame = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
+    return replace(rings, **{name: getattr(rings, name)[rows] for name in per_frame})
+
+
+def _behind(tracks: Tracks, start_mm: float) -> Tracks:
+    """Return tracks with distance counted from ``start_mm``."""
+    T_pc, xyz = tracks.poses.T_pc.copy(), tracks.xyz - np.array([0, 0, start_mm])
+    T_pc[:, 2, 3] -= start_mm
+    return replace(tracks, poses=replace(tracks.poses, T_pc=T_pc), xyz=xyz)
+
+
+def _since_first(encoder: EncoderReadings | None, part: slice) -> EncoderReadings | None:
+    if encoder is None:
+        return None
+    distance = encoder.distance_mm[part]
+    return replace(encoder, distance_mm=distance - distance[0], known=encoder.known[part])

@@ -1,0 +1,90 @@
+"""An encoder whose clock is late is put in time; slips, even speed and sound encoders are no delay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from pipeline.arrays import Float
+from pipeline.instrument.probe import Probe
+from stages.motion.bundle_adjustment.encoder_delay import find_delay
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.encoder import EncoderReadings
+from stages.motion.parameters import MotionParameters
+from stages.motion.windows.first_window import adjust_first
+from stages.motion.windows.submaps import Window
+from tests.motion_scene import Scene, displaced, scene
+
+TIME_S = np.arange(300) / 30
+QUANTUM = 0.05
+
+
+def way(time_s: Float) -> Float:
+    """Distance, mm, of a probe pulled at 18 mm/s by hand."""
+    return 18 * time_s + 0.9 * np.sin(1.7 * time_s) + 0.4 * np.sin(4.1 * time_s + 1)
+
+
+def readings(late_s: float, slip_mm: float = 0.0) -> EncoderReadings:
+    """What an encoder reads whose clock is late: it shows at t what was at t less the delay."""
+    distance = np.round(1.01 * way(TIME_S - late_s) / QUANTUM) * QUANTUM
+    slipped = slip_mm * np.clip((TIME_S - 4) / 0.3, 0, 1)
+    return EncoderReadings(distance - slipped, QUANTUM / 12**0.5, np.ones(len(TIME_S), bool))
+
+
+@pytest.mark.parametrize("slip_mm", [0.0, 3.0])
+@pytest.mark.parametrize("late_s", [0.0, 0.2, -0.13, 0.5])
+def test_delay_is_found_with_its_sigma_also_where_the_wheel_slips(late_s: float, slip_mm: float) -> None:
+    found = find_delay(TIME_S, way(TIME_S), readings(late_s, slip_mm))
+    assert found is not None
+    assert abs(found.delay_s - late_s) < 3 * found.sigma_s + 1e-3
+    assert found.sigma_s < 0.02
+    assert found.matters == (late_s != 0)
+
+
+def test_even_speed_tells_no_delay() -> None:
+    late = EncoderReadings(18 * (TIME_S - 0.2), QUANTUM / 12**0.5, np.ones(len(TIME_S), bool))
+    found = find_delay(TIME_S, 18 * TIME_S, late)
+    assert found is None or not found.matters
+
+
+def test_readings_are_put_in_time_and_unknown_beyond_their_end() -> None:
+    late = readings(0.2)
+    found = find_delay(TIME_S, way(TIME_S), late)
+    assert found is not None
+    mended = found.taken_out(late, TIME_S)
+    off = mended.distance_mm - 1.01 * (way(TIME_S) - way(TIME_S[:1]))
+    assert np.ptp(off[mended.known]) < 2 * QUANTUM
+    assert np.ptp((late.distance_mm - 1.01 * way(TIME_S))[mended.known]) > 10 * QUANTUM, "the control"
+    assert (~mended.known).sum() == 6, "as many frames as the delay is long"
+
+
+@dataclass(frozen=True)
+class Made:
+    """What of a measured run its first window needs."""
+
+    given: Scene
+    encoder: EncoderReadings | None
+    probe: Probe
+    time_s: Float
+
+    def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
+        return replace(self.given.measured, encoder=self.encoder, probe=self.probe)
+
+    def start(self, window: Window, measured: Measurements, parameters: MotionParameters) -> State:
+        return displaced(self.given.truth, np.random.default_rng(1), 0.3)
+
+
+def test_a_window_is_adjusted_with_the_encoder_put_in_time() -> None:
+    given = scene(100, 250, noise=1.0, swing_mm=2.0)
+    sound, time_s = given.measured.encoder, given.measured.time_s
+    assert sound is not None
+    late = replace(sound, distance_mm=np.interp(time_s - 0.2, time_s, sound.distance_mm))
+    run = Made(given, late, given.measured.probe, time_s)
+    got = adjust_first(run, Window(0, 100), MotionParameters(), lambda: None)  # type: ignore[arg-type]
+    assert got.encoder.delay is not None
+    assert got.encoder.delay.delay_s == pytest.approx(0.2, abs=4 * got.encoder.delay.sigma_s)
+    z = got.estimate.state.T_pc[:, 2, 3] - given.truth.T_pc[:, 2, 3]
+    assert np.ptp(z) < 0.3, "with the late encoder it is 5 mm"
