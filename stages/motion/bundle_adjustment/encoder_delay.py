@@ -39,15 +39,21 @@ _REDESCENT = 2.5
 
 @dataclass(frozen=True)
 class EncoderDelay:
-    """How late the encoder's times are against those of the pictures, s, with its 1 σ."""
+    """How late the encoder's times are against those of the pictures, s, with its 1 σ.
+
+    ``better`` is by how much no delay at all is less likely, as a logarithm: where the speed is even, one delay
+    is nearly as good as another, though the best of them may be sharp.
+    """
 
     delay_s: float
     sigma_s: float
+    better: float
 
     @property
     def matters(self) -> bool:
         """Whether there is a delay, and one that moves distances."""
-        return abs(self.delay_s) > max(_SURE * self.sigma_s, _SHORTEST_S)
+        certain = self.better > 0.5 * _SURE**2 and abs(self.delay_s) > _SURE * self.sigma_s
+        return certain and abs(self.delay_s) > _SHORTEST_S
 
     def taken_out(self, encoder: EncoderReadings, time_s: Float) -> EncoderReadings:
         """Return the readings that belong to the times (N,) of the pictures; at an end they are unknown."""
@@ -91,7 +97,8 @@ def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> E
     if not 0 < best < len(cost) - 1:
         return None
     slope, bend = (cost[best + 1] - cost[best - 1]) / 2, cost[best + 1] - 2 * cost[best] + cost[best - 1]
-    return EncoderDelay(float(delays[best] - step * slope / bend), step / float(np.sqrt(bend)))
+    better = float(cost[len(cost) // 2] - cost[best])
+    return EncoderDelay(float(delays[best] - step * slope / bend), step / float(np.sqrt(bend)), better)
 
 
 def _costs(z: Float, reading: Float, sigma_mm: float, walk_mm: float) -> Float:

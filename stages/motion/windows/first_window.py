@@ -77,9 +77,10 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     delay = delay_of_encoder(estimate, measured)
     if delay is not None and run.encoder is not None and delay.matters:
         free = _without_encoder(estimate, measured, parameters, watch)
-        delay = delay_of_encoder(free, measured) or delay
-        run = replace(run, encoder=delay.taken_out(run.encoder, run.time_s))
-        measured = run.measured(window, parameters)
+        delay = delay_of_encoder(free, measured)
+        if delay is not None and delay.matters:
+            run = replace(run, encoder=delay.taken_out(run.encoder, run.time_s))
+            measured = run.measured(window, parameters)
         estimate = estimate_state(free.state, measured, parameters, watch)
     scale = scale_of_encoder(estimate, measured, unsure)
     if scale is not None and scale.contradicted:
