@@ -30,8 +30,9 @@ _FRAMES = 400
 _FEWEST = 30
 _SURE = 5.0
 """Delays of fewer σ are none: by chance one in a million is more."""
-_SHORTEST_S = 0.02
-"""Delays that count: at speeds that vary by 1 mm/s, less is .02 mm, the rounding of a fine encoder."""
+_MOVES = 3.0
+"""Delays that count move readings by more than three times their rounding, beside shift and scale: less does
+no harm, and at even speed any delay moves them by 1.4 times, since both readings are rounded."""
 _ROUNDS = 5
 _REDESCENT = 2.5
 """Whitened differences of more pull less: those of a slip, which would else be taken for a delay."""
@@ -41,19 +42,21 @@ _REDESCENT = 2.5
 class EncoderDelay:
     """How late the encoder's times are against those of the pictures, s, with its 1 σ.
 
-    ``better`` is by how much no delay at all is less likely, as a logarithm: where the speed is even, one delay
-    is nearly as good as another, though the best of them may be sharp.
+    ``better`` is by how much no delay at all is less likely, as a logarithm: where the speed is even, one
+    delay is nearly as good as another, though the best of them may be sharp. ``moves`` is by how many σ of a
+    reading the delay moves them, rms, beside shift and scale.
     """
 
     delay_s: float
     sigma_s: float
     better: float
+    moves: float
 
     @property
     def matters(self) -> bool:
         """Whether there is a delay, and one that moves distances."""
         certain = self.better > 0.5 * _SURE**2 and abs(self.delay_s) > _SURE * self.sigma_s
-        return certain and abs(self.delay_s) > _SHORTEST_S
+        return certain and self.moves > _MOVES
 
     def taken_out(self, encoder: EncoderReadings, time_s: Float) -> EncoderReadings:
         """Return the readings that belong to the times (N,) of the pictures; at an end they are unknown."""
@@ -98,7 +101,15 @@ def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> E
         return None
     slope, bend = (cost[best + 1] - cost[best - 1]) / 2, cost[best + 1] - 2 * cost[best] + cost[best - 1]
     better = float(cost[len(cost) // 2] - cost[best])
-    return EncoderDelay(float(delays[best] - step * slope / bend), step / float(np.sqrt(bend)), better)
+    sigma_s = step / float(np.sqrt(bend))
+    moves = _moved_mm(reading[:, len(cost) // 2], reading[:, best]) / encoder.sigma_mm
+    return EncoderDelay(float(delays[best] - step * slope / bend), sigma_s, better, moves)
+
+
+def _moved_mm(before: Float, after: Float) -> float:
+    """Return by how much readings (M,) differ, rms, beside shift and scale."""
+    by = np.column_stack([before, np.ones_like(before)])
+    return float(np.std(after - by @ np.linalg.lstsq(by, after, rcond=None)[0]))
 
 
 def _costs(z: Float, reading: Float, sigma_mm: float, walk_mm: float) -> Float:
