@@ -18,7 +18,7 @@ from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
-from stages.rings.noise import QUANTISATION_VARIANCE, clip_level_of, noise_response
+from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED, clip_level_of, noise_response
 from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
@@ -30,6 +30,11 @@ _LEARNING_FRAMES = 4
 _AT_ONCE = 512
 _BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
 _LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
+# Clipped pixels are looked for so many widths to either side of the line. Where it is amid them but for half a
+# width, it was found by both flanks.
+_CLIP_WIDTHS, _ASIDE_WIDTHS = 3.0, 0.5
+# Where more of them clip, the wall does so too, and nothing is seen of the line.
+_MOST_CLIPPED = 0.5
 _PER_RING = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
 
 
@@ -96,7 +101,8 @@ def _laser_traces(images: Images, recording: Recording, sectors: Sectors) -> Ite
 
 def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Found]:
     """Trace frames in which the wall is lit too, in the mixture of channels that shows the line best."""
-    weights, trace = excess_weights(probe.laser.wavelength_nm), None
+    weights, channel = excess_weights(probe.laser.wavelength_nm), _channel(probe.laser.wavelength_nm)
+    trace = None
     for frame, bgr in images:
         if bgr is None:
             yield frame, None
@@ -105,10 +111,32 @@ def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
             weights = _first_weights(bgr, sectors, probe)
         image = mix(bgr, weights)
         trace = trace_ring(image, sectors, np.inf, trace)
-        yield frame, trace
+        yield frame, None if trace is None else _without_dips(trace, bgr, sectors, channel)
         if trace is not None:
             weights = discriminant_weights(bgr, sectors, trace, weights)
             trace = replace(trace, response=noise_response(image, sectors, trace.fit, trace.response))
+
+
+def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -> RingTrace:
+    """Return a ring without the samples that are not amid the pixels at which the laser's channel clips.
+
+    The other channels go on rising there, and the mixture dips where the line is brightest: on a bright wall
+    the line came out beside itself, which looked like deposits.
+    """
+    across = np.arange(-_CLIP_WIDTHS, _CLIP_WIDTHS + 0.25, 0.5)
+    radius = np.nan_to_num(trace.fit.radius_px)[:, None] + across * trace.width_px
+    psi, size = sectors.azimuth_rad[:, None], np.array(sectors.image_size) - 1
+    u, v = (
+        np.clip(np.rint(c + radius * f(psi)), 0, most).astype(int)
+        for c, f, most in zip(sectors.centre_px, (np.cos, np.sin), size, strict=True)
+    )
+    clips = bgr[v, u, channel] > SURELY_UNCLIPPED * np.iinfo(bgr.dtype).max
+    count = clips.sum(1)
+    aside = np.abs(clips @ across) / np.maximum(count, 1)
+    lost = (aside > _ASIDE_WIDTHS) | (count > _MOST_CLIPPED * len(across))
+    lost &= trace.validity == RingValidity.VALID
+    fit = trace.fit._replace(sigma_px=np.hypot(trace.fit.sigma_px, aside * trace.width_px))
+    return replace(trace, fit=fit, validity=np.where(lost, RingValidity.SATURATED, trace.validity))
 
 
 def _first_weights(bgr: Byte, sectors: Sectors, probe: Probe) -> Float:
@@ -195,10 +223,14 @@ def _report(context: Context, samples: RingSamples, wander: float) -> None:
 
 def excess_weights(wavelength_nm: float) -> Float:
     """Return (3,) B, G, R weights: the channel nearest to the laser's wavelength minus half of the others."""
-    channel = 0 if wavelength_nm < _BLUE_GREEN_NM else 1 if wavelength_nm < _GREEN_RED_NM else 2
     weights = np.full(3, -0.5)
-    weights[channel] = 1.0
+    weights[_channel(wavelength_nm)] = 1.0
     return weights
+
+
+def _channel(wavelength_nm: float) -> int:
+    """Return the channel, of blue, green and red, nearest to a wavelength."""
+    return 0 if wavelength_nm < _BLUE_GREEN_NM else 1 if wavelength_nm < _GREEN_RED_NM else 2
 
 
 def mix(bgr: Byte, weights: Float) -> Float32:

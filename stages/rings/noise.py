@@ -17,7 +17,7 @@ QUANTISATION_VARIANCE = 1 / 12
 _BINS, _BIN_LEVELS = 32, 8.0
 _ABSOLUTE_TO_SIGMA = np.sqrt(np.pi / 2)
 _LEAST_RESIDUALS = 50
-_SURELY_UNCLIPPED = 0.95
+SURELY_UNCLIPPED = 0.95
 
 
 def dark_response(image: Image, clip_level: float) -> Response:
@@ -77,7 +77,7 @@ def clip_level_of(grey: Byte, bgr: Byte, line: Int32) -> float:
     colour, level = bgr.reshape(-1, 3)[line].astype(float), grey.ravel()[line].astype(float)
     white = float(np.iinfo(bgr.dtype).max)
     strongest = int(np.argmax(colour.mean(0)))
-    unclipped = (colour < _SURELY_UNCLIPPED * white).all(1)
+    unclipped = (colour < SURELY_UNCLIPPED * white).all(1)
     bright = unclipped & (colour[:, strongest] > np.median(colour[:, strongest]))
     if bright.sum() < _LEAST_RESIDUALS:
         return white

@@ -115,6 +115,31 @@ def test_the_line_is_found_on_a_lit_textured_wall():
     assert abs(np.nanmean(error)) < 0.02
 
 
+def white_wall(ring, seed, texture):
+    """The same line, much brighter, on a grey wall; it is in all channels, as bright lines are."""
+    random = np.random.default_rng(seed)
+    line = ring_light(SIZE, CENTRE, ring, 1.5, 200.0)[..., None] * np.array([0.6, 1.0, 0.5])
+    light = texture[..., None] * np.array([100.0, 105.0, 110.0]) + line
+    noisy = light + random.normal(size=light.shape) * np.sqrt(1 + 0.1 * light)
+    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+
+
+def test_a_line_that_clips_on_a_bright_wall_is_where_it_is_said_to_be():
+    """The other channels go on rising where the laser's clips: the line was up to 1.6 px beside itself."""
+    ring, random = off_centre(165.0, 8.0), np.random.default_rng(3)
+    v, u = np.mgrid[: SIZE[1], : SIZE[0]] - np.array(CENTRE)[::-1, None, None]
+    bright = np.where(np.abs(np.arctan2(v, u)) < 0.6, 1.8, 1.0)
+    texture = bright * cv2.GaussianBlur(random.uniform(0.3, 1.7, SIZE[::-1]), (0, 0), 1.2)
+    samples = extracted({i: white_wall(ring, i, texture) for i in range(3)}, ["both"] * 3)
+    error = np.where(samples.valid, samples.radius_px - ring(samples.azimuth_rad), np.nan)
+    on_bright = np.abs(samples.azimuth_rad) < 0.55
+    z = (error / samples.sigma_px)[:, on_bright]
+    assert (samples.validity == RingValidity.SATURATED)[:, on_bright].mean() > 0.1, "some are not measured"
+    assert samples.valid[:, ~on_bright].mean() > 0.97
+    assert np.mean(np.abs(z[np.isfinite(z)]) < 1.96) > 0.93
+    assert np.nanmax(np.abs(error[:, on_bright])) < 1.2
+
+
 def test_the_same_recording_gives_the_same_bytes():
     images = {i: image(off_centre(165.0, 7.0), i) for i in range(3)}
     first, second = extracted(images), extracted(images)
