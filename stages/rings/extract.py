@@ -30,8 +30,8 @@ _LEARNING_FRAMES = 4
 _AT_ONCE = 512
 _BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
 _LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
-# Clipped pixels are looked for so many widths to either side of the line. Where it is amid them but for half a
-# width, it was found by both flanks.
+# Clipped pixels are looked for so many widths to either side of the line. Where it is amid them but for half
+# a width, it was found by both flanks.
 _CLIP_WIDTHS, _ASIDE_WIDTHS = 3.0, 0.5
 # Where more of them clip, the wall does so too, and nothing is seen of the line.
 _MOST_CLIPPED = 0.5

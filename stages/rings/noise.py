@@ -17,6 +17,7 @@ QUANTISATION_VARIANCE = 1 / 12
 _BINS, _BIN_LEVELS = 32, 8.0
 _ABSOLUTE_TO_SIGMA = np.sqrt(np.pi / 2)
 _LEAST_RESIDUALS = 50
+# Noise and coding blur what clips by a few levels: 5 % below white is not clipped.
 SURELY_UNCLIPPED = 0.95
 
 
