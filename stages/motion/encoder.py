@@ -27,6 +27,9 @@ _DIFFERENCE_MM = 0.5
 """Smaller differences of a step never count, since texture may err as much in a single frame. Not
 measured."""
 _USUAL_PERCENT = 90.0
+_LIKE_USUAL = 3.0
+"""An encoder caught up if its jump is what the probe went meanwhile, within this factor of its mean speed.
+Not measured."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,10 @@ def encoder_at_frames(
         return None
     time_s = recording.frames.time_s
     slack = _frame_time(time_s)
-    known = (time_s >= encoder.time_s[0] - slack) & (time_s <= encoder.time_s[-1] + slack)
-    at_frames, jumps = _without_jumps(np.interp(time_s, encoder.time_s, encoder.distance_mm))
+    read_s, read_mm = _without_held(encoder.time_s, encoder.distance_mm)
+    known = (time_s >= read_s[0] - slack) & (time_s <= read_s[-1] + slack)
+    known &= ~_in_gaps(time_s, read_s, read_mm, slack)
+    at_frames, jumps = _without_jumps(np.interp(time_s, read_s, read_mm))
     context.report("frames outside the encoder's time", int((~known).sum()), "frames")
     context.report("encoder jumps taken out", jumps, "")
     if known.mean() < _LEAST_COVERED or _usual(np.diff(at_frames)) > farthest_mm:
@@ -97,6 +102,33 @@ def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Conte
         "check the encoder's scale and clock, and whether its wheel slipped"
     )
     return True
+
+
+def _without_held(time_s: Float, distance_mm: Float) -> tuple[Float, Float]:
+    """Return times and readings (M,) without those at which the encoder hung and then caught up.
+
+    It hung where its reading rests and then jumps by about what the probe usually goes in such a time.
+    """
+    step, usual = np.diff(distance_mm), _usual(np.diff(distance_mm))
+    resting = np.concatenate([[False], step == 0, [False]])
+    first = np.flatnonzero(~resting[:-1] & resting[1:])
+    after = np.flatnonzero(resting[:-1] & ~resting[1:])
+    kept = np.ones(len(time_s), bool)
+    per_row = np.abs(step[step != 0]).mean() if np.any(step) else 0.0
+    for begin, end in zip(first, after, strict=True):
+        jumps = end < len(step) and abs(step[end]) > max(_JUMP_TIMES * usual, _DIFFERENCE_MM)
+        if jumps and 1 / _LIKE_USUAL < abs(step[end]) / ((end - begin) * per_row) < _LIKE_USUAL:
+            kept[begin + 1 : end + 1] = False
+    return time_s[kept], distance_mm[kept]
+
+
+def _in_gaps(time_s: Float, read_s: Float, read_mm: Float, frame_s: float) -> Bool:
+    """Return which frames (N,) lie where nothing was read for a while, though the probe went on."""
+    usual_s = float(np.median(np.diff(read_s)))
+    gap = np.diff(read_s) > max(_JUMP_TIMES * usual_s, 2 * frame_s)
+    gap &= np.abs(np.diff(read_mm)) > _DIFFERENCE_MM
+    at = np.clip(np.searchsorted(read_s, time_s) - 1, 0, len(gap) - 1)
+    return np.asarray(gap[at] & (time_s > read_s[at]) & (time_s < read_s[at + 1]))
 
 
 def _without_jumps(distance_mm: Float) -> tuple[Float, int]:

@@ -59,6 +59,25 @@ def test_jump_is_taken_out() -> None:
     assert found.distance_mm[-1] == pytest.approx(SPEED * (FRAMES - 1) / RATE, abs=1.0)
 
 
+@pytest.mark.parametrize("silent", [True, False])
+def test_an_encoder_that_hangs_and_catches_up_is_unknown_meanwhile(silent: bool) -> None:
+    """The jump is a right reading: taken out, half a second of way was missing from there on."""
+    time_s, distance = clean()
+    hung = (time_s > 0.7) & (time_s < 1.2)
+    held = np.where(hung, distance[hung][0], distance)
+    found = readings(time_s[~hung], distance[~hung]) if silent else readings(time_s, held)
+    assert found is not None
+    assert found.distance_mm[-1] == pytest.approx(SPEED * (FRAMES - 1) / RATE, abs=0.1)
+    assert 12 <= (~found.known).sum() <= 15, "half a second of frames"
+
+
+def test_an_encoder_that_rests_with_its_probe_is_known() -> None:
+    time_s, distance = clean()
+    found = readings(time_s, distance - np.clip(time_s - 0.7, 0, 0.5) * SPEED)
+    assert found is not None
+    assert found.known.all()
+
+
 def test_frames_after_its_end_are_not_known() -> None:
     time_s, distance = clean()
     found = readings(time_s[time_s < 1], distance[time_s < 1])
