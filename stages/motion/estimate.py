@@ -26,6 +26,7 @@ from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
 from stages.motion.events import find_events
+from stages.motion.frame_times import believed_times
 from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.parameters import MotionParameters
@@ -122,6 +123,10 @@ def measure_run(
     if use_encoder:
         encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
     texture, predictor = _track(view, circles, encoder, parameters, context)
+    times = believed_times(recording, texture.poses, context)
+    if encoder is not None and times is not recording.frames.time_s:
+        recording = replace(recording, frames=replace(recording.frames, time_s=times))
+        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
     if encoder is not None and contradicted(encoder, texture.poses, context):
         encoder = None
         texture, predictor = _track(view, circles, None, parameters, context)
@@ -250,7 +255,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "20",
+    "21",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -93,3 +93,17 @@ def test_a_window_is_adjusted_with_the_encoder_put_in_time() -> None:
     assert got.encoder.delay.delay_s == pytest.approx(0.2, abs=4 * got.encoder.delay.sigma_s)
     z = got.estimate.state.T_pc[:, 2, 3] - given.truth.T_pc[:, 2, 3]
     assert np.ptp(z) < 0.3, "with the late encoder it is 5 mm"
+
+
+def test_readings_that_scatter_by_more_than_their_rounding_are_believed_less() -> None:
+    given = scene(60, 250, noise=1.0)
+    sound, time_s = given.measured.encoder, given.measured.time_s
+    assert sound is not None
+    shaken = sound.distance_mm + 0.4 * np.random.default_rng(5).standard_normal(len(time_s))
+    for reading, noise_mm in ((sound.distance_mm, sound.sigma_mm), (shaken, 0.4)):
+        run = Made(given, replace(sound, distance_mm=reading), given.measured.probe, time_s)
+        got = adjust_first(run, Window(0, 60), MotionParameters(), lambda: None)  # type: ignore[arg-type]
+        assert got.run.encoder is not None
+        assert got.run.encoder.sigma_mm == pytest.approx(noise_mm, rel=0.35)
+        z = got.estimate.state.T_pc[:, 2, 3] - given.truth.T_pc[:, 2, 3]
+        assert np.std(np.diff(z)) < 0.02, "believed as before it is 0.06"

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.robust import spread_about_median
+from pipeline.geometry.axis import distance_along
 from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import Estimate
@@ -68,3 +70,16 @@ def scale_of_encoder(estimate: Estimate, measured: Measurements, unsure: float) 
     told = max(1 / variance - stated**-2, 1e-6 * stated**-2)
     off = (float(estimate.state.globals[ENCODER_SCALE]) - 1) / variance / told
     return EncoderScale(1 + off, float(np.hypot(told**-0.5, unsure)), stated)
+
+
+def noise_of_encoder(estimate: Estimate, measured: Measurements) -> float:
+    """Return the 1 σ, mm, by which readings differ from an estimate; 0 without encoder.
+
+    Where frames are stamped late by chance, or the wheel shakes, it is more than the rounding.
+    """
+    encoder, state = measured.encoder, estimate.state
+    if encoder is None or not encoder.known.any():
+        return 0.0
+    distance = distance_along(state.axis, state.T_pc)
+    off = distance - state.globals[ENCODER_SCALE] * encoder.distance_mm - state.slip
+    return spread_about_median(off[encoder.known])
