@@ -31,6 +31,7 @@ _NEARLY_ROUND = 1.25
 _WORTH_TELLING = 0.05
 _SMALL_MM2 = 60.0  # below this a quartic surface follows everything
 _UNKNOWN_ROUGHNESS = 0.08
+_ROUND = " It goes all round: it may be the gap of a joint or the hollow root of a weld."
 
 
 @dataclass(frozen=True)
@@ -61,13 +62,18 @@ class Features:
 
 @dataclass(frozen=True)
 class Likeness:
-    """Median of a feature for a kind, and by which factor two of three examples stay around it."""
+    """Median of a feature for a kind, and by which factor two of three examples stay around it.
+
+    An ``open`` one counts no less the more there is of it: a groove all round is longer than any gouge.
+    """
 
     median: float
     factor: float
+    open: bool = False
 
     def log_likelihood(self, value: float) -> float:
         """Return that of a lognormal with a floor, so that no single feature rules a kind out."""
+        value = min(value, self.median) if self.open else value
         z = np.log(max(value, 1e-3) / self.median) / np.log(self.factor)
         return float(np.log(np.exp(-0.5 * z * z) / np.log(self.factor) + 1e-4))
 
@@ -86,8 +92,8 @@ class Portrait:
 _PORTRAITS = (
     Portrait(DefectKind.PIT, 1.0, Likeness(5.0, 1.7), Likeness(1.3, 1.4), Likeness(0.08, 2.0)),
     Portrait(DefectKind.CORROSION, 1.0, Likeness(20.0, 1.8), Likeness(1.4, 1.4), Likeness(0.12, 2.0)),
-    Portrait(DefectKind.GOUGE, 1.0, Likeness(2.5, 1.5), Likeness(7.0, 1.7), Likeness(0.12, 2.0)),
-    Portrait(DefectKind.CRACK, 1.0, Likeness(1.0, 1.4), Likeness(14.0, 1.8), Likeness(0.15, 2.0)),
+    Portrait(DefectKind.GOUGE, 1.0, Likeness(2.5, 1.5), Likeness(7.0, 1.7, open=True), Likeness(0.12, 2.0)),
+    Portrait(DefectKind.CRACK, 1.0, Likeness(1.0, 1.4), Likeness(14.0, 1.8, open=True), Likeness(0.15, 2.0)),
     Portrait(DefectKind.DENT, -1.0, Likeness(22.0, 1.6), Likeness(1.3, 1.3), Likeness(0.03, 1.7)),
     Portrait(DefectKind.DEPOSIT, -1.0, Likeness(11.0, 1.9), Likeness(1.6, 1.5), Likeness(0.12, 1.8)),
 )
@@ -125,7 +131,7 @@ def _roughness(relief: Relief, region: Region, depth: Depth) -> float:
 def probabilities(features: Features, region: Region) -> dict[DefectKind, float]:
     """Return the probability of every kind that is possible, likeliest first (naive Bayes, equal priors)."""
     if region.all_round:
-        return {DefectKind.WELD: 1.0}
+        return {DefectKind.WELD if region.sign < 0 else DefectKind.GOUGE: 1.0}
     logs = {
         p.kind: p.slim_mm.log_likelihood(features.slim_mm)
         + p.elongation.log_likelihood(features.elongation)
@@ -183,8 +189,14 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
         ),
         pacp_suggestion=pacp_suggestion(kind, features.direction_rad),
         en13508_suggestion=en13508_suggestion(kind),
-        statement=_statement(features, likely, depth, darkness(scene.seen_by.texture, relief, region)),
+        statement=_statement(features, likely, depth, darkness(scene.seen_by.texture, relief, region))
+        + (_ROUND if kind.is_metal_loss and _goes_round(relief, region) else ""),
     )
+
+
+def _goes_round(relief: Relief, region: Region) -> bool:
+    """Return whether a region reaches over every azimuth."""
+    return region.all_round or region.mask.shape[1] >= len(relief.azimuth_rad)
 
 
 def _azimuths(relief: Relief, region: Region) -> tuple[float, float]:
@@ -195,7 +207,7 @@ def _azimuths(relief: Relief, region: Region) -> tuple[float, float]:
 
 
 def _clock(relief: Relief, region: Region) -> tuple[float, float]:
-    if region.all_round:
+    if _goes_round(relief, region):
         return 0.0, 12.0
     hours = clock_of_azimuth(np.array(_azimuths(relief, region)))
     return float(hours[0]), float(hours[1])

@@ -100,6 +100,16 @@ def test_a_weld_is_one_finding_all_round_with_a_pit_beside_it_apart():
     assert (second.kind, second.pof_class) == ("pit", "pinhole")
 
 
+def test_a_groove_all_round_is_no_pit():
+    """The gap of a joint, 70 times as long as wide, was called a pit: no kind is as long."""
+    rng = np.random.default_rng(3)
+    groove = relief(DrawnDefect("weld", 60.0, 0.0, 4.0, 0.0, 1.5), DISTANCE, AZIMUTH, RADIUS, rng)
+    (found,) = search(noisy(rng, groove)).items
+    assert found.kind in ("gouge", "crack")
+    assert (found.clock_from, found.clock_to) == (0.0, 12.0)
+    assert "joint" in found.statement
+
+
 @pytest.mark.parametrize(
     ("azimuth_deg", "hours"), [(-90.0, 0.0), (180.0, 9.0), (-179.9, 9.0), (0.0, 3.0), (-100.0, 11.667)]
 )
