@@ -74,11 +74,15 @@ def _of_each(lines: Sequence[Line]) -> Iterator[str]:
     for line in lines:
         true, names = Counter(c[0] for c in line["concealed"]), _said(line)
         right, said = right + sum((true & names).values()), said + sum(names.values())
-        snr = dict(zip((c[0] for c in line["concealed"]), line["snr"], strict=True))
-        recalled += [name in names for name, size in snr.items() if size is not None and size >= SNR]
+        clear = Counter(c[0] for c, snr in zip(line["concealed"], line["snr"], strict=True) if _clear(snr))
+        recalled += [k < min(of, names[n]) for n, of in clear.items() for k in range(of)]
     if lines:
         yield f"several effects, {len(lines)} cases: names that are right {_words(Rate(right, said))}"
         yield f"several effects: of those at SNR ≥ {SNR:g} named {_words(rate(recalled))}"
+
+
+def _clear(snr: float | None) -> bool:
+    return snr is not None and snr >= SNR
 
 
 def _said(line: Line) -> Counter[str]:

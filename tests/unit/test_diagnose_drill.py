@@ -27,6 +27,7 @@ from stages.diagnose.drill.score import (
     figures,
     heldout_removed,
     shuffled,
+    size_errors,
 )
 
 
@@ -243,3 +244,19 @@ def test_an_effect_on_pictures_alone_is_scored_without_a_channel():
     )
     assert score([named]).named_exactly.count == 1
     assert score([named]).size_in_95.of == 0
+
+
+def test_sizes_of_a_law_that_comes_twice_are_compared_with_their_own():
+    def waves(amplitude, order):
+        return Concealed(name="sheet_waviness", values=(amplitude, order, 0.0))
+
+    def told(amplitude, order):
+        numbers = {"amplitude_mrad": {"value": amplitude, "sd": 0.1}, "order": {"value": order, "sd": 0.0}}
+        return NamedEffect(name="sheet_waviness", probability=0.99, parameters=numbers)
+
+    answer = Answer(verdict="named", effects=(told(0.52, 3), told(2.01, 2)))
+    trial = Trial("a", (waves(2.0, 2), waves(0.5, 3), TILT), answer)
+    assert sorted(size_errors(trial)) == pytest.approx([0.1, 0.2])
+    # A size is compared with one truth only, however near it is to that of a second.
+    one = replace(trial, answer=Answer(verdict="named", effects=(told(0.5, 3), told(0.5, 3))))
+    assert sorted(map(abs, size_errors(one))) == pytest.approx([0.0, 15.0])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.drill.answer import Answer, Concealed, NamedEffect
@@ -18,6 +19,8 @@ SNR = 8.0
 _FOUND = ("named", "partly", "class", "unexplained")
 _WITH_NAMES = ("named", "partly")
 NOTHING = "nothing"
+# More than the numbers of one law can differ: each by its whole range.
+_STRANGERS = 1e3
 _PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 1.0001)
 
 
@@ -241,10 +244,28 @@ def owned(trial: Trial) -> bool:
 
 def size_errors(trial: Trial) -> list[float]:
     """Return (estimate − truth) / σ of the first quantity of every effect that is rightly named."""
-    truth = {c.name: c for c in trial.concealed}
     given = trial.answer.effects if trial.answer.verdict in _WITH_NAMES else ()
-    errors = (_size_error(e, truth[e.name]) for e in given if e.name in truth and e.name in EFFECTS)
-    return [e for e in errors if e is not None]
+    return [error for e, c in matched(given, trial.concealed) if (error := _size_error(e, c)) is not None]
+
+
+def matched(
+    given: Sequence[NamedEffect], concealed: Sequence[Concealed]
+) -> list[tuple[NamedEffect, Concealed]]:
+    """Return names with what they name, one to one; laws that come twice so that their numbers differ least.
+
+    Numbers differ by shares of what the catalogue allows them.
+    """
+    apart = np.array([[_apart(e, c) for c in concealed] for e in given]).reshape(len(given), len(concealed))
+    rows, columns = linear_sum_assignment(np.minimum(apart, _STRANGERS))
+    return [(given[r], concealed[c]) for r, c in zip(rows, columns, strict=True) if apart[r, c] < _STRANGERS]
+
+
+def _apart(named: NamedEffect, truth: Concealed) -> float:
+    if named.name != truth.name or named.name not in EFFECTS:
+        return np.inf
+    each = zip(EFFECTS[truth.name].quantities, truth.values, strict=False)
+    known = ((q, named.parameters[q.name].value - v) for q, v in each if q.name in named.parameters)
+    return float(sum(min(abs(d) / (q.high - q.low), 1.0) for q, d in known if np.isfinite(d)))
 
 
 def heldout_removed(answer: Answer) -> float | None:

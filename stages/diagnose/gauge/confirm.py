@@ -57,11 +57,11 @@ def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: S
     wanted = [(term.model.name, a.name, term.shape) for a in term.amplitudes]
     keys = [(c.effect, c.amplitude, c.shape) for c in part.columns]
     at = [keys.index(w) for w in wanted]
-    inflation = np.sqrt(
-        np.diag(part.score_covariance)[at] / np.maximum(np.diag(part.information)[at], 1e-300)
-    )
     if not np.all(np.diag(part.information)[at] > 0):
         return None
+    # Of a difference of two kinds' evidence the spread may come out below that of independent errors.
+    ratio = np.diag(part.score_covariance)[at] / np.diag(part.information)[at]
+    inflation = np.sqrt(np.maximum(ratio, 1.0))
     covariance = result.covariance[np.ix_(at, at)] * np.outer(inflation, inflation)
     return Partial(where, result.value[at], covariance)
 
