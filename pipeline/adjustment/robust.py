@@ -57,6 +57,15 @@ def cluster_variance(scores: Float, cluster: Int) -> Float:
     return np.asarray(np.square(sums).sum(0) * _few(len(sums)))
 
 
+def degrees_of(scores: Float, cluster: Int) -> Float:
+    """Return the degrees of freedom (K,) of `cluster_variance`: few clusters may hold most of a score.
+
+    F. Satterthwaite, "An approximate distribution of estimates of variance components", 1946.
+    """
+    squares = np.square(cluster_sums(scores, cluster))
+    return np.asarray(squares.sum(0) ** 2 / np.maximum(np.square(squares).sum(0), 1e-300))
+
+
 def two_way_variance(scores: Float, cluster: Int, other: Int) -> Float:
     """Return the variance (K,) of summed scores that err alike in clusters of two kinds.
 

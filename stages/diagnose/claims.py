@@ -12,6 +12,7 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.channels import Seen
+from stages.diagnose.inference import UNKNOWN
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
@@ -35,8 +36,6 @@ _OF_ONE_RECORDING = frozenset({"time_s", "duration_s", "slip_mm", "frequency_hz"
 _ROCKING_P = 0.01
 # Of a swing: what one ring takes for a turn of the camera.
 _TURNED = 0.01
-# Beforehand, beside a named cause: one that the library does not know and that shows just so.
-_UNKNOWN = 0.1
 
 
 def chance_of_name(p_value: float, rivals: int, agreements: Sequence[Agreement], drilled: int) -> float:
@@ -53,7 +52,7 @@ def chance_of_name(p_value: float, rivals: int, agreements: Sequence[Agreement],
     ratios = [a.ratio for a in agreements]
     failed = [a.ratio for a in agreements if not a.confirmation.agrees]
     ratio = min(failed) if failed else max(ratios, default=1.0)
-    weight = 1 / (1 + nothing + rivals + _UNKNOWN / ratio)
+    weight = 1 / (1 + nothing + rivals + UNKNOWN / ratio)
     return min(float(weight), (drilled + 1) / (drilled + 2))
 
 

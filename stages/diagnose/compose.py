@@ -216,7 +216,7 @@ def _unexplained_travel(*recordings: Seen | None) -> tuple[str, ...]:
 
 
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:
-    """Return the least chance of all channels, counted as often as channels were looked at."""
+    """Return the least chance of all channels, counted as often as channels show anything at all."""
     each = []
     for seen in (field, gauge):
         if seen is None:
@@ -227,7 +227,8 @@ def _global_p(field: Seen | None, gauge: Seen | None) -> float:
             each.append(seen.travel.least_p)
         if seen.profile is not None:
             each.append(min((f.p_value for f in seen.profile.findings), default=1.0))
-    return float(min(min(each) * len(each), 1.0)) if each else 1.0
+    showing = [p for p in each if p < 1]
+    return float(min(min(showing) * len(showing), 1.0)) if showing else 1.0
 
 
 def to_json(found: Diagnosis) -> dict[str, object]:

@@ -23,8 +23,8 @@ def field_with(signal):
     columns = [Column(n, a.name) for n in names for a in LIBRARY[n].amplitudes]
     information = patterns.T @ patterns / SIGMA**2
     right = patterns.T @ signal / SIGMA**2
-    misfit, cells = float(signal @ signal) / SIGMA**2, 400.0
-    whole = Evidence(tuple(columns), information, right, information, misfit, cells)
+    misfit, degrees = float(signal @ signal) / SIGMA**2, np.full(len(right), np.inf)
+    whole = Evidence(tuple(columns), information, right, information, misfit, degrees)
     return FieldEvidence(None, whole)
 
 

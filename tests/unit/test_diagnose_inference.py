@@ -96,7 +96,8 @@ def evidence_of(
     design: np.ndarray, measured: np.ndarray, columns: tuple[Column, ...], inflation: float = 1.0
 ) -> Evidence:
     a = design.T @ design
-    return Evidence(columns, a, design.T @ measured, inflation * a, float(measured @ measured), len(measured))
+    surely = np.full(len(a), np.inf)
+    return Evidence(columns, a, design.T @ measured, inflation * a, float(measured @ measured), surely)
 
 
 def test_the_surprise_is_the_marginal_likelihood():
@@ -272,7 +273,7 @@ def names_and_patterns(scale_of_cone: float, share: float, measured: float) -> E
     information *= scale_of_cone
     right = np.zeros(len(columns))
     right[[0, line, image]] = scale_of_cone * np.array([1.0, np.sqrt(0.99), measured])
-    return Evidence(columns, information, right, information, 0.0, 1e4)
+    return Evidence(columns, information, right, information, 0.0, np.full(len(columns), np.inf))
 
 
 @pytest.mark.parametrize(
@@ -287,3 +288,16 @@ def test_a_pattern_without_a_cause_has_odds_by_likelihood_and_prior(strength, me
     own = 0.035 * np.exp(-0.005 * strength)
     assert odds.pop("δr", 0.0) == pytest.approx(own if own > 1e-3 else 0.0)
     assert odds == pytest.approx(likely, rel=0.02)
+
+
+def test_a_score_that_few_cells_hold_is_less_surprising():
+    random = np.random.default_rng(12)
+    of = evidence_of(random.normal(size=(500, 1)), random.normal(size=500), (Column("a", ""),))
+    of = replace(of, right=6.0 * np.sqrt(np.diag(of.information)))
+    stated, block = Stated((), np.zeros((0, 0))), np.array([0])
+    many, few = (score(replace(of, degrees=np.array([d])), stated, block) for d in (np.inf, 10.0))
+    assert many is not None
+    assert few is not None
+    assert many.statistic == few.statistic == pytest.approx(36.0)
+    # The tails of F(1, 60) and F(1, 10) beyond 36.
+    assert (many.p_value, few.p_value) == pytest.approx((1.22e-7, 1.33e-4), rel=0.02)

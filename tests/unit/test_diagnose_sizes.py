@@ -57,9 +57,11 @@ def test_scores_of_a_large_effect_are_not_widened_by_the_effect_itself():
     )
     left = Marginal(np.eye(GLOBALS), np.zeros(GLOBALS), np.eye(GLOBALS), np.zeros(GLOBALS), 0.0)
     none = np.zeros(0, np.int64)
-    alone = score_inflation(e, reduced, left, none, np.full(GLOBALS, -1))
-    explained = score_inflation(e, reduced, left, none, np.array([-1, -1, 0, -1, -1]))
+    alone, degrees = score_inflation(e, reduced, left, none, np.full(GLOBALS, -1))
+    explained, _ = score_inflation(e, reduced, left, none, np.array([-1, -1, 0, -1, -1]))
     assert alone[2] > 5
+    # Half of the cells hold all of it.
+    assert degrees[2] == pytest.approx(len(np.unique(e.cell)) / 2, rel=0.2)
     assert explained[2] == pytest.approx(1.0, abs=0.5)
     assert explained[[0, 1, 3, 4]] == pytest.approx(alone[[0, 1, 3, 4]])
 

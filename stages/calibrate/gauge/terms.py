@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,11 @@ class Equations:
 
 def edge_equations(state: Unknowns, edges: Edges) -> Equations:
     """Return the equations of borders: each is seen where it was measured; its edge may be a little off."""
+    return _weighted(edge_rows(state, edges), edges.sigma_px, 4 * edges.marker + edges.side)
+
+
+def edge_rows(state: Unknowns, edges: Edges) -> Rows:
+    """Return the equations of borders without weights: σ is 1, infinite where they are not defined."""
     T = state.T_pc[edges.frame]
     xyz_p = edges.xyz_p + state.edge_mm[edges.marker, edges.side][:, None] * edges.outward_p
     xyz_c = transform(inverse(T), xyz_p)
@@ -54,7 +59,7 @@ def edge_equations(state: Unknowns, edges: Edges) -> Equations:
     by_border[:, at.instrument] = (
         np.einsum("mi,mij->mj", edges.normal, by_camera) @ state.unsure[: by_camera.shape[2]]
     )
-    return _weighted(edges.frame, by_frame, by_border, residual, edges.sigma_px, edge)
+    return _usable(edges.frame, by_frame, by_border, residual)
 
 
 def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
@@ -65,6 +70,15 @@ def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
     (W. A. Fuller, "Measurement Error Models", 1987, ch. 3).
     """
     residual, uv = expected_ring(state, rings)
+    rows, mm_per_px = ring_rows(state, rings, residual, uv)
+    return _weighted(rows, rings.sigma_px * mm_per_px, wall_cells(rings.wall_mm))
+
+
+def ring_rows(state: Unknowns, rings: BoreRings, residual: Float, uv: Float) -> tuple[Rows, Float]:
+    """Return the equations of rings, linearised at ``uv`` (M, 2), without weights, and (M,) mm per px.
+
+    σ is 1, infinite where they are not defined.
+    """
     T = state.T_pc[rings.frame]
     xyz_c, normal, _ = _wall_at(state, T, uv)
     by_pixel, by_parameters = state.probe.triangulate_jacobian(uv)
@@ -77,9 +91,7 @@ def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
     by_border[np.arange(len(residual)), at.bore.start + rings.section] = -1
     by_border[:, at.instrument] = np.einsum("mj,mjp->mp", normal_c, by_parameters) @ state.unsure
     mm_per_px = np.abs(np.einsum("mj,mjk,mk->m", normal_c, by_pixel, rings.outward))
-    return _weighted(
-        rings.frame, by_frame, by_border, residual, rings.sigma_px * mm_per_px, wall_cells(rings.wall_mm)
-    )
+    return _usable(rings.frame, by_frame, by_border, residual), mm_per_px
 
 
 def expected_ring(state: Unknowns, rings: BoreRings) -> tuple[Float, Float]:
@@ -159,18 +171,20 @@ def _bore_radius(state: Unknowns, rings: BoreRings) -> Float:
     return np.asarray(rings.radius_mm + state.bore_mm[rings.section])
 
 
-def _weighted(
-    frame: Int, by_frame: Float, by_border: Float, residual: Float, sigma: Float, cluster: Int
-) -> Equations:
-    """Return equations with Cauchy weights about the measurements' own spread, frame by frame for the σ."""
+def _usable(frame: Int, by_frame: Float, by_border: Float, residual: Float) -> Rows:
     bad = ~(np.isfinite(residual) & np.isfinite(by_border).all(1) & np.isfinite(by_frame).all((1, 2)))
     for part in (residual, by_frame, by_border):
         part[bad] = 0.0
-    in_sigma = residual / np.where(np.isfinite(sigma), sigma, 1.0)
-    believed = np.where(bad | ~np.isfinite(sigma), np.inf, sigma * frame_spread(frame, in_sigma))
-    return Equations(
-        Rows(frame[:, None], by_frame, by_border, residual, believed, Cauchy()), in_sigma, cluster
-    )
+    return Rows(frame[:, None], by_frame, by_border, residual, np.where(bad, np.inf, 1.0))
+
+
+def _weighted(rows: Rows, sigma: Float, cluster: Int) -> Equations:
+    """Return equations with Cauchy weights about the measurements' own spread, frame by frame for the σ."""
+    known = np.isfinite(sigma)
+    in_sigma = rows.residual / np.where(known, sigma, 1.0)
+    spread = sigma * frame_spread(rows.frame[:, 0], in_sigma)
+    believed = np.where(known & np.isfinite(rows.sigma), spread, np.inf)
+    return Equations(replace(rows, sigma=believed, loss=Cauchy()), in_sigma, cluster)
 
 
 def frame_spread(frame: Int, in_sigma: Float) -> Float:

@@ -256,8 +256,8 @@ def matched(
     Numbers differ by shares of what the catalogue allows them.
     """
     apart = np.array([[_apart(e, c) for c in concealed] for e in given]).reshape(len(given), len(concealed))
-    rows, columns = linear_sum_assignment(np.minimum(apart, _STRANGERS))
-    return [(given[r], concealed[c]) for r, c in zip(rows, columns, strict=True) if apart[r, c] < _STRANGERS]
+    pairs = np.stack(linear_sum_assignment(np.minimum(apart, _STRANGERS)), -1).tolist()
+    return [(given[e], concealed[c]) for e, c in pairs if apart[e, c] < _STRANGERS]
 
 
 def _apart(named: NamedEffect, truth: Concealed) -> float:

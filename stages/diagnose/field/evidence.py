@@ -148,7 +148,7 @@ def nothing_said(recording: Recording, problem: str) -> FieldEvidence:
             "No frame of the field shows the wall's texture, so nothing but the rings places the probe."
         )
     sentences.append("A pose that only the ring gives takes up what the sheet or the lens do to it.")
-    none = Evidence((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), 0.0, 0.0)
+    none = Evidence((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(0))
     return FieldEvidence(None, none, tuple(sentences))
 
 

@@ -72,7 +72,7 @@ def evidence_of(system: FieldSystem, found: Reduced, ring_cell: Int, landmark_ce
     right = found.right + found.information @ system.value
     covariance = found.information * np.outer(inflation, inflation)
     return Evidence(
-        system.names, found.information, right, covariance, misfit + rest, float(len(np.unique(cells)))
+        system.names, found.information, right, covariance, misfit + rest, np.full(len(right), np.inf)
     )
 
 

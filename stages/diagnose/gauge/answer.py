@@ -10,12 +10,12 @@ import numpy as np
 
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.elimination import RING
-from stages.diagnose.gauge.examine import Examined, pattern_of
-from stages.diagnose.gauge.formula import ADEQUATE
+from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.formula import ADEQUATE, pattern_of
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.search import shift_px
-from stages.diagnose.inference import SURE
+from stages.diagnose.inference import SURE, UNKNOWN
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Picture, Verdict
 
 # What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Under right
@@ -30,8 +30,20 @@ def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return ()
-    each = zip(best.library_terms, examined.sizes, examined.confirmed, strict=False)
-    return tuple(_found(verdicts, term, sized, confirmed) for term, sized, confirmed in each)
+    each = zip(best.library_terms, examined.sizes, examined.confirmed, _doubts(examined), strict=False)
+    return tuple(_found(verdicts, *one) for one in each)
+
+
+def _doubts(examined: Examined) -> tuple[float, ...]:
+    """Return for each effect of the likeliest the odds against its name beyond those of fitted hypotheses.
+
+    What is not expected to be told from it is as likely as it, and so is, with `UNKNOWN`, a cause that nobody
+    knows, where no second prediction agrees.
+    """
+    return tuple(
+        len(alike) + UNKNOWN * (not (confirmed and all(c.agrees for c in confirmed)))
+        for alike, confirmed in zip(examined.unsplit, examined.confirmed, strict=True)
+    )
 
 
 def sure(examined: Examined) -> tuple[bool, ...]:
@@ -83,10 +95,12 @@ def beyond_line(examined: Examined) -> tuple[bool, ...]:
     return tuple(shift_px(best.fit, t) > width_px for t in best.library_terms) if best is not None else ()
 
 
-def _found(verdicts: Verdicts, term: Term, sized: Sized, confirmed: tuple[Confirmation, ...]) -> EffectFound:
+def _found(
+    verdicts: Verdicts, term: Term, sized: Sized, confirmed: tuple[Confirmation, ...], doubt: float
+) -> EffectFound:
     model, shape = term.model, term.shape if sized.time_s is None else (sized.time_s.value,)
     return EffectFound(
-        model.law, verdicts.chance_of(model.law), quantities(sized),
+        model.law, verdicts.chance_of(model.law) / (1 + doubt), quantities(sized),
         model.statement(shape, term.amplitude), model.equation(shape, term.amplitude),
         confirmed, replace(course_of(sized), probability=verdicts.chance_of_course(model)),
     )  # fmt: skip

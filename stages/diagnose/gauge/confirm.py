@@ -126,7 +126,7 @@ def _by_kind(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> tuple
     from_edges = partial_of("fiducials alone", edges, judged, term, stated)
     rings = Evidence(
         both.columns, both.information - edges.information, both.right - edges.right,
-        both.score_covariance - edges.score_covariance, both.misfit - edges.misfit, both.cells,
+        both.score_covariance - edges.score_covariance, both.misfit - edges.misfit, both.degrees,
     )  # fmt: skip
     from_rings = partial_of("rings alone", rings, judged, term, stated)
     if from_edges is None or from_rings is None:

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.elimination import Sums, add_rows
 from pipeline.adjustment.normal_equations import BandedCholesky, Marginal, marginalised
-from pipeline.adjustment.robust import two_way_variance
+from pipeline.adjustment.robust import degrees_of, two_way_variance
 from pipeline.arrays import Bool, Float, Int
 
 POSE = 6
@@ -156,8 +156,12 @@ def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> tuple[Marginal, flo
     return left, reduced.misfit + float(own.value @ own.pull) - left.gain
 
 
-def score_inflation(equations: Equations, reduced: Reduced, left: Marginal, out: Int, group: Int) -> Float:
+def score_inflation(
+    equations: Equations, reduced: Reduced, left: Marginal, out: Int, group: Int
+) -> tuple[Float, Float]:
     """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1.
+
+    The second, (K,), is how many degrees of freedom that has; infinite where it is 1.
 
     ``out`` (O,) are the globals that were eliminated, ``left`` what is left without them.
     Columns of one ``group`` (K,) are one effect: what they explain together is no error of theirs, else a
@@ -179,8 +183,10 @@ def score_inflation(equations: Equations, reduced: Reduced, left: Marginal, out:
     residual = equations.residual + step
     plain = follow**2 @ equations.weight
     scores = follow * equations.weight * _unexplained(equations.weight, follow, residual, group)
-    robust = two_way_variance(np.ascontiguousarray(scores.T), equations.cell, equations.frame)
-    return np.asarray(np.sqrt(np.maximum(robust / np.maximum(plain, 1e-300), 1.0)))
+    by_row = np.ascontiguousarray(scores.T)
+    robust = two_way_variance(by_row, equations.cell, equations.frame)
+    ratio = robust / np.maximum(plain, 1e-300)
+    return np.sqrt(np.maximum(ratio, 1.0)), np.where(ratio > 1, degrees_of(by_row, equations.cell), np.inf)
 
 
 def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> Float:

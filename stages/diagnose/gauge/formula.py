@@ -8,13 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy import stats
 
 from pipeline.arrays import Int
+from pipeline.physics.catalogue import EFFECTS
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.nameless import SWINGS, VOCABULARY
+from stages.diagnose.effects.courses import Coursed
+from stages.diagnose.effects.nameless import SWINGS, VOCABULARY, Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term, asking, linearise
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan
@@ -46,6 +50,25 @@ _SHOWN, _MOST = 1e-6, 100.0
 # Debt: data/debts.md.
 _WEAK = 1e-3
 
+_IN_TIME = MappingProxyType({
+    CourseKind.CONSTANT: "static", CourseKind.STEP: "event", CourseKind.RAMP: "drift",
+    CourseKind.EXPONENTIAL: "drift", CourseKind.SINUSOID: "periodic", CourseKind.SPEED: "speed",
+    CourseKind.REVERSAL: "reversal", CourseKind.DISTANCE: "static",
+})  # fmt: skip
+
+
+def pattern_of(term: Term) -> tuple[str, str, int | None]:
+    """Return what a term is fixed to, its behaviour in time and its harmonic."""
+    model = term.model
+    if isinstance(model, Nameless):
+        fixed_to, time, harmonic = model.goes_with(term.shape)
+        return str(fixed_to), time, harmonic
+    known = EFFECTS[model.law]
+    numbers = model.quantities(term.shape, term.amplitude)
+    order = int(numbers["order"]) if "order" in numbers else known.harmonic
+    time = _IN_TIME[model.kind] if isinstance(model, Coursed) else known.time
+    return str(known.fixed_to), time, order
+
 
 def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored]) -> Fit:
     """Return a fit with the few patterns added that explain the most of what it leaves.
@@ -73,11 +96,10 @@ def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
     return scan(run, found, {model.name: model for model in SWINGS}, stated)
 
 
-def patterns_p(run: GaugeRun, nothing: Fit, stated: Stated, swung: Sequence[Scored]) -> float:
-    """Return the chance of what patterns and swings without a cause take up when nothing is hidden."""
+def patterns_by_chance(run: GaugeRun, nothing: Fit, stated: Stated, swung: Sequence[Scored]) -> float:
+    """Return how often that which patterns and swings take up is expected when nothing is hidden."""
     swinging = min((s.p_value for s in swung), default=1.0) * len(SWINGS)
-    left = adequacy(evidence(run, nothing, VOCABULARY)[0], nothing.terms, stated)
-    return float(min(2 * min(left, swinging), 1.0))
+    return 2 * min(_by_chance(evidence(run, nothing, VOCABULARY)[0], nothing.terms, stated), swinging)
 
 
 def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
@@ -102,10 +124,14 @@ def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
 
     ``about`` is the evidence over the terms and `VOCABULARY`.
     """
+    return min(_by_chance(about, terms, stated), 1.0)
+
+
+def _by_chance(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
     given = _places(about, [(t.model, t.shape) for t in terms])
     each = [_score(about, stated, m, s, given) for m, s in VOCABULARY]
     single = min((s.p_value for s in each if s is not None), default=1.0) * len(VOCABULARY)
-    return float(min(2 * min(single, joint_p(about, stated, given)), 1.0))
+    return float(2 * min(single, joint_p(about, stated, given)))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, Unknowns
-from stages.calibrate.gauge.terms import edge_equations, expected_ring, ring_equations, ring_residual
+from stages.calibrate.gauge.terms import edge_rows, expected_ring, ring_residual, ring_rows, wall_cells
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.library import (
     columns,
@@ -138,6 +138,11 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     return Linearised(Equations(**joined), motion, ring_at, edge_at)
 
 
+def beside(run: GaugeRun, state: Unknowns, at: Linearised, model: EffectModel, shape: Shape) -> Linearised:
+    """Return the linearisation with an effect of size zero behind the others."""
+    return replace(at, equations=asking(run, state, at, [(model, shape)]))
+
+
 def asking(
     run: GaugeRun, state: Unknowns, at: Linearised, asked: Sequence[tuple[EffectModel, Shape]],
     with_baseline: bool = False,
@@ -231,24 +236,21 @@ def _ring_part(
 ) -> Equations:  # fmt: skip
     mm_per_px = ring_mm_per_px(points)
     shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
-    made = ring_equations(state, rings)
-    rows = replace(made.rows, residual=residual)
-    return _with_effects(rows, -mm_per_px[:, None], shift, run.ring_weight, made.cluster, RING)
+    rows, _ = ring_rows(state, rings, residual, points.uv)
+    return _with_effects(rows, -mm_per_px[:, None], shift, run.ring_weight, wall_cells(rings.wall_mm), RING)
 
 
 def _edge_part(
     run: GaugeRun, state: Unknowns, edges: Edges, points: ImagePoints, terms: Sequence[Term]
 ) -> Equations:
-    made = edge_equations(state, edges)
-
     def texture_shift(term: Term, amplitude: Float) -> Float:
         return _across(texture_shift_px(term.model, points, *term.at(amplitude)), edges)
 
     shift = [_term_slope(t, partial(texture_shift, t)) for t in terms]
-    # Cells of fiducials count on where those of wall end.
-    return _with_effects(
-        made.rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, -1 - made.cluster, EDGE
-    )
+    # Cells of fiducials, one an edge, count on where those of wall end.
+    cell = -1 - (4 * edges.marker + edges.side)
+    rows = edge_rows(state, edges)
+    return _with_effects(rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, cell, EDGE)
 
 
 def _with_effects(
@@ -260,7 +262,7 @@ def _with_effects(
     )
     by_global = np.concatenate([rows.by_border, *effects], 1)
     by_global[bad] = 0.0
-    usable = (rows.weight > 0) & ~bad
+    usable = (rows.weight > 0) & np.isfinite(weight) & ~bad
     return Equations(
         rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual,
         np.where(usable, weight, 0.0), cell, np.full(len(cell), kind),

@@ -17,7 +17,7 @@ from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, 
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
-from stages.diagnose.gauge.fit import Fit, fit, own_parameters
+from stages.diagnose.gauge.fit import Fit, fit, fit_beside, own_parameters
 from stages.diagnose.gauge.points import bin_widths
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
 from stages.diagnose.gauge.scan import Scored, refined, scan
@@ -28,7 +28,9 @@ from stages.diagnose.inference import Stated
 DETECTED = 1e-4
 _REFITTED = 4
 _OTHER_COURSES = 2
-_MOST_EFFECTS = 3
+_MOST_EFFECTS = 6
+# So many effects are looked through together, once; of two each way is tried at once.
+_FEW = 3
 _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
 _RIVAL_ITERATIONS = 5
@@ -115,12 +117,15 @@ def _weight(frame: Int, residual: Float, sigma: Float) -> Float:
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the selection: the fit it starts from, all scores there, and the refits tried."""
+    """One step of the selection: the fit it starts from, all scores there, and the refits tried.
+
+    ``by_chance`` is how many scores as large as the largest are expected when nothing more is hidden.
+    """
 
     before: Fit
     scores: tuple[Scored, ...]
     tried: tuple[Fit, ...]
-    global_p: float
+    by_chance: float
 
 
 @dataclass(frozen=True)
@@ -149,21 +154,25 @@ class Search:
 
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
-    """Add effects while the data ask for them; then see whether a rival does better in each one's place."""
+    """Add effects while the data ask for them; then see whether rivals do better in their places.
+
+    A rival in an earlier one's place is looked for when the second effect comes, because the first was found
+    with all others still there, and once more when nothing more is asked for.
+    """
     nothing, found, steps = start, start, []
     rivals: tuple[Fit, ...] = ()
+    exchanged = False
     while True:
         step, better = _extended(run, found, library, stated)
         steps.append(step)
-        if better is None or len(better.terms) > _MOST_EFFECTS:
+        at_end = better is None or len(better.terms) > _MOST_EFFECTS
+        if at_end and (exchanged or len(found.terms) < _FEW):
             break
-        better = refined(run, better)
-        tried: Sequence[Fit] = step.tried
-        if found.terms:
-            earlier = (found, *rivals)
-            better, others = _exchanged(run, better, step.tried, library, stated)
-            tried = (*others, *earlier)
-        run, found, rivals = _weighed_anew(run, better, tried, alike(step.scores))
+        better, tried = refined(run, better) if better is not None and not at_end else found, step.tried
+        if at_end or len(better.terms) == _FEW - 1:
+            better, others = _exchanged(run, better, () if at_end else step.tried, library, stated)
+            tried, exchanged = (*others, found), at_end
+        run, found, rivals = _weighed_anew(run, better, (*tried, *rivals), alike(step.scores))
         nothing = fit(run, start.state, ())
     return Search(run, nothing, found, tuple(rivals), tuple(steps), alike(steps[-1].scores))
 
@@ -189,18 +198,22 @@ def _weighed_anew(
     return run, *_sorted(found, list(rest))
 
 
-def global_p(scores: Sequence[Scored]) -> float:
-    """Return the chance that nothing hidden gives so large a score anywhere."""
-    return float(min(min((s.p_value for s in scores), default=1.0) * max(len(scores), 1), 1.0))
+def by_chance(scores: Sequence[Scored]) -> float:
+    """Return how many scores as large as the largest are expected when nothing is hidden."""
+    return float(min((s.p_value for s in scores), default=1.0) * max(len(scores), 1))
 
 
 def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored], most: int = _REFITTED) -> list[Fit]:
     """Return the fits with each of the most promising effects added, best first; no impossible sizes."""
     promising = _promising(scores, most)
     worth = [s for s in promising if s.score.gain > _WORTH_REFITTING * promising[0].score.gain]
-    # The linear prediction of a large effect is wrong, so that its fit starts from size zero.
-    terms = [Term(s.model, s.shape, 0 * s.score.amplitude) for s in worth]
-    fits = [fit(run, found.state, (*found.terms, term), _RIVAL_ITERATIONS) for term in terms]
+    found = found if run.measures_as(found.run) else replace(found, run=run)
+    fits: list[Fit] = []
+    near, allowed = np.inf, _FAR * alike(scores)
+    for s in sorted(worth, key=lambda s: -s.score.gain):
+        # The linear prediction of a large effect is wrong, so that its fit starts from size zero.
+        fits.append(fit_beside(found, s.model, s.shape, _RIVAL_ITERATIONS, near))
+        near = min(near, fits[-1].cost + allowed)
     possible = [f for f in fits if f.terms[-1].model.possible(f.terms[-1].shape, f.terms[-1].amplitude)]
     return sorted(possible or fits, key=lambda f: f.cost)
 
@@ -233,11 +246,11 @@ def _extended(
     run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated
 ) -> tuple[Step, Fit | None]:
     scores = scan(run, found, library, stated)
-    p_value = global_p(scores)
-    if p_value > DETECTED:
-        return Step(found, tuple(scores), (), p_value), None
+    expected = by_chance(scores)
+    if expected > DETECTED:
+        return Step(found, tuple(scores), (), expected), None
     tried = refits(run, found, scores)
-    step = Step(found, tuple(scores), tuple(tried), p_value)
+    step = Step(found, tuple(scores), tuple(tried), expected)
     best = tried[0]
     needed = found.cost - best.cost > _LEAST_GAIN * alike(scores) and _counts(best)
     return step, best if needed else None
