@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,11 +11,12 @@ from pipeline.adjustment.normal_equations import Marginal
 from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import SWINGS
-from stages.diagnose.gauge.confirm import Sized, quantities
+from stages.diagnose.gauge.confirm import Sized, partial_of, quantities
 from stages.diagnose.gauge.elimination import Reduced, score_inflation
 from stages.diagnose.gauge.fit import Fit
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import freed
+from stages.diagnose.inference import Column, Evidence, Stated
 from tests.unit.test_diagnose_inference import FRAMES, GLOBALS, equations
 from tests.unit.wall_points import Bore, plain_probe, ring_points
 
@@ -86,3 +88,15 @@ def test_a_fit_whose_shapes_are_choices_stays_as_it_is_and_others_get_one_more_a
     tilt, drift = freed(found.run, drifting).terms
     assert tilt is found.terms[0]
     assert (drift.shape, list(drift.amplitude), len(drift.amplitudes)) == ((3.0,), [0.002, 0.0], 2)
+
+
+@pytest.mark.parametrize("spread", [-0.5, 0.5, 1.0])
+def test_rings_that_are_left_when_fiducials_are_taken_out_have_no_less_than_independent_errors(spread):
+    columns = tuple(Column(TILT.name, a.name) for a in TILT.amplitudes)
+    information = 4.0 * np.eye(2)
+    of = Evidence(columns, information, information @ [1.0, 2.0], spread * information, 0.0, np.ones(2))
+    term = Term(TILT, (), np.array([1.0, 2.0]))
+    judged = cast(Any, SimpleNamespace(fit=SimpleNamespace(terms=(term,))))
+    found = partial_of("rings", of, judged, term, Stated((), np.zeros((0, 0))))
+    assert found is not None
+    assert np.diag(found.covariance) == pytest.approx(0.25, rel=0.01)
