@@ -191,7 +191,8 @@ def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = No
     inverse = np.linalg.inv(own)
     amplitude, covariance = inverse @ right, np.asarray(inverse @ spread @ inverse, np.float64)
     statistic = float(right @ np.linalg.solve(spread, right))
-    degrees = min(DEGREES, float(evidence.degrees[block].min()))
+    # Columns whose spread is sure make up for those of which few cells tell: relative variances average.
+    degrees = 1 / max(1 / DEGREES, float(np.mean(1 / evidence.degrees[block])))
     p_value = float(stats.f.sf(statistic / len(block), len(block), degrees))
     return Score(np.asarray(amplitude, np.float64), covariance, statistic, p_value, float(right @ amplitude))
 

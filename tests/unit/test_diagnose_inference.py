@@ -301,3 +301,11 @@ def test_a_score_that_few_cells_hold_is_less_surprising():
     assert many.statistic == few.statistic == pytest.approx(36.0)
     # The tails of F(1, 60) and F(1, 10) beyond 36.
     assert (many.p_value, few.p_value) == pytest.approx((1.22e-7, 1.33e-4), rel=0.02)
+    both = replace(
+        of, columns=(Column("a", ""), Column("a", "b")), information=np.eye(2), score_covariance=np.eye(2),
+        right=np.array([6.0, 0.0]), degrees=np.array([10.0, np.inf]),
+    )  # fmt: skip
+    one_sure = score(both, stated, np.array([0, 1]))
+    assert one_sure is not None
+    # The tail of F(2, 20) beyond 18.
+    assert one_sure.p_value == pytest.approx(3.4e-5, rel=0.02)
