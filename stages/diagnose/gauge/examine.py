@@ -169,8 +169,9 @@ def examine(
             table = feasibility(about, shapes, library, stated)
             groups = inseparable(table, about, shapes, library, stated)
             coursed = with_courses(library, courses)
-            searched = search(_watched(measurements, 1, progress), nothing, coursed, stated)
-            searched = replace(searched, run=_watched(searched.run, 2, progress))
+            nothing = nothing.watched(partial(progress, 1, _PARTS))
+            searched = search(nothing.run, nothing, coursed, stated)
+            searched = searched.watched(partial(progress, 2, _PARTS))
             # Effects that the library lacks move rings and fiducials as well.
             swung = swings(searched.run, searched.nothing, stated)
             beyond = patterns_by_chance(searched.run, searched.nothing, stated, swung)
@@ -180,11 +181,6 @@ def examine(
             return _judged(replace(seen, verdicts=judge(searched, coursed, stated, swung)), coursed, stated)
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
-
-
-def _watched(run: GaugeRun, done: int, progress: Progress) -> GaugeRun:
-    """Return the run for the part of the examination after so many others."""
-    return replace(run, watch=partial(progress, done, _PARTS))
 
 
 def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:

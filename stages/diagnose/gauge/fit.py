@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns
@@ -59,6 +60,12 @@ class Fit:
     state: Unknowns
     terms: tuple[Term, ...]
     cost: float
+
+    def watched(self, watch: Watch) -> Fit:
+        """Return the fit with another watch at its run; what was made of it is not made again."""
+        made = replace(self, run=replace(self.run, watch=watch))
+        vars(made).update({k: v for k, v in vars(self).items() if k in ("linearised", "reduced")})
+        return made
 
     @cached_property
     def linearised(self) -> Linearised:

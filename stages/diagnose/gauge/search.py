@@ -152,6 +152,13 @@ class Search:
     steps: tuple[Step, ...]
     alike: float
 
+    def watched(self, watch: Watch) -> Search:
+        """Return the outcome with another watch, whichever of its fits is gone on from."""
+        return replace(
+            self, run=replace(self.run, watch=watch), nothing=self.nothing.watched(watch),
+            found=self.found.watched(watch), rivals=tuple(f.watched(watch) for f in self.rivals),
+        )  # fmt: skip
+
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
     """Add effects while the data ask for them; then see whether rivals do better in their places.
