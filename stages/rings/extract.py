@@ -22,7 +22,8 @@ from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED, clip_lev
 from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
-from stages.rings.validity import contradicted, wander_px
+from stages.rings.validity import contradicted
+from stages.rings.wander import Wander, wander_of
 
 Images = Iterator[tuple[int, Image | None]]
 Found = tuple[int, RingTrace | None]
@@ -32,7 +33,7 @@ _BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
 _LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
 # Clipped pixels are looked for so many widths to either side of the line. Where it is amid them but for half
 # a width, it was found by both flanks.
-_CLIP_WIDTHS, _ASIDE_WIDTHS = 3.0, 0.5
+_CLIP_WIDTHS, _CLIP_STEP, _ASIDE_WIDTHS = 3.0, 0.5, 0.5
 # Where more of them clip, the wall does so too, and nothing is seen of the line.
 _MOST_CLIPPED = 0.5
 _PER_RING = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
@@ -82,11 +83,18 @@ def extract_rings(
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
     _compare_rings(samples)
-    wander = wander_px(_some(samples))
-    _report(context, samples, wander)
-    warn_of_rings(samples, wander, recording.kind == "gauge", context)
-    np.hypot(samples.sigma_px, np.float32(wander), out=samples.sigma_px)
+    wander = wander_of(_some(samples))
+    typical = _typical(samples, wander)
+    _report(context, samples, typical)
+    warn_of_rings(samples, typical, recording.kind == "gauge", context)
+    np.hypot(samples.sigma_px, wander.at(samples.amplitude), out=samples.sigma_px, casting="same_kind")
     return samples
+
+
+def _typical(samples: RingSamples, wander: Wander) -> float:
+    """Return the wander of a line of middling height."""
+    valid = samples.valid
+    return float(wander.at(np.median(samples.amplitude[valid]))) if valid.any() else 0.0
 
 
 def _laser_traces(images: Images, recording: Recording, sectors: Sectors) -> Iterator[Found]:
@@ -121,9 +129,10 @@ def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -
     """Return a ring without the samples that are not amid the pixels at which the laser's channel clips.
 
     The other channels go on rising there, and the mixture dips where the line is brightest: on a bright wall
-    the line came out beside itself, which looked like deposits.
+    the line came out beside itself, which looked like deposits. The others are as unsure as the line's centre
+    of gravity is with all its light there and with none.
     """
-    across = np.arange(-_CLIP_WIDTHS, _CLIP_WIDTHS + 0.25, 0.5)
+    across = np.arange(-_CLIP_WIDTHS, _CLIP_WIDTHS + _CLIP_STEP / 2, _CLIP_STEP)
     radius = np.nan_to_num(trace.fit.radius_px)[:, None] + across * trace.width_px
     psi, size = sectors.azimuth_rad[:, None], np.array(sectors.image_size) - 1
     u, v = (
@@ -133,9 +142,11 @@ def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -
     clips = bgr[v, u, channel] > SURELY_UNCLIPPED * np.iinfo(bgr.dtype).max
     count = clips.sum(1)
     aside = np.abs(clips @ across) / np.maximum(count, 1)
+    line = np.exp(-(across**2) / 2)
+    pull = np.abs(clips @ (across * line)) / line.sum()
     lost = (aside > _ASIDE_WIDTHS) | (count > _MOST_CLIPPED * len(across))
     lost &= trace.validity == RingValidity.VALID
-    fit = trace.fit._replace(sigma_px=np.hypot(trace.fit.sigma_px, aside * trace.width_px))
+    fit = trace.fit._replace(sigma_px=np.hypot(trace.fit.sigma_px, pull * trace.width_px))
     return replace(trace, fit=fit, validity=np.where(lost, RingValidity.SATURATED, trace.validity))
 
 

@@ -1,4 +1,4 @@
-"""What only neighbours tell: samples off the ring, and how much the line wanders beyond its noise."""
+"""What only neighbours tell: samples off the ring."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from stages.rings.kernels import median, take_finite
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0
 _MAJORITY = 0.5
-_LAG_WIDTHS = 6.0
 
 
 def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
@@ -47,27 +46,6 @@ def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte
     out = validity.copy()
     out[valid & (~kept | alone)] = RingValidity.OUTLIER
     return out
-
-
-def wander_px(samples: RingSamples) -> float:
-    """Return the 1 σ, px, by which the line wanders beyond its noise: speckle, texture, compression.
-
-    From second differences along the ring between sectors far enough apart to share neither pixels nor
-    speckle (blurred together over the line's width), near enough for the wall to be straight; medians keep
-    true edges out of it.
-    """
-    valid = samples.valid
-    arc = np.median(samples.radius_px[valid]) * (samples.azimuth_rad[1] - samples.azimuth_rad[0])
-    lag = int(np.ceil(_LAG_WIDTHS * np.median(samples.width_px[valid]) / arc))
-    radius = np.where(valid, samples.radius_px, np.nan).astype(float)
-    bend = np.roll(radius, lag, 1) - 2 * radius + np.roll(radius, -lag, 1)
-    known = np.isfinite(bend)
-    if not known.any():
-        return 0.0
-    variance = np.where(known, samples.sigma_px, 0.0).astype(float) ** 2
-    expected = (np.roll(variance, lag, 1) + 4 * variance + np.roll(variance, -lag, 1))[known]
-    total = robust_spread(bend[known]) ** 2
-    return float(np.sqrt(max(total - np.median(expected), 0.0) / 6))
 
 
 @numba.njit(cache=True, nogil=True)
