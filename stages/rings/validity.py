@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spread, robust_spreads
+from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spreads
 from pipeline.arrays import Bool, Byte, Float32
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.rings.glints import lone_runs

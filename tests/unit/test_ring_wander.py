@@ -23,8 +23,8 @@ def rings(even_px: float, slope_px: float, seed: int, count: int = RINGS) -> Rin
     radius = RADIUS_PX + sigma * draw.standard_normal((count, AZIMUTHS))
     plain = np.ones_like(radius, np.float32)
     return RingSamples(
-        np.arange(count), AZIMUTH, np.zeros(2), radius.astype(np.float32), STATED_PX * plain, WIDTH_PX * plain,
-        amplitude.astype(np.float32), np.zeros(radius.shape, np.uint8),
+        np.arange(count), AZIMUTH, np.zeros(2), radius.astype(np.float32), STATED_PX * plain,
+        WIDTH_PX * plain, amplitude.astype(np.float32), np.zeros(radius.shape, np.uint8),
     )  # fmt: skip
 
 
