@@ -94,7 +94,7 @@ def extract_rings(
 def _typical(samples: RingSamples, wander: Wander) -> float:
     """Return the wander of a line of middling height."""
     valid = samples.valid
-    return float(wander.at(np.median(samples.amplitude[valid]))) if valid.any() else 0.0
+    return float(wander.at(float(np.median(samples.amplitude[valid])))) if valid.any() else 0.0
 
 
 def _laser_traces(images: Images, recording: Recording, sectors: Sectors) -> Iterator[Found]:
