@@ -78,6 +78,19 @@ def test_sigma_is_that_of_the_noise() -> None:
     assert 0.8 < np.median(got.sigma_random_mm[4:-4]) / error.std() < 1.4
 
 
+def test_sigma_is_that_of_the_noise_at_its_place() -> None:
+    """Grease on a quarter of the window: a σ for the whole wall held one interval in two there."""
+    rings = drawn_rings()
+    greasy = np.abs(rings.azimuth_rad - 1.0) < np.pi / 4
+    more = greasy * 4 * SIGMA_PX * np.random.default_rng(1).normal(size=rings.radius_px.shape)
+    got = accumulated(replace(rings, radius_px=rings.radius_px + more.astype(np.float32)))
+    error = np.abs(got.radius_map.radius_mm - RADIUS)[4:-4]
+    inside = error < 1.96 * got.radius_map.sigma_random_mm[4:-4]
+    away = np.abs(got.radius_map.azimuth_rad - 1.0)
+    assert 0.9 < inside[:, away < 0.6].mean() < 0.99
+    assert 0.9 < inside[:, (away > 1.2)].mean() < 0.995
+
+
 def test_cloud_lies_on_the_wall_with_unit_normals_toward_the_axis() -> None:
     cloud = accumulated(drawn_rings(oval)).cloud
     np.testing.assert_allclose(np.linalg.norm(cloud.normal_p, axis=1), 1, atol=1e-5)
