@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from scipy.ndimage import median_filter
 
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.local_spread import local_spread
 from pipeline.arrays import Float, Float32, Int
 from pipeline.system.parallel import in_threads
 from stages.accumulate.survey import RingSurvey, WallSamples
@@ -26,11 +26,6 @@ _BLOCK, _THREADS = 64, 2
 WIDTH_IN_RINGS = 0.4
 # Cells of the running median that roughness is counted from. Debt: data/debts.md.
 _FINE_CELLS = (9, 9)
-# Scatter is told in places of such a length, and in so many sectors, of 13 mm in a pipe of 100 mm. Each holds
-# some 300 independent cells, which tell its spread to 6 %, and a defect of 10 mm fills less than half of it.
-_PLACE_MM, _PLACES_AROUND = 32.0, 24
-# Fewer cells do not tell a place's own scatter: that of the whole wall stands in.
-_FEWEST_CELLS = 100
 # Share of a ring from which its distance belongs to the map: half and twice as much change nothing on open-1
 # and open-3, whose rings end within a cell.
 _SEEN_SHARE = 0.1
@@ -168,28 +163,13 @@ def _roughness(radius: Float32, sigma: Float32, grid: MapGrid) -> Float32:
 
 
 def _spread_by_place(ratio: Float | Float32, grid: MapGrid) -> Float32:
-    """Return the robust spread (S, A) of ratios about each cell, at least 1, without steps between places.
+    """Return the robust spread (S, A) of ratios about each cell, at least 1.
 
     Grease on a part of the window, or a codec's blocks, make the line worse at some azimuths and for some
     time: one spread for the whole wall states too small a σ there, and findings are made of noise.
     """
-    place = np.floor(grid.distance_mm / _PLACE_MM).astype(np.int64)
-    rows = [np.flatnonzero(place == k) for k in np.unique(place)]
-    sectors = np.array_split(np.arange(ratio.shape[1]), _PLACES_AROUND)
-    overall = _spread_of(ratio, 1.0)
-    spread = np.array([[_spread_of(ratio[r[0] : r[-1] + 1, c], overall) for c in sectors] for r in rows])
-    middle = [float(c.mean()) for c in sectors]
-    columns = np.arange(ratio.shape[1])
-    around = np.array([np.interp(columns, middle, row, period=ratio.shape[1]) for row in spread])
-    at = [float(grid.distance_mm[r].mean()) for r in rows]
-    along = [np.interp(grid.distance_mm, at, column) for column in around.T]
-    return np.stack(along, 1).astype(np.float32)
-
-
-def _spread_of(ratio: Float | Float32, otherwise: float) -> float:
-    """Return the robust spread of what is known of ratios, at least 1, or another where few are."""
-    known = ratio[np.isfinite(ratio)]
-    return max(1.0, robust_spread(known)) if known.size >= _FEWEST_CELLS else otherwise
+    spread = local_spread(lambda rows: ratio[rows], grid.distance_mm, ratio.shape[1])
+    return np.maximum(spread.at(grid.distance_mm), 1.0).astype(np.float32)
 
 
 def _usual_spacing(columns: RingColumns) -> float:
