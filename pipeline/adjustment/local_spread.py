@@ -11,7 +11,7 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32
 
 # Places have such a length along the pipe; of so many sectors each is 13 mm wide in a pipe of 100 mm. It
-# holds some 300 independent cells, which tell its spread to 6 %; a defect of 10 mm fills less than half of it.
+# holds some 300 independent cells, which tell its spread to 6 %; 10 mm of defect fill less than half of it.
 _PLACE_MM, _SECTORS = 32.0, 24
 # Fewer cells do not tell a place's own spread: that of the whole wall stands in.
 _FEWEST_CELLS = 100
