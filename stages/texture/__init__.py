@@ -171,7 +171,7 @@ def _texture_of_run(
 
 TEXTURE = Stage(
     "texture",
-    "6",
+    "7",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",

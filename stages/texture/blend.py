@@ -1,6 +1,12 @@
-"""Tiles of the flat picture blended from many views, robustly."""
+"""Tiles of the flat picture blended from many views, robustly.
+
+Luma is sampled for every pixel, colours for every block of 2 by 2: the eye and video coding hold colour to be
+half as fine, and a block is sampled in less than half of the time of four pixels.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -8,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA
-from pipeline.arrays import Byte, Image, Int
+from pipeline.arrays import Byte, Float32, Image, Int
 from stages.texture.project import TileProjection
 
 Short = NDArray[np.uint16]
@@ -17,66 +23,113 @@ Short = NDArray[np.uint16]
 REFLECTANCE_SCALE = 32.0
 _SCALE = np.float32(REFLECTANCE_SCALE)
 _SATURATED = np.uint8(250)
-# A key is brightness, 18 bits, above weight, 8 bits; samples without weight come last and weigh nothing.
+# A key is brightness, 16 bits, above weight, 8 bits; samples without weight come last and weigh nothing.
 _BITS, _WEIGHT = np.int32(8), np.int32(255)
 _NO_SAMPLE = np.int32((1 << 31) - 256)
-_ZERO, _TWO = np.int32(0), np.int32(2)
+_ZERO, _ONE_COUNT, _TWO = np.int32(0), np.int32(1), np.int32(2)
 # Pixels that are worked on side by side: two registers of 16 numbers of 32 bits where there are such.
 _AT_ONCE = 32
+_BLOCKS_AT_ONCE = _AT_ONCE // 2
 # A map of pairs needs no second one, and is read without a copy.
 _NO_SECOND_MAP = np.empty(0, np.float32)
-_QUARTER, _MAD, _TUKEY = np.float32(0.25), np.float32(MAD_TO_SIGMA), np.float32(4.685)
-_LEAST, _ONE = np.float32(0.03 * 0.25), np.float32(1.0)
+_MAD, _TUKEY = np.float32(MAD_TO_SIGMA), np.float32(4.685)
+_LEAST, _LEAST_LEVEL = np.float32(0.03), np.float32(1.0)
+_HALF, _ONE = np.float32(0.5), np.float32(1.0)
+_LUMA_OF_BGR = (0.114, 0.587, 0.299)
+"""ITU-R BT.601, as OpenCV's BGR2GRAY."""
+_LEAST_KNOWN = np.float32(0.25)
+"""Share of the nearest block in the interpolation of its colour: no pixel has less of its own block."""
+
+
+@dataclass(frozen=True)
+class SplitImage:
+    """A picture as ``luma`` (H, W) and as colours of half its size, ``small`` (H / 2, W / 2, 3)."""
+
+    luma: Image
+    small: Image
+
+    @staticmethod
+    def of(image: Image) -> SplitImage:
+        """Split a picture (H, W, 3)."""
+        size = (image.shape[1] // 2, image.shape[0] // 2)
+        luma, small = (
+            cv2.cvtColor(image, cv2.COLOR_BGR2GRAY),
+            cv2.resize(image, size, None, 0, 0, cv2.INTER_AREA),
+        )
+        return SplitImage(np.asarray(luma, np.uint8), np.asarray(small, np.uint8))
+
+    def small_at(self, uv: Float32) -> list[Image]:
+        """Return the blue, green and red (n, m) of the small picture at places (n, m, 2) of the large one."""
+        u, v = (
+            (uv[..., k] + _HALF) * np.float32(self.small.shape[1 - k] / self.luma.shape[1 - k]) - _HALF
+            for k in range(2)
+        )
+        # With both maps in one, OpenCV 5.0 reads beyond them when it interpolates linearly.
+        return [np.asarray(c, np.uint8) for c in cv2.split(cv2.remap(self.small, u, v, cv2.INTER_LINEAR))]
 
 
 class TileStack:
     """Samples of one tile's pixels in up to ``views`` views, each view's one after the other.
 
     Used for one tile after the other: memory that the system gives anew costs more than all writing to it.
+    ``rows`` and ``columns`` are even.
     """
 
     def __init__(self, views: int, rows: int, columns: int) -> None:
         whole = -(-columns // _AT_ONCE) * _AT_ONCE
-        self._values = np.empty((views, rows, 3, whole), np.uint16)
+        self._luma = np.empty((views, rows, whole), np.uint16)
+        self._colour = np.empty((views, rows // 2, 3, whole // 2), np.uint16)
         self._weights = np.zeros((views, rows, whole), np.uint8)
         self._used, self._columns = 0, columns
 
-    def add(self, image: Image, projection: TileProjection) -> None:
-        """Sample a view's ``image`` (H, W, 3) where ``projection`` puts the tile's pixels."""
-        seen = np.flatnonzero(projection.weight.any(1))
+    def add(self, image: SplitImage, projection: TileProjection) -> None:
+        """Sample a view's ``image`` where ``projection`` puts the tile's pixels."""
+        seen = np.flatnonzero(projection.weight.any(1)) // 2
         if seen.size:
-            rows = slice(seen[0], seen[-1] + 1)
+            blocks = slice(seen[0], seen[-1] + 1)
+            rows = slice(2 * blocks.start, 2 * blocks.stop)
             _store(
-                cv2.split(cv2.remap(image, projection.uv[rows], _NO_SECOND_MAP, cv2.INTER_CUBIC)),
+                cv2.remap(image.luma, projection.uv[rows], _NO_SECOND_MAP, cv2.INTER_CUBIC),
+                tuple(image.small_at(projection.block_uv[blocks])),
                 projection.inverse_brightness[rows], projection.weight[rows],
-                self._values[self._used, rows], self._weights[self._used, rows],
+                self._luma[self._used, rows], self._colour[self._used, blocks],
+                self._weights[self._used, rows],
             )  # fmt: skip
         self._used += 1
 
     def blend(self) -> tuple[Short, Byte]:
         """Return the blended colours (rows, columns, 3) and how many samples are behind each; start anew."""
-        colour, count = blend_samples(self._values, self._weights)
+        luma, colour, count = blend_samples(self._luma, self._colour, self._weights)
         self._weights[:] = 0
         self._used = 0
-        return colour[:, : self._columns], count[:, : self._columns]
+        columns, blocks = slice(self._columns), slice(self._columns // 2)
+        return _in_colour(luma[:, columns], colour[:, blocks]), count[:, columns]
 
 
 @njit(cache=True, nogil=True)
-def _store(colours, inverse_brightness, weight, values, weights):  # type: ignore[no-untyped-def]
+def _store(grey, colours, inverse_brightness, weight, lumas, values, weights):  # type: ignore[no-untyped-def]
     """Write a view's samples and weights; values of weight 0 mean nothing."""
     most, half, steps = np.float32(65535.0), np.float32(0.5), np.float32(254.0)
     for i in range(len(weight)):
-        own, gain, worth = weight[i], inverse_brightness[i], weights[i]
+        own, gain, worth, seen, out = weight[i], inverse_brightness[i], weights[i], grey[i], lumas[i]
+        for p in range(len(own)):
+            out[p] = np.int32(min(most, np.float32(seen[p]) * (_SCALE * gain[p]) + half))
+            w = min(np.int32(255), np.int32(steps * own[p]) + _ONE_COUNT)
+            w = _ONE_COUNT if seen[p] >= _SATURATED else w
+            worth[p] = w if own[p] > 0 else _ZERO
+    for i in range(len(values)):
+        gain = inverse_brightness[2 * i]
+        blue, green, red = colours[0][i], colours[1][i], colours[2][i]
         for c in range(3):
             colour, out = colours[c][i], values[i, c]
-            for p in range(len(own)):
-                out[p] = np.int32(min(most, np.float32(colour[p]) * (_SCALE * gain[p]) + half))
-        blue, green, red = colours[0][i], colours[1][i], colours[2][i]
-        for p in range(len(own)):
-            w = min(np.int32(255), np.int32(steps * own[p]) + np.int32(1))
+            for q in range(len(colour)):
+                out[q] = np.int32(min(most, np.float32(colour[q]) * (_SCALE * gain[2 * q]) + half))
+        for q in range(len(blue)):
             # A clipped sample counts only where there is no other.
-            w = np.int32(1) if max(blue[p], max(green[p], red[p])) >= _SATURATED else w
-            worth[p] = w if own[p] > 0 else _ZERO
+            if max(blue[q], max(green[q], red[q])) >= _SATURATED:
+                for worth in (weights[2 * i], weights[2 * i + 1]):
+                    for p in (2 * q, 2 * q + 1):
+                        worth[p] = min(worth[p], np.uint8(1))
 
 
 def _sorting_network(keys: int) -> Int:
@@ -114,95 +167,140 @@ def _weighted_median(key, network, total, below, middle):  # type: ignore[no-unt
 
 
 @njit(cache=True, nogil=True)
-def _write_keys(four, weight, middle, key):  # type: ignore[no-untyped-def]
-    """Write the keys of how far four times the brightness is from ``middle`` (pixels,)."""
+def _write_keys(luma, weight, middle, key):  # type: ignore[no-untyped-def]
+    """Write the keys of how far the luma is from ``middle`` (pixels,)."""
     for k in range(len(key)):
         for p in range(_AT_ONCE):
-            own = (abs(four[k, p] - middle[p]) << _BITS) + np.int32(weight[k, p])
+            own = (abs(np.int32(luma[k, p]) - middle[p]) << _BITS) + np.int32(weight[k, p])
             key[k, p] = own if weight[k, p] > 0 else _NO_SAMPLE
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _biweight_mean(values, four, weight, middle, spread, mean):  # type: ignore[no-untyped-def]
-    """Write robust mean colours to ``mean`` (3, pixels), about the middles and in units of the spreads."""
+def _biweight_mean(luma, weight, middle, spread, worth, mean):  # type: ignore[no-untyped-def]
+    """Write the samples' robust weights and mean, about the middles and in units of the spreads."""
     steepness, total = np.empty(_AT_ONCE, np.float32), np.zeros(_AT_ONCE, np.float32)
-    worth = np.empty(_AT_ONCE, np.float32)
     for p in range(_AT_ONCE):
-        limit = _TUKEY * max(_MAD * _QUARTER * np.float32(spread[p]), _LEAST * np.float32(middle[p]) + _ONE)
-        steepness[p] = _QUARTER / limit
+        least = _LEAST * np.float32(middle[p]) + _LEAST_LEVEL
+        steepness[p] = _ONE / (_TUKEY * max(_MAD * np.float32(spread[p]), least))
     mean[:] = 0
-    for k in range(len(four)):
+    for k in range(len(luma)):
         for p in range(_AT_ONCE):
-            x = np.float32(four[k, p] - middle[p]) * steepness[p]
+            x = np.float32(np.int32(luma[k, p]) - middle[p]) * steepness[p]
             inside = max(_ONE - x * x, np.float32(0))
-            worth[p] = np.float32(weight[k, p]) * inside * inside
-            total[p] += worth[p]
+            worth[k, p] = np.float32(weight[k, p]) * inside * inside
+            total[p] += worth[k, p]
+            mean[p] += worth[k, p] * np.float32(luma[k, p])
+    for p in range(_AT_ONCE):
+        mean[p] /= total[p]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mean_colour(values, worth, mean):  # type: ignore[no-untyped-def]
+    """Write the mean colours of blocks (3, blocks); a block's samples weigh what its pixels' do (2, ...)."""
+    total, own = np.zeros(_BLOCKS_AT_ONCE, np.float32), np.empty(_BLOCKS_AT_ONCE, np.float32)
+    mean[:] = 0
+    for k in range(len(values)):
+        for q in range(_BLOCKS_AT_ONCE):
+            own[q] = worth[0, k, 2 * q] + worth[0, k, 2 * q + 1] + worth[1, k, 2 * q] + worth[1, k, 2 * q + 1]
+            total[q] += own[q]
         for c in range(3):
-            for p in range(_AT_ONCE):
-                mean[c, p] += worth[p] * np.float32(values[k, c, p])
+            for q in range(_BLOCKS_AT_ONCE):
+                mean[c, q] += own[q] * np.float32(values[k, c, q])
     for c in range(3):
-        for p in range(_AT_ONCE):
-            mean[c, p] /= total[p]
+        for q in range(_BLOCKS_AT_ONCE):
+            mean[c, q] /= total[q]
 
 
 @njit(cache=True, nogil=True)
-def _brightness(values, weight, four, total, count):  # type: ignore[no-untyped-def]
-    """Write four times the brightness (views, pixels); sum and count the weights."""
+def _summed(weight, total, count):  # type: ignore[no-untyped-def]
+    """Sum and count the weights (views, pixels)."""
     total[:] = 0
     count[:] = 0
-    for k in range(len(values)):
+    for k in range(len(weight)):
         for p in range(_AT_ONCE):
-            own, w = values[k], np.int32(weight[k, p])
-            four[k, p] = np.int32(own[0, p]) + _TWO * np.int32(own[1, p]) + np.int32(own[2, p])
+            w = np.int32(weight[k, p])
             total[p] += w
-            count[p] += min(w, np.int32(1))
+            count[p] += min(w, _ONE_COUNT)
 
 
-def blend_samples(values: Short, weights: Byte) -> tuple[Short, Byte]:
-    """Return robust weighted means (rows, columns, 3) and counts (rows, columns).
+def blend_samples(luma: Short, colour: Short, weights: Byte) -> tuple[Short, Short, Byte]:
+    """Return robust weighted means of luma (rows, columns) and colours (blocks), and counts (rows, columns).
 
-    Tukey's biweight on brightness about the weighted median, with the weighted median of absolute
-    deviations as scale, but at least 3 %: a glint or a passing shadow is left out, noise is averaged.
+    Tukey's biweight on luma about the weighted median, with the weighted median of absolute deviations as
+    scale, but at least 3 %: a glint or a passing shadow is left out, noise is averaged. Colours (rows / 2,
+    columns / 2, 3) are weighted as the luma of their pixels.
 
     Parameters
     ----------
-    values : (views, rows, 3, columns) uint16
+    luma : (views, rows, columns) uint16
         So many columns that 32 of them can be worked on at once.
+    colour : (views, rows / 2, 3, columns / 2) uint16
     weights : (views, rows, columns) uint8
         0 where a view does not show the pixel.
     """
     views, rows, columns = weights.shape
-    colour, count = np.zeros((rows, columns, 3), np.uint16), np.zeros((rows, columns), np.uint8)
-    _blend(values, weights, _sorting_network(views), colour, count)
-    return colour, count
+    mean, count = np.zeros((rows, columns), np.uint16), np.zeros((rows, columns), np.uint8)
+    mean_colour = np.zeros((rows // 2, columns // 2, 3), np.uint16)
+    _blend(luma, colour, weights, _sorting_network(views), mean, mean_colour, count)
+    return mean, mean_colour, count
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _blend(values, weights, network, colour, counts):  # type: ignore[no-untyped-def]
+def _gathered(luma, colour, weights, i, near, tint, weight):  # type: ignore[no-untyped-def]
+    """Write the samples of a pair of rows so that those worked on at once lie side by side."""
+    for k in range(luma.shape[0]):
+        for b in range(near.shape[1]):
+            for p in range(_AT_ONCE):
+                for r in range(2):
+                    near[r, b, k, p] = luma[k, 2 * i + r, b * _AT_ONCE + p]
+                    weight[r, b, k, p] = weights[k, 2 * i + r, b * _AT_ONCE + p]
+            for c in range(3):
+                for q in range(_BLOCKS_AT_ONCE):
+                    tint[b, k, c, q] = colour[k, i, c, b * _BLOCKS_AT_ONCE + q]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _blend(lumas, colours, weights, network, out, out_colour, counts):  # type: ignore[no-untyped-def]
     views, rows, columns = weights.shape
-    blocks, side = columns // _AT_ONCE, _AT_ONCE
-    near = np.empty((blocks, views, 3, side), np.uint16)
-    weight = np.empty((blocks, views, side), np.uint8)
-    four, key = np.empty((views, side), np.int32), np.empty((views, side), np.int32)
+    blocks, side, half = columns // _AT_ONCE, _AT_ONCE, np.float32(0.5)
+    near, weight = np.empty((2, blocks, views, side), np.uint16), np.empty((2, blocks, views, side), np.uint8)
+    tint, key = np.empty((blocks, views, 3, side // 2), np.uint16), np.empty((views, side), np.int32)
     middle, spread, below = np.empty(side, np.int32), np.empty(side, np.int32), np.empty(side, np.int32)
-    total, count, zero = np.empty(side, np.int32), np.empty(side, np.int32), np.zeros(side, np.int32)
-    mean = np.empty((3, side), np.float32)
-    for i in range(rows):
-        for k in range(views):
-            for b in range(blocks):
-                for p in range(side):
-                    weight[b, k, p] = weights[k, i, b * side + p]
-                    for c in range(3):
-                        near[b, k, c, p] = values[k, i, c, b * side + p]
+    total, count, zero = np.empty(side, np.int32), np.empty((2, side), np.int32), np.zeros(side, np.int32)
+    worth, mean = np.empty((2, views, side), np.float32), np.empty(side, np.float32)
+    mean_colour = np.empty((3, side // 2), np.float32)
+    for i in range(rows // 2):
+        _gathered(lumas, colours, weights, i, near, tint, weight)
         for b in range(blocks):
-            _brightness(near[b], weight[b], four, total, count)
-            _write_keys(four, weight[b], zero, key)
-            _weighted_median(key, network, total, below, middle)
-            _write_keys(four, weight[b], middle, key)
-            _weighted_median(key, network, total, below, spread)
-            _biweight_mean(near[b], four, weight[b], middle, spread, mean)
-            for p in range(side):
-                counts[i, b * side + p] = count[p]
+            for r in range(2):
+                _summed(weight[r, b], total, count[r])
+                _write_keys(near[r, b], weight[r, b], zero, key)
+                _weighted_median(key, network, total, below, middle)
+                _write_keys(near[r, b], weight[r, b], middle, key)
+                _weighted_median(key, network, total, below, spread)
+                _biweight_mean(near[r, b], weight[r, b], middle, spread, worth[r], mean)
+                for p in range(side):
+                    seen = count[r, p] > 0
+                    counts[2 * i + r, b * side + p] = count[r, p]
+                    out[2 * i + r, b * side + p] = np.int32(mean[p] + half) if seen else _ZERO
+            _mean_colour(tint[b], worth, mean_colour)
+            for q in range(side // 2):
+                seen = count[0, 2 * q] + count[0, 2 * q + 1] + count[1, 2 * q] + count[1, 2 * q + 1] > 0
                 for c in range(3):
-                    filled = mean[c, p] + np.float32(0.5) if count[p] > 0 else np.float32(0)
-                    colour[i, b * side + p, c] = np.uint16(np.int32(filled))
+                    filled = np.int32(mean_colour[c, q] + half) if seen else _ZERO
+                    out_colour[i, b * (side // 2) + q, c] = filled
+
+
+def _in_colour(luma: Short, colour: Short) -> Short:
+    """Return luma (rows, columns) with the colours (rows / 2, columns / 2, 3) of its blocks.
+
+    Differences of colour from luma go over linearly from block to block; blocks without a sample have none.
+    """
+    known = (colour.max(2) > 0).astype(np.float32)
+    small = colour.astype(np.float32)
+    grey = sum(np.float32(share) * small[..., c] for c, share in enumerate(_LUMA_OF_BGR))
+    layers = np.dstack([small - np.expand_dims(grey, -1), known])
+    large = cv2.resize(layers, luma.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    tint = large[..., :3] / np.maximum(large[..., 3:], _LEAST_KNOWN)
+    shown = np.clip(luma[..., None] + tint + np.float32(0.5), 0, 65535)
+    return np.where(luma[..., None] > 0, shown, 0).astype(np.uint16)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.arrays import Byte, Image
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
-from stages.texture.blend import TileStack
+from stages.texture.blend import SplitImage, TileStack
 from stages.texture.grid import FlatGrid
 from stages.texture.photometry import Light
 from stages.texture.project import project_tile
@@ -78,7 +78,8 @@ class Mosaic:
         for tile in tiles:
             self._ensure_open(tile)
         if image is not None and np.isfinite(self._light.gain[view]):
-            list(pool.map(lambda tile: self._sample(tile, view, image), tiles))
+            split = SplitImage.of(image)
+            list(pool.map(lambda tile: self._sample(tile, view, split), tiles))
         done = [tile for tile in tiles if self._plan[tile].views[-1] == view]
         list(pool.map(self._close, done))
 
@@ -89,7 +90,7 @@ class Mosaic:
                 self._spare.append(TileStack(self._most_views, self._grid.tile_rows, self._grid.columns))
             self._open[tile] = patch, self._spare.pop()
 
-    def _sample(self, tile: int, view: int, image: Image) -> None:
+    def _sample(self, tile: int, view: int, image: SplitImage) -> None:
         patch, stack = self._open[tile]
         gap = self._band if self._views.laser_on[view] else 0.0
         stack.add(

@@ -20,9 +20,13 @@ _BORDER_PX = 3.0
 
 @dataclass(frozen=True)
 class TileProjection:
-    """Per pixel of a tile: ``uv`` (n, m, 2), ``inverse_brightness`` (n, m) and ``weight`` (n, m), 0 to 1."""
+    """Per pixel of a tile: ``uv`` (n, m, 2), ``inverse_brightness`` (n, m) and ``weight`` (n, m), 0 to 1.
+
+    ``block_uv`` (n / 2, m / 2, 2) is where the middles of blocks of 2 by 2 pixels lie.
+    """
 
     uv: Float32
+    block_uv: Float32
     inverse_brightness: Float32
     weight: Float32
 
@@ -63,11 +67,12 @@ def project_tile(
     weight = _enlarge(worth * usable)
     if gap_mm > 0:
         weight = np.where(np.abs(_enlarge(from_sheet)) < gap_mm, np.float32(0), weight)
-    seen_at = _enlarge(np.where(valid[..., None], uv, -100.0))
+    node_uv = np.where(valid[..., None], uv, -100.0)
+    seen_at = _enlarge(node_uv)
     if left_out:
         weight = np.where(clear_of(left_out, seen_at), weight, np.float32(0))
     inverse = _enlarge(1 / np.maximum(brightness, 0.01))
-    return TileProjection(seen_at, inverse, weight)
+    return TileProjection(seen_at, _enlarge(node_uv, NODE_PX // 2), inverse, weight)
 
 
 def _quality(uv: Float, brightness: Float) -> Float:
@@ -78,7 +83,7 @@ def _quality(uv: Float, brightness: Float) -> Float:
     return np.asarray(quality / max(float(quality.max()), 1e-12))
 
 
-def _enlarge(nodes: Float) -> Float32:
-    """Return node values (n, m) or (n, m, 2) at all pixels, linearly; the outer ring of nodes is cut off."""
-    big = cv2.resize(nodes.astype(np.float32), None, fx=NODE_PX, fy=NODE_PX, interpolation=cv2.INTER_LINEAR)
-    return np.ascontiguousarray(big[NODE_PX:-NODE_PX, NODE_PX:-NODE_PX])
+def _enlarge(nodes: Float, by: int = NODE_PX) -> Float32:
+    """Return node values (n, m) or (n, m, 2) ``by`` times as fine, linearly; the outer nodes are cut off."""
+    big = cv2.resize(nodes.astype(np.float32), None, fx=by, fy=by, interpolation=cv2.INTER_LINEAR)
+    return np.ascontiguousarray(big[by:-by, by:-by])

@@ -7,11 +7,11 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Lighting
 from stages.rings.kernels import median
-from stages.texture.blend import blend_samples
+from stages.texture.blend import REFLECTANCE_SCALE, SplitImage, TileStack, blend_samples
 from stages.texture.grid import NODE_PX, FlatGrid, flat_grid, footprint_mm
 from stages.texture.light import irradiance
 from stages.texture.photometry import solve_light
-from stages.texture.project import _enlarge
+from stages.texture.project import TileProjection, _enlarge
 from stages.texture.sampling import LightSamples
 from stages.texture.surface import smoothed, wall_surface
 from stages.texture.views import LitViews, lit_views, plan_tiles, sheet_distance_mm
@@ -19,11 +19,10 @@ from tests.synthetic_wall import wall_of
 from tests.unit.drawn_pipe import BASELINE, RADIUS, poses, recording_of, small_probe, trajectory_of
 
 
-def plain_blend(values, weights):
-    """The same robust mean in plain numpy, one pixel."""
+def plain_blend(luma, weights):
+    """The robust weights of one pixel's samples (views,) and their mean, in plain numpy."""
     seen = weights > 0
-    colour, w = values[seen].astype(float), weights[seen].astype(float)
-    grey = colour @ [0.25, 0.5, 0.25]
+    grey, w = luma[seen].astype(float), weights[seen].astype(float)
 
     def median(x):
         order = np.argsort(x, kind="stable")
@@ -31,26 +30,51 @@ def plain_blend(values, weights):
 
     middle = median(grey)
     limit = 4.685 * max(1.4826 * median(np.abs(grey - middle)), 0.03 * middle + 1)
-    w = w * np.clip(1 - ((grey - middle) / limit) ** 2, 0, None) ** 2
-    return (colour * w[:, None]).sum(0) / w.sum()
+    worth = np.zeros(len(luma))
+    worth[seen] = w * np.clip(1 - ((grey - middle) / limit) ** 2, 0, None) ** 2
+    return worth, worth @ luma / worth.sum()
 
 
 def test_blend_agrees_with_plain_numpy():
     random = np.random.default_rng(1)
-    values = random.integers(3000, 4000, (15, 6, 3, 64)).astype(np.uint16)
-    values[4] = 20000
+    luma = random.integers(3000, 4000, (15, 6, 64)).astype(np.uint16)
+    colour = random.integers(2000, 5000, (15, 3, 3, 32)).astype(np.uint16)
+    luma[4] = colour[4] = 20000
     weights = random.integers(0, 255, (15, 6, 64)).astype(np.uint8)
     weights[3] = 0
-    colour, count = blend_samples(values, weights)
-    expected = [[plain_blend(values[:, i, :, j], weights[:, i, j]) for j in range(64)] for i in range(6)]
-    assert np.abs(colour - np.array(expected)).max() <= 0.51
+    mean, mean_colour, count = blend_samples(luma, colour, weights)
+    plain = [[plain_blend(luma[:, i, j], weights[:, i, j]) for j in range(64)] for i in range(6)]
+    assert np.abs(mean - [[pixel[1] for pixel in row] for row in plain]).max() <= 0.51
     assert np.array_equal(count, (weights > 0).sum(0))
+    worth = np.array([[pixel[0] for pixel in row] for row in plain])
+    block = worth[::2, ::2] + worth[::2, 1::2] + worth[1::2, ::2] + worth[1::2, 1::2]
+    expected = np.einsum("ijk,kicj->ijc", block, colour.astype(float)) / block.sum(2)[..., None]
+    assert np.abs(mean_colour - expected).max() <= 0.51
 
 
 def test_blend_leaves_pixels_without_samples_empty():
-    colour, count = blend_samples(np.ones((2, 3, 3, 32), np.uint16), np.zeros((2, 3, 32), np.uint8))
-    assert colour.max() == 0
-    assert count.max() == 0
+    luma, colour = np.ones((2, 4, 32), np.uint16), np.ones((2, 2, 3, 16), np.uint16)
+    mean, mean_colour, count = blend_samples(luma, colour, np.zeros((2, 4, 32), np.uint8))
+    assert mean.max() == mean_colour.max() == count.max() == 0
+
+
+def test_a_coloured_wall_comes_back_in_its_colours_and_its_luma_pixel_by_pixel():
+    u, v = np.meshgrid(np.arange(20, 84, dtype=np.float32), np.arange(10, 26, dtype=np.float32))
+    uv = np.stack([u, v], -1)
+    bright = np.random.default_rng(2).uniform(0.5, 1.0, (48, 120, 1))
+    image = np.round(bright * np.where(np.arange(120) < 52, 1, -1)[:, None] * [60, 0, -60] + 150 * bright)
+    split = SplitImage.of(image.astype(np.uint8))
+    ones, middles = np.ones((16, 64), np.float32), (uv[::2, ::2] + uv[1::2, 1::2]) / 2
+    stack = TileStack(2, 16, 64)
+    for _ in range(2):
+        stack.add(split, TileProjection(uv, middles, ones, ones))
+    seen, count = stack.blend()
+    told, true = seen / REFLECTANCE_SCALE, image[10:26, 20:84]
+    assert np.all(count == 2)
+    luma = [0.114, 0.587, 0.299]
+    assert np.abs(told @ luma - true @ luma).max() < 1.0
+    away = np.r_[0:28, 36:64]  # from where one colour meets the other
+    assert np.abs(told - true)[:, away].mean() < 6.0
 
 
 @pytest.mark.parametrize("values", [[3.0], [2.0, -1.0], [5.0, 1.0, 1.0], list(np.sin(np.arange(50.0)))])
