@@ -122,7 +122,7 @@ def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, A
         },
         "found": [_mismatch(m) for m in (*tried.found, *found.found)],
         "worst": [_mismatch(m) for m in found.worst],
-        "withdrawn": [_mismatch(m) for m in tried.withdrawn],
+        "withdrawn": [_mismatch(m) for m in (*tried.withdrawn, *found.withdrawn)],
         "gauge": gauge,
         "psnr_db": _known(found.psnr_db),
         "psnr_noise_free_db": _known(found.psnr_noise_free_db),

@@ -151,6 +151,8 @@ class Twin:
         χ² per pixel of lit wall by its brightness, grey levels above black; 1 σ that of as many pixels.
     worst : tuple of Mismatch
         Where lit wall differs most, whether or not it is explained: shown, not judged.
+    withdrawn : tuple of Mismatch
+        Names that single frames suggest and frames rendered again do not bear out.
     """
 
     frame: Int
@@ -169,6 +171,7 @@ class Twin:
     maps: tuple[TwinMap, ...] = ()
     by_level: tuple[NamedFigure, ...] = ()
     worst: tuple[Mismatch, ...] = ()
+    withdrawn: tuple[Mismatch, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
+from threadpoolctl import threadpool_limits
 
-from pipeline.arrays import Bool, Float32, Image, Int
+from pipeline.arrays import Bool, Float32, Int
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.twin import Mismatch, Twin
 from pipeline.errors import UnusableError
@@ -16,8 +17,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
-from stages.twin.cells import Cells, CellsOfFrames, sectors_of
-from stages.twin.compare import Comparison, block_contrasts, block_ratios, exposure_of
+from stages.twin.compare import Comparison, block_contrasts, block_ratios
 from stages.twin.locate import LEAST_CONTRAST, ImagePlace, beside, full_size, places_in_image
 from stages.twin.name import (
     cannot_tell,
@@ -25,19 +25,16 @@ from stages.twin.name import (
     left_over,
     maps_of,
     noise_figures,
-    of_texture,
     state_figures,
     worst_places,
 )
-from stages.twin.picture import WholePictures
-from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image, unnamed
+from stages.twin.reference import unnamed
+from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
-from stages.twin.state import PhotometricState, Region, Sampled, estimate_state, render_frame, sample_frames
-from stages.twin.window import WindowPlace, told_once
+from stages.twin.state import PhotometricState, Sampled, estimate_state, sample_frames
+from stages.twin.sums import Sums
 
 _EVERY = 10
-_MOST_STRAY = 8
-"""Laser frames that are looked at for stray light: each takes as long as a lit frame."""
 
 
 class PhotometryParameters(Parameters):
@@ -95,8 +92,9 @@ def measure_photometry(
     context: Context,
 ) -> Photometry:
     """Estimate camera noise, lamps, laser line, blur and dirt from frames that the run has measured."""
-    scene = scene_of(probe, trajectory, wall, texture, parameters.blur_px)
-    return photometry_of(scene, recording, frames, rings, parameters, context)
+    with threadpool_limits(1, "blas"):  # its threads wait for each other longer than they work
+        scene = scene_of(probe, trajectory, wall, texture, parameters.blur_px)
+        return photometry_of(scene, recording, frames, rings, parameters, context)
 
 
 def photometry_of(
@@ -136,8 +134,9 @@ def compare_with_twin(
     UnusableError
         When no frame could be re-rendered.
     """
-    scene = scene_of(probe, trajectory, wall, texture, photometry.blur_px)
-    return compared_with(scene, recording, frames, rings, photometry, parameters, context)
+    with threadpool_limits(1, "blas"):
+        scene = scene_of(probe, trajectory, wall, texture, photometry.blur_px)
+        return compared_with(scene, recording, frames, rings, photometry, parameters, context)
 
 
 def compared_with(
@@ -149,7 +148,7 @@ def compared_with(
     if frames.withheld is None:
         context.warn(_NONE_WITHHELD)
     light = dict(zip(frames.frame.tolist(), frames.illumination.tolist(), strict=True))
-    sums = Sums(scene, photometry)
+    sums = Sums(scene, photometry.state, (*photometry.places, *photometry.blurred))
     for done, (frame, image) in enumerate(recording.read(compared, "grey")):
         context.progress(done, len(compared))
         if image is not None:
@@ -157,15 +156,11 @@ def compared_with(
     comparison = sums.comparison
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
-    state, samples, whole = (
-        photometry.state,
-        sums.blocks.samples(),
-        sums.whole.found(photometry.state.sharpness),
-    )
+    state, samples = photometry.state, sums.blocks.samples()
+    whole, withdrawn = sums.named(samples, recording)
     found: tuple[Mismatch, ...] = (
-        *causes(*sums.cells(), scene.probe.lighting, scene.ring),
-        *sums.on_window(samples), *unnamed(samples), *whole, *of_texture(state, samples, sums.whole, whole),
-        *clipped(rings, comparison.clipped_wall / max(comparison.lit, 1.0)),
+        *causes(*sums.cells(), scene.probe.lighting, scene.ring), *sums.on_window(samples),
+        *unnamed(samples), *whole, *clipped(rings, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(samples)
     comparison.after[Region.WALL] -= fall
@@ -175,65 +170,8 @@ def compared_with(
         noise_figures(state.noise), (*state_figures(state), *unnamed_map), comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
-        maps_of(samples), comparison.levels(), worst_places(samples),
+        maps_of(samples), comparison.levels(), worst_places(samples), withdrawn,
     )  # fmt: skip
-
-
-class Sums:
-    """What is kept of the compared frames: χ², blocks, places of dirt, and brightness in sectors."""
-
-    def __init__(self, scene: Scene, photometry: Photometry) -> None:
-        self._scene, self._state = scene, photometry.state
-        self.comparison = Comparison()
-        self.window = [WindowPlace(p) for p in (*photometry.places, *photometry.blurred)]
-        self.blocks = BlocksOfFrames(scene.surface.mean_radius_mm)
-        self.lit, self.line = CellsOfFrames(), CellsOfFrames()
-        self.whole = WholePictures(scene)
-        self._sector = sectors_of(scene.polar[1])
-
-    def add(self, frame: int, kind: Illumination, image: Image) -> None:
-        """Compare a frame (H, W) with its twin."""
-        noise = self._state.noise
-        above = image.astype(np.float32) - np.float32(noise.black.value)
-        before = render_frame(self._scene, self._state, frame, kind)
-        gain = self._state.gain_map
-        after = before if gain is None else before.brighter(gain, noise)
-        free = above < noise.white - noise.black.value
-        if kind != Illumination.LASER:
-            self.lit.add(frame, above, after, free & (after.region == Region.WALL), self._sector)
-        if kind == Illumination.LASER:
-            near = (after.region == Region.LINE_CORE) | (after.region == Region.LINE_FLANK)
-            self.line.add_line(frame, above, after, free & near, self._sector)
-        if kind == Illumination.LED:
-            self.blocks.add(frame, above, before, noise.white - noise.black.value)
-        exposure = float(np.exp(exposure_of(above, after)))
-        after = after.brighter(exposure, noise)
-        if kind == Illumination.LED:
-            exposed = before.brighter(exposure, noise)
-            for place in self.window:
-                place.add(frame, above, exposed, free)
-            self.whole.add_lit(frame, above, after, free)
-        if kind == Illumination.LASER and len(self.whole.stray) < _MOST_STRAY:
-            lit = render_frame(self._scene, self._state, frame, Illumination.LED)
-            self.whole.add_laser(frame, above, after, free, lit)
-        self.whole.add_clipped(frame, above, after, free)
-        self.comparison.add(frame, kind, above, before, after, noise)
-
-    def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
-        """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
-        fixed_to = in_image(samples, tuple(w.place for w in self.window))
-        judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
-        return told_once([m for m in judged if m is not None])
-
-    def cells(self) -> tuple[Cells | None, Cells | None]:
-        """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser."""
-        lit, line, state = self.lit.cells(), self.line.cells(), self._state
-        if lit is not None and state.lamp is not None:
-            lit = lit.on(-np.array([[state.lamp.gain.at(f)] for f in lit.frame]))
-        if line is not None and state.line is not None:
-            power = [[state.line.course.at(f)] for f in line.frame]
-            line = line.on(-np.array(power) - state.line.log_power)
-        return lit, line
 
 
 _NONE_WITHHELD = (
@@ -261,12 +199,12 @@ def _blocks(
     scene: Scene, state: PhotometricState, sampled: list[Sampled]
 ) -> tuple[list[Float32], list[Float32]]:
     """Return recorded over predicted brightness, and texture, of blocks of the sampled lit frames."""
-    black = state.noise.black.value
+    black, renderer = state.noise.black.value, Renderer(scene, state)
     made = [
         [f(s.image - black, twin, state.noise.white - black) for f in (block_ratios, block_contrasts)]
         for s in sampled
         if s.light == Illumination.LED
-        for twin in [render_frame(scene, state, s.frame, s.light)]
+        for twin in [renderer.frame(s.frame, s.light)]
     ]
     return [m[0] for m in made], [m[1] for m in made]
 
@@ -281,14 +219,14 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "4",
+    "5",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
 )
 TWIN = Stage(
     "twin",
-    "9",
+    "10",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import t
 
 from pipeline.arrays import Bool, Float, Float32, Int
-from stages.twin.state import TwinFrame
+from stages.twin.render import TwinFrame
 
 SECTORS = 36
 _FEWEST_PIXELS, _LEAST_RATIO = 60, 0.02

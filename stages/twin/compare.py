@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import cv2
+import numba
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import NamedFigure, RegionFit, TwinView
 from pipeline.recording.base import Illumination
 from stages.twin.noise import CameraNoise
-from stages.twin.state import Region, TwinFrame
+from stages.twin.render import Region, TwinFrame
 
 BLOCK_PX = 8
 """Side of the blocks in which a difference is looked for that stays in one place of the image."""
@@ -21,6 +22,8 @@ _SILENT = 0.92
 """Share of pixels at one grey level from which noise is less than that of rounding, 1/√12: erf(√1.5)."""
 _LEAST_TEXTURE = 4.0
 """Variance of fine texture, grey levels squared, from which its share shows through noise of 576 pixels."""
+_DARK, _AT_BLACK = int(Region.DARK), 0.5
+"""The region as the compiled sums know it; half a grey level: at black to the level."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
 
@@ -73,16 +76,13 @@ class Comparison:
     ) -> None:  # fmt: skip
         """Count a frame, its grey levels (H, W) given above black."""
         region = before.region
-        z = np.asarray((above_black - after.level) / np.sqrt(after.variance), np.float32)
-        size = np.bincount(region.ravel(), minlength=len(Region)).astype(float)
+        z, sums = _differences(region, above_black, *_pair(before), *_pair(after), _STRAY)
+        size, before_sum, after_sum = sums[:3]
         self.pixels += size
-        self.before += np.bincount(region.ravel(), _chi2(above_black, before).ravel(), len(Region))
-        after_sum = np.bincount(region.ravel(), (z**2).ravel(), len(Region))
+        self.before += before_sum
         self.after += after_sum
         self.clipped = noise.clips_black
-        dark = region == Region.DARK
-        self.stray += float((z[dark] > _STRAY).sum())
-        self.still += float((np.abs(above_black[dark]) < 0.5).sum())
+        self.stray, self.still = self.stray + sums[3, 0], self.still + sums[3, 1]
         wall = region == Region.WALL
         if light != Illumination.LASER:
             square = (above_black - after.level)[wall].astype(float) ** 2
@@ -145,8 +145,26 @@ class Comparison:
         return float(10 * np.log10(_FULL_SCALE**2 * self.lit / left)) if left > 0 else float("inf")
 
 
-def _chi2(above_black: Float32, twin: TwinFrame) -> Float32:
-    return np.asarray((above_black - twin.level) ** 2 / twin.variance)
+def _pair(twin: TwinFrame) -> tuple[Float32, Float32]:
+    return twin.level, twin.variance
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _differences(region, above, level, variance, level_after, variance_after, stray):  # type: ignore[no-untyped-def]
+    """Return z (H, W) after, and of each region pixels and χ² before and after; then stray and still dark."""
+    z, sums = np.empty_like(above), np.zeros((4, 6))
+    for i in range(region.shape[0]):
+        for j in range(region.shape[1]):
+            r = region[i, j]
+            rest = above[i, j] - level[i, j]
+            z[i, j] = (above[i, j] - level_after[i, j]) / np.sqrt(variance_after[i, j])
+            sums[0, r] += 1
+            sums[1, r] += rest * rest / variance[i, j]
+            sums[2, r] += z[i, j] * z[i, j]
+            if r == _DARK:
+                sums[3, 0] += z[i, j] > stray
+                sums[3, 1] += abs(above[i, j]) < _AT_BLACK
+    return z, sums
 
 
 def _view(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipeline.arrays import Bool, Byte, Float, Int
@@ -9,6 +11,7 @@ from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.artefacts.twin import Mismatch, NamedFigure, TwinMap
 from stages.twin.cells import centred, chance_of, sigmas
 from stages.twin.compare import BLOCK_PX
+from stages.twin.gate import Suspected
 from stages.twin.line_light import LineLight
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.noise import CameraNoise
@@ -16,6 +19,7 @@ from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, OF_LAW, WholePictu
 from stages.twin.reference import SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
 from stages.twin.scene import Ring
 from stages.twin.state import PhotometricState
+from stages.twin.switched import IN_FOCUS_PX, defocus, response, wide_line
 
 _CLIPPED, _CLIPPED_WALL = 0.05, 0.01
 """Share of ring samples, and of pixels of lit wall, from which clipping is told."""
@@ -27,9 +31,6 @@ _OF_BLOCKS = 0.005
 _MAP_BLOCKS, _USUAL_GAIN, _USUAL_OFFSET, _MEDIAN_OF_SQUARE = 4, 0.02, 1.0, 0.455
 """Blocks to a cell of the map of gain and offset; what a cell usually has: as much as no law names; median of
 the square of a normal number."""
-_IN_FOCUS_PX = 1.2
-"""1 σ of lens and pixel that lenses in focus stay below: a pixel's own is 0.29, and a spot two pixels wide at
-half height has 0.85."""
 
 
 def clipped(rings: RingSamples, wall_share: float) -> tuple[Mismatch, ...]:
@@ -52,83 +53,82 @@ def clipped(rings: RingSamples, wall_share: float) -> tuple[Mismatch, ...]:
     return tuple(found)
 
 
-def _not_sharp(line: LineLight | None) -> tuple[Mismatch, ...]:
-    """Return a line that is wider than its sheet and a lens in focus make it.
-
-    Its width is held against a fixed limit, not against other frames: the run's photo is as blurred as its
-    frames, and re-rendered ones are, too.
-    """
-    if line is None or line.blur_px.value - 3 * line.blur_px.sd < _IN_FOCUS_PX:
-        return ()
-    blur, nan = line.blur_px, float("nan")
-    return (
-        Mismatch(
-            "defocus or thick_sheet", "line", "line", (), (NamedFigure("blur", blur.value, blur.sd, "px"),),
-            nan, nan, nan,
-            f"The line is blurred by {blur.value:.1f} px (1 σ) beyond its sheet's stated thickness: the lens "
-            "is out of focus, or the sheet is thicker than stated. In one diameter the two look alike.",
-        ),
-    )  # fmt: skip
-
-
-def of_texture(
-    state: PhotometricState, samples: BlockSamples | None, whole: WholePictures, others: tuple[Mismatch, ...]
-) -> tuple[Mismatch, ...]:
-    """Return response and focus; ``others`` are laws of whole pictures that were found."""
-    power = _response(samples, whole.scene.ring)
-    if power is not None:  # where contrast follows another power, its curvature tells nothing of blur
-        return (power,)
-    moved = sum(m.parameters[0].value for m in others if m.name == "motion_blur")
-    return _defocus(whole, whole.even_blur(state.sharpness) - moved**2 / 2) or _not_sharp(state.line)
-
-
-def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Mismatch, ...]:
-    """Return a blur beyond that of the photo and of motion, by half its variance (F,), px²."""
-    if (
-        not whole.loses_texture
-        or len(half_variance) < FEWEST_FRAMES
-        or half_variance.mean() < LEAST_BLUR_PX**2 / 2
-    ):
-        return ()
-    each, nan = np.sqrt(2 * np.maximum(half_variance, 0)), float("nan")
-    blur = float(each.mean())
-    sd = float(np.hypot(each.std() / np.sqrt(len(each)), OF_LAW * blur))
-    return (
-        Mismatch(
-            "defocus", "intensity", "image", (), (NamedFigure("blur", blur, sd, "px"),),
-            chance_of(half_variance), nan, nan,
-            f"Lit frames are blurred by {blur:.1f} px (1 σ) beyond the wall's photo in all directions.",
-            whole.scene.ring.whole(whole.frame["blur"][0]),
-        ),
-    )  # fmt: skip
-
-
-def _response(samples: BlockSamples | None, ring: Ring) -> Mismatch | None:
+def response_of(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:
     """Return a response whose contrast differs from the photo's, from the blocks of lit frames.
 
     Blocks and the means of sixteen must tell the same: a photo that is displaced or blurred loses contrast in
     fine texture alone.
     """
     if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
-        return None
-    each, coarse = (_exponents(samples, side) for side in (1, _MAP_BLOCKS))
+        return ()
+    (frame, each), (_, coarse) = (_exponents(samples, side) for side in (1, _MAP_BLOCKS))
     power, least = float(each.mean()), abs(float(coarse.mean()) - 1)
     chance, way = max(chance_of(e - 1) for e in (each, coarse)), np.sign(power - 1)
     sure = min(sigmas((e - 1) * way) for e in (each, coarse)) > _SURE_OF_POWER
     alike = abs(float(coarse.mean()) - power) < _ALIKE * abs(power - 1)
     if chance > FALSE_ALARM or least < _LEAST_POWER or not sure or not alike:
-        return None
+        return ()
     sd = float(np.hypot(each.std() / np.sqrt(len(each)), _OF_BLOCKS))
-    figure, nan = NamedFigure("exponent", power, sd), float("nan")
-    return Mismatch(
-        "response", "intensity", "image", (), (figure,), chance, nan, nan,
+    nan = float("nan")
+    found = Mismatch(
+        "response", "intensity", "image", (), (NamedFigure("exponent", power, sd),), chance, nan, nan,
         f"Recorded wall has the contrast of its photo to the power {power:.2f}: the response is another "
         "than the photo's.", ring.whole(int(samples.number[0])),
     )  # fmt: skip
+    return (Suspected(found, response, samples.number[frame], each[:, None]),)
 
 
-def _exponents(samples: BlockSamples, side: int) -> Float:
-    """Return the exponent (F,) between recorded and foretold brightness of cells of so many blocks a side.
+def focus_of(
+    state: PhotometricState, whole: WholePictures, named: Sequence[Mismatch]
+) -> tuple[Suspected, ...]:
+    """Return a blur of lit frames, or else of the line; ``named`` are laws of whole pictures that stand.
+
+    Where contrast follows another power than the photo's, its curvature tells nothing of blur.
+    """
+    if any(m.name == "response" for m in named):
+        return ()
+    moved = sum(m.parameters[0].value for m in named if m.name == "motion_blur")
+    half_variance = whole.even_blur(state.sharpness) - moved**2 / 2
+    return _defocus(whole, half_variance) or _not_sharp(state.line, whole)
+
+
+def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Suspected, ...]:
+    """Return a blur beyond that of the photo and of motion, by half its variance (F,), px²."""
+    few = len(half_variance) < FEWEST_FRAMES
+    if few or not whole.loses_texture or half_variance.mean() < LEAST_BLUR_PX**2 / 2:
+        return ()
+    each, nan = np.sqrt(2 * np.maximum(half_variance, 0)), float("nan")
+    blur = float(each.mean())
+    sd = float(np.hypot(each.std() / np.sqrt(len(each)), OF_LAW * blur))
+    found = Mismatch(
+        "defocus", "intensity", "image", (), (NamedFigure("blur", blur, sd, "px"),), chance_of(half_variance),
+        nan, nan, f"Lit frames are blurred by {blur:.1f} px (1 σ) beyond the wall's photo in all directions.",
+        whole.scene.ring.whole(whole.frame["blur"][0]),
+    )  # fmt: skip
+    return (Suspected(found, defocus, whole.frames_of("blur"), half_variance[:, None]),)
+
+
+def _not_sharp(line: LineLight | None, whole: WholePictures) -> tuple[Suspected, ...]:
+    """Return a line that is wider than its sheet and a lens in focus make it.
+
+    Its width is held against a fixed limit: the run's photo is as blurred as its frames.
+    """
+    if line is None or line.blur_px.value - 3 * line.blur_px.sd < IN_FOCUS_PX:
+        return ()
+    blur, nan, frame = line.blur_px, float("nan"), whole.frames_of("line")
+    found = Mismatch(
+        "defocus or thick_sheet", "line", "line", (), (NamedFigure("blur", blur.value, blur.sd, "px"),),
+        nan, nan, nan,
+        f"The line is blurred by {blur.value:.1f} px (1 σ) beyond its sheet's stated thickness: the lens "
+        "is out of focus, or the sheet is thicker than stated. In one diameter the two look alike.",
+    )  # fmt: skip
+    return (Suspected(found, wide_line, frame, np.full((len(frame), 1), blur.value)),)
+
+
+def _exponents(samples: BlockSamples, side: int) -> tuple[Int, Float]:
+    """Return frames (F,) and their exponents (F,) between recorded and foretold brightness.
+
+    Cells have so many blocks a side.
 
     What stays at one place of the image is taken off: light, vignette and dirt are no response.
     """
@@ -139,7 +139,8 @@ def _exponents(samples: BlockSamples, side: int) -> Float:
     frame, place = cell[whole] // 10_000_000, np.unique(cell[whole] % 10_000_000, return_inverse=True)[1]
     x, y = (centred((np.bincount(of, v) / count)[whole], place, frame) for v in logs)
     above, below = (np.bincount(frame, v, samples.frame.max() + 1) for v in (x * y, x * x))
-    return np.asarray((above / np.maximum(below, 1e-9))[below > 0])
+    seen = np.flatnonzero(below > 0)
+    return seen, np.asarray(above[seen] / below[seen])
 
 
 def left_over(samples: BlockSamples | None) -> tuple[float, tuple[NamedFigure, ...]]:

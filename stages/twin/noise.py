@@ -54,13 +54,12 @@ class CameraNoise:
 
     def variance(self, above_black: Float32) -> Float32:
         """Return the variance (...) of pixels so many grey levels above black."""
-        level = np.maximum(above_black, 0)
-        return np.asarray(
-            np.float32(max(self.read_variance.value, _LEAST_VARIANCE))
-            + np.float32(self.variance_per_level.value) * level
-            + np.float32(self.uneven.value**2) * level**2,
-            np.float32,
-        )
+        level = np.maximum(above_black, np.float32(0))
+        out = np.multiply(level, np.float32(self.uneven.value**2))
+        out += np.float32(self.variance_per_level.value)
+        out *= level
+        out += np.float32(max(self.read_variance.value, _LEAST_VARIANCE))
+        return out
 
     @property
     def clips_black(self) -> bool:

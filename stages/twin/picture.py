@@ -1,9 +1,9 @@
-"""Laws of whole pictures: blur by motion, response, stray light, bloom, a second line.
+"""Laws of whole pictures: blur by motion, stray light, bloom. A second line: `stages.twin.second_ring`.
 
-Every frame gives the size of each law by itself, from least squares over its pixels or blocks; a size counts
-if frames agree on it beyond chance. Laws that act on texture are columns beside those of exposure and of a
-displaced photo, which they must not be taken for. A change of σ² of the blur along a direction α changes the
-picture by σ²/2 · d²L/dα².
+Every frame gives the size of each law by itself, from least squares over its pixels or blocks; a law on whose
+size frames agree beyond chance is suspected, and judged by `stages.twin.gate`. Laws that act on texture are
+columns beside those of exposure and of a displaced photo, which they must not be taken for. A change of σ² of
+the blur along a direction α changes the picture by σ²/2 · d²L/dα².
 """
 
 from __future__ import annotations
@@ -13,18 +13,28 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from scipy.ndimage import median_filter
 
-from pipeline.arrays import Bool, Float, Float32
+from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import chance_of, sigmas
 from stages.twin.compare import of_blocks
+from stages.twin.gate import Suspected
 from stages.twin.locate import FALSE_ALARM
+from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
-from stages.twin.state import Region, TwinFrame
+from stages.twin.second_ring import ring_profile, second_ring
+from stages.twin.switched import (
+    STEP,
+    TILE,
+    bloom,
+    bounced,
+    leaked,
+    motion_blur,
+    stray,
+)
 
-_SURE, FEWEST_FRAMES, _STEP, _TILE = 3.0, 6, 2, 16
-"""σ by which laws are told apart; frames; every second pixel; side of tiles that halve a picture."""
+_SURE, FEWEST_FRAMES = 3.0, 6
+"""σ by which laws are told apart; frames."""
 LEAST_BLUR_PX = 0.7
 """Least motion blur that is named, 1 σ: as much as a sharp lens and a pixel blur by themselves."""
 _ONE_WAY = 0.6
@@ -39,11 +49,9 @@ _FINE_PX, _KEPT = 9, 1.0
 _DIRECTIONS = ("even", "across", "slanted", "radial")
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
 """Rounds of leaving out blocks that differ, and least spread of blocks, grey levels."""
-_BLOOM_PX, _CLIPPED, _LEAST_BLOOM, _NEAR = 6.0, 200, 0.01, 0.02
-"""Way along a column that leaves 1/e of the bloom, pixels that must clip, least leak and spread."""
-_RATIOS, _REACH, _FAR_WIDTHS, _LEAST_LINE, _AROUND = 400, 0.8, 14.0, 0.01, 25
-"""Bins and reach of ln(radius over the line's), px that belong to the line, least share of a second one,
-and bins about each that tell what it stands out from."""
+_CLIPPED, _LEAST_BLOOM, _NEAR = 200, 0.01, 0.02
+"""Pixels that must clip, least leak and spread."""
+_ALONG = "along the pipe"
 
 
 @dataclass
@@ -78,16 +86,16 @@ class WholePictures:
 
     def add_lit(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped."""
-        inner = (slice(_STEP, -_STEP, _STEP),) * 2
+        inner = (slice(STEP, -STEP, STEP),) * 2
         use = cv2.erode((free & (twin.region == Region.WALL)).astype(np.uint8), np.ones((5, 5), np.uint8))
         at = np.flatnonzero(use[inner])
-        if len(at) < _TILE**2:
+        if len(at) < TILE**2:
             return
         columns = self._columns(twin.level, inner).reshape(-1, use[inner].size)[:, at]
         weight = np.asarray(1 / np.sqrt(twin.variance[inner].ravel()[at]), np.float32)
         columns, rest = columns * weight, (above - twin.level)[inner].ravel()[at] * weight
         row, column = np.unravel_index(at, use[inner].shape)
-        half = (row // _TILE + column // _TILE) % 2
+        half = (row // TILE + column // TILE) % 2
         sums = [(c @ c.T, c @ rest[half == h]) for h in (0, 1) for c in [columns[:, half == h]]]
         self.blur.append((np.stack([s[0] for s in sums]).astype(float), np.stack([s[1] for s in sums])))
         fine = [(a - cv2.blur(a, (_FINE_PX, _FINE_PX)))[inner].ravel()[at] for a in (above, twin.level)]
@@ -99,7 +107,7 @@ class WholePictures:
 
         def at(down: int, right: int) -> Float32:
             both = zip((down, right), level.shape, strict=True)
-            return np.asarray(level[tuple(slice(_STEP + d, n - _STEP + d, _STEP) for d, n in both)])
+            return np.asarray(level[tuple(slice(STEP + d, n - STEP + d, STEP) for d, n in both)])
 
         here, phi = at(0, 0), self.scene.polar[1][inner]
         du, dv = (at(0, 1) - at(0, -1)) / 2, (at(1, 0) - at(-1, 0)) / 2
@@ -115,53 +123,24 @@ class WholePictures:
         line = (twin.region == Region.LINE_CORE) | (twin.region == Region.LINE_FLANK)
         away = cv2.dilate(line.astype(np.uint8), np.ones((9, 9), np.uint8)) == 0
         known = away & (lit.region == Region.WALL) & free
-        glow = self._bounced(twin, lit)
+        glow = bounced(self.scene, twin, lit)
         small = [of_blocks(np.where(known, a, 0)) for a in (np.ones_like(above), above, lit.level, glow)]
         whole = small[0] > 0.99
-        if whole.sum() < _TILE**2:
+        if whole.sum() < TILE**2:
             return
         value, *columns = (a[whole].astype(float) for a in small[1:])
         self.stray.append(np.array([_size_beside_one(value, c) for c in columns]))
         self.frame["stray"].append(frame)
-        self._add_ghost(frame, above, twin, free & (twin.region != Region.EDGE))
-
-    def _bounced(self, twin: TwinFrame, lit: TwinFrame) -> Float32:
-        """Return light of the line bounced once in a round bore, up to a factor."""
-        on_line = twin.distance_mm[twin.region == Region.LINE_CORE]
-        middle = float(np.nanmedian(on_line)) if len(on_line) else np.nan
-        x = np.abs(lit.distance_mm - np.float32(middle)) / np.float32(2 * self.scene.surface.mean_radius_mm)
-        share = 1 - x * (2 * x**2 + 3) / (2 * (x**2 + 1) ** 1.5)
-        return np.asarray(np.nan_to_num(100 * share), np.float32)
-
-    def _add_ghost(self, frame: int, above: Float32, twin: TwinFrame, use: Bool) -> None:
-        rows, columns = np.nonzero(twin.region == Region.LINE_CORE)
-        u, v = self.scene.ring.centre_px
-        degree = np.floor(np.degrees(np.arctan2(rows - v, columns - u)) + 180).astype(int) % 360
-        count = np.bincount(degree, minlength=360)
-        if (count == 0).mean() > 0.5:
-            return
-        radius = np.bincount(degree, np.hypot(rows - v, columns - u), 360) / np.maximum(count, 1)
-        radius = np.interp(np.arange(360), np.flatnonzero(count), radius[count > 0], period=360)
-        row, column = np.nonzero(use[::_STEP, ::_STEP])
-        grey, away = above[::_STEP, ::_STEP][row, column], (_STEP * column - u, _STEP * row - v)
-        turn = (np.degrees(np.arctan2(away[1], away[0])) + 180) % 360
-        ratio = np.log(np.maximum(np.hypot(*away), 1) / radius[turn.astype(int) % 360])
-        cell = np.floor((ratio / _REACH + 1) / 2 * _RATIOS).astype(int)
-        inside = (cell >= 0) & (cell < _RATIOS)
-        cell = (turn[inside] // 90).astype(int) % 4 * _RATIOS + cell[inside]
-        total, pixels = (np.bincount(cell, w, 4 * _RATIOS) for w in (grey[inside], None))
-        mean = np.where(pixels > 3, total / np.maximum(pixels, 1), np.nan)
-        self.ghost.append(mean.reshape(4, _RATIOS))
-        self.frame["ghost"].append(frame)
+        around = ring_profile(self.scene.ring, above, twin, free & (twin.region != Region.EDGE))
+        if around is not None:
+            self.ghost.append(around)
+            self.frame["ghost"].append(frame)
 
     def add_clipped(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take any frame: what leaks from clipped pixels along columns, and along rows for comparison."""
         if (~free).sum() < _CLIPPED:
             return
-        reach = np.arange(-int(4 * _BLOOM_PX), int(4 * _BLOOM_PX) + 1)
-        tail, one = np.exp(-np.abs(reach) / _BLOOM_PX), np.ones(1)
-        full, tail = (~free).astype(np.float32), tail / tail.sum()
-        spread = [cv2.sepFilter2D(full, -1, *k) for k in ((one, tail), (tail, one))]
+        spread = leaked(free)
         known = (twin.region != Region.UNSEEN) & (twin.region != Region.EDGE)
         near = free & known & (spread[0] + spread[1] > _NEAR)
         columns = np.stack([*(s[near] for s in spread), twin.level[near]]).astype(float)
@@ -170,10 +149,26 @@ class WholePictures:
         self.bloom.append(np.linalg.solve(own, columns @ rest)[:2])
         self.frame["bloom"].append(frame)
 
-    def found(self, sharpness: Float) -> tuple[Mismatch, ...]:
+    def suspected(self, sharpness: Float) -> tuple[Suspected, ...]:
         """Return what frames agree on; ``sharpness`` (Z,) is half the variance by which they are blurrier."""
-        made = (self._motion_blur(sharpness), self._stray(), self._bloom(), self._second())
+        made = (
+            self._motion_blur(sharpness),
+            self._stray(),
+            self._bloom(),
+            second_ring(self.scene.ring, self.ghost, self.frames_of("ghost")),
+        )
         return tuple(m for m in made if m is not None)
+
+    def frames_of(self, law: str) -> Int:
+        """Return the frames (F,) that told of a law."""
+        return np.array(self.frame[law], np.int64)
+
+    def direction(self, frame: int) -> Float:
+        """Return cosine and sine of twice the angle of a frame's blur, as each half (2, 2) tells it."""
+        if frame not in self.frame["blur"]:
+            return np.tile([1.0, 0.0], (2, 1))
+        own, cross = self.blur[self.frame["blur"].index(frame)]
+        return np.array([_blur_of(o, c)[1:3] for o, c in zip(own, cross, strict=True)])
 
     def _blurs(self) -> Float:
         """Half the variances (F, 2, 4) that frames are blurred by, of both halves."""
@@ -189,15 +184,15 @@ class WholePictures:
         """Return half the variance (F,), px², by which lit frames are blurrier than the photo all round."""
         return np.asarray(self._blurs()[:, :, 0].mean(1) + np.mean(sharpness))
 
-    def _motion_blur(self, sharpness: Float) -> Mismatch | None:
+    def _motion_blur(self, sharpness: Float) -> Suspected | None:
         if len(self.blur) < FEWEST_FRAMES:
             return None
         each = self._blurs()
         uniform = (each[:, 0, 1:3] * each[:, 1, 1:3]).sum(1)
         radial = np.maximum(each[:, :, 3].mean(1), 0) ** 2 * np.sign(each[:, :, 3].mean(1))
-        ways = ((uniform, "sideways"), (radial, "along the pipe"))
+        ways = ((uniform, "sideways"), (radial, _ALONG))
         product, way = max(ways, key=lambda p: float(p[0].mean()))
-        size = float(np.sqrt(2 * np.sqrt(max(product.mean(), 0.0))))
+        size = _blur_px(product.mean())
         chance = chance_of(product)
         if size**2 / 2 < _ONE_WAY * self.even_blur(sharpness).mean():
             return None  # blur in all directions, which fine texture of one direction shows more
@@ -205,12 +200,16 @@ class WholePictures:
             return None
         spread = float(product.std() / np.sqrt(len(product))) / max(float(product.mean()), 1e-12) / 4
         sd = size * float(np.hypot(spread, OF_LAW))
-        return self._mismatch(
+        found = self._mismatch(
             "motion_blur", "time", NamedFigure("blur", size, sd, "px"), chance, "blur",
             f"Frames are blurred by {size:.1f} px (1 σ) {way}, and less across: they move while exposed.",
         )  # fmt: skip
+        told, along = product[:, None], float(way == _ALONG)
+        return Suspected(
+            found, motion_blur, self.frames_of("blur"), told, lambda m: np.array([_blur_px(m[0]), along])
+        )
 
-    def _stray(self) -> Mismatch | None:
+    def _stray(self) -> Suspected | None:
         if len(self.stray) < FEWEST_FRAMES:
             return None
         size, level, fall = np.moveaxis(np.stack(self.stray), -1, 0)
@@ -222,13 +221,14 @@ class WholePictures:
         told = sigmas(fall[:, k] - fall[:, 1 - k]) > _SURE
         name, grey = (names[k] if told else " or ".join(names)), share * level[:, k]
         sd = float(np.std(size[:, k])) / np.sqrt(len(size)) * float(level[:, k].mean())
-        return self._mismatch(
+        found = self._mismatch(
             name, "wall", NamedFigure("level", float(grey.mean()), sd, "grey levels"), chance, "stray",
             f"With the LEDs off the wall away from the line is up to {grey.mean():.1f} grey levels bright: "
             "other light, the line's own from wall to wall, or what a codec keeps of the frame before.",
         )  # fmt: skip
+        return Suspected(found, stray(k), self.frames_of("stray"), size)
 
-    def _bloom(self) -> Mismatch | None:
+    def _bloom(self) -> Suspected | None:
         if len(self.bloom) < FEWEST_FRAMES:
             return None
         leak = np.stack(self.bloom) / 255.0
@@ -237,40 +237,17 @@ class WholePictures:
         if chance > FALSE_ALARM or sigmas(more) < _SURE or size < _LEAST_BLOOM:
             return None
         figure = NamedFigure("leak", size, float(more.std()) / np.sqrt(len(more)), "of full scale")
-        return self._mismatch(
+        found = self._mismatch(
             "bloom", "image", figure, chance, "bloom",
             f"Above and below clipped pixels the picture is {100 * size:.0f} % of full scale brighter than "
             "beside them: charge leaks along columns.",
         )  # fmt: skip
+        return Suspected(found, bloom, self.frames_of("bloom"), 255.0 * leak)
 
-    def _second(self) -> Mismatch | None:
-        if len(self.ghost) < FEWEST_FRAMES:
-            return None
-        stack = np.stack(self.ghost)
-        at = (np.arange(_RATIOS) + 0.5) / _RATIOS * 2 * _REACH - _REACH
-        line = float(np.where(np.abs(at) < 0.02, np.nan_to_num(stack), 0).max((1, 2)).mean())
-        ground = median_filter(np.apply_along_axis(_without_gaps, -1, stack), (1, 1, _AROUND), mode="nearest")
-        far = np.abs(at) * self.scene.ring.radius_px > _FAR_WIDTHS
-        known = np.isfinite(stack) & far
-        excess, count = np.where(known, np.nan_to_num(stack) - ground, 0.0), np.maximum(known.sum(0), 1)
-        mean = excess.sum(0) / count
-        sd = np.sqrt((np.where(known, excess - mean, 0) ** 2).sum(0)) / count
-        beyond = (mean > _SURE * sd) & (mean > _LEAST_LINE * line) & (count >= FEWEST_FRAMES)
-        seen = beyond.sum(0) >= 3  # quadrants: a glint is in one, at most two
-        if not seen.any():
-            return None
-        k = int(np.argmax(np.where(seen, mean.mean(0), -1)))
-        each = excess[:, :, k].mean(1) / line
-        share, chance = float(each.mean()), min(1.0, _RATIOS * chance_of(each))
-        if chance > FALSE_ALARM or share < _LEAST_LINE:
-            return None
-        figure = NamedFigure("share", share, float(each.std()) / np.sqrt(len(each)), "of the line")
-        radius = NamedFigure("radius", float(np.exp(at[k])), _REACH / _RATIOS, "of the line's")
-        return self._mismatch(
-            "second_line", "line", figure, chance, "ghost",
-            f"A second ring lies at {radius.value:.2f} radii of the line, {100 * share:.0f} % as bright: "
-            "a ghost of window or lens, or a second sheet.", (radius,),
-        )  # fmt: skip
+
+def _blur_px(product: float) -> float:
+    """Return the blur, 1 σ, from the product of half its variance in two halves of a picture."""
+    return float(np.sqrt(2 * np.sqrt(max(product, 0.0))))
 
 
 def _blur_of(own: Float, cross: Float) -> Float:
@@ -279,12 +256,6 @@ def _blur_of(own: Float, cross: Float) -> Float:
     (du, dv, dr, dt), blur = size[1:5], size[5:]
     moved = np.array([du**2 + dv**2 + dr**2 + dt**2, du**2 - dv**2, 2 * du * dv, dr**2 - dt**2]) / 2
     return np.asarray(blur - moved)
-
-
-def _without_gaps(values: Float) -> Float:
-    """Return values (N,), those that are NaN interpolated."""
-    known = np.flatnonzero(np.isfinite(values))
-    return np.interp(np.arange(len(values)), known, values[known]) if len(known) else np.zeros(len(values))
 
 
 def _size_beside_one(value: Float, column: Float) -> Float:

@@ -21,7 +21,7 @@ from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX, block_ratios, of_blocks
 from stages.twin.locate import FALSE_ALARM, ImagePlace
-from stages.twin.state import TwinFrame
+from stages.twin.render import TwinFrame
 
 _SURE, _FEWEST_FRAMES, _FEWEST_CELLS = 3.0, 4, 2
 """σ from frame to frame by which an order must predict better, frames for that, and cells of a region."""

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.artefacts.twin import Look
+from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Lighting, Probe
 from stages.texture.surface import WallSurface, wall_surface
 from stages.texture.views import sheet_distance_mm
@@ -21,6 +22,9 @@ _STEP_PX = 4
 _BAND_PX = 14.0
 """Half width of the band about the line that is rendered exactly, pixel by pixel: four line widths and the
 wander of the ring within four pixels."""
+_ASIDE = 0.15
+"""Share of the radius by which a ray may meet the sheet nearer or farther than any wall and be looked at: the
+band and bends of the axis within a baseline have room in it."""
 SMOOTHING_MM, SHADING_MM = 0.2, 0.4
 """1 σ of the smoothing of radii and slopes: the defaults of the stage texture, whose photo is used."""
 
@@ -190,7 +194,7 @@ class Scene:
 
     def _near_line(self, T_pc: Float) -> tuple[Int, Int]:
         """Return rows and columns of pixels within a band about the line, found on the nodes."""
-        seen = wall_seen(self.surface, T_pc, self._rays.reshape(-1, 3))
+        seen = wall_seen(self.surface, T_pc, self._rays_to_sheet(T_pc))
         offset = sheet_distance_mm(self.probe.laser, seen.xyz_c).reshape(self._rays.shape[:2])
         slope = np.hypot(*np.gradient(offset)) / _STEP_PX
         near = np.abs(offset) < _BAND_PX * np.maximum(slope, 1e-6)
@@ -198,6 +202,24 @@ class Scene:
         big = np.kron(near.astype(np.uint8), np.ones((_STEP_PX, _STEP_PX), np.uint8))[:height, :width]
         found = np.nonzero(big)
         return found[0], found[1]
+
+    def _rays_to_sheet(self, T_pc: Float) -> Float:
+        """Return the rays (N, 3) of the nodes, NaN where they meet the sheet far from any wall."""
+        axis, on_sheet = self.surface.axis, transform(T_pc, self._on_sheet)
+        at = int(np.argmin(np.abs(axis.distance_mm - float(np.nanmedian(on_sheet[:, 2])))))
+        away = np.hypot(*((on_sheet - axis.origin_p[at]) @ axis.R_pa[at][:, :2]).T)
+        least, most = float(self.surface.radius_mm.min()), float(self.surface.radius_mm.max())
+        near = (away > (1 - _ASIDE) * least) & (away < (1 + _ASIDE) * most)
+        return np.where(near[:, None], self._rays.reshape(-1, 3), np.nan)
+
+    @cached_property
+    def _on_sheet(self) -> Float:
+        """Points (N, 3) in C where the rays of the nodes meet the laser's sheet; NaN where they do not."""
+        rays = self._rays.reshape(-1, 3)
+        met = np.full(rays.shape, np.nan)
+        known = np.isfinite(rays[:, 0])
+        met[known] = self.probe.laser.intersect(rays[known])
+        return met
 
     @cached_property
     def _reference(self) -> float:

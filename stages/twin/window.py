@@ -18,7 +18,7 @@ from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX
 from stages.twin.locate import FALSE_ALARM, ImagePlace
-from stages.twin.state import Region, TwinFrame
+from stages.twin.render import Region, TwinFrame
 
 _POWER_STEP = 0.4
 _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0, 1.2, 1.4, 1.7, 2.0))

@@ -31,13 +31,13 @@ from pipeline.machine.plan import Selection
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
-from stages.twin import PhotometryParameters, Sums, TwinParameters, compared_with, photometry_of
+from stages.twin import PhotometryParameters, TwinParameters, compared_with, photometry_of
 from stages.twin.causes import causes
 from stages.twin.locate import places_in_image
-from stages.twin.name import of_texture
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlocksOfFrames, in_image, unnamed
 from stages.twin.scene import Scene, scene_of
+from stages.twin.sums import Sums
 from tests.hidden_effects import Change, Hidden, effects
 
 Few = tuple[int, int]
@@ -154,6 +154,8 @@ def _found(run: Opened, few: Few, change: Change) -> tuple[Mismatch, ...]:
     twin = compared_with(
         run.scene, recording, run.frames, run.rings, photometry, parameters_of_twin, _context()
     )
+    for m in twin.withdrawn:
+        print(f"    withdrawn: {m.statement}", flush=True)
     return twin.found
 
 
@@ -184,10 +186,14 @@ def _is_there(case: Hidden, found: Mismatch) -> bool:
 
 def part_of(whole: WholePictures, random: np.random.Generator) -> WholePictures:
     """Return two thirds of what was kept of each law."""
-    part = WholePictures(whole.scene, frame=whole.frame)
-    for name in ("blur", "kept", "stray", "bloom", "ghost"):
-        kept = getattr(whole, name)
-        setattr(part, name, [kept[k] for k in np.sort(random.permutation(len(kept))[: 2 * len(kept) // 3])])
+    part = WholePictures(whole.scene)
+    for law, kept_of in (("blur", ("blur", "kept")), ("stray", ("stray",)), ("bloom", ("bloom",)),
+                         ("ghost", ("ghost",)), ("line", ())):  # fmt: skip
+        frame = whole.frame[law]
+        use = np.sort(random.permutation(len(frame))[: 2 * len(frame) // 3])
+        part.frame[law] = [frame[k] for k in use]
+        for name in kept_of:
+            setattr(part, name, [getattr(whole, name)[k] for k in use])
     return part
 
 
@@ -196,40 +202,41 @@ def nulls(run: Opened, count: int, seed: int) -> tuple[int, int]:
     random, scene = np.random.default_rng(seed), run.scene
     recording: Any = run
     photometry = photometry_of(scene, recording, run.frames, run.rings, PhotometryParameters(), _context())
-    sums = Sums(scene, photometry)
+    sums = Sums(scene, photometry.state, ())
     light = dict(zip(run.frames.frame.tolist(), run.frames.illumination, strict=True))
     posed = np.isin(run.frames.frame, scene.trajectory.frame)
     withheld = run.frames.frame[posed & (run.frames.withheld if run.frames.withheld is not None else True)]
     for number, image in run.read(withheld, "grey"):
         sums.add(number, Illumination(str(light[number])), image)
-    lit, line = sums.cells()
-    false = 0
+    (lit, line), whole = sums.cells(), sums.whole
+    false = taken_back = 0
     for _ in range(count):
         lit_use, line_use = (
-            np.sort(random.permutation(len(c.frame))[: 2 * len(c.frame) // 3]) for c in (lit, line)
+            np.sort(random.permutation(len(c.frame))[: 2 * len(c.frame) // 3]) if c else None
+            for c in (lit, line)
         )
+        chosen = () if lit_use is None else lit_use
         blocks = BlocksOfFrames(
             sums.blocks.mean_radius_mm,
-            *([of[k] for k in lit_use] for of in (sums.blocks.parts, sums.blocks.number)),
+            *([of[k] for k in chosen] for of in (sums.blocks.parts, sums.blocks.number)),
         )
         few = [
-            replace(c, **{n: getattr(c, n)[k] for n in ("frame", "square", "cross", "own", "pixels")})
+            c and replace(c, **{n: getattr(c, n)[k] for n in ("frame", "square", "cross", "own", "pixels")})
             for c, k in ((lit, lit_use), (line, line_use))
         ]
         samples = blocks.samples()
         places, _ = places_in_image([p[0] for p in blocks.parts])
         on_window = [p for p, to in zip(places, in_image(samples, places), strict=True) if "image" in to]
-        part = part_of(sums.whole, random)
-        pictures = part.found(photometry.state.sharpness)
-        found = (
-            *causes(*few, scene.probe.lighting, scene.ring), *unnamed(samples), *pictures,
-            *of_texture(photometry.state, samples, part, pictures),
-        )  # fmt: skip
+        sums.whole = part_of(whole, random)
+        pictures, withdrawn = sums.named(samples, recording)
+        found = (*causes(*few, scene.probe.lighting, scene.ring), *unnamed(samples), *pictures)
+        taken_back += len(withdrawn)
         false += bool(on_window or found)
         for m in found:
             print(f"  false: {m.statement} p {m.probability:.1e}")
         for p in on_window:
             print(f"  false: {p}")
+    print(f"  names that single frames suggested and frames rendered again did not bear out: {taken_back}")
     return count, false
 
 

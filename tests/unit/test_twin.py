@@ -26,8 +26,8 @@ from stages.twin.name import _not_sharp, clipped, left_over
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
 from stages.twin.reference import BlockSamples, in_image, unnamed
 from stages.twin.reflectance import wall_seen
+from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import LineSight
-from stages.twin.state import Region, TwinFrame
 
 BLACK = Figure(16.0, 0.1)
 NOISE = CameraNoise(BLACK, 255.0, Figure(4.0, 0.1), Figure(0.0, 0.0), Figure(0.0, 0.0), Figure(1.0, 0.1))
@@ -194,10 +194,11 @@ def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
     assert (line.fixed_to, line.parameters[0].value) == ("line", 0.2)
     assert (wall.fixed_to, wall.parameters[0].value) == ("image", 0.3)
     assert not clipped(SimpleNamespace(validity=np.array([RingValidity.VALID])), 0.001)
-    assert not _not_sharp(None)
+    whole = SimpleNamespace(frames_of=lambda law: np.arange(8))
+    assert not _not_sharp(None, whole)
     for blur, told in ((0.8, 0), (2.2, 1)):
         line_light = SimpleNamespace(blur_px=Figure(blur, 0.1 * blur))
-        assert len(_not_sharp(line_light)) == told
+        assert len(_not_sharp(line_light, whole)) == told
 
 
 def _twin():

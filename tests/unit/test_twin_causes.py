@@ -6,8 +6,8 @@ import pytest
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import causes
 from stages.twin.cells import SECTORS, Cells, CellsOfFrames, sector_azimuth_rad, sectors_of
+from stages.twin.render import TwinFrame
 from stages.twin.scene import Ring
-from stages.twin.state import TwinFrame
 
 RING, FRAMES = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 18
 NUMBER = 10 * np.arange(FRAMES)

@@ -6,11 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from stages.twin.name import of_texture
+from stages.twin.gate import judged
+from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlocksOfFrames
+from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
-from stages.twin.state import Region, TwinFrame
+from stages.twin.switched import Shown
 
 SHAPE, FRAMES, WHITE = (240, 320), 8, 200.0
 V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
@@ -46,8 +48,10 @@ def _noisy(picture, random):
     return (picture + 1.4 * random.standard_normal(SHAPE)).astype(np.float32)
 
 
-def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0):
+def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0, judge=None):
+    """Names that stand and names that are withdrawn; ``judge`` changes the frames that are rendered again."""
     random, whole, blocks = np.random.default_rng(2), WholePictures(SCENE), BlocksOfFrames(50.0)
+    shown = {}
     for frame in range(FRAMES):
         twin, line = _lit(random), _line()
         seen = np.minimum(_noisy(lit(twin.level, random), random), WHITE)
@@ -55,11 +59,23 @@ def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0):
         whole.add_lit(frame, seen, twin, free)
         whole.add_clipped(frame, seen, twin, free)
         blocks.add(frame, seen, twin, WHITE)
+        shown[frame] = _shown(seen if judge is None else judge(twin.level, random), twin, twin, frame, whole)
         seen = _noisy(laser(line.level, random), random)
-        whole.add_laser(frame, seen, line, seen < WHITE, twin)
+        whole.add_laser(FRAMES + frame, seen, line, seen < WHITE, twin)
+        shown[FRAMES + frame] = _shown(seen, line, twin, FRAMES + frame, whole)
     state = SimpleNamespace(sharpness=np.full(4, of_sharpness), lamp=True, line=None)
-    found = whole.found(state.sharpness)
-    return [m.name for m in (*found, *of_texture(state, blocks.samples(), whole, found))]
+    first = (*whole.suspected(state.sharpness), *response_of(blocks.samples(), RING))
+    kept, withdrawn = judged(first, lambda frames: [(f, shown[f]) for f in frames])
+    focus, not_focus = judged(focus_of(state, whole, kept), lambda frames: [(f, shown[f]) for f in frames])
+    names = [[m.name for m in found] for found in ((*kept, *focus), (*withdrawn, *not_focus))]
+    return names if judge is not None else names[0]
+
+
+def _shown(seen, twin, lit, frame, whole):
+    def again(sharpness=None, power=1.0):
+        return (100 * (twin.level / 100) ** power).astype(np.float32)
+
+    return Shown(seen, twin, seen < WHITE, SCENE, again, lambda: lit, whole.direction(frame))
 
 
 def _moved(picture, random):
@@ -90,6 +106,18 @@ def test_nothing_is_named_where_noise_alone_differs():
 def test_motion_blur_is_told_from_defocus():
     assert _named(_moved) == ["motion_blur"]
     assert _named(lambda p, r: cv2.GaussianBlur(p, (0, 0), 2), of_sharpness=2.0) == ["defocus"]
+
+
+def test_a_name_that_frames_rendered_again_do_not_bear_out_is_withdrawn():
+    for change, name in (
+        (_moved, "motion_blur"),
+        (lambda p, r: 100 * (p / 100) ** 0.7, "response"),
+        (lambda p, r: cv2.GaussianBlur(p, (0, 0), 2), "defocus"),
+    ):
+        blur = 2.0 if name == "defocus" else 0.0
+        kept, withdrawn = _named(change, of_sharpness=blur, judge=_noisy)
+        assert not kept
+        assert withdrawn[0] == name
 
 
 def test_a_displaced_photo_is_no_motion_blur():

@@ -7,7 +7,7 @@ import pytest
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.compare import BLOCK_PX, block_contrasts
 from stages.twin.locate import ImagePlace, full_size, places_in_image
-from stages.twin.state import Region, TwinFrame
+from stages.twin.render import Region, TwinFrame
 from stages.twin.window import WindowPlace, told_once
 
 

@@ -1,0 +1,141 @@
+"""The gate of names: an effect is switched on in withheld frames rendered again, which must fit better.
+
+Single frames agree on a law of the whole picture by chance, or because something else resembles it. Its size
+as every other frame tells it is therefore switched on in the frames between; the squares of z must fall there
+from frame to frame. A name that does not pass is withdrawn, and said to be one that cannot be told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t
+
+from pipeline.arrays import Float, Float32, Int
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.cells import sigmas
+from stages.twin.locate import FALSE_ALARM
+from stages.twin.switched import Law, Pair, Shown
+
+_SURE, _MOST, _FEWEST = 3.0, 16, 6
+"""σ from frame to frame that z must fall by; most frames that are rendered again, and fewest that judge."""
+_MOST_SQUARE = 25.0
+"""Square of z that a pixel counts with at most: a glint of thirty σ would outweigh a thousand pixels."""
+_FEWEST_PIXELS = 200
+"""Pixels at which an effect acts, from which a frame judges it."""
+
+Again = Callable[[Int], Iterable[tuple[int, Shown]]]
+"""Gives frames by their numbers, each with its number, to be rendered again."""
+
+
+@dataclass(frozen=True)
+class Suspected:
+    """A law that single frames agree on.
+
+    Attributes
+    ----------
+    mismatch : Mismatch
+        As it would be told.
+    law : callable
+        Switches it on.
+    frame : (F,) int
+        Frames that told of it, ascending.
+    told : (F, K)
+        What each told of its sizes.
+    size_of : callable
+        From the mean (K,) of what frames told to the numbers that the law takes.
+    measured : callable, optional
+        Gives the size anew from a frame rendered again; the mean of frames is then told.
+    """
+
+    mismatch: Mismatch
+    law: Law
+    frame: Int
+    told: Float
+    size_of: Callable[[Float], Float] = np.asarray
+    measured: Callable[[Shown, Float], float] | None = None
+
+    def by_others(self, frame: int) -> Float:
+        """Return the law's numbers as the half of the frames told that does not hold this one."""
+        half = np.arange(len(self.frame)) % 2
+        own = half[int(np.searchsorted(self.frame, frame))]
+        return np.asarray(self.size_of(self.told[half != own].mean(0)), float)
+
+    @property
+    def judges(self) -> Int:
+        """Frames that judge, spread over those that told."""
+        few = np.linspace(0, len(self.frame) - 1, min(_MOST, len(self.frame)))
+        return np.asarray(self.frame[np.unique(few.round().astype(int))])
+
+
+def judged(suspected: Sequence[Suspected], again: Again) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+    """Return the mismatches that frames rendered again bear out, and those that are withdrawn."""
+    made = [_judged(one, again) for one in suspected]
+    return tuple(m for m, kept in made if kept), tuple(m for m, kept in made if not kept)
+
+
+def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
+    """Return the mismatch as frames rendered again have it, and whether its name stays."""
+    squares, sizes = [np.zeros((0, 3))], []
+    for frame, shown in again(one.judges):
+        numbers = one.by_others(frame)
+        squares.append(_squares(shown, one.law(shown, numbers))[None])
+        if one.measured is not None:
+            sizes.append(one.measured(shown, numbers))
+    before, after, pixels = np.concatenate(squares).T
+    seen = pixels >= _FEWEST_PIXELS
+    fall = (before - after)[seen]
+    told, chance = sigmas(fall), float(t.sf(sigmas(fall), max(len(fall) - 1, 1)))
+    total = max(float(pixels[seen].sum()), 1.0)
+    chi2 = [float(squares[seen].sum()) / total for squares in (before, after)]
+    found = replace(one.mismatch, chi2_before=chi2[0], chi2_after=chi2[1])
+    if len(fall) < _FEWEST or told < _SURE or chance > FALSE_ALARM:
+        return _withdrawn(found, fall, told), False
+    found = found if not sizes else replace(found, parameters=_with_size(found, sizes))
+    return replace(found, probability=float(np.nanmax([chance, found.probability]))), True
+
+
+def _squares(shown: Shown, pair: Pair) -> Float:
+    """Return the squares of z of a frame without and with an effect, and the pixels that count."""
+    above = np.asarray(shown.above[pair.use])
+    weight = np.asarray(1 / shown.twin.variance[pair.use], np.float32)
+    made = [
+        float(np.minimum(weight * (above - _taken_up(level[pair.use], above, weight, pair.free_of)) ** 2,
+                         _MOST_SQUARE).sum(dtype=float))
+        for level in (pair.without, pair.with_it)
+    ]  # fmt: skip
+    return np.array([*made, float(len(above))])
+
+
+def _taken_up(level: Float32, above: Float32, weight: Float32, free_of: str) -> Float32:
+    """Return a frame's levels (N,) with the exposure, or the offset, that suits it best."""
+    if free_of == "scale":
+        own = float((weight * level * level).sum(dtype=float))
+        return level * np.float32(float((weight * level * above).sum(dtype=float)) / max(own, 1e-9))
+    if free_of == "offset":
+        return level + np.float32(np.median(above - level)) if len(level) else level
+    return level
+
+
+def _with_size(found: Mismatch, sizes: list[float]) -> tuple[NamedFigure, ...]:
+    figure, *others = found.parameters
+    sd = float(np.std(sizes, ddof=1) / np.sqrt(len(sizes)))
+    mean = float(np.mean(sizes))
+    return (replace(figure, value=mean, sd=float(np.hypot(sd, _OF_PROFILE * mean))), *others)
+
+
+_OF_PROFILE = 0.02
+"""Relative 1 σ of a size told by a profile: half of what a line varies by about its profile."""
+
+
+def _withdrawn(found: Mismatch, fall: Float, told: float) -> Mismatch:
+    words = found.name.replace("_", " ")
+    why = (
+        f"{len(fall)} frames rendered again with it fit no better ({told:+.1f} σ)"
+        if len(fall) >= _FEWEST
+        else f"only {len(fall)} frames could be rendered again with it"
+    )
+    said = f"Single frames look like {words}, but {why}: it cannot be told from what resembles it."
+    return replace(found, statement=said)

@@ -1,0 +1,159 @@
+"""Frames re-rendered with a photometric state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from pipeline.arrays import Byte, Float, Float32
+from pipeline.recording.base import Illumination
+from stages.twin.noise import CameraNoise
+from stages.twin.scene import Scene
+from stages.twin.state import PhotometricState, slope_squared
+
+_DARK_LEVEL = 3.0
+"""Grey levels above black below which lit wall counts as dark."""
+_CORE_WIDTHS, _MIDDLE_GREY = 1.0, 100.0
+"""Widths of the line's core, and the grey of a photo that another response leaves as it is: any other is made
+up for by the exposure."""
+
+
+class Region(IntEnum):
+    """What a pixel of a frame shows."""
+
+    UNSEEN = 0
+    LINE_CORE = 1
+    LINE_FLANK = 2
+    WALL = 3
+    DARK = 4
+    EDGE = 5
+
+
+@dataclass(frozen=True)
+class TwinFrame:
+    """A re-rendered frame, all (H, W).
+
+    Attributes
+    ----------
+    level : float32
+        Grey levels above black; 0 where the region is UNSEEN.
+    variance : float32
+        Of camera noise, speckle, and the error of the photo's place.
+    region : uint8
+        `Region`.
+    distance_mm, azimuth_rad : float32
+        Place on the wall; NaN where none is known.
+    """
+
+    level: Float32
+    variance: Float32
+    region: Byte
+    distance_mm: Float32
+    azimuth_rad: Float32
+
+    def brighter(self, factor: float | Float32, noise: CameraNoise) -> TwinFrame:
+        """Return the frame with another exposure, or seen through a window that lets pass (H, W)."""
+        scale = np.float32(factor) if isinstance(factor, float) else factor
+        level = np.minimum(scale * self.level, np.float32(noise.white - noise.black.value))
+        beyond = scale**2 * (self.variance - noise.variance(self.level))
+        return replace(self, level=level, variance=noise.variance(level) + beyond)
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """A scene in the light of a photometric state.
+
+    What is alike in all frames is worked out once.
+    """
+
+    scene: Scene
+    state: PhotometricState
+
+    @cached_property
+    def _white_wall(self) -> Float32:
+        """Grey levels (H, W) of white wall in even light."""
+        assert self.state.lamp is not None
+        return self.state.lamp.factor(*self.scene.polar[:2])
+
+    @cached_property
+    def _sharp(self) -> Float32:
+        """By how much (H, W) frames are blurrier than the photo: half the blurs' difference, px²."""
+        return self._over_view(self.state.sharpness)
+
+    @cached_property
+    def _place_variance(self) -> Float32:
+        """Squared error (H, W) of the photo's place, px²."""
+        return self._over_view(self.state.place_px) ** 2
+
+    def _over_view(self, of_zone: Float) -> Float32:
+        return np.interp(self.scene.polar[0], self.state.sharpness_theta, of_zone).astype(np.float32)
+
+    def frame(self, frame: int, light: Illumination) -> TwinFrame:
+        """Return the twin of a frame; number and light give pose and exposure, as sampled frames near it."""
+        state, shape = self.state, self.state.outside.shape
+        made = _Canvas.dark(shape)
+        if light != Illumination.LASER and state.lamp is not None:
+            self._light_wall(made, frame)
+        if light != Illumination.LED and state.line is not None:
+            self._draw_line(made, frame)
+        made.region[state.outside] = Region.DARK
+        made.level[state.outside] = 0.0
+        made.region[state.edge & (made.region != Region.UNSEEN)] = Region.EDGE
+        variance = state.noise.variance(made.level)
+        variance += made.variance
+        level = np.minimum(made.level, np.float32(state.noise.white - state.noise.black.value))
+        return TwinFrame(level, variance, made.region, made.distance_mm, made.azimuth_rad)
+
+    def _light_wall(self, made: _Canvas, frame: int) -> None:
+        """Put lit wall into a dark frame."""
+        assert self.state.lamp is not None
+        sight = self.scene.lit(self.scene.pose(frame))
+        exposure = np.float32(np.exp(self.state.lamp.gain.at(frame)))
+        level = self._white_wall * sight.reflectance * (sight.irradiance * exposure)
+        if self.state.power != 1.0:
+            level *= (sight.reflectance / np.float32(_MIDDLE_GREY)) ** np.float32(self.state.power - 1)
+        made.region[level > _DARK_LEVEL] = Region.WALL
+        made.region[np.isnan(level)] = Region.UNSEEN
+        level = np.nan_to_num(level, copy=False)
+        inside = cv2.erode(made.region, np.ones((3, 3), np.uint8)) > 0
+        made.variance[inside] = (self._place_variance * slope_squared(level))[inside]
+        level[inside] += (self._sharp * cv2.Laplacian(level, cv2.CV_32F))[inside]
+        made.level, made.distance_mm, made.azimuth_rad = level, sight.distance_mm, sight.azimuth_rad
+
+    def _draw_line(self, made: _Canvas, frame: int) -> None:
+        """Put the laser line into a frame."""
+        assert self.state.line is not None
+        near, light = self.scene.line(self.scene.pose(frame)), self.state.line
+        power = light.course.at(frame)
+        (line, _), (_, width) = light.line_and_slope(near, power), light.peak(near)
+        known = np.isfinite(line)
+        away = np.abs(near.offset_px) / width
+        at = near.row, near.column
+        flank = known & (away < light.profile_x[-1])
+        kind = np.where(away < _CORE_WIDTHS, Region.LINE_CORE, Region.LINE_FLANK)
+        made.region[at] = np.where(flank, kind, np.where(known, made.region[at], Region.UNSEEN))
+        made.level[at] += np.nan_to_num(line)
+        made.variance[at] += np.nan_to_num(light.variance(near, power))
+        made.distance_mm[at], made.azimuth_rad[at] = near.distance_mm, near.azimuth_rad
+
+
+@dataclass
+class _Canvas:
+    """A frame while it is rendered, each (H, W); ``variance`` is what comes on top of the camera's noise."""
+
+    level: Float32
+    variance: Float32
+    region: Byte
+    distance_mm: Float32
+    azimuth_rad: Float32
+
+    @staticmethod
+    def dark(shape: tuple[int, ...]) -> _Canvas:
+        """Return a frame in which nothing is lit."""
+        nowhere = [np.full(shape, np.nan, np.float32) for _ in range(2)]
+        level, variance = (np.zeros(shape, np.float32) for _ in range(2))
+        return _Canvas(level, variance, np.full(shape, Region.DARK, np.uint8), *nowhere)

@@ -1,0 +1,135 @@
+"""What is kept of compared frames, and the same frames rendered again to judge names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pipeline.arrays import Float32, Image, Int
+from pipeline.artefacts.twin import Mismatch
+from pipeline.recording.base import Illumination, Recording
+from stages.twin.cells import Cells, CellsOfFrames, sectors_of
+from stages.twin.compare import Comparison, exposure_of
+from stages.twin.gate import judged
+from stages.twin.locate import ImagePlace
+from stages.twin.name import focus_of, response_of
+from stages.twin.picture import WholePictures
+from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image
+from stages.twin.render import Region, Renderer
+from stages.twin.scene import Scene
+from stages.twin.state import PhotometricState
+from stages.twin.switched import Shown
+from stages.twin.window import WindowPlace, told_once
+
+_MOST_STRAY = 8
+"""Laser frames that are looked at for stray light: each takes as long as a lit frame."""
+
+
+class Sums:
+    """What is kept of the compared frames: χ², blocks, places of dirt, and brightness in sectors."""
+
+    def __init__(self, scene: Scene, state: PhotometricState, places: tuple[ImagePlace, ...]) -> None:
+        self._scene, self._state, self._light = scene, state, dict[int, Illumination]()
+        self._renderer = Renderer(scene, state)
+        self.comparison = Comparison()
+        self.window = [WindowPlace(p) for p in places]
+        self.blocks = BlocksOfFrames(scene.surface.mean_radius_mm)
+        self.lit, self.line = CellsOfFrames(), CellsOfFrames()
+        self.whole = WholePictures(scene)
+        self._sector = sectors_of(scene.polar[1])
+
+    def add(self, frame: int, kind: Illumination, image: Image) -> None:
+        """Compare a frame (H, W) with its twin."""
+        noise, self._light[frame] = self._state.noise, kind
+        above = image.astype(np.float32) - np.float32(noise.black.value)
+        before = self._renderer.frame(frame, kind)
+        gain = self._state.gain_map
+        after = before if gain is None else before.brighter(gain, noise)
+        free = above < noise.white - noise.black.value
+        if kind != Illumination.LASER:
+            self.lit.add(frame, above, after, free & (after.region == Region.WALL), self._sector)
+        if kind == Illumination.LASER:
+            near = (after.region == Region.LINE_CORE) | (after.region == Region.LINE_FLANK)
+            self.line.add_line(frame, above, after, free & near, self._sector)
+        if kind == Illumination.LED:
+            self.blocks.add(frame, above, before, noise.white - noise.black.value)
+        exposure = float(np.exp(exposure_of(above, after)))
+        after = after.brighter(exposure, noise)
+        if kind == Illumination.LED:
+            exposed = after if gain is None else before.brighter(exposure, noise)
+            for place in self.window:
+                place.add(frame, above, exposed, free)
+            self.whole.add_lit(frame, above, after, free)
+        if kind != Illumination.LED:
+            self.whole.frame["line"].append(frame)
+        if kind == Illumination.LASER and len(self.whole.stray) < _MOST_STRAY:
+            lit = self._renderer.frame(frame, Illumination.LED)
+            self.whole.add_laser(frame, above, after, free, lit)
+        self.whole.add_clipped(frame, above, after, free)
+        self.comparison.add(frame, kind, above, before, after, noise)
+
+    def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
+        """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
+        fixed_to = in_image(samples, tuple(w.place for w in self.window))
+        judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
+        return told_once([m for m in judged if m is not None])
+
+    def cells(self) -> tuple[Cells | None, Cells | None]:
+        """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser."""
+        lit, line, state = self.lit.cells(), self.line.cells(), self._state
+        if lit is not None and state.lamp is not None:
+            lit = lit.on(-np.array([[state.lamp.gain.at(f)] for f in lit.frame]))
+        if line is not None and state.line is not None:
+            power = [[state.line.course.at(f)] for f in line.frame]
+            line = line.on(-np.array(power) - state.line.log_power)
+        return lit, line
+
+    def named(
+        self, samples: BlockSamples | None, recording: Recording
+    ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+        """Return laws of whole pictures that frames rendered again bear out, and those that are withdrawn."""
+        again = partial(self._shown, recording)
+        first = (
+            *self.whole.suspected(self._state.sharpness),
+            *response_of(samples, self._scene.ring),
+        )
+        kept, withdrawn = judged(first, again)
+        focus, not_focus = judged(focus_of(self._state, self.whole, kept), again)
+        return (*kept, *focus), (*withdrawn, *not_focus)
+
+    def _shown(self, recording: Recording, frames: Int) -> Iterator[tuple[int, Shown]]:
+        """Yield compared frames anew, with what renders them under other assumptions."""
+        noise, gain = self._state.noise, self._state.gain_map
+        for frame, image in recording.read(frames, "grey"):
+            if image is None:
+                continue
+            above = image.astype(np.float32) - np.float32(noise.black.value)
+            twin = self._renderer.frame(frame, self._light[frame])
+            twin = twin if gain is None else twin.brighter(gain, noise)
+            exposure = float(np.exp(exposure_of(above, twin)))
+            yield (
+                frame,
+                Shown(
+                    above, twin.brighter(exposure, noise), above < noise.white - noise.black.value,
+                    self._scene, partial(self._again, frame, exposure),
+                    partial(self._renderer.frame, frame, Illumination.LED), self.whole.direction(frame),
+                ),
+            )  # fmt: skip
+
+    def _again(self, frame: int, exposure: float, **changes: Any) -> Float32:
+        """Return the grey levels (H, W) of a frame with attributes of the state changed.
+
+        ``sharpness=None`` is the photo as it is; ``line`` is a function of the line's light.
+        """
+        state, noise = self._state, self._state.noise
+        if "sharpness" in changes:
+            changes["sharpness"] = np.zeros_like(state.sharpness)
+        if "line" in changes:
+            changes["line"] = changes["line"](state.line)
+        made = Renderer(self._scene, replace(state, **changes)).frame(frame, self._light[frame])
+        made = made if state.gain_map is None else made.brighter(state.gain_map, noise)
+        return made.brighter(exposure, noise).level

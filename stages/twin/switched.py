@@ -1,0 +1,237 @@
+"""Laws of whole pictures, switched on in frames rendered again: grey levels without and with each.
+
+Sizes are what other frames told. Where a law needs a nuisance that is each frame's own (the direction of its
+motion), one half of the picture tells it for the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from pipeline.arrays import Bool, Float, Float32
+from stages.twin.lamp_light import Figure
+from stages.twin.line_light import LineLight
+from stages.twin.render import Region, TwinFrame
+from stages.twin.scene import Scene
+
+TILE, STEP = 16, 2
+"""Side of the tiles that halve a picture, counted in every second pixel."""
+BLOOM_PX, _NEAR = 6.0, 0.02
+"""Way along a column that leaves 1/e of the bloom, and the least spread that is looked at."""
+IN_FOCUS_PX = 1.2
+"""1 σ of lens and pixel that lenses in focus stay below: a pixel's own is 0.29, and a spot two pixels wide at
+half height has 0.85."""
+_NODES = ((-1.732051, 1 / 6), (0.0, 2 / 3), (1.732051, 1 / 6))
+"""Gauss and Hermite's nodes: three displacements whose mean blurs as a normal curve does, to the fifth power
+of its width. Two rounds of them make nine."""
+_ON_RING = 0.05
+"""Share of a second ring's peak from which pixels belong to it."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A recorded frame beside its twin.
+
+    Attributes
+    ----------
+    above : (H, W) float32
+        Recorded grey levels above black.
+    twin : TwinFrame
+        With the exposure of the frame.
+    free : (H, W) bool
+        Pixels that are not clipped.
+    scene : Scene
+    again : callable
+        Renders the frame with other attributes of the photometric state, and the frame's exposure.
+    lit : callable
+        Renders the frame as the LEDs would show it.
+    direction : (2, 2) float
+        Cosine and sine of twice the angle of the frame's blur, as each half of the picture tells it.
+    """
+
+    above: Float32
+    twin: TwinFrame
+    free: Bool
+    scene: Scene
+    again: Callable[..., Float32]
+    lit: Callable[[], TwinFrame]
+    direction: Float
+
+    @property
+    def wall(self) -> Bool:
+        """(H, W) pixels of lit wall, away from its borders."""
+        return _inner(self.free & (self.twin.region == Region.WALL))
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Grey levels (H, W) without and with an effect, and pixels that count.
+
+    ``free_of`` is what each may take up before it is judged: ``scale`` the exposure, ``offset`` a constant.
+    """
+
+    without: Float32
+    with_it: Float32
+    use: Bool
+    free_of: str = ""
+
+
+Law = Callable[[Shown, Float], Pair]
+
+
+def motion_blur(shown: Shown, told: Float) -> Pair:
+    """Return a frame that moved while it was exposed; ``told`` is σ, px, and 1 for motion along the pipe."""
+    sigma, even = float(told[0]), shown.again(sharpness=None)
+    phi = shown.scene.polar[1]
+    made = np.empty_like(even)
+    half = halves(even.shape)
+    for h in (0, 1):
+        if told[1]:
+            c, s = np.cos(phi), np.sin(phi)
+        else:
+            angle = 0.5 * np.arctan2(shown.direction[1 - h, 1], shown.direction[1 - h, 0])
+            c, s = (np.full(even.shape, f(angle), np.float32) for f in (np.cos, np.sin))
+        made = np.where(half == h, smeared(even, c, s, sigma), made)
+    return Pair(shown.twin.level, made, shown.wall, "scale")
+
+
+def smeared(level: Float32, c: Float32, s: Float32, sigma: float) -> Float32:
+    """Return a picture (H, W) blurred by 1 σ along directions (H, W)."""
+    v, u = np.mgrid[0 : level.shape[0], 0 : level.shape[1]].astype(np.float32)
+    step = np.float32(sigma / np.sqrt(2))
+    for _ in range(2):
+        made = np.zeros_like(level)
+        for away, weight in _NODES:
+            d = np.float32(away) * step
+            moved = cv2.remap(level, u + d * c, v + d * s, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+            made += np.float32(weight) * moved
+        level = made
+    return level
+
+
+def halves(shape: tuple[int, ...]) -> Float32:
+    """Return to which half, 0 or 1, each pixel of a picture belongs: tiles by turns."""
+    row, column = ((np.arange(n) - STEP) // (STEP * TILE) for n in shape)
+    return np.asarray((row[:, None] + column) % 2)
+
+
+def defocus(shown: Shown, told: Float) -> Pair:
+    """Return a frame blurred all round; ``told`` is half the blur's variance, px²."""
+    plain = shown.again(sharpness=None)
+    sigma = float(np.sqrt(2 * max(told[0], 1e-3)))
+    blurred = np.asarray(cv2.GaussianBlur(plain, (0, 0), sigma), np.float32)
+    return Pair(plain, blurred, shown.wall, "scale")
+
+
+def response(shown: Shown, told: Float) -> Pair:
+    """Return a frame whose wall has the photo's contrast to a power ``told``."""
+    return Pair(shown.twin.level, shown.again(power=float(told[0])), shown.wall, "scale")
+
+
+def stray(which: int) -> Law:
+    """Return the law of light on the wall while the LEDs are off: 0 as they light it, 1 as the line does."""
+
+    def law(shown: Shown, told: Float) -> Pair:
+        lit, line = shown.lit(), _dilated(on_line(shown.twin))
+        column = (lit.level, bounced(shown.scene, shown.twin, lit))[which]
+        use = _inner(~line & (lit.region == Region.WALL) & shown.free)
+        level = shown.twin.level
+        return Pair(level, level + np.float32(told[which]) * column, use, "offset")
+
+    return law
+
+
+def bounced(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> Float32:
+    """Return light of the line bounced once in a round bore, up to a factor."""
+    on = twin.distance_mm[twin.region == Region.LINE_CORE]
+    middle = float(np.nanmedian(on)) if len(on) else np.nan
+    x = np.abs(lit.distance_mm - np.float32(middle)) / np.float32(2 * scene.surface.mean_radius_mm)
+    share = 1 - x * (2 * x**2 + 3) / (2 * (x**2 + 1) ** 1.5)
+    return np.asarray(np.nan_to_num(100 * share), np.float32)
+
+
+def bloom(shown: Shown, told: Float) -> Pair:
+    """Return what leaks from clipped pixels along columns, beside as much glow to all sides.
+
+    ``told`` is what leaks along columns and along rows, grey levels.
+    """
+    along, across = leaked(shown.free)
+    use = shown.free & ~np.isin(shown.twin.region, (Region.UNSEEN, Region.EDGE)) & (along + across > _NEAR)
+    level, even = shown.twin.level, np.float32(told.mean())
+    with_it = level + np.float32(told[0]) * along + np.float32(told[1]) * across
+    return Pair(level + even * (along + across), with_it, use)
+
+
+def leaked(free: Bool) -> tuple[Float32, Float32]:
+    """Return how near (H, W) clipped pixels are along columns, and along rows."""
+    reach = np.arange(-int(4 * BLOOM_PX), int(4 * BLOOM_PX) + 1)
+    tail, one = np.exp(-np.abs(reach) / BLOOM_PX), np.ones(1)
+    full, tail = (~free).astype(np.float32), tail / tail.sum()
+    along, across = (cv2.sepFilter2D(full, -1, *k) for k in ((one, tail), (tail, one)))
+    return np.asarray(along, np.float32), np.asarray(across, np.float32)
+
+
+def second_line(shown: Shown, told: Float) -> Pair:
+    """Return a frame with the line a second time; ``told`` is its share and its radius over the line's."""
+    level = shown.twin.level
+    copy = _copied(shown, float(told[1]))
+    use = shown.free & (copy > _ON_RING * copy.max()) & (shown.twin.region == Region.DARK)
+    return Pair(level, level + np.float32(told[0]) * copy, use)
+
+
+def share_of_second(shown: Shown, told: Float) -> float:
+    """Return how bright the second ring is in a frame, its twin's line being as bright as the recorded one.
+
+    Both are held against the same profile, each free to lie a little beside its place.
+    """
+    copy, line = _copied(shown, float(told[1])), shown.twin.level
+    dark = shown.free & (shown.twin.region == Region.DARK) & (copy > _ON_RING * copy.max())
+    own = shown.free & (shown.twin.region == Region.LINE_CORE)
+    sizes = [_size_at_place(shown, basis, use) for basis, use in ((copy, dark), (line, own))]
+    return sizes[0] / max(sizes[1], 1e-9)
+
+
+def _size_at_place(shown: Shown, basis: Float32, use: Bool) -> float:
+    """Return the size of a ring's picture (H, W), less what a displacement outward makes of it."""
+    phi, weight = shown.scene.polar[1][use], 1 / np.sqrt(shown.twin.variance[use])
+    down, right = (np.asarray(np.gradient(basis, axis=k)) for k in (0, 1))
+    outward = np.cos(phi) * right[use] + np.sin(phi) * down[use]
+    columns = np.stack([basis[use], outward, np.ones(int(use.sum()), np.float32)]) * weight
+    return float(np.linalg.lstsq(columns.T, shown.above[use] * weight, rcond=None)[0][0])
+
+
+def _copied(shown: Shown, ratio: float) -> Float32:
+    """Return the line's light (H, W) as a ring of another radius."""
+    (u, v), shape = shown.scene.ring.centre_px, shown.twin.level.shape
+    back = 1 / ratio
+    move = np.array([[back, 0, u * (1 - back)], [0, back, v * (1 - back)]])
+    line = np.where(on_line(shown.twin), shown.twin.level, np.float32(0))
+    copy = cv2.warpAffine(line, move, shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+    return np.asarray(copy, np.float32)
+
+
+def wide_line(shown: Shown, told: Float) -> Pair:
+    """Return a line as wide as it was found, beside one of a lens in focus."""
+    sharp = shown.again(line=_in_focus)
+    return Pair(sharp, shown.twin.level, shown.free & on_line(shown.twin), "scale")
+
+
+def _in_focus(line: LineLight) -> LineLight:
+    return replace(line, blur_px=Figure(IN_FOCUS_PX, 0.0))
+
+
+def on_line(twin: TwinFrame) -> Bool:
+    """Return which pixels (H, W) show the line."""
+    return np.asarray((twin.region == Region.LINE_CORE) | (twin.region == Region.LINE_FLANK))
+
+
+def _dilated(use: Bool) -> Bool:
+    return np.asarray(cv2.dilate(use.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0)
+
+
+def _inner(use: Bool) -> Bool:
+    return np.asarray(cv2.erode(use.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0)
