@@ -31,10 +31,12 @@ from stages.twin.name import (
 from stages.twin.reference import unnamed
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
-from stages.twin.state import PhotometricState, Sampled, estimate_state, sample_frames
+from stages.twin.state import PhotometricState, Sampled, clipped_line, estimate_state, sample_frames
 from stages.twin.sums import Sums
 
 _EVERY = 10
+_COLOURED = 3
+"""Laser frames whose colours are looked at for clipping, which takes three times as long to decode."""
 
 
 class PhotometryParameters(Parameters):
@@ -107,6 +109,9 @@ def photometry_of(
         recording, frames.frame[measured], frames.illumination[measured], parameters.sampled
     )
     state = estimate_state(scene, sampled, rings, context)
+    lines = [s.frame for s in sampled if s.light == Illumination.LASER]
+    few = np.array(lines[:: max(len(lines) // _COLOURED, 1)], np.int64)
+    state = replace(state, line_clipped=clipped_line(scene, recording.read(few, "bgr")))
     ratios, contrasts = _blocks(scene, state, sampled)
     places, gain = places_in_image(ratios)
     blurred, _ = places_in_image(contrasts, LEAST_CONTRAST)
@@ -160,7 +165,8 @@ def compared_with(
     whole, withdrawn = sums.named(samples, recording)
     found: tuple[Mismatch, ...] = (
         *causes(*sums.cells(), scene.probe.lighting, scene.ring), *sums.on_window(samples),
-        *unnamed(samples), *whole, *clipped(rings, comparison.clipped_wall / max(comparison.lit, 1.0)),
+        *unnamed(samples), *whole,
+        *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(samples)
     comparison.after[Region.WALL] -= fall

@@ -33,15 +33,17 @@ _MAP_BLOCKS, _USUAL_GAIN, _USUAL_OFFSET, _MEDIAN_OF_SQUARE = 4, 0.02, 1.0, 0.455
 the square of a normal number."""
 
 
-def clipped(rings: RingSamples, wall_share: float) -> tuple[Mismatch, ...]:
+def clipped(rings: RingSamples, line_share: float, wall_share: float) -> tuple[Mismatch, ...]:
     """Return a clipped line and clipped lit wall, which are counted, not inferred: χ² stays as it was.
 
-    ``wall_share`` is the share of pixels of lit wall at the level where grey levels pile up.
+    ``line_share`` is that of pixels in the line's middle whose strongest channel is at full scale, and
+    ``wall_share`` that of pixels of lit wall at the level where grey levels pile up.
     """
-    line_share = float(np.mean(rings.validity == RingValidity.SATURATED)) if rings.validity.size else 0.0
+    lost = float(np.mean(rings.validity == RingValidity.SATURATED)) if rings.validity.size else 0.0
     nan, found = float("nan"), []
     for share, least, what, where, of in (
-        (line_share, _CLIPPED, "The line is", "line", "of ring samples"),
+        (lost, _CLIPPED, "The line is", "line", "of ring samples"),
+        (line_share, _CLIPPED, "The line's colour is", "line", "of the pixels in its middle"),
         (wall_share, _CLIPPED_WALL, "Lit wall is", "image", "of pixels of lit wall"),
     ):
         if share > least:

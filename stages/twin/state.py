@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.arrays import Bool, Byte, Float, Float32, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
@@ -21,6 +22,8 @@ _LEAST_LEVEL = 4.0
 """Grey levels above black below which a lit wall tells nothing."""
 _USUAL_WIDTH_PX = 1.2
 _ZONES = 4
+_FULL_SCALE = 250
+"""Grey level of 255 from which a channel counts as clipped: coding moves clipped pixels by a few levels."""
 _NOISE_FRAMES = 6
 _OUTSIDE_LEVEL, _EDGE_PX = 6.0, 8
 """Pixels that no lit frame shows brighter lie outside the view; the border is what lies this near to it."""
@@ -44,6 +47,8 @@ class PhotometricState:
         1 σ of how far the photo lies beside the frames at those angles, from pixel to pixel, per direction.
     outside, edge : (H, W) bool
         Pixels outside the camera's view, and next to its border.
+    line_clipped : float
+        Share of the line's middle at which its strongest channel is at full scale.
     power : float
         Exponent that frames have the photo's contrast to; another than 1 only when tried.
     gain_map : (H, W) float32 or None
@@ -58,6 +63,7 @@ class PhotometricState:
     place_px: Float
     outside: Bool
     edge: Bool
+    line_clipped: float = 0.0
     power: float = 1.0
     gain_map: Float32 | None = None
 
@@ -111,6 +117,24 @@ def estimate_state(
     if line is not None:
         line = lines.with_speckle(line, noise.variance)
     return PhotometricState(noise, lamp, line, at, sharpness, place_px, outside, edge)
+
+
+def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> float:
+    """Return the share of the line's middle at which its strongest channel is at full scale.
+
+    ``frames`` gives numbers and colour pictures (H, W, 3). Their grey does not tell: it goes on rising with
+    the other channels.
+    """
+    found = []
+    for frame, image in frames:
+        if image is None:
+            continue
+        line = scene.line(scene.pose(frame))
+        middle = np.abs(line.offset_px) < _USUAL_WIDTH_PX
+        colour = image[line.row[middle], line.column[middle]]
+        if len(colour):
+            found.append(float((colour[:, int(colour.mean(0).argmax())] >= _FULL_SCALE).mean()))
+    return float(np.median(found)) if found else 0.0
 
 
 def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:

@@ -78,6 +78,9 @@ class Opened:
 
     def read(self, numbers: Int, planes: str) -> Iterator[tuple[int, Any]]:
         """Yield pictures as a recording does, each read from the video once."""
+        if planes == "bgr":
+            yield from self.recording.read(numbers, "bgr")
+            return
         missing = np.array([n for n in numbers if n not in self.pictures], np.int64)
         self.pictures.update(self.recording.read(missing, "grey"))
         yield from ((int(n), self.pictures[int(n)]) for n in numbers)
@@ -93,10 +96,11 @@ class Changed:
     def read(self, numbers: Int, planes: str) -> Iterator[tuple[int, Any]]:
         """Yield changed pictures as a recording does."""
         light = dict(zip(self.opened.frames.frame.tolist(), self.opened.frames.illumination, strict=True))
-        for number, image in self.opened.read(numbers, planes):
+        for number, image in self.opened.read(numbers, "grey"):
             black = np.float32(np.quantile(image[::8, ::8], 0.05))
             made = self.change(number, str(light[number]), image - black) + black
-            yield number, np.clip(np.round(made), 0, 255).astype(np.uint8)
+            grey = np.clip(np.round(made), 0, 255).astype(np.uint8)
+            yield number, grey if planes == "grey" else np.repeat(grey[..., None], 3, -1)
 
 
 def opened(run: Path, folder: Path) -> Opened:

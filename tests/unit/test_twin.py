@@ -28,6 +28,7 @@ from stages.twin.reference import BlockSamples, in_image, unnamed
 from stages.twin.reflectance import wall_seen
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import LineSight
+from stages.twin.state import clipped_line
 
 BLACK = Figure(16.0, 0.1)
 NOISE = CameraNoise(BLACK, 255.0, Figure(4.0, 0.1), Figure(0.0, 0.0), Figure(0.0, 0.0), Figure(1.0, 0.1))
@@ -190,15 +191,28 @@ def test_light_in_the_dark_is_counted():
 
 def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
     rings = SimpleNamespace(validity=np.array([RingValidity.SATURATED] * 2 + [RingValidity.VALID] * 8))
-    line, wall = clipped(rings, 0.3)
+    line, wall = clipped(rings, 0.0, 0.3)
     assert (line.fixed_to, line.parameters[0].value) == ("line", 0.2)
     assert (wall.fixed_to, wall.parameters[0].value) == ("image", 0.3)
-    assert not clipped(SimpleNamespace(validity=np.array([RingValidity.VALID])), 0.001)
+    sound = SimpleNamespace(validity=np.array([RingValidity.VALID]))
+    assert not clipped(sound, 0.0, 0.001)
+    (colour,) = clipped(sound, 0.4, 0.0)
+    assert (colour.fixed_to, colour.parameters[0].value) == ("line", 0.4)
     whole = SimpleNamespace(frames_of=lambda law: np.arange(8))
     assert not _not_sharp(None, whole)
     for blur, told in ((0.8, 0), (2.2, 1)):
         line_light = SimpleNamespace(blur_px=Figure(blur, 0.1 * blur))
         assert len(_not_sharp(line_light, whole)) == told
+
+
+def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():
+    row = column = np.arange(40)
+    sight = SimpleNamespace(row=row, column=column, offset_px=np.where(row < 20, 0.0, 9.0))
+    scene = SimpleNamespace(pose=lambda frame: None, line=lambda pose: sight)
+    picture = np.zeros((40, 40, 3), np.uint8)
+    picture[row, column] = [(60, 255, 3 * k) if k < 8 else (60, 200, 3 * k) for k in row]
+    assert clipped_line(scene, [(1, picture), (2, None)]) == pytest.approx(8 / 20)
+    assert clipped_line(scene, []) == 0.0
 
 
 def _twin():
