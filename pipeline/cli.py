@@ -118,7 +118,10 @@ def run(
     assignments: Assignments = None,
     twin: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder of a twin: dirt that it found is kept out of the photo."),
+        typer.Option(
+            metavar="DIR",
+            help="Folder of a twin: dirt and drops that it found are kept out of photo and rings.",
+        ),
     ] = None,
     from_stage: Annotated[
         str, typer.Option("--from", metavar="STAGE", help="Compute this stage and all after it again.")

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pipeline.api.job import Job, open_job, run_job
 from pipeline.artefacts.findings import Defects, Sections
@@ -28,6 +28,9 @@ from stages.catalogue import PIPELINE
 
 _PLACE = ("u_px", "v_px", "radius_px")
 _WIDER = 1.5
+_LINE_PX, _MOVED_PX = 1.2, 0.03
+"""1 σ of a sharp line, and how far a rim may move it: light that changes by a share g per px across a line of
+width w moves it by g w². A ring's sample is measured to about as much."""
 """A spot's edge reaches beyond the place where it was found. Derived for Gaussian spots that take 10 to 50 %:
 their change falls to 3 %, where they are found, at 1.5 to 2.4 of their σ, and to 1 % at 2.1 to 2.8."""
 
@@ -62,7 +65,8 @@ def run(
     settings : sequence of str
         Single parameters, each ``stage.name=value``; they go before those of ``config``.
     twin : path, optional
-        Folder of `twin` on an earlier run of this recording: dirt that it found is kept out of the photo.
+        Folder of `twin` on an earlier run of this recording: dirt and drops that it found are kept out of
+        photo and rings, and so of findings.
     from_stage : str
         Compute this stage and all after it again.
     only : str
@@ -100,7 +104,9 @@ def prepare(
 
 
 def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
-    """Return the setting that keeps the dirt out of the photo that a twin found on window or lens.
+    """Return the settings that keep out of photo and rings what a twin found on window or lens.
+
+    A speck that dims the line alike on both its flanks leaves it where it is, and stays in the rings.
 
     Raises
     ------
@@ -111,13 +117,24 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
         return ()
     file = Path(twin) / "twin.json"
     try:
-        on_image = [m for m in read_json(file)["found"] if m["fixed_to"] == "image"]
+        on_image = [m for m in read_json(file)["found"] if m["fixed_to"] == "image" and m["place"]]
         places = [[float(m["place"][k]["value"]) for k in _PLACE] for m in on_image]
+        moved = [_moves_line(m, p[2]) for m, p in zip(on_image, places, strict=True)]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
             file, "is not what a twin found", expected="twin.json of boresight twin", hint="name its folder"
         ) from error
-    return (f"texture.left_out={json.dumps([[u, v, _WIDER * r] for u, v, r in places])}",)
+    wider = [[u, v, _WIDER * r] for u, v, r in places]
+    of_line = [p for p, m in zip(wider, moved, strict=True) if m]
+    return f"texture.left_out={json.dumps(wider)}", f"rings.left_out={json.dumps(of_line)}"
+
+
+def _moves_line(found: dict[str, Any], radius_px: float) -> bool:
+    """Return whether what is on the window moves the line: a drop, or a rim that is steep for its width."""
+    share = found["parameters"].get("share")
+    if share is None or found["name"] is None:
+        return True
+    return abs(float(share["value"])) / radius_px * _LINE_PX**2 > _MOVED_PX
 
 
 def configuration(config: Path | str | None = None, settings: Sequence[str] = ()) -> Configuration:

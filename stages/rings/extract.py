@@ -12,6 +12,7 @@ from pydantic import Field
 from pipeline.arrays import Byte, Float, Float32, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
+from pipeline.geometry.image_places import ImagePlaces, clear_of
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
@@ -49,6 +50,11 @@ class RingParameters(Parameters):
         le=1.0,
         description="share of azimuths with a valid line below which a frame is rejected",
     )
+    left_out: ImagePlaces = Field(
+        (),
+        description="dirty places of the image in which no line is measured: u, v and radius, px, of each; "
+        "boresight run --twin takes them from a twin",
+    )
 
 
 def extract_rings(
@@ -74,7 +80,8 @@ def extract_rings(
     samples, rings = _empty(frames, sectors, context.scratch), 0
     for done, (frame, trace) in enumerate(found, 1):
         if trace is not None and trace.coverage >= parameters.least_coverage:
-            _put(samples, int(np.searchsorted(frames, frame)), trace)
+            seen = _outside(parameters.left_out, trace, sectors)
+            _put(samples, int(np.searchsorted(frames, frame)), seen)
             rings += 1
         context.progress(done, len(frames))
     if not rings:
@@ -170,6 +177,16 @@ def _first_trace(
         clips = trace.response._replace(clip_level=clip_level_of(grey, bgr, line))
         return replace(trace, response=noise_response(grey, sectors, trace.fit, clips))
     return None
+
+
+def _outside(places: ImagePlaces, trace: RingTrace, sectors: Sectors) -> RingTrace:
+    """Return a ring without the samples that lie in dirty places of the image."""
+    if not places:
+        return trace
+    psi = sectors.azimuth_rad
+    uv = sectors.centre_px + trace.fit.radius_px[:, None] * np.stack([np.cos(psi), np.sin(psi)], -1)
+    hidden = ~clear_of(places, uv)
+    return replace(trace, validity=np.where(hidden, RingValidity.OUT_OF_VIEW, trace.validity))
 
 
 def _empty(frames: Int, sectors: Sectors, scratch: Scratch) -> RingSamples:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Byte, Image
+from pipeline.geometry.image_places import ImagePlaces
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from stages.texture.blend import SplitImage, TileStack
@@ -18,7 +19,7 @@ from stages.texture.grid import FlatGrid
 from stages.texture.photometry import Light
 from stages.texture.project import project_tile
 from stages.texture.surface import SurfacePatch, WallSurface
-from stages.texture.views import ImagePlaces, LitViews, TileViews
+from stages.texture.views import LitViews, TileViews
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Float, Float32
+from pipeline.geometry.image_places import ImagePlaces, clear_of
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from stages.texture.grid import NODE_PX
 from stages.texture.light import LightField
 from stages.texture.surface import SurfacePatch
-from stages.texture.views import ImagePlaces, clear_of, sheet_distance_mm
+from stages.texture.views import sheet_distance_mm
 
 _BORDER_PX = 3.0
 

@@ -8,11 +8,12 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Image, Int
+from pipeline.geometry.image_places import ImagePlaces, clear_of
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from stages.texture.light import irradiance
 from stages.texture.surface import WallSurface
-from stages.texture.views import ImagePlaces, LitViews, clear_of, sheet_distance_mm
+from stages.texture.views import LitViews, sheet_distance_mm
 
 _CELL_COLUMNS = 30
 _CELL_RADII = 0.05

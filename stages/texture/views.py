@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.geometry.rigid import inverse
@@ -45,18 +45,6 @@ class TileViews:
 
     views: Int
     reach_mm: float
-
-
-ImagePlaces = tuple[tuple[float, float, float], ...]
-"""Round places of the image: u, v and radius, px, of each."""
-
-
-def clear_of(places: ImagePlaces, uv: Float | Float32) -> Bool:
-    """Return whether pixels (..., 2) lie outside all places of the image."""
-    out = np.ones(uv.shape[:-1], bool)
-    for u, v, radius in places:
-        out &= (uv[..., 0] - u) ** 2 + (uv[..., 1] - v) ** 2 > radius**2
-    return out
 
 
 def lit_views(recording: Recording, trajectory: Trajectory) -> LitViews:

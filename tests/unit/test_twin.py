@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 
 from pipeline.api.diagnosis.simulated import DiagnosisTried
-from pipeline.api.run import configuration, dirt_of
 from pipeline.api.twin import TwinOf, twin_document, write_twin
 from pipeline.artefacts.measured import RingValidity
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, RegionFit, Twin, TwinView
-from pipeline.errors import InputError
 from pipeline.files.provenance import MadeBy
 from pipeline.geometry.axis import straight_axis
 from pipeline.recording.base import Illumination
 from stages.texture.surface import WallSurface
-from stages.texture.views import clear_of
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import LineSamples
@@ -243,27 +240,6 @@ def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
     page = (tmp_path / "twin.html").read_text("utf-8")
     assert page.count("data:image/jpeg;base64") == 3
     assert page.count("</script>") == 1
-
-
-def _dirty(tmp_path, fixed_to):
-    figures = {"u_px": 100.0, "v_px": 50.0, "radius_px": 8.0}
-    place = {name: {"value": value, "sd": 4.0, "unit": "px"} for name, value in figures.items()}
-    document = {"found": [{"fixed_to": fixed_to, "place": place}]}
-    (tmp_path / "twin.json").write_text(json.dumps(document), "utf-8")
-    return dirt_of(tmp_path)
-
-
-def test_dirt_of_a_twin_is_left_out_of_the_photo_and_what_is_on_the_wall_is_not(tmp_path):
-    settings = configuration(settings=_dirty(tmp_path, "image")).tree()["texture"]["left_out"]
-    np.testing.assert_allclose(settings, [(100.0, 50.0, 12.0)])
-    assert not configuration(settings=_dirty(tmp_path, "wall")).tree()["texture"]["left_out"]
-    uv = np.array([[[100.0, 50.0], [111.0, 50.0], [113.0, 50.0]]])
-    np.testing.assert_array_equal(clear_of(tuple(settings), uv), [[False, False, True]])
-
-
-def test_a_folder_without_a_twin_is_refused(tmp_path):
-    with pytest.raises(InputError, match="boresight twin"):
-        dirt_of(tmp_path)
 
 
 def _sight(random, count=8000):
