@@ -198,6 +198,9 @@ class GaugeTwin:
     kept : tuple of bool
         Of each effect, whether frames fit better with it than with the others alone; the others are
         withdrawn.
+    chi2_wrong, sigmas_wrong : float
+        χ² per pixel with the effects the other way round, a wrong diagnosis of the same size, and by how many
+        σ that is worse than with the effects.
     """
 
     frame: Int
@@ -211,3 +214,5 @@ class GaugeTwin:
     told_px: float
     sigmas: float
     kept: tuple[bool, ...]
+    chi2_wrong: float = float("nan")
+    sigmas_wrong: float = float("nan")

@@ -27,7 +27,7 @@ from pipeline.machine.stage import Context, Of, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
 from pipeline.simulator.effects import switch_on
-from pipeline.simulator.effects.switch import Switch, parse_switches
+from pipeline.simulator.effects.switch import Switch, parse_switches, the_other_way
 from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.sheet import room_mm
@@ -82,8 +82,9 @@ def compare_gauge_line(
     switches = parse_switches(parameters.effects)
     less = [tuple(s for s in switches if s is not left) for left in switches] if len(switches) > 1 else []
     place = []
-    for done, chosen in enumerate(((), switches, *less)):
-        context.progress(done, 2 + len(less))
+    wrong = tuple(the_other_way(s) for s in switches)
+    for done, chosen in enumerate(((), switches, wrong, *less)):
+        context.progress(done, 3 + len(less))
         place.append(line.displacement_px(chosen))
     found = _judged(line, switches, place)
     context.report("chi-square per pixel of the gauge's line, as stated", found.chi2_stated, "")
@@ -209,9 +210,9 @@ def seen_at(camera: TrueCamera, xyz_c: Float) -> Float:
 
 
 def _judged(line: GaugeLine, switches: Sequence[Switch], place: Sequence[Float]) -> GaugeTwin:
-    """Return χ² for places of the line: as stated, with all effects, and with all but one each."""
+    """Return χ² for places of the line: as stated, with all effects, with wrong ones, and less one each."""
     blocks, pixels = line.blocks, line.pixels
-    stated, diagnosed, *less = (line.chi2(p) for p in place)
+    stated, diagnosed, wrong, *less = (line.chi2(p) for p in place)
     nowhere = np.zeros(len(blocks.of_frame))
     measured = line.chi2(nowhere)
     rise = line.chi2(nowhere + _PROBED_PX) - measured
@@ -222,7 +223,7 @@ def _judged(line: GaugeLine, switches: Sequence[Switch], place: Sequence[Float])
         _mean(stated, pixels), _mean(diagnosed, pixels), _mean(measured, pixels),
         _rms(place[0]), _rms(place[1]),
         float(_PROBED_PX * np.sqrt(_TOLD * _mean(measured, pixels) / max(_mean(rise, pixels), 1e-9))),
-        sigmas(stated - diagnosed), tuple(kept),
+        sigmas(stated - diagnosed), tuple(kept), _mean(wrong, pixels), sigmas(wrong - diagnosed),
     )  # fmt: skip
 
 
@@ -236,7 +237,7 @@ def _rms(displacement_px: Float) -> float:
 
 GAUGE_LINE = Stage(
     "gauge_line",
-    "1",
+    "2",
     GaugeLineParameters,
     compare_gauge_line,
     "the line of a gauge run beside the same line, re-rendered with what was diagnosed",

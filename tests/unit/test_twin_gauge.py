@@ -1,6 +1,8 @@
 """A gauge run's line held against instruments, on made pixels; what a diagnosis switches on."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,11 +10,12 @@ import pytest
 from pipeline.api.diagnosis.simulated import switches_of, try_diagnosis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.machine.display import SilentDisplay
+from pipeline.simulator.effects.switch import Switch, the_other_way
 from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.window import CylinderWindow
 from stages.twin.cells import sigmas
-from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, seen_at
+from stages.twin.gauge_line import GaugeLine, GaugeLineParameters, _judged, seen_at
 from stages.twin.line_blocks import LineBlocks, light_of
 
 FRAMES, BLOCKS, PIXELS = 12, 30, 160
@@ -47,6 +50,29 @@ def test_a_line_where_it_was_measured_leaves_noise_and_a_displaced_one_more(whit
     assert displaced == sorted(displaced)
     assert displaced[0] > 1.05 * measured.mean()
     assert displaced[2] > 10 * measured.mean()
+
+
+def test_a_wrong_diagnosis_of_the_same_size_is_a_figure_of_the_report():
+    frames = SimpleNamespace(frames=SimpleNamespace(frame=np.arange(FRAMES)))
+    line = replace(_line(), recording=frames)
+    nowhere, azimuth = np.zeros(FRAMES * BLOCKS), line.blocks.azimuth_rad
+    stated, wrong = (size * np.cos(azimuth) for size in (0.4, 0.8))
+    found = _judged(line, [Switch("laser_tilt", (0.4, 10.0))], [stated, nowhere, wrong])
+    assert found.chi2_diagnosed < found.chi2_stated < found.chi2_wrong
+    assert found.sigmas_wrong > found.sigmas > 3
+
+
+@pytest.mark.parametrize(
+    ("switch", "other"),
+    [
+        (Switch("laser_tilt", (0.4, 10.0)), (0.4, -170.0)),
+        (Switch("laser_cone", (0.3,)), (-0.3,)),
+        (Switch("sheet_waviness", (2.0, 3.0, 30.0)), (2.0, 3.0, 90.0)),
+        (Switch("housing_glass", (1.5,)), (3.0,)),
+    ],
+)
+def test_a_wrong_answer_is_as_far_off_as_none(switch, other):
+    assert the_other_way(switch).values == pytest.approx(other)
 
 
 def test_the_nearer_of_two_instruments_fits_better_and_no_difference_is_none():

@@ -25,6 +25,7 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CONSTANTLY, COURSES, Course, CourseKind, Effect, Quantity
 
 _COURSE = "~"
+_DIRECTIONS = ("direction_deg", "azimuth_deg")
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _SIZE = re.compile(rf"(?P<value>{_NUMBER})(?P<unit>[a-zA-Z]*?)(?=[@/]|x[-+.\d]|$)")
 _PART = re.compile(rf"(?P<mark>[@x/])(?P<value>{_NUMBER})(?P<unit>[a-zA-Z]*?)(?=[@/]|x[-+.\d]|$)")
@@ -131,6 +132,22 @@ def _kind(text: str) -> CourseKind:
     if text and text not in kinds:
         raise InputError("course", f"{text!r} is not known", expected=", ".join(kinds))
     return CourseKind(text or CourseKind.CONSTANT)
+
+
+def the_other_way(switch: Switch) -> Switch:
+    """Return an effect of the same size the other way round, or of twice the size where it has one way only.
+
+    It is a wrong answer about as far from the right one as none is.
+    """
+    values, quantities = list(switch.values), switch.effect.quantities
+    direction = next((k for k, q in enumerate(quantities) if q.name in _DIRECTIONS), None)
+    if direction is None:
+        own = quantities[0]
+        values[0] = -values[0] if own.low <= -values[0] <= own.high else 2 * values[0]
+    else:
+        turn = 180.0 / switch.quantities.get("order", 1.0)
+        values[direction] = (values[direction] + turn + 180.0) % 360.0 - 180.0
+    return Switch(switch.name, tuple(values), switch.course)
 
 
 def parse_switches(texts: Sequence[str]) -> tuple[Switch, ...]:
