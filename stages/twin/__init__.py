@@ -209,7 +209,7 @@ def _blocks(
     made = [
         [f(s.image - black, twin, state.noise.white - black) for f in (block_ratios, block_contrasts)]
         for s in sampled
-        if s.light == Illumination.LED
+        if s.light in state.shows_wall
         for twin in [renderer.frame(s.frame, s.light)]
     ]
     return [m[0] for m in made], [m[1] for m in made]

@@ -236,7 +236,10 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
     if state.lamp is None:
         said.append("No lit frame could be used: nothing is known of lamps, vignetting and photon transfer.")
     if state.line is None:
-        said.append("No frame of the laser alone could be used: nothing is known of the line's profile.")
+        said.append(
+            "No frame of the laser alone could be used: nothing is known of the line's profile, and pixels "
+            "near the line are not compared."
+        )
     else:
         said.append(
             "The sheet's thickness is the stated one: in one diameter it cannot be told from the lens' blur."

@@ -100,6 +100,9 @@ class Renderer:
             self._light_wall(made, frame)
         if light != Illumination.LED and state.line is not None:
             self._draw_line(made, frame)
+        if light == Illumination.BOTH and state.line is None:
+            near = self.scene.line(self.scene.pose(frame))
+            made.region[near.row, near.column] = Region.UNSEEN
         made.region[state.outside] = Region.DARK
         made.level[state.outside] = 0.0
         made.region[state.edge & (made.region != Region.UNSEEN)] = Region.EDGE

@@ -67,6 +67,12 @@ class PhotometricState:
     power: float = 1.0
     gain_map: Float32 | None = None
 
+    @property
+    def shows_wall(self) -> tuple[Illumination, ...]:
+        """Lights whose frames show the wall and no line, or one whose pixels are left out."""
+        both = (Illumination.BOTH,) if self.line is None else ()
+        return Illumination.LED, *both
+
 
 @dataclass(frozen=True)
 class Sampled:

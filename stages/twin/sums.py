@@ -55,11 +55,11 @@ class Sums:
         if kind == Illumination.LASER:
             near = (after.region == Region.LINE_CORE) | (after.region == Region.LINE_FLANK)
             self.line.add_line(frame, above, after, free & near, self._sector)
-        if kind == Illumination.LED:
+        if kind in self._state.shows_wall:
             self.blocks.add(frame, above, before, noise.white - noise.black.value)
         exposure = float(np.exp(exposure_of(above, after)))
         after = after.brighter(exposure, noise)
-        if kind == Illumination.LED:
+        if kind in self._state.shows_wall:
             exposed = after if gain is None else before.brighter(exposure, noise)
             for place in self.window:
                 place.add(frame, above, exposed, free)

@@ -1,0 +1,47 @@
+"""Frames rendered again: what is compared of frames in which both lights shine."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from pipeline.recording.base import Illumination
+from stages.twin.lamp_light import Course, Figure, LampLight
+from stages.twin.noise import CameraNoise
+from stages.twin.render import Region, Renderer
+from stages.twin.scene import LitSight
+from stages.twin.state import PhotometricState
+
+SHAPE = (40, 60)
+ONES = np.ones(SHAPE, np.float32)
+NOISE = CameraNoise(
+    Figure(16.0, 0.1), np.inf, Figure(2.0, 0.1), Figure(0.02, 0.01), Figure(0, 0), Figure(1, 1)
+)
+NOWHERE = np.zeros(SHAPE, bool)
+LAMP = LampLight(
+    1.0, np.array([0.0, 2.0]), np.zeros(2), np.zeros(2), np.zeros(4), np.zeros(4),
+    Course(np.array([0]), np.zeros(1), np.zeros(1)),
+)  # fmt: skip
+STATE = PhotometricState(NOISE, LAMP, None, np.array([0.5, 1.5]), np.zeros(2), np.zeros(2), NOWHERE, NOWHERE)
+LINE = SimpleNamespace(row=np.full(60, 20), column=np.arange(60))
+SCENE = SimpleNamespace(
+    polar=(ONES, ONES, ~NOWHERE), pose=lambda frame: np.eye(4), line=lambda T_pc: LINE,
+    lit=lambda T_pc: LitSight(100 * ONES, ONES, ONES, ONES),
+)  # fmt: skip
+
+
+def test_a_line_of_which_nothing_is_known_is_left_out_of_frames_with_both_lights():
+    for light, left_out in ((Illumination.BOTH, 60), (Illumination.LED, 0)):
+        twin = Renderer(SCENE, STATE).frame(0, light)
+        assert (twin.region == Region.UNSEEN).sum() == left_out
+        assert (twin.level[:20] == 100).all()
+    assert STATE.shows_wall == (Illumination.LED, Illumination.BOTH)
+    assert replace(STATE, line=SimpleNamespace()).shows_wall == (Illumination.LED,)
+
+
+def test_a_response_acts_on_the_contrast_of_the_wall():
+    grey = np.where(np.arange(60) < 30, np.float32(50), np.float32(100)) * ONES
+    sight = LitSight(grey, ONES, ONES, ONES)
+    scene = SimpleNamespace(**vars(SCENE) | {"lit": lambda T_pc: sight})
+    twin = Renderer(scene, replace(STATE, power=0.5)).frame(0, Illumination.LED)
+    np.testing.assert_allclose(twin.level[:, 30:].mean() / twin.level[:, :30].mean(), np.sqrt(2), rtol=0.01)
