@@ -38,6 +38,9 @@ def review(
     compare: Annotated[
         Path | None, typer.Option(metavar="EARLIER", help="folder of an earlier run of the same pipe")
     ] = None,
+    twin: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="folder of a twin of this run, for a page of its own")
+    ] = None,
     years: Annotated[
         float | None,
         typer.Option(min=0.001, max=200, help="time from the earlier run to this one, for rates"),
@@ -57,7 +60,7 @@ def review(
     The page is served on this machine only; nothing is sent anywhere. Decisions are kept in RUN/review.
     """
     opened = open_review(RunFiles(run.resolve()))
-    compared = _compared(opened, compare, years, config, assignments or ())
+    compared, beside = _compared(opened, compare, years, config, assignments or ()), _twin_page(twin)
     with as_file(files("pipeline.review").joinpath("page", "dist")) as page:
         if not (page / "index.html").is_file():
             raise InputError(page, "has no page", hint="install boresight whole")
@@ -67,10 +70,18 @@ def review(
             )
 
             with disk_errors_named(export):
-                export_review(opened, page, export, compared)
+                export_review(opened, page, export, compared, beside)
             typer.echo(f"Read-only review: {export.resolve() / 'index.html'}")
             return
-        serve(opened, page, port, browser, compared)
+        serve(opened, page, port, browser, compared, beside)
+
+
+def _twin_page(twin: Path | None) -> Path | None:
+    """Return the page in the folder of a twin."""
+    page = None if twin is None else twin / "twin.html"
+    if page is not None and not page.is_file():
+        raise InputError(page.parent, "holds no twin.html", expected="the folder of boresight twin")
+    return page
 
 
 def _compared(
@@ -96,7 +107,10 @@ def _compared(
     return compared
 
 
-def serve(opened: Review, page: Path, port: int, browser: bool, compared: Compared | None = None) -> None:
+def serve(
+    opened: Review, page: Path, port: int, browser: bool, compared: Compared | None = None,
+    twin: Path | None = None,
+) -> None:  # fmt: skip
     """Serve a review until interrupted.
 
     Raises
@@ -114,7 +128,7 @@ def serve(opened: Review, page: Path, port: int, browser: bool, compared: Compar
         typer.echo(f"Review of {opened.files.path.name}: {address}\nStop with Ctrl-C.")
         if browser:
             webbrowser.open(address)
-        guarded = Guard(application(opened, page, compared), token, number)
+        guarded = Guard(application(opened, page, compared, twin), token, number)
         server = uvicorn.Server(uvicorn.Config(guarded, log_level="warning", server_header=False))
         server.run(sockets=[listener])
 

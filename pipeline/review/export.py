@@ -28,7 +28,9 @@ _SECTIONS = 400
 _LARGEST_MODEL = 200 << 20
 
 
-def export_review(review: Review, page: Path, folder: Path, compared: Compared | None = None) -> None:
+def export_review(
+    review: Review, page: Path, folder: Path, compared: Compared | None = None, twin: Path | None = None
+) -> None:
     """Write the page, its data, pictures and papers into a new or empty ``folder``.
 
     Raises
@@ -42,7 +44,7 @@ def export_review(review: Review, page: Path, folder: Path, compared: Compared |
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir(parents=True)
     try:
-        _write(review, page, temporary, compared)
+        _write(review, page, temporary, compared, twin)
         if folder.exists():
             folder.rmdir()
         temporary.rename(folder)
@@ -50,7 +52,7 @@ def export_review(review: Review, page: Path, folder: Path, compared: Compared |
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _write(review: Review, page: Path, folder: Path, compared: Compared | None) -> None:
+def _write(review: Review, page: Path, folder: Path, compared: Compared | None, twin: Path | None) -> None:
     state = review.state()
     shutil.copytree(page / "assets", folder / "assets")
     index = (page / "index.html").read_text("utf-8")
@@ -58,6 +60,9 @@ def _write(review: Review, page: Path, folder: Path, compared: Compared | None) 
     index = index.replace('<script defer src="assets/page.js"></script>', own)
     (folder / "index.html").write_text(index, "utf-8")
     data = _data(review, state, folder)
+    data["run"]["twin"] = twin is not None
+    if twin is not None:
+        shutil.copyfile(twin, folder / "twin.html")
     if compared is not None:
         _add_comparison(data, compared, folder)
     text = json.dumps(data, allow_nan=False, separators=(",", ":"))

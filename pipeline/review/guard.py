@@ -13,9 +13,14 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-    "connect-src 'self' blob:; worker-src 'self' blob:; font-src 'self'; base-uri 'none'; "
+    "connect-src 'self' blob:; worker-src 'self' blob:; font-src 'self'; frame-src 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'none'"
 )
+TWIN_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'self'; sandbox allow-scripts"
+)
+"""A twin's page holds its scripts. In its sandbox it has no origin: it cannot ask the server anything."""
 HEADERS = {
     "content-security-policy": _POLICY,
     "x-content-type-options": "nosniff",
@@ -109,8 +114,10 @@ def _cookie(headers: Headers, name: str) -> str:
 def _with_headers(send: Send) -> Send:
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
-            own = [(k.encode(), v.encode()) for k, v in HEADERS.items()]
-            message = {**message, "headers": [*message.get("headers", []), *own]}
+            given = message.get("headers", [])
+            names = {k for k, _ in given}
+            own = [(k.encode(), v.encode()) for k, v in HEADERS.items() if k.encode() not in names]
+            message = {**message, "headers": [*given, *own]}
         await send(message)
 
     return sending

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
@@ -24,6 +24,7 @@ from pipeline.review.decisions import Point, action_of
 from pipeline.review.decisions.ledger import StaleError
 from pipeline.review.flat_tiles import FlatPicture, Limits, picture_of
 from pipeline.review.frames import UnseenError, finder_of
+from pipeline.review.guard import TWIN_POLICY
 from pipeline.review.measuring import Tool, readings
 from pipeline.review.model_stretches import model_of
 from pipeline.review.review import Review
@@ -97,12 +98,14 @@ class ReviewApp:
     review: Review
     page: Path
     compared: Compared | None = None
+    twin: Path | None = None
 
     def routes(self) -> list[Route | Mount]:
         """Return all addresses."""
         return [
             Route("/", self._index),
             Mount("/assets", StaticFiles(directory=self.page / "assets")),
+            Route("/twin", self._answering(self._twin)),
             Route("/api/run", self._answering(self._run)),
             Route("/api/state", self._answering(self._state)),
             Route("/api/seal", self._answering(self._seal)),
@@ -152,7 +155,13 @@ class ReviewApp:
         return Response(part, media_type="model/gltf-binary")
 
     def _run(self, _: Request, __: bytes) -> Response:
-        return JSONResponse(documents.run_document(self.review.files))
+        return JSONResponse(documents.run_document(self.review.files) | {"twin": self.twin is not None})
+
+    def _twin(self, _: Request, __: bytes) -> Response:
+        if self.twin is None:
+            raise InputError("--twin", "no twin was given", hint="boresight review RUN --twin DIR")
+        page = self.twin.read_text("utf-8")
+        return HTMLResponse(page, headers={"content-security-policy": TWIN_POLICY})
 
     def _state(self, _: Request, __: bytes) -> Response:
         return JSONResponse(documents.state_document(self.review.state(), self.review.files))
@@ -256,9 +265,11 @@ class ReviewApp:
         )
 
 
-def application(review: Review, page: Path, compared: Compared | None = None) -> Starlette:
+def application(
+    review: Review, page: Path, compared: Compared | None = None, twin: Path | None = None
+) -> Starlette:
     """Return the server's application, unguarded: see `pipeline.review.guard`."""
-    return Starlette(routes=ReviewApp(review, page, compared).routes())
+    return Starlette(routes=ReviewApp(review, page, compared, twin).routes())
 
 
 def _number(request: Request, name: str) -> float:

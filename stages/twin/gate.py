@@ -23,6 +23,8 @@ _SURE, _MOST, _FEWEST = 3.0, 16, 6
 """σ from frame to frame that z must fall by; most frames that are rendered again, and fewest that judge."""
 _MOST_SQUARE = 25.0
 """Square of z that a pixel counts with at most: a glint of thirty σ would outweigh a thousand pixels."""
+_MOST_ALIKE = 0.9
+"""Correlation of neighbours that counts at most: of so few frames it is not told better."""
 _FEWEST_PIXELS = 200
 """Pixels at which an effect acts, from which a frame judges it."""
 
@@ -87,7 +89,7 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     before, after, pixels = np.concatenate(squares).T
     seen = pixels >= _FEWEST_PIXELS
     fall = (before - after)[seen]
-    told, chance = sigmas(fall), float(t.sf(sigmas(fall), max(len(fall) - 1, 1)))
+    told, chance = _over_frames(fall)
     total = max(float(pixels[seen].sum()), 1.0)
     chi2 = [float(squares[seen].sum()) / total for squares in (before, after)]
     found = replace(one.mismatch, chi2_before=chi2[0], chi2_after=chi2[1])
@@ -95,6 +97,20 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
         return _withdrawn(found, fall, told), False
     found = found if not sizes else replace(found, parameters=_with_size(found, sizes))
     return replace(found, probability=float(np.nanmax([chance, found.probability]))), True
+
+
+def _over_frames(fall: Float) -> tuple[float, float]:
+    """Return by how many σ falls (F,) in the order of time are above 0, and the chance of that.
+
+    Frames that follow each other see the same wall: as far as their falls are alike they count as fewer.
+    """
+    if len(fall) < 3:
+        return 0.0, 1.0
+    off = fall - fall.mean()
+    alike = float(np.clip((off[1:] * off[:-1]).sum() / max(float((off**2).sum()), 1e-12), 0.0, _MOST_ALIKE))
+    worth = (1 - alike) / (1 + alike)
+    told = sigmas(fall) * float(np.sqrt(worth))
+    return told, float(t.sf(told, max(len(fall) * worth - 1, 1.0)))
 
 
 def _squares(shown: Shown, pair: Pair) -> Float:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from stages.twin.gate import judged
+from stages.twin.gate import _over_frames, judged
 from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlocksOfFrames
@@ -118,6 +118,16 @@ def test_a_name_that_frames_rendered_again_do_not_bear_out_is_withdrawn():
         kept, withdrawn = _named(change, of_sharpness=blur, judge=_noisy)
         assert not kept
         assert withdrawn[0] == name
+
+
+def test_frames_that_follow_each_other_count_as_fewer():
+    random = np.random.default_rng(5)
+    apart = 1 + random.standard_normal(16)
+    alike = 1 + np.repeat(random.standard_normal(4), 4)
+    alike = 1 + (alike - alike.mean()) * apart.std() / alike.std()
+    apart = 1 + apart - apart.mean()
+    assert _over_frames(apart)[0] > 1.5 * _over_frames(alike)[0] > 0
+    assert _over_frames(-apart)[1] > 0.5
 
 
 def test_a_displaced_photo_is_no_motion_blur():

@@ -11,6 +11,7 @@ import { Session } from "./session";
 import { signPage } from "./sign";
 import { Export, Server, type Exported, type Source } from "./source";
 import { ToolBar } from "./tools";
+import { twinPage } from "./twin";
 import * as words from "./words";
 import { element } from "./words";
 
@@ -32,7 +33,7 @@ async function start(): Promise<void> {
     pane("Recorded frame", "view-frame", frame.bar(), frame.root), pane("Cross-section", "view-section", section.bar(), section.root),
     pane("Findings", "view-findings", null, findings.root));
   const pages: Record<string, HTMLElement> = {
-    Inspect: inspect, Quality: qualityPage(session), "Sign-off": signPage(session), Compare: comparePage(session),
+    Inspect: inspect, Quality: qualityPage(session), "Sign-off": signPage(session), Compare: comparePage(session), Twin: twinPage(session),
   };
   const help = keysDialog();
   document.body.replaceChildren(header(session, pages, help), notice(session), ...Object.values(pages), help);

@@ -21,7 +21,7 @@ export interface Run {
   program: { name: string; version: string }; inputs: Record<string, string>; has_recording: boolean;
   nominal_diameter_mm: number; wall_thickness_mm: number | null; distance_mm: [number, number]; radius_mm: number;
   overlays: Overlay[]; kinds: string[]; defects: MeasuredDefect[]; unconfirmed: Unconfirmed[]; axis: Axis; diagnosis: Diagnosis | null;
-  version: string;
+  version: string; twin?: boolean;
 }
 
 export interface Diagnosis { verdict: string; statement: string; effects: string[] }
