@@ -11,7 +11,7 @@ const KEYS: [string, string][] = [
   ["E", "redraw the outline"], ["S", "split"], ["X, M", "tick for merging; merge the ticked"], ["D", "add a missed defect"],
   ["F", "go to the unrolled wall: arrows move the spot, + − zoom, Enter sets a point, Backspace takes it back"],
   [", and Ctrl+Enter", "next part of a split; done drawing"], ["G", "go to the model: W S fly, A D look around"],
-  ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["1, 2, 3, 4", "the pages in order"], ["Esc", "leave a tool"], ["?", "this list"],
+  ["Ctrl+Z, Ctrl+Shift+Z", "undo, redo"], ["1, 2, 3, 4, 5", "the pages in order"], ["Esc", "leave a tool"], ["?", "this list"],
 ];
 
 export interface Reach {
