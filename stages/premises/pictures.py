@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -128,13 +128,17 @@ class _PolarView:
 
 @dataclass(frozen=True)
 class _Strip:
-    """An unrolled wall: number of its picture, brightness, grey levels, and the rows without a laser line."""
+    """An unrolled wall: number of its picture, brightness, grey levels, and the rows without a laser line.
+
+    ``levelled`` holds the parts, by first row and end, that were freed of the lamps' light.
+    """
 
     place: int
     brightness: float
     grey: Float32
     first: int
     end: int
+    levelled: dict[tuple[int, int], Float32] = field(default_factory=dict)
 
 
 class _AxialMotion:
@@ -150,7 +154,9 @@ class _AxialMotion:
         self._radius_px = np.hypot(from_centre[..., 0], from_centre[..., 1])
         self._ray = np.arange(_COLUMNS) * _RAYS // _COLUMNS
         self._line_width_px = line_width_px
+        self._at = tuple(np.ascontiguousarray(self._uv[..., k]) for k in range(2))
         self._moves = _moving(stays, camera.image_size, self._uv)
+        self._known: dict[tuple[int, int], Float32] = {}
         self._radii_per_row = float(z[1] - z[0])
         self._kept: deque[_Strip] = deque(maxlen=_KEPT)
 
@@ -161,7 +167,7 @@ class _AxialMotion:
 
         Rows with a laser line, at ``line_px`` on each ray, are left out: it does not move with the wall.
         """
-        grey = cv2.remap(image, self._uv[..., 0], self._uv[..., 1], cv2.INTER_LINEAR).astype(np.float32)
+        grey = cv2.remap(image, *self._at, cv2.INTER_LINEAR).astype(np.float32)
         strip = _Strip(place, brightness, grey, *self._free_rows(line_px))
         before = next((k for k in reversed(self._kept) if _in_like_light(k, strip)), None)
         self._kept.append(strip)
@@ -177,17 +183,34 @@ class _AxialMotion:
         return before.place, change, -moved * self._radii_per_row
 
     def _levelled(self, strip: _Strip, rows: slice) -> Float32:
+        """Return `_freed` rows of a strip, kept for the picture that will be compared with it."""
+        part = rows.start, rows.stop
+        if part not in strip.levelled:
+            strip.levelled[part] = self._freed(strip, rows)
+        return strip.levelled[part]
+
+    def _freed(self, strip: _Strip, rows: slice) -> Float32:
         """Return rows of a strip freed of the lamps' light, every row of spread 1.
 
         Where something stays there is noise instead: gaps of one shape would say that the wall stands still.
         """
         grey, moves = strip.grey[rows], self._moves[rows]
-        light, known = (cv2.GaussianBlur(p, (0, 0), _BROAD) for p in (grey * moves, moves))
-        fine = (grey - light / np.maximum(known, _LEAST_KNOWN)) * moves
+        light = cv2.GaussianBlur(grey * moves, (0, 0), _BROAD)
+        fine = (grey - light / self._share_known(rows)) * moves
         fine -= fine.mean(1, keepdims=True)
         fine /= np.maximum(fine.std(1, keepdims=True), 1.0)
+        if moves.all():
+            return np.asarray(fine, np.float32)
         noise = np.random.default_rng(strip.place).standard_normal(fine.shape)
         return np.where(moves > 0, fine, noise).astype(np.float32)
+
+    def _share_known(self, rows: slice) -> Float32:
+        """Return which share of the light about a place is that of what moves."""
+        part = rows.start, rows.stop
+        if part not in self._known:
+            known = cv2.GaussianBlur(self._moves[rows], (0, 0), _BROAD)
+            self._known[part] = np.maximum(known, _LEAST_KNOWN).astype(np.float32)
+        return self._known[part]
 
     def _free_rows(self, line_px: Float32 | None) -> tuple[int, int]:
         """Return the longest run of rows of which the laser line covers a tenth at most."""
