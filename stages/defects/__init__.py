@@ -251,5 +251,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "13", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "14", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

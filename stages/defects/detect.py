@@ -12,7 +12,7 @@ from scipy.ndimage import maximum_filter
 from scipy.optimize import brentq
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Bool, Complex, Float, Float32
+from pipeline.arrays import Bool, Complex64, Float, Float32
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
 from stages.defects.along import stretches, widened
@@ -60,36 +60,36 @@ class Weighed:
     reach: int
 
     @cached_property
-    def signal_spectrum(self) -> Complex:
+    def signal_spectrum(self) -> Complex64:
         """The Fourier transform of ``signal``, zero beyond its ends."""
         return self._spectrum(self.signal)
 
     @cached_property
-    def weight_spectrum(self) -> Complex:
+    def weight_spectrum(self) -> Complex64:
         """The Fourier transform of ``weight``, zero beyond its ends."""
         return self._spectrum(self.weight)
 
-    def filtered(self, spectrum: Complex, kernel: Float) -> Float:
+    def filtered(self, spectrum: Complex64, kernel: Float) -> Float:
         """Return the correlation (S, A) with a template's kernel: periodic in azimuth, zero beyond the ends.
 
         Templates look alike upside down, so that correlation is convolution.
         """
         rows, columns = self._shape
-        padded = np.zeros((rows, columns))
+        padded = np.zeros((rows, columns), np.float32)
         i, j = (np.arange(n) - n // 2 for n in kernel.shape)
         # A template that is longer than the circle is wound round it.
-        np.add.at(padded, np.ix_(i % rows, j % columns), kernel)
+        np.add.at(padded, np.ix_(i % rows, j % columns), kernel.astype(np.float32))
         found = irfft2(spectrum * rfft2(padded), (rows, columns))
-        return np.asarray(found[: len(self.seen)])
+        return np.asarray(found[: len(self.seen)], float)
 
     @property
     def _shape(self) -> tuple[int, int]:
         return next_fast_len(len(self.seen) + self.reach, real=True), self.seen.shape[1]
 
-    def _spectrum(self, image: Float) -> Complex:
-        padded = np.zeros(self._shape)
+    def _spectrum(self, image: Float) -> Complex64:
+        padded = np.zeros(self._shape, np.float32)
         padded[: len(image)] = image
-        return np.asarray(rfft2(padded), complex)
+        return np.asarray(rfft2(padded), np.complex64)
 
 
 @dataclass(frozen=True)

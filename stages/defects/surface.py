@@ -172,12 +172,13 @@ def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wante
     rows, columns = out.shape
     reach_s = int(np.ceil(2.5 * along / cell_s))
     reach_a = min(int(np.ceil(2.5 * around / cell_a)), columns // 2 - 1)
-    normal, right, basis = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
+    normal, right = np.zeros((6, 6)), np.zeros(6)
     for row, column in wanted:
-        normal[:] = 0.0
-        right[:] = 0.0
         count = 0
         before = after = False
+        # Sums of weight times powers of s, the first digit, and q: all that the equations hold.
+        m00 = m10 = m01 = m20 = m11 = m02 = m30 = m21 = m12 = m03 = m40 = m31 = m22 = m13 = m04 = 0.0
+        d00 = d10 = d01 = d20 = d11 = d02 = 0.0
         for r in range(max(0, row - reach_s), min(rows, row + reach_s + 1)):
             for c in range(column - reach_a, column + reach_a + 1):
                 cell = r * columns + c % columns
@@ -186,17 +187,35 @@ def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wante
                     q = j[k] - column
                     q = (q - columns * np.rint(q / columns)) * cell_a
                     w = np.exp(-0.5 * ((s / along) ** 2 + (q / around) ** 2))
-                    basis[0], basis[1], basis[2] = 1.0, s, q
-                    basis[3], basis[4], basis[5] = s * s, s * q, q * q
-                    for a in range(6):
-                        right[a] += w * basis[a] * deviation[k]
-                        for b in range(a, 6):
-                            normal[a, b] += w * basis[a] * basis[b]
+                    ws, wq, wd = w * s, w * q, w * deviation[k]
+                    wss, wsq, wqq = ws * s, ws * q, wq * q
+                    m00, m10, m01, m20, m11, m02 = (
+                        m00 + w,
+                        m10 + ws,
+                        m01 + wq,
+                        m20 + wss,
+                        m11 + wsq,
+                        m02 + wqq,
+                    )
+                    m30, m21, m12, m03 = m30 + wss * s, m21 + wss * q, m12 + wqq * s, m03 + wqq * q
+                    ss, sq, qq = s * s, s * q, q * q
+                    m40, m31, m22, m13, m04 = (
+                        m40 + wss * ss, m31 + wss * sq, m22 + wss * qq, m13 + wqq * sq, m04 + wqq * qq
+                    )  # fmt: skip
+                    d00, d10, d01 = d00 + wd, d10 + wd * s, d01 + wd * q
+                    d20, d11, d02 = d20 + wd * ss, d11 + wd * sq, d02 + wd * qq
                     count += 1
                     before = before or s <= 0.0
                     after = after or s >= 0.0
         if count < least or not (before and after):
             continue
+        right[0], right[1], right[2], right[3], right[4], right[5] = d00, d10, d01, d20, d11, d02
+        normal[0] = (m00, m10, m01, m20, m11, m02)
+        normal[1, 1:] = (m20, m11, m30, m21, m12)
+        normal[2, 2:] = (m02, m21, m12, m03)
+        normal[3, 3:] = (m40, m31, m22)
+        normal[4, 4:] = (m22, m13)
+        normal[5, 5] = m04
         weight = normal[0, 0]
         for a in range(6):
             normal[a, a] += 1e-4 * weight
