@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
-Complex = NDArray[np.complex128]
 Complex64 = NDArray[np.complex64]
 Int = NDArray[np.int64]
 Int32 = NDArray[np.int32]

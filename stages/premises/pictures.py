@@ -154,7 +154,7 @@ class _AxialMotion:
         self._radius_px = np.hypot(from_centre[..., 0], from_centre[..., 1])
         self._ray = np.arange(_COLUMNS) * _RAYS // _COLUMNS
         self._line_width_px = line_width_px
-        self._at = tuple(np.ascontiguousarray(self._uv[..., k]) for k in range(2))
+        self._u, self._v = (np.ascontiguousarray(self._uv[..., k]) for k in range(2))
         self._moves = _moving(stays, camera.image_size, self._uv)
         self._known: dict[tuple[int, int], Float32] = {}
         self._radii_per_row = float(z[1] - z[0])
@@ -167,7 +167,7 @@ class _AxialMotion:
 
         Rows with a laser line, at ``line_px`` on each ray, are left out: it does not move with the wall.
         """
-        grey = cv2.remap(image, *self._at, cv2.INTER_LINEAR).astype(np.float32)
+        grey = cv2.remap(image, self._u, self._v, cv2.INTER_LINEAR).astype(np.float32)
         strip = _Strip(place, brightness, grey, *self._free_rows(line_px))
         before = next((k for k in reversed(self._kept) if _in_like_light(k, strip)), None)
         self._kept.append(strip)
