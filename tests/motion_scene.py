@@ -23,6 +23,8 @@ ENCODER_SIGMA_MM = 0.05
 SHAKE = np.array([0.1, 0.1, 0, 2e-3, 2e-3, 0])
 """Trembling, 1 σ, mm and rad."""
 _SIGMA_PX = 0.1
+_RING_MM_PER_PX = 1.5  # dr = b (1 + r² / b²) dθ, 90 px per radian, b = 22 mm
+_RING_PX = 103.0
 
 
 @dataclass(frozen=True)
@@ -50,10 +52,13 @@ def scene(
     seed: int = 0,
     shake: float = 0.0,
     swing_mm: float = 0.0,
+    widens: float = 0.0,
+    picture_grows: float = 0.0,
 ) -> Scene:
     """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`.
 
-    The way swings by ``swing_mm`` about one of even speed.
+    The way swings by ``swing_mm`` about one of even speed. The pipe's radius gains the share ``widens`` of
+    the distance, and pictures are larger in the end than at the beginning by the share ``picture_grows``.
     """
     random = np.random.default_rng(seed)
     instrument = probe()
@@ -70,9 +75,13 @@ def scene(
         T_pc, np.zeros((landmarks, 3)), -20.0, 1.2 * frames + 60, RADIUS, 30.0, unsure.shape[1] + MATCH_BIASES
     )
     state = _bent(replace(start, globals=np.array([RADIUS, 0.2, -0.1, 1.0])))
-    truth = replace(state, xyz_p=_on_wall(state, random, landmarks))
+    truth = replace(state, xyz_p=_on_wall(state, random, landmarks, widens))
     tracks = _tracks(truth, instrument, noise, random)
-    rings = _rings(truth, noise, random, unsure.shape[1])
+    rings = _rings(truth, noise, random, unsure.shape[1], widens=widens)
+    larger = picture_grows * (k / (frames - 1) - 0.5)
+    tracks = tracks.reduced(1 - larger, instrument.camera.centre_px)
+    grown = _RING_PX * larger[rings.frame, None] * rings.by_pixel
+    rings = replace(rings, xyz_c=rings.xyz_c + grown)
     distance = t[:, 2] - t[0, 2] + noise * ENCODER_SIGMA_MM * random.standard_normal(frames)
     readings = EncoderReadings(distance, ENCODER_SIGMA_MM, np.ones(len(distance), bool)) if encoder else None
     sigma = np.array([0.05] * 3 + [1e-3] * 3)
@@ -96,11 +105,11 @@ def _bent(state: State) -> State:
     return state.step(np.zeros((len(state.T_pc), 7)), border, np.zeros_like(state.xyz_p))
 
 
-def _on_wall(state: State, random: np.random.Generator, count: int) -> Float:
+def _on_wall(state: State, random: np.random.Generator, count: int, widens: float) -> Float:
     s = random.uniform(12, 1.2 * len(state.T_pc) + 30, count)
     psi = random.uniform(-np.pi, np.pi, count)
     r, a, b, _ = state.globals
-    return from_pipe(state.axis, s, psi, r + a * np.cos(2 * psi) + b * np.sin(2 * psi))
+    return from_pipe(state.axis, s, psi, r + widens * s + a * np.cos(2 * psi) + b * np.sin(2 * psi))
 
 
 def _tracks(state: State, instrument: Probe, noise: float, random: np.random.Generator) -> Tracks:
@@ -122,14 +131,21 @@ def _tracks(state: State, instrument: Probe, noise: float, random: np.random.Gen
     )  # fmt: skip
 
 
-def _rings(state: State, noise: float, random: np.random.Generator, unsure: int, bins: int = 24) -> RingBins:
+def _rings(
+    state: State,
+    noise: float,
+    random: np.random.Generator,
+    unsure: int,
+    bins: int = 24,
+    widens: float = 0.0,
+) -> RingBins:
     psi = np.linspace(-np.pi, np.pi, bins, endpoint=False)
     r, a, b, _ = state.globals
     points = []
     for T in state.T_pc:
         s = np.full(bins, T[2, 3] + 22.0)
         for _ in range(6):
-            wall = from_pipe(state.axis, s, psi, r + a * np.cos(2 * psi) + b * np.sin(2 * psi))
+            wall = from_pipe(state.axis, s, psi, r + widens * s + a * np.cos(2 * psi) + b * np.sin(2 * psi))
             s = s - (transform(inverse(T), wall)[:, 2] - 22.0)
         points.append(transform(inverse(T), wall))
     xyz_c = np.concatenate(points)
@@ -137,4 +153,5 @@ def _rings(state: State, noise: float, random: np.random.Generator, unsure: int,
     xyz_c = xyz_c + noise * 0.05 * random.standard_normal(len(xyz_c))[:, None] * outward
     by_instrument = random.standard_normal((len(xyz_c), 3, unsure)) * 0.01
     frame = np.repeat(np.arange(len(state.T_pc)), bins)
-    return RingBins(frame, xyz_c, by_instrument, 0.2 * outward, 0 * by_instrument, np.full(len(xyz_c), 0.05))
+    by_pixel = _RING_MM_PER_PX * outward
+    return RingBins(frame, xyz_c, by_instrument, by_pixel, 0 * by_instrument, np.full(len(xyz_c), 0.05))

@@ -8,7 +8,7 @@ A field may be an array, a number, a string, a tuple of such, a nested artefact,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -70,6 +70,10 @@ class RingSamples:
         """Return (F, A, 2) pixel coordinates (u, v) of the samples."""
         direction = np.stack([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)], -1)
         return np.asarray(self.centre_px + self.radius_px[..., None].astype(np.float64) * direction)
+
+    def reduced(self, times: Float) -> RingSamples:
+        """Return the rings seen in pictures that were so many times (F,) too large about the centre."""
+        return replace(self, radius_px=(self.radius_px / times[:, None]).astype(np.float32))
 
 
 @dataclass(frozen=True)
@@ -171,6 +175,9 @@ class Trajectory:
         it was not worked out.
     pieces : tuple of PipePiece
         Straight lengths and bends in the order of distance; empty where they were not looked for.
+    image_scale, image_scale_sigma : (N,) or None
+        By how many times pictures are larger than the probe's camera has them, and its 1 σ; None where the
+        scale did not drift.
     """
 
     frame: Int
@@ -187,6 +194,8 @@ class Trajectory:
     instrument_covariance: Float | None = None
     distance_sigma_mm: float = float("nan")
     pieces: tuple[PipePiece, ...] = ()
+    image_scale: Float | None = None
+    image_scale_sigma: Float | None = None
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from pipeline.pages import notation
 from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
-from stages.accumulate.survey import RingsOnWall, RingSurvey, survey_of
+from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, survey_of
 
 # Azimuths, 5° apart: the instrument's errors are harmonics up to the fourth, and linear between nodes.
 _AZIMUTHS = 72
@@ -69,7 +69,11 @@ def calibration_spread(
     turn = np.swapaxes(section, 1, 2) @ trajectory.T_pc[index, :3, :3]
     roll = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
     profiles = [_around(probe, rings, k, azimuth, t) for k, t in zip(some, roll, strict=True)]
-    return CalibrationSpread(survey.middle_mm[some], np.stack(profiles))
+    drift = np.zeros(len(some))
+    if trajectory.image_scale_sigma is not None:
+        by_scale = [_by_scale(probe, rings, k) for k in some]
+        drift = np.array(by_scale) * trajectory.image_scale_sigma[index]
+    return CalibrationSpread(survey.middle_mm[some], np.hypot(np.stack(profiles), drift[:, None]))
 
 
 def _nearest(distance: Float, wanted: Float) -> Int:
@@ -77,6 +81,14 @@ def _nearest(distance: Float, wanted: Float) -> Int:
     order = np.argsort(distance, kind="stable")
     middle = (distance[order][1:] + distance[order][:-1]) / 2
     return np.asarray(order[np.searchsorted(middle, wanted)])
+
+
+def _by_scale(probe: Probe, rings: RingSamples, row: int) -> float:
+    """Return the gain of a ring's radius, mm, per relative gain of the picture's scale."""
+    outward = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
+    radius_px = float(np.median(rings.radius_px[row][rings.valid[row]]))
+    by_pixel = probe.triangulate_jacobian(rings.centre_px + radius_px * outward)[0][:, :2]
+    return radius_px * float(np.mean(np.einsum("ai,aij,aj->a", outward, by_pixel, outward)))
 
 
 def _around(probe: Probe, rings: RingSamples, row: int, azimuth_p: Float, roll: float) -> Float:
@@ -136,6 +148,7 @@ def accumulate_wall(
         When no ring sample lies on the wall, or most of the wall is nowhere near the pipe's radius.
     """
     found = probe.as_found_in(trajectory)
+    rings = in_steady_pictures(rings, trajectory)
     on_wall = RingsOnWall(found, rings, points, trajectory)
     survey = survey_of(on_wall)
     if not survey.count.any():

@@ -79,6 +79,16 @@ class RingsOnWall:
         return self._last[1]
 
 
+def in_steady_pictures(rings: RingSamples, trajectory: Trajectory) -> RingSamples:
+    """Return the rings as seen in pictures of one scale, where the motion shows that the scale drifted."""
+    if trajectory.image_scale is None:
+        return rings
+    last = len(trajectory.frame) - 1
+    return rings.reduced(
+        trajectory.image_scale[np.minimum(np.searchsorted(trajectory.frame, rings.frame), last)]
+    )
+
+
 def wall_samples(
     probe: Probe, rings: RingSamples, points: RingPoints, trajectory: Trajectory, rows: Int
 ) -> WallSamples:

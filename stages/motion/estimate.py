@@ -96,7 +96,8 @@ def estimate_motion(
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
-    return replace(trajectory, events=events)
+    steady = estimate.steady
+    return replace(trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma)
 
 
 def measure_run(
@@ -255,7 +256,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "21",
+    "22",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -116,6 +116,7 @@ def report_motion(
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
     estimate.encoder.warn(context)
+    estimate.steady.warn(context)
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     context.report("distance travelled", travelled, "mm")
     context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")

@@ -163,6 +163,21 @@ def shake(image: Image, laser: bool, k: int, random: np.random.Generator) -> Ima
     return np.asarray(cv2.warpAffine(image, move, image.shape[1::-1], flags=cv2.INTER_CUBIC), np.float32)
 
 
+def scale_shrinks(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The lens warms up: the picture shrinks by 0.25 % over 170 frames, evenly."""
+    return _scaled(image, 1 - 0.0025 * k / 170)
+
+
+def scale_grows(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The picture grows by 0.25 % over 170 frames, evenly."""
+    return _scaled(image, 1 + 0.0025 * k / 170)
+
+
+def scale_settles(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The picture shrinks by 0.3 %, fast at first, to an end: an e-th of the way is left after 60 frames."""
+    return _scaled(image, 1 - 0.003 * (1 - np.exp(-k / 60)))
+
+
 def dark_edges(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
     """Light falls off to a tenth towards the edge."""
     away = _distance(image)[..., None] / 600
@@ -226,6 +241,13 @@ def _distance(image: Image) -> NDArray[np.float64]:
     return np.asarray(np.hypot(*(np.mgrid[:h, :w] - np.array([h, w])[:, None, None] / 2)))
 
 
+def _scaled(image: Image, factor: float) -> Image:
+    h, w = image.shape[:2]
+    centre = (np.array([w, h]) - 1) / 2
+    move = np.column_stack([factor * np.eye(2), (1 - factor) * centre]).astype(np.float64)
+    return np.asarray(cv2.warpAffine(image, move, (w, h), flags=cv2.INTER_CUBIC), np.float32)
+
+
 def _shrunk(image: Image, factor: float) -> Image:
     h, w = image.shape[:2]
     v = np.clip(np.rint((np.arange(h) - h / 2) / factor + h / 2), 0, h - 1).astype(int)
@@ -270,6 +292,7 @@ PAINTED: dict[str, Paint] = {
         hot_pixels, static_reflection, droplet, banding, interlaced, dim_sector, second_ring, sliding_drop,
         text_overlay, clock_and_logo, cable, debris, black_frames, fog, grey_camera, standing_water, shake,
         dark_edges, exposure_pumping, fouled_lens, lamp_out, laser_flicker, mirrored, half_size,
+        scale_shrinks, scale_grows, scale_settles,
     )
 }  # fmt: skip
 # Frames whose pictures all are the one before the first of them.

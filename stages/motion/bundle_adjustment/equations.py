@@ -41,7 +41,7 @@ _NO_PIXEL_PX = 1000.0
 """Residual of a landmark that projects nowhere."""
 _DAMPED = 1e-5
 """Relative damping with which covariances are computed where rounding made the equations singular."""
-_LEAST_REACH = 4
+LEAST_REACH = 4
 """Frames that are coupled at least: a third difference has four."""
 _FIRST_RAD, _KNOT_RAD = np.radians(38.0), np.radians(10.0)
 """First knot and way to the next: five cover the polar angles at which texture is tracked by default."""
@@ -162,18 +162,29 @@ class Equations:
         """
         system = self._system()
         system.add_landmarks(self.texture)
-        try:
-            return system.factor()
-        except np.linalg.LinAlgError:
-            # Rounding can make a weakly determined direction negative: its σ is then a little too small.
-            return system.factor(_DAMPED)
+        return factorised(system)
 
     def _system(self) -> BorderedSystem:
         border = self.rings.by_border.shape[1]
-        system = BorderedSystem(self.frames, border, max(self.texture.reach, _LEAST_REACH))
+        system = BorderedSystem(self.frames, border, max(self.texture.reach, LEAST_REACH))
         for row in (*self.rows, self.rings):
             system.add(row)
         return system
+
+
+def factorised(system: BorderedSystem) -> Factor:
+    """Return the factorised system, for covariances.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When some unknown is not determined.
+    """
+    try:
+        return system.factor()
+    except np.linalg.LinAlgError:
+        # Rounding can make a weakly determined direction negative: its σ is then a little too small.
+        return system.factor(_DAMPED)
 
 
 def linearised(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,6 +148,10 @@ class Tracks:
         landmark = (np.cumsum(often) - 1)[self.landmark[keep]]
         parts = self.frame[keep], self.uv[keep], self.sigma_px[keep], self.xyz[often], self.poses
         return Tracks(landmark, *parts), often
+
+    def reduced(self, times: Float, centre_px: Float) -> Tracks:
+        """Return the tracks seen in pictures that were so many times (N,) too large about their centre."""
+        return replace(self, uv=centre_px + (self.uv - centre_px) / times[self.frame, None])
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of_encoder
@@ -12,6 +14,7 @@ from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, scale_between_halves
 from stages.motion.parameters import MotionParameters
 from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 
 _SHARED_ERROR = 1 / 3
@@ -54,6 +57,8 @@ class FirstWindow:
     unsure : float
         Relative 1 σ of distances by texture that its residuals do not show.
     encoder : EncoderCheck
+    steady : SteadyRun
+        Its image scale.
     """
 
     run: MeasuredRun
@@ -62,6 +67,12 @@ class FirstWindow:
     measured: Measurements
     unsure: float
     encoder: EncoderCheck
+    steady: SteadyRun
+
+    @property
+    def distance_sigma(self) -> float:
+        """Return the relative 1 σ of distances beside the estimate's own."""
+        return float(np.hypot(self.unsure, self.steady.distance_sigma))
 
 
 def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters, watch: Watch) -> FirstWindow:
@@ -98,7 +109,9 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
         run = replace(run, probe=replace(run.probe, encoder_scale_sigma=abs(scale.scale - 1)))
         measured = replace(measured, probe=run.probe)
         estimate = estimate_state(estimate.state, measured, parameters, watch)
-    return FirstWindow(run, parameters, estimate, measured, unsure, EncoderCheck(delay, scale))
+    steady = with_steady_scale(run, window, estimate, measured, parameters, watch)
+    check = EncoderCheck(delay, scale)
+    return FirstWindow(steady.run, parameters, steady.estimate, steady.measured, unsure, check, steady)
 
 
 def _without_encoder(

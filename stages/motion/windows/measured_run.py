@@ -40,6 +40,8 @@ class MeasuredRun:
         As stated.
     bore : BoreSteps
         Of the straightened pipe.
+    image_scale : (N,) or None
+        By how many times the pictures are larger than the probe's camera has them, where that drifts.
     """
 
     texture: TrackedTexture
@@ -50,6 +52,7 @@ class MeasuredRun:
     encoder: EncoderReadings | None
     probe: Probe
     bore: BoreSteps
+    image_scale: Float | None = None
 
     @property
     def whole(self) -> Window:
@@ -61,8 +64,11 @@ class MeasuredRun:
         part = slice(window.first, window.last)
         rows = slice(*np.searchsorted(self.ring_place, [window.first, window.last]))
         rings, place = _some_rings(self.rings, rows), self.ring_place[rows] - window.first
+        rings = rings if self.image_scale is None else rings.reduced(self.image_scale[self.ring_place[rows]])
         bins = ring_bins(rings, place, self.probe, parameters.ring_bins, parameters.surface_sigma_mm)
         tracks = _behind(self.texture.between(window.first, window.last), self._start_mm(window))
+        if self.image_scale is not None:
+            tracks = tracks.reduced(self.image_scale[part], self.probe.camera.centre_px)
         encoder = _since_first(self.encoder, part)
         return Measurements.of(tracks, bins, self.time_s[part], encoder, self.probe)
 

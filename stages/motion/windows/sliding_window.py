@@ -15,8 +15,9 @@ from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, est
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.normalisation import alike_samples
-from stages.motion.windows.first_window import EncoderCheck, adjust_first
+from stages.motion.windows.first_window import EncoderCheck, FirstWindow, adjust_first
 from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.steady_scale import SteadyRun
 from stages.motion.windows.submap_joining import JoinedRun, join_submaps
 from stages.motion.windows.submaps import (
     SharedInformation,
@@ -52,6 +53,8 @@ class RunEstimate:
         blurred together count as one.
     encoder : EncoderCheck
         Against what rings and texture of the first window show.
+    steady : SteadyRun
+        What the image scale did in the first window.
     """
 
     joined: JoinedRun
@@ -60,6 +63,7 @@ class RunEstimate:
     reprojection_px: float
     excess: float
     encoder: EncoderCheck
+    steady: SteadyRun
 
 
 @dataclass(frozen=True)
@@ -111,8 +115,8 @@ def adjust_run(
     run, parameters, estimate, measured = first.run, first.parameters, first.estimate, first.measured
     check(estimate)
     if len(windows) == 1:
-        joined = joined_at_once(estimate).with_scale_sigma(first.unsure)
-        return _run_estimate(joined, [_End.of(estimate, measured, run.texture.grid.step_mm)], first.encoder)
+        joined = joined_at_once(estimate).with_scale_sigma(first.distance_sigma)
+        return _run_estimate(joined, [_End.of(estimate, measured, run.texture.grid.step_mm)], first)
     alone = [_alone(estimate, measured)]
     for window in windows[1:]:
         watch = partial(progress, len(alone), steps)
@@ -130,8 +134,8 @@ def adjust_run(
         )
         check(estimate)
         found.append((_submap(estimate, windows, k), _End.of(estimate, measured, run.texture.grid.step_mm)))
-    joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(first.unsure)
-    return _run_estimate(joined, [f[1] for f in found], first.encoder)
+    joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(first.distance_sigma)
+    return _run_estimate(joined, [f[1] for f in found], first)
 
 
 def joined_at_once(estimate: Estimate) -> JoinedRun:
@@ -142,10 +146,10 @@ def joined_at_once(estimate: Estimate) -> JoinedRun:
     return join_submaps([_submap(estimate, [Window(0, len(state.T_pc))], 0)], shared)
 
 
-def _run_estimate(joined: JoinedRun, ends: Sequence[_End], encoder: EncoderCheck) -> RunEstimate:
+def _run_estimate(joined: JoinedRun, ends: Sequence[_End], first: FirstWindow) -> RunEstimate:
     error, excess = (float(np.median([getattr(e, n) for e in ends])) for n in ("reprojection_px", "excess"))
     trials, unsettled = sum(e.trials for e in ends), sum(not e.settled for e in ends)
-    return RunEstimate(joined, trials, unsettled, error, excess, encoder)
+    return RunEstimate(joined, trials, unsettled, error, excess, first.encoder, first.steady)
 
 
 def _adjusted(

@@ -1,0 +1,213 @@
+"""An image scale that drifts over a run, told from a pipe that widens, by a linear step at an estimate.
+
+A lens that warms up, or a laser that moves against the camera, makes the rings grow or shrink over the run: a
+picture larger by a share ε has rings with 3 ε more radius, but the wall that texture follows, between
+landmarks and encoder, is wider by 0.3 ε only (open-1-field). A pipe that widens is wider in both. Columns for
+both, low polynomials of time and of distance, are added to the equations at their optimum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.stats import chi2
+
+from pipeline.adjustment.bordered import BorderedSystem, Rows
+from pipeline.adjustment.elimination import BLOCK
+from pipeline.arrays import Float
+from pipeline.geometry.axis import to_pipe
+from pipeline.geometry.rigid import transform
+from pipeline.machine.stage import Context
+from stages.motion.bundle_adjustment import residuals
+from stages.motion.bundle_adjustment.equations import LEAST_REACH, Measurements, factorised
+from stages.motion.bundle_adjustment.solver import Estimate
+from stages.motion.bundle_adjustment.unknowns import State
+
+_COURSE, _WIDTH = 3, 4
+"""Degrees of the polynomials: warming up by an exponential of a third of the run is followed by three to a
+thirtieth of its size; the pipe's width gets one more, so that its own waves are not taken for the lens."""
+_LARGEST = 0.1
+"""1 σ of either beforehand, relative: no more than keeps the equations regular."""
+_SURE_P = 1e-4
+"""Chance of the equations by which a steady scale is refused: that of 4 σ."""
+_MAY_BE_P = 1e-3
+"""Chance above which the rings' course may all be due to the scale: that of 3 σ."""
+_OTHER_CAUSE = 0.1
+"""Share of the course that is unsure: a laser that moves changes the rings alone, a lens the wall seen in
+texture too, by a tenth as much, which is below the σ of texture."""
+
+
+@dataclass(frozen=True)
+class ScaleDrift:
+    """Course of the image scale over a window, its mean taken as the probe's.
+
+    Attributes
+    ----------
+    at_frames : (N,)
+        By how much pictures are larger than on average, relative; all that was taken out so far.
+    sigma : (N,)
+        Its 1 σ.
+    p_steady : float
+        Chance of such equations if the scale was steady.
+    p_even : float
+        Chance of such equations if the pipe was of one width.
+    p_neither : float
+        Chance of rings that change so much if neither did.
+    alone : (N,)
+        The course if the pipe is of one width.
+    ring_mm : float
+        Gain of the rings' radius per relative gain of scale.
+    stated_mm : float
+        1 σ of the pipe's radius without any of it.
+    """
+
+    at_frames: Float
+    sigma: Float
+    p_steady: float
+    p_even: float
+    p_neither: float
+    alone: Float
+    ring_mm: float
+    stated_mm: float
+
+    @property
+    def told(self) -> bool:
+        """Whether the scale cannot have been steady."""
+        return self.p_steady < _SURE_P
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether the rings change, and a lens that drifts explains it as well as a pipe that widens."""
+        return not self.told and self.p_neither < _SURE_P and self.p_even > _MAY_BE_P
+
+    @property
+    def offset_sigma(self) -> float:
+        """Return the relative 1 σ of the mean scale: the probe was calibrated anywhere on the course."""
+        return float(np.abs(self.at_frames).max())
+
+    @property
+    def stated_sigma(self) -> Float:
+        """Return the 1 σ (N,) of the scale, relative, that radii are to be stated with."""
+        if self.told:
+            own = np.hypot(self.sigma, _OTHER_CAUSE * self.at_frames)
+            return np.asarray(np.hypot(own, self.offset_sigma))
+        return np.abs(self.alone) if self.ambiguous else np.zeros_like(self.alone)
+
+    def warn(self, context: Context, taken_out: bool) -> None:
+        """Tell of a scale that drifts, or of a pipe of which that cannot be told."""
+        if self.told:
+            change = float(np.ptp(self.at_frames) * np.sign(self.at_frames[-1] - self.at_frames[0]))
+            outcome = (
+                "This is taken out of motion and radii, and what is left of it is in their σ"
+                if taken_out
+                else "So long a run is not corrected: radii and distances may be off by more than their σ"
+            )
+            context.warn(
+                f"the picture {'grows' if change > 0 else 'shrinks'} by {100 * abs(change):.2f} % over the "
+                f"run: the rings change by {abs(change * self.ring_mm):.2f} mm of radius, and the texture "
+                "does not follow. The lens warms up or is loose, the laser moves against the camera, or zoom "
+                f"or stabilisation is on. {outcome}. What to do: let the probe warm up before the run, "
+                "fix lens and laser, switch off zoom and stabilisation"
+            )
+        elif self.ambiguous and (widest := float(np.ptp(self.alone) * abs(self.ring_mm))) > self.stated_mm:
+            context.warn(
+                f"the rings change by {widest:.2f} mm of radius over the run. Whether the pipe does, or "
+                f"the picture's scale by {100 * np.ptp(self.alone):.2f} % (a lens that warms up), texture is "
+                "too weak to tell; σ of the radii includes it. What to do: let the probe warm up, record "
+                "back and forth, give an encoder, or measure both ends' diameters"
+            )
+
+
+def drift_of_scale(estimate: Estimate, measured: Measurements, before: Float | None = None) -> ScaleDrift:
+    """Return the course of the image scale at an estimate; ``before`` (N,) was taken out of it already."""
+    course = _polynomials(measured.time_s, _COURSE)
+    system, border = _widened(estimate, measured, course)
+    factor = factorised(system)
+    step, covariance = factor.step()[1][border:], factor.border_covariance()[border:, border:]
+    width, scale = np.arange(_WIDTH), np.arange(_WIDTH, _WIDTH + _COURSE)
+    found, own = step[scale], covariance[np.ix_(scale, scale)]
+    follow = covariance[np.ix_(scale, width)] @ np.linalg.inv(covariance[np.ix_(width, width)])
+    before = np.zeros(len(course)) if before is None else before
+    at_frames = before + course @ found
+    sigma = np.sqrt(np.einsum("ni,ij,nj->n", course, own, course))
+    known = np.linalg.lstsq(course, before, rcond=None)[0]
+    return ScaleDrift(
+        at_frames, sigma, _chance(found + known, own), _chance(step[width], covariance[np.ix_(width, width)]),
+        _chance(step, covariance), course @ (found - follow @ step[width]),
+        _ring_gain(estimate.state, measured)[1],
+        float(np.sqrt(estimate.factor.border_covariance()[0, 0])),
+    )  # fmt: skip
+
+
+def _widened(estimate: Estimate, measured: Measurements, course: Float) -> tuple[BorderedSystem, int]:
+    """Return the equations with columns for the pipe's width and the scale, and where these begin."""
+    equations, state = estimate.adjusted.equations, estimate.state
+    by_ring, _ = _ring_gain(state, measured)
+    in_rings = _points(state, measured)[1]
+    span = np.concatenate([in_rings, to_pipe(state.axis, state.xyz_p)[0]])
+    width = _polynomials(span, _WIDTH)
+    rings = np.concatenate([-width[: len(in_rings)], by_ring[:, None] * course[measured.rings.frame]], 1)
+    texture, border = equations.texture, equations.rings.by_border.shape[1]
+    away_px = measured.tracks.uv - measured.camera_at(state).centre_px
+    away_px = away_px * np.asarray(texture.by_pose.any((1, 2)))[:, None]
+    by_scale = away_px[:, :, None] * course[measured.tracks.frame][:, None, :]
+    unmoved = np.zeros((*away_px.shape, _WIDTH))
+    landmarks = width[len(in_rings) :]
+    more = np.concatenate([-landmarks, np.zeros((len(landmarks), _COURSE))], 1)
+    texture = replace(
+        texture,
+        by_instrument=np.concatenate([texture.by_instrument, unmoved, by_scale], 2),
+        surface_by_border=np.concatenate([texture.surface_by_border, more], 1),
+    )
+    size = border + _WIDTH + _COURSE
+    system = BorderedSystem(equations.frames, size, max(texture.reach, LEAST_REACH))
+    for rows in equations.rows:
+        system.add(_with(rows, np.zeros((len(rows.residual), _WIDTH + _COURSE))))
+    system.add(_with(equations.rings, rings))
+    system.add(_beforehand(border, state.nominal_radius_mm))
+    system.add_landmarks(texture)
+    return system, border
+
+
+def _ring_gain(state: State, measured: Measurements) -> tuple[Float, float]:
+    """Return what rings' residuals (M,) change by per scale that was too large, and the mean radius' gain."""
+    normal_c = _points(state, measured)[2]
+    camera = measured.camera_at(state)
+    radius_px = np.linalg.norm(camera.project(_points(state, measured)[0]).uv - camera.centre_px, axis=1)
+    gain = np.einsum("mi,mi->m", normal_c, measured.rings.by_pixel) * radius_px
+    gain = np.where(np.isfinite(gain), gain, 0.0)
+    return -gain, float(np.median(gain)) if gain.size else 0.0
+
+
+def _points(state: State, measured: Measurements) -> tuple[Float, Float, Float]:
+    """Return rings' points (M, 3) in C, their distances (M,), and the wall's normals (M, 3) there in C."""
+    rings, T = measured.rings, state.T_pc[measured.rings.frame]
+    xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument[: rings.by_instrument.shape[2]]
+    xyz_p = transform(T, xyz_c)
+    normal = residuals.surface(state, xyz_p)[1]
+    return xyz_c, to_pipe(state.axis, xyz_p)[0], np.einsum("mi,mij->mj", normal, T[:, :3, :3])
+
+
+def _with(rows: Rows, more: Float) -> Rows:
+    return replace(rows, by_border=np.concatenate([rows.by_border, more], 1))
+
+
+def _beforehand(border: int, radius_mm: float) -> Rows:
+    count = _WIDTH + _COURSE
+    by_border = np.concatenate([np.zeros((count, border)), np.eye(count)], 1)
+    sigma = _LARGEST * np.r_[np.full(_WIDTH, radius_mm), np.ones(_COURSE)]
+    none = np.zeros((count, 0), np.int64)
+    return Rows(none, np.zeros((count, 0, BLOCK)), by_border, np.zeros(count), sigma)
+
+
+def _polynomials(at: Float, degree: int) -> Float:
+    """Return Legendre's polynomials (M, degree) from the first on, over the span of places (M,)."""
+    x = 2 * (at - at.min()) / max(float(np.ptp(at)), 1e-9) - 1
+    return np.asarray(legendre.legvander(x, degree)[:, 1:])
+
+
+def _chance(value: Float, covariance: Float) -> float:
+    """Return the chance by which values (K,) lie as far from 0 or farther."""
+    return float(chi2.sf(value @ np.linalg.solve(covariance, value), len(value)))

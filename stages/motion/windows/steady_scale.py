@@ -1,0 +1,84 @@
+"""A run's image scale made steady where it drifts, and the run adjusted again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from pipeline.adjustment.levenberg_marquardt import Watch
+from pipeline.arrays import Float
+from pipeline.machine.stage import Context
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
+from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.parameters import MotionParameters
+from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.submaps import Window
+
+_ROUNDS = 2
+"""Times that the scale is taken out: the second finds what the linear step before it left."""
+
+
+@dataclass(frozen=True)
+class SteadyRun:
+    """A run, its estimate, what its image scale did, and whether that was ``taken_out``."""
+
+    run: MeasuredRun
+    estimate: Estimate
+    measured: Measurements
+    drift: ScaleDrift
+    taken_out: bool
+
+    def warn(self, context: Context) -> None:
+        """Tell of a scale that drifted."""
+        self.drift.warn(context, self.taken_out)
+
+    @property
+    def distance_sigma(self) -> float:
+        """Return the relative 1 σ of distances by it: they follow the rings, or hold to the encoder."""
+        if not self.drift.told:
+            return 0.0
+        by_rings = abs(self.drift.ring_mm) * self.drift.offset_sigma / self.estimate.state.nominal_radius_mm
+        return by_rings if self.measured.encoder is None else min(by_rings, self._encoder_sigma)
+
+    @property
+    def _encoder_sigma(self) -> float:
+        return self.measured.probe.encoder_scale_sigma
+
+    @property
+    def scale(self) -> Float | None:
+        """Return by how many times (N,) pictures were too large; None where nothing was taken out."""
+        return self.run.image_scale
+
+    @property
+    def scale_sigma(self) -> Float | None:
+        """Return its 1 σ (N,); None where the recording bears out a steady scale, or is too long."""
+        whole = len(self.drift.at_frames) == len(self.run.time_s)
+        return self.drift.stated_sigma if whole and (self.drift.told or self.drift.ambiguous) else None
+
+
+def with_steady_scale(
+    run: MeasuredRun,
+    window: Window,
+    estimate: Estimate,
+    measured: Measurements,
+    parameters: MotionParameters,
+    watch: Watch,
+) -> SteadyRun:
+    """Look whether the image scale drifts over a window, and take it out where the window is the whole run.
+
+    Raises
+    ------
+    UnusableError
+        When the motion is not determined.
+    """
+    drift = drift_of_scale(estimate, measured)
+    if not drift.told or window != run.whole:
+        return SteadyRun(run, estimate, measured, drift, taken_out=False)
+    first = drift
+    for _ in range(_ROUNDS):
+        run = replace(run, image_scale=1 + drift.at_frames)
+        measured = run.measured(window, parameters)
+        estimate = estimate_state(estimate.state, measured, parameters, watch)
+        drift = drift_of_scale(estimate, measured, drift.at_frames)
+    drift = replace(drift, p_steady=first.p_steady)
+    return SteadyRun(run, estimate, measured, drift, taken_out=True)

@@ -1,0 +1,107 @@
+"""An image scale that drifts is told from a pipe that widens, taken out, and stated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.artefacts.measured import Trajectory
+from pipeline.geometry.axis import straight_axis
+from stages.accumulate import AccumulateParameters, accumulate_wall
+from stages.motion import MotionParameters, estimate_motion
+from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
+from stages.motion.bundle_adjustment.solver import estimate_state
+from stages.triangulate import TriangulateParameters, triangulate_rings
+from tests.drawn_run import RADIUS, DrawnRun, drawn_run
+from tests.motion_scene import scene
+from tests.quiet import quiet_context
+from tests.ring_images import MemorySource
+
+FRAMES, LANDMARKS = 60, 500
+GROWS = 0.005
+
+
+def drift_in(**changes: float) -> tuple[ScaleDrift, list[str]]:
+    made = scene(FRAMES, LANDMARKS, noise=1.0, **changes)
+    parameters = MotionParameters(match_bias_px=0.01)
+    estimate = estimate_state(made.truth, made.measured, parameters)
+    drift, told = drift_of_scale(estimate, made.measured), []
+    drift.warn(replace(quiet_context(), warn=told.append), taken_out=True)
+    return drift, told
+
+
+def seen_growing(run: DrawnRun, grows: float) -> DrawnRun:
+    """Return a run whose pictures are larger in the end than at the beginning by the share ``grows``."""
+    count, source = len(run.T_pc), run.recording.source
+    larger = 1 + grows * (np.arange(count) / (count - 1) - 0.5)
+    assert isinstance(source, MemorySource)
+    centre, images = run.probe.camera.centre_px, {}
+    for k, image in source.images.items():
+        move = np.column_stack([larger[k] * np.eye(2), (1 - larger[k]) * centre])
+        images[k] = cv2.warpAffine(image, move, image.shape[1::-1], flags=cv2.INTER_CUBIC)
+    rings = run.rings.reduced(1 / larger[run.rings.frame])
+    points = triangulate_rings(rings, run.probe, TriangulateParameters(), quiet_context())
+    recording = replace(run.recording, source=MemorySource(images, run.probe.camera.image_size))
+    return replace(run, recording=recording, rings=rings, points=points)
+
+
+@pytest.mark.parametrize("grows", [GROWS, -GROWS])
+def test_a_picture_that_grows_is_told_with_its_size(grows: float) -> None:
+    drift, told = drift_in(picture_grows=grows)
+    found = drift.at_frames[-1] - drift.at_frames[0]
+    assert drift.told
+    assert abs(found - grows) < 3 * 2 * drift.sigma[-1] + 0.1 * GROWS  # one step of linear equations
+    assert any(("grows" if grows > 0 else "shrinks") in words for words in told)
+
+
+@pytest.mark.parametrize("widens", [0.0, 0.01])
+def test_a_pipe_that_widens_is_not_taken_for_it(widens: float) -> None:
+    drift, told = drift_in(widens=widens)
+    assert drift.p_steady > 1e-3
+    assert not drift.ambiguous
+    assert told == []
+
+
+def test_a_little_change_of_the_rings_may_be_either() -> None:
+    drift, _ = drift_in(widens=0.002)
+    assert drift.ambiguous
+    assert np.ptp(drift.stated_sigma) * drift.ring_mm > 0.05
+
+
+def test_radii_of_a_picture_that_grows_lie_within_their_sigma() -> None:
+    """Taken as they are, the rings change by 1.1 mm of radius with 0.02 mm stated."""
+    k = np.arange(150)
+    run, told = seen_growing(drawn_run(0.9 * k, 0.004 * k), 0.008), []
+    parameters = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
+    context = replace(quiet_context(), warn=told.append)
+    got = estimate_motion(run.recording, run.probe, run.rings, run.points, parameters, context)
+    assert any("the picture grows" in words for words in told)
+    chosen = AccumulateParameters(azimuth_samples=180)
+    wall = accumulate_wall(run.probe, run.rings, run.points, got, chosen, quiet_context()).radius_map
+    radius, sigma = (np.nanmedian(part, 1) for part in (wall.radius_mm, wall.sigma_mm))
+    seen = np.isfinite(radius)
+    assert np.ptp(radius[seen]) < 0.4
+    assert np.mean(np.abs(radius - RADIUS)[seen] < 1.96 * sigma[seen]) > 0.93
+
+
+def test_what_is_known_of_the_scale_goes_into_the_radii() -> None:
+    run = drawn_run(0.9 * np.arange(40), np.zeros(40))
+    axis, count = straight_axis(-50.0, 150.0), 40
+    plain = Trajectory(
+        np.arange(count), np.arange(count) / 30, run.T_pc, np.zeros((count, 6, 6)), axis, RADIUS, 1, 0, 0, ()
+    )
+    scale = 1 + 0.01 * (np.arange(count) / count - 0.5)
+    known = replace(plain, image_scale=scale, image_scale_sigma=np.full(count, 2e-3))
+    rings = run.rings.reduced(1 / scale[run.rings.frame])
+    chosen = AccumulateParameters(azimuth_samples=180)
+    walls = [
+        accumulate_wall(run.probe, r, run.points, t, chosen, quiet_context()).radius_map
+        for r, t in ((run.rings, plain), (rings, known))
+    ]
+    assert np.nanmax(np.abs(walls[0].radius_mm - walls[1].radius_mm)) < 0.02
+    gain = np.nanmedian(walls[1].sigma_mm ** 2 - walls[0].sigma_mm ** 2) ** 0.5
+    theta = np.arctan2(RADIUS, 22.0)  # dr = b (1 + tan² θ) θ dε where radius in the picture is f θ
+    assert gain == pytest.approx(22.0 / np.cos(theta) ** 2 * theta * 2e-3, rel=0.05)
