@@ -131,7 +131,7 @@ def _freedom(rest: Float) -> float:
                 :, max(-down, 0) : _WINDOW_PX + min(-down, 0), max(-right, 0) : _WINDOW_PX + min(-right, 0)
             ]
             square += float((a * b).mean() / max(total, 1e-12)) ** 2
-    return max((_WINDOW_PX**2 - 3) / square, 1.0)
+    return max((_WINDOW_PX**2 - 3) / max(square, 1.0), 1.0)  # every pixel is like itself
 
 
 def photon_transfer(windows: list[QuietWindows], black: Figure, white: float) -> CameraNoise:
@@ -164,7 +164,8 @@ def _fitted(windows: list[QuietWindows]) -> Float:
     x = np.array([level[cell == k].mean() for k in used])
     freedom = float(np.median([w.freedom for w in windows]))
     quiet = chi2.ppf(_QUIET, freedom) / freedom
-    y = np.array([np.quantile(variance[cell == k], _QUIET) / quiet for k in used])
+    # Where black cuts noise off, windows show none at all.
+    y = np.array([max(np.quantile(variance[cell == k], _QUIET) / quiet, _LEAST_VARIANCE) for k in used])
     design = np.stack([np.ones_like(x), x, x**2], 1) / y[:, None]
     (read, per_level, square), _ = nnls(design, np.ones_like(x))
     shot = y - _LEAST_VARIANCE

@@ -88,6 +88,12 @@ def test_other_noise_gives_another_answer():
     assert loud.variance_per_level.value > 5 * quiet.variance_per_level.value
 
 
+def test_pictures_whose_dark_shows_no_noise_have_that_of_rounding():
+    black = np.zeros((120, 240), np.float32)
+    noise = photon_transfer([windows_of(black, black, black == 0)] * 2, BLACK, 255.0)
+    assert noise.read_variance.value == pytest.approx(1 / 12)
+
+
 def _frame(level, region=Region.WALL):
     unknown = np.full(level.shape, np.nan, np.float32)
     return TwinFrame(

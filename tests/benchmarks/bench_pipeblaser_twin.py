@@ -1,0 +1,171 @@
+"""A real probe's ring pictures beside the same pictures, re-rendered. usage: bench_pipeblaser_twin OUT
+
+Sixteen single frames of one smooth pipe, without texture, motion or photo: what can be modelled is the line's
+profile, the background and the noise. Profile and noise of every other frame are tried on those
+between; brightness and background of each frame's line are its own, in blocks of 1.5°. Writes recorded |
+re-rendered | z of the worst frame into OUT.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.optimize import nnls
+
+from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.artefacts.measured import RingValidity
+from stages.rings.extract import excess_weights, mix
+from stages.rings.sectors import cut_sectors
+from stages.rings.trace import trace_ring
+from stages.twin.line_blocks import BlockLight, LineBlocks, light_of
+from tests.shared_data import shared
+
+RED, RED_NM, WHITE = 2, 650.0, 250.0
+BLOCKS, HALF_PX, BROAD_PX, BINS = 240, 12.0, 8.0, 24
+CENTRE = (0.445, 0.524)
+
+
+@dataclass(frozen=True)
+class RealFrame:
+    """A picture's red channel (H, W), its background, where the line is not, and its line in blocks."""
+
+    grey: Float32
+    ground: Float32
+    off_line: Bool
+    blocks: LineBlocks
+    row: Int
+    column: Int
+
+
+def real_frame(file: Path) -> RealFrame:
+    """Return a picture with its ring traced."""
+    image = cv2.imread(str(file))
+    assert image is not None
+    image[:, -2:] = 0
+    size = (image.shape[1], image.shape[0])
+    sectors = cut_sectors(size, (CENTRE[0] * size[0], CENTRE[1] * size[1]), 1440)
+    trace = trace_ring(mix(image, excess_weights(RED_NM)), sectors, 255.0)
+    assert trace is not None, file.name
+    radius = np.where(trace.validity == RingValidity.VALID, trace.fit.radius_px, np.nan)
+    by_block = radius.reshape(BLOCKS, -1)
+    seen = np.isfinite(by_block).sum(1) >= by_block.shape[1] // 2
+    ring = np.where(seen, np.nanmedian(np.where(seen[:, None], by_block, 0.0), 1), np.nan)
+    v, u = np.mgrid[0 : size[1], 0 : size[0]]
+    away = np.stack([u, v], -1) - sectors.centre_px
+    phi, rho = np.arctan2(away[..., 1], away[..., 0]), np.hypot(away[..., 0], away[..., 1])
+    cell = ((phi + np.pi) / (2 * np.pi) * BLOCKS).astype(int) % BLOCKS
+    own = sectors.azimuth_rad[np.isfinite(radius)], radius[np.isfinite(radius)]
+    beyond = rho - np.interp(phi, *own, period=2 * np.pi)
+    near = (np.abs(beyond) < HALF_PX) & seen[cell]
+    row, column = np.nonzero(near)
+    number = np.cumsum(seen) - 1
+    grey = image[..., RED].astype(np.float32)
+    count = int(seen.sum())
+    blocks = LineBlocks(
+        np.zeros(1, np.int64), np.zeros(count, np.int64), np.flatnonzero(seen) * 2 * np.pi / BLOCKS - np.pi,
+        ring[seen], np.full(count, float(trace.width_px)), number[cell[near]], beyond[near],
+        grey[near].astype(float), np.array(sectors.centre_px), WHITE,
+    )  # fmt: skip
+    off = (np.abs(beyond) > 2 * HALF_PX) & (rho < 0.49 * size[1])
+    weight = cv2.GaussianBlur(off.astype(np.float32), (0, 0), BROAD_PX)
+    ground = cv2.GaussianBlur(np.where(off, grey, np.float32(0)), (0, 0), BROAD_PX) / np.maximum(weight, 1e-3)
+    return RealFrame(grey, ground, off, blocks, row, column)
+
+
+def rendered(frame: RealFrame, light: BlockLight) -> tuple[Float, Float]:
+    """Return grey levels (N,) of the pixels about the line, and the part of them that is the line."""
+    b = frame.blocks
+    x = b.offset_px / b.width_px[b.block]
+    shape = np.interp(x, light.x, light.profile, left=0.0, right=0.0)
+    free = ~b.clipped
+    w, p, pp, g, pg = (b.total(free * v) for v in (np.ones_like(x), shape, shape**2, b.grey, shape * b.grey))
+    height = np.maximum((pg * w - p * g) / np.maximum(pp * w - p**2, 1e-9), 0.0)
+    ground = (g - height * p) / np.maximum(w, 1)
+    line = height[b.block] * shape
+    return ground[b.block] + line, line
+
+
+def noise_of(frames: list[RealFrame], light: BlockLight) -> Float:
+    """Return variances: of dark pixels, per grey level, and relative to the line's square (speckle).
+
+    Mean squares of what is left over in bins of brightness: errors of the profile count as noise, too.
+    """
+    each = [(*rendered(f, light), f) for f in frames]
+    level, line = (np.concatenate([e[k][~e[2].blocks.clipped] for e in each]) for k in (0, 1))
+    rest = np.concatenate([(e[2].blocks.grey - e[0])[~e[2].blocks.clipped] for e in each])
+    cell = np.searchsorted(np.quantile(level, np.linspace(0, 1, BINS + 1)[1:-1]), level)
+    count = np.bincount(cell, minlength=BINS)
+    parts = [np.ones_like(level), np.maximum(level, 0.0), line**2, rest**2]
+    mean = np.stack([np.bincount(cell, p, BINS) / count for p in parts], 1)
+    return np.asarray(nnls(mean[:, :3] / mean[:, 3:], np.ones(BINS))[0])
+
+
+def variance_of(noise: Float, level: Float, line: Float) -> Float:
+    """Return the variance (N,) of pixels, that of rounding at least."""
+    return np.asarray(np.maximum(noise[0] + noise[1] * np.maximum(level, 0) + noise[2] * line**2, 1 / 12))
+
+
+def main(out: Path) -> None:
+    """Print profile, noise and χ² of frames that had no part in them; write the worst frame."""
+    files = sorted((shared() / "real" / "pipeblaser_cmu" / "rings_v1").glob("*.png"))
+    frames = [real_frame(f) for f in files]
+    worst: tuple[float, int, Float] = (0.0, 0, np.zeros(0))
+    chi2 = np.zeros((3, len(frames)))
+    for half in (0, 1):
+        learned = frames[half::2]
+        lights = [light_of(f.blocks) for f in learned]
+        profile = np.median([light.profile for light in lights], 0)
+        light = BlockLight(lights[0].x, profile, np.zeros(0))
+        noise = noise_of(learned, light)
+        step, wide = light.x[1] - light.x[0], np.abs(light.x) > 3
+        print(
+            f"learned from {len(learned)} frames: variance {noise[0]:.2f} + {noise[1]:.3f} · level + "
+            f"({np.sqrt(noise[2]):.3f} · line)²; light beyond 3 widths "
+            f"{profile[wide].sum() / profile.sum():.3f}, width {profile.sum() * step:.2f}, "
+            f"{np.sqrt(2 * np.pi):.2f} for a normal curve"
+        )
+        gauss = replace(light, profile=np.exp(-0.5 * light.x**2))
+        for k in range(1 - half, len(frames), 2):
+            z = [_z(frames[k], shape, noise) for shape in (gauss, light)]
+            use = ~frames[k].blocks.clipped
+            dark = _z_dark(frames[k], noise)
+            chi2[:, k] = [np.mean(z[0][use] ** 2), np.mean(z[1][use] ** 2), np.mean(dark**2)]
+            if chi2[1, k] > worst[0]:
+                worst = chi2[1, k], k, z[1]
+            print(
+                f"{files[k].name}: line, normal profile {chi2[0, k]:.2f}, learned {chi2[1, k]:.2f}, "
+                f"background {chi2[2, k]:.2f}"
+            )
+    better = int((chi2[1] < chi2[0]).sum())
+    print(f"learned profile fits better in {better} of {len(frames)} withheld frames")
+    print(f"median χ²: normal {np.median(chi2[0]):.2f}, learned {np.median(chi2[1]):.2f}, "
+          f"background {np.median(chi2[2]):.2f}")  # fmt: skip
+    _write(frames[worst[1]], worst[2], light, out / f"worst-{files[worst[1]].stem}.png")
+
+
+def _z(frame: RealFrame, light: BlockLight, noise: Float) -> Float:
+    level, line = rendered(frame, light)
+    return np.asarray((frame.blocks.grey - level) / np.sqrt(variance_of(noise, level, line)))
+
+
+def _z_dark(frame: RealFrame, noise: Float) -> Float:
+    use = frame.off_line & (frame.grey < WHITE)
+    ground = frame.ground[use].astype(float)
+    return np.asarray((frame.grey[use] - ground) / np.sqrt(variance_of(noise, ground, 0 * ground)))
+
+
+def _write(frame: RealFrame, z: Float, light: BlockLight, file: Path) -> None:
+    made, map_of_z = frame.ground.copy(), np.full(frame.grey.shape, 128.0)
+    made[frame.row, frame.column] = rendered(frame, light)[0]
+    map_of_z[frame.row, frame.column] = 128 + 16 * z
+    file.parent.mkdir(parents=True, exist_ok=True)
+    pictures = [np.clip(p, 0, 255).astype(np.uint8) for p in (frame.grey, made, map_of_z)]
+    cv2.imwrite(str(file), np.concatenate(pictures, 1))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
