@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from stages.twin.gate import _over_frames, judged
+from stages.twin.lamp_light import Figure
+from stages.twin.line_light import _plain_line
 from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlocksOfFrames
@@ -18,6 +20,7 @@ SHAPE, FRAMES, WHITE = (240, 320), 8, 200.0
 V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
 AWAY, PHI = np.hypot(V - 120, U - 160), np.arctan2(V - 120, U - 160)
 RING = Ring((160.0, 120.0), 70.0, 50.0, 25.0)
+LINE_LIGHT = _plain_line(0.1, 2.4)
 SCENE = SimpleNamespace(
     polar=(AWAY / 70, PHI, AWAY > 0), ring=RING, surface=SimpleNamespace(mean_radius_mm=50.0)
 )
@@ -118,6 +121,40 @@ def test_a_name_that_frames_rendered_again_do_not_bear_out_is_withdrawn():
         kept, withdrawn = _named(change, of_sharpness=blur, judge=_noisy)
         assert not kept
         assert withdrawn[0] == name
+
+
+def _ring(width):
+    return (150 / width * np.exp(-0.5 * ((AWAY - 70) / width) ** 2)).astype(np.float32)
+
+
+@pytest.mark.parametrize(("recorded", "stands"), [(2.4, True), (1.2, False)])
+def test_a_wide_line_stands_if_recorded_frames_fit_no_line_of_a_lens_in_focus(recorded, stands):
+    random, region = np.random.default_rng(3), np.where(abs(AWAY - 70) < 9, Region.LINE_CORE, Region.DARK)
+    line = SimpleNamespace(blur_px=Figure(2.4, 0.1))
+    whole = SimpleNamespace(frames_of=lambda law: np.arange(8), scene=SCENE)
+    (suspected,) = focus_of(SimpleNamespace(line=line, sharpness=np.zeros(4)), _blind(whole), ())
+
+    def again(line):
+        return _ring(line(LINE_LIGHT).blur_px.value)
+
+    shown = [
+        (
+            f,
+            Shown(
+                _noisy(_ring(recorded), random), _twin(_ring(2.4), region), AWAY > 0, SCENE, again, None, None
+            ),
+        )
+        for f in range(8)
+    ]
+    kept, withdrawn = judged([suspected], lambda frames: shown)
+    assert [m.name for m in (kept if stands else withdrawn)] == ["defocus or thick_sheet"]
+    assert not (withdrawn if stands else kept)
+
+
+def _blind(whole):
+    """A run whose lit frames say nothing of blur."""
+    whole.even_blur, whole.loses_texture = lambda sharpness: np.zeros(8), False
+    return whole
 
 
 def test_frames_that_follow_each_other_count_as_fewer():
