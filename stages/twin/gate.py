@@ -110,7 +110,7 @@ def _over_frames(fall: Float) -> tuple[float, float]:
     alike = float(np.clip((off[1:] * off[:-1]).sum() / max(float((off**2).sum()), 1e-12), 0.0, _MOST_ALIKE))
     worth = (1 - alike) / (1 + alike)
     told = sigmas(fall) * float(np.sqrt(worth))
-    return told, float(t.sf(told, max(len(fall) * worth - 1, 1.0)))
+    return told, float(t.sf(told, len(fall) - 1))
 
 
 def _squares(shown: Shown, pair: Pair) -> Float:
@@ -149,7 +149,7 @@ _OF_PROFILE = 0.02
 def _withdrawn(found: Mismatch, fall: Float, told: float) -> Mismatch:
     words = found.name.replace("_", " ")
     why = (
-        f"{len(fall)} frames rendered again with it fit no better ({told:+.1f} σ)"
+        f"{len(fall)} frames rendered again with it fit no better beyond chance ({told:+.1f} σ)"
         if len(fall) >= _FEWEST
         else f"only {len(fall)} frames could be rendered again with it"
     )

@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.twin import TwinOf, write_twin
 from pipeline.artefacts.twin import Mismatch, NamedFigure, RegionFit, Twin, TwinView
+from pipeline.cli import app
+from pipeline.errors import InputError
 from pipeline.files.provenance import MadeBy
 from tests.review_browser import Tab, tab
 from tests.review_server import ReviewServer
@@ -64,3 +67,17 @@ def test_without_a_twin_the_tab_says_how_to_make_one(run: Path, context) -> None
         opened.page_of("Twin")
         assert "boresight twin RUN -o DIR" in opened.page.locator("#twin").inner_text()
         assert plain.ask("/twin").code != 200
+
+
+def test_a_read_only_copy_holds_the_twin(run: Path, twin: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    asked = CliRunner().invoke(app, ["review", str(run), "--export", str(copy), "--twin", str(twin)])
+    assert asked.exit_code == 0, asked.output
+    assert (copy / "twin.html").read_bytes() == (twin / "twin.html").read_bytes()
+    assert '"twin":true' in (copy / "assets" / "data.js").read_text("utf-8")
+
+
+def test_a_folder_without_a_twin_is_refused_by_name(run: Path, tmp_path: Path) -> None:
+    asked = CliRunner().invoke(app, ["review", str(run), "--no-browser", "--twin", str(tmp_path)])
+    assert isinstance(asked.exception, InputError)
+    assert "twin.html" in str(asked.exception)
