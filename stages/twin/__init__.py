@@ -33,6 +33,7 @@ from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
 from stages.twin.state import PhotometricState, Sampled, clipped_line, estimate_state, sample_frames
 from stages.twin.sums import Sums
+from stages.twin.window import beside_blur
 
 _EVERY = 10
 _COLOURED = 3
@@ -163,8 +164,9 @@ def compared_with(
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
     whole, withdrawn = sums.named(samples, recording)
+    on_window, unsure = beside_blur(sums.on_window(samples), whole)
     found: tuple[Mismatch, ...] = (
-        *causes(*sums.cells(), scene.probe.lighting, scene.ring), *sums.on_window(samples),
+        *causes(*sums.cells(), scene.probe.lighting, scene.ring), *on_window,
         *unnamed(samples), *whole,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
@@ -176,7 +178,7 @@ def compared_with(
         noise_figures(state.noise), (*state_figures(state), *unnamed_map), comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
-        maps_of(samples), comparison.levels(), worst_places(samples), withdrawn,
+        maps_of(samples), comparison.levels(), worst_places(samples), (*withdrawn, *unsure),
     )  # fmt: skip
 
 
@@ -232,7 +234,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "11",
+    "12",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

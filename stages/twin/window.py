@@ -6,7 +6,8 @@ shows at Δ from its middle what is at Δ (1 − p (1 − Δ²/R²)). w is a spo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -35,6 +36,7 @@ _LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
 """Narrowest spot, 1 σ; the middle of a spot reaches to where a quarter of its depth is gone."""
 _PARTS = 6
 """Parts of the frames of which each is left out once, for the σ of a spot: neighbours in time go together."""
+_BLURS = ("motion_blur", "defocus")
 _STATED = {
     "window_dirt": "dust or dirt on the window or the lens takes away",
     "window_scatter": "something on the window or the lens scatters",
@@ -182,6 +184,21 @@ def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
         if not any(same):
             kept.append((at, one))
     return tuple(m for _, m in kept)
+
+
+def beside_blur(
+    found: Sequence[Mismatch], whole: Sequence[Mismatch]
+) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+    """Return what stands on the window, and what a blur of whole pictures, if one is named, resembles.
+
+    Blur makes texture faint everywhere, and more so where it is finest: that looks like scatter in places.
+    """
+    if not any(m.name in _BLURS for m in whole):
+        return tuple(found), ()
+    unsure = tuple(m for m in found if "window_scatter" in m.name.split(" or "))
+    said = "{} But whole frames are blurred, which looks alike: it cannot be told."
+    withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in unsure)
+    return tuple(m for m in found if m not in unsure), withdrawn
 
 
 def _fall_of_drop(sums: Float) -> tuple[Float, float, float]:

@@ -8,7 +8,7 @@ from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.compare import BLOCK_PX, block_contrasts
 from stages.twin.locate import ImagePlace, full_size, places_in_image
 from stages.twin.render import Region, TwinFrame
-from stages.twin.window import WindowPlace, told_once
+from stages.twin.window import WindowPlace, beside_blur, told_once
 
 
 def _frame(level):
@@ -132,3 +132,15 @@ def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
     poor = np.where(far < 8, 0.1 * np.sin(0.7 * (u + 2 * v)), 0)
     (place,), _ = places_in_image([r + poor.astype(np.float32) for r in ratios])
     assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
+
+
+def test_scatter_is_withdrawn_where_whole_frames_are_blurred():
+    def named(name):
+        return Mismatch(name, "intensity", "image", (), (), 1e-5, 2.0, 1.0, "Something is there.")
+
+    spots = [named("window_dirt"), named("window_scatter or window_dirt"), named("droplet")]
+    kept, withdrawn = beside_blur(spots, [named("motion_blur")])
+    assert [m.name for m in kept] == ["window_dirt", "droplet"]
+    assert [m.name for m in withdrawn] == ["window_scatter or window_dirt"]
+    assert "blurred" in withdrawn[0].statement
+    assert beside_blur(spots, [named("bloom")]) == (tuple(spots), ())
