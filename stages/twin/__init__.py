@@ -170,7 +170,7 @@ def compared_with(
         *unnamed(samples), *whole,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
-    fall, unnamed_map = left_over(samples)
+    fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
     comparison.after[Region.WALL] -= fall
     _report(comparison, found, context)
     return Twin(

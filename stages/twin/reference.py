@@ -8,7 +8,7 @@ between which frames do not decide cannot be told apart.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import cv2
@@ -98,6 +98,13 @@ class BlockSamples:
         predicted = total[other] / np.maximum(count[other], 1)
         fall = self.change[use] ** 2 - (self.change[use] - predicted) ** 2
         return np.asarray(np.bincount(self.frame[use], fall, self.frame.max() + 1), float)
+
+    def seen_through(self, gain: Float32 | None) -> BlockSamples:
+        """Return the blocks against a twin that is seen through a window which lets ``gain`` (H, W) pass."""
+        if gain is None:
+            return self
+        passed = of_blocks(gain)[self.row, self.column].astype(float)
+        return replace(self, change=(1 + self.change) / passed - 1, log_level=self.log_level + np.log(passed))
 
     @cached_property
     def strength(self) -> Float:

@@ -278,3 +278,14 @@ def test_what_nobody_named_is_a_map_only_where_frames_in_between_fit_better():
     assert figures[0].name == "unnamed_gain"
     assert left_over(_samples(lambda f, r, c, s: 0.0)) == (0.0, ())
     assert left_over(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 4 + 2.1 * f))) == (0.0, ())
+
+
+def test_what_the_window_takes_away_is_no_map_of_its_own():
+    gain = np.ones((40 * BLOCK_PX, 60 * BLOCK_PX), np.float32)
+    gain[: 20 * BLOCK_PX] = 0.5
+    dark = _samples(lambda f, r, c, s: np.where(r < 20, -0.5, 0.0))
+    assert left_over(dark)[0] > 0
+    seen = dark.seen_through(gain)
+    assert abs(seen.change.mean()) < 0.01
+    np.testing.assert_allclose(np.exp(seen.log_level - dark.log_level)[dark.row < 20], 0.5)
+    assert dark.seen_through(None) is dark
