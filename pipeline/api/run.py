@@ -131,8 +131,12 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
 
 def _moves_line(found: dict[str, Any], radius_px: float) -> bool:
     """Return whether what is on the window moves the line: a drop, or a rim that is steep for its width."""
+    if (
+        found["name"] is None
+    ):  # brighter in lit frames: a reflection of the LEDs, which laser frames do not show
+        return False
     share = found["parameters"].get("share")
-    if share is None or found["name"] is None:
+    if share is None:
         return True
     return abs(float(share["value"])) / radius_px * _LINE_PX**2 > _MOVED_PX
 

@@ -38,7 +38,7 @@ def test_dirt_of_a_twin_is_left_out_of_the_photo_and_what_is_on_the_wall_is_not(
         ("droplet", {"power": 1.0}, True),
         ("window_dirt", {"share": 0.6}, True),
         ("window_dirt", {"share": 0.1}, False),
-        (None, {"share": 0.1}, True),
+        (None, {"share": -1.2}, False),
     ],
 )
 def test_rings_leave_out_what_moves_the_line(tmp_path, name, parameters, left_out):
