@@ -37,6 +37,7 @@ def equations(random: np.random.Generator, rows: int = 200) -> Equations:
     return Equations(
         random.integers(0, FRAMES, rows), random.normal(size=(rows, 6)), by_global,
         random.normal(size=rows), random.uniform(0.5, 2, rows), random.integers(0, 30, rows), kind,
+        random.uniform(0, 60, (rows, 2)),
     )  # fmt: skip
 
 

@@ -55,12 +55,13 @@ def test_scores_of_a_large_effect_are_not_widened_by_the_effect_itself():
     e.by_global[:, 2] = pattern
     e = replace(e, residual=e.residual / np.sqrt(e.weight) - 3 * pattern)
     reduced = Reduced(
-        np.eye(GLOBALS), np.zeros(GLOBALS), 0.0, np.zeros((FRAMES, 6, GLOBALS)), np.zeros((FRAMES, 6))
+        np.eye(GLOBALS), np.zeros(GLOBALS), 0.0, np.zeros((FRAMES, 6, GLOBALS)), np.zeros((FRAMES, 6)),
+        np.zeros(FRAMES)
     )
     left = Marginal(np.eye(GLOBALS), np.zeros(GLOBALS), np.eye(GLOBALS), np.zeros(GLOBALS), 0.0)
-    none = np.zeros(0, np.int64)
-    alone, degrees = score_inflation(e, reduced, left, none, np.full(GLOBALS, -1))
-    explained, _ = score_inflation(e, reduced, left, none, np.array([-1, -1, 0, -1, -1]))
+    none, fast = np.zeros(0, np.int64), 1e12 * np.eye(GLOBALS)
+    alone, degrees = score_inflation(e, reduced, left, none, np.full(GLOBALS, -1), fast)
+    explained, _ = score_inflation(e, reduced, left, none, np.array([-1, -1, 0, -1, -1]), fast[1:, 1:])
     assert alone[2] > 5
     # Half of the cells hold all of it.
     assert degrees[2] == pytest.approx(len(np.unique(e.cell)) / 2, rel=0.2)

@@ -24,6 +24,8 @@ _STEP_S, _ORIGIN_SIGMA_MM = 1e-3, 1e-3
 _FARTHEST_PX = 3.0
 # Half the step of a derivative along the image radius, px: its error is of the third order, below 1e-6.
 _APART = 0.1
+# Side of the cells of wall in which errors are taken as alike. Debt: data/debts.md.
+WALL_CELL_MM = 10.0
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def _wall_at(state: Unknowns, T: Float, uv: Float) -> tuple[Float, Float, Float]
     return xyz_c, np.stack([xyz_p[:, 0] / radius, xyz_p[:, 1] / radius, 0 * radius], -1), radius
 
 
-def wall_cells(wall_mm: Float, size_mm: float = 10.0) -> Int:
+def wall_cells(wall_mm: Float, size_mm: float = WALL_CELL_MM) -> Int:
     """Return numbers (M,) of the square cells of wall in which points (M, 2) lie."""
     cell = np.floor(wall_mm / size_mm).astype(np.int64)
     return np.asarray(cell[:, 0] * 10_000 + cell[:, 1])

@@ -15,14 +15,18 @@ import numpy as np
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.elimination import Sums, add_rows
 from pipeline.adjustment.normal_equations import BandedCholesky, Marginal, marginalised
-from pipeline.adjustment.robust import degrees_of, two_way_variance
+from pipeline.adjustment.robust import cluster_variance, degrees_of, two_way_variance
 from pipeline.arrays import Bool, Float, Int
+from stages.diagnose.gauge.near import beyond_cells
 
 POSE = 6
 RING, EDGE, ENCODER = 0, 1, 2
 _REACH = 4
 # Information, relative to that of the best determined pose, that keeps an undetermined pose in its place.
 _HOLD = 1e-10
+# Frames with few cells tell little of errors: that these are larger than what is left by more than this factor is
+# not said of them. Debt: data/debts.md.
+_MOST_LOST = 4.0
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,8 @@ class Equations:
         Measurements of one cell err alike.
     kind : (M,) int
         `RING`, `EDGE` or `ENCODER`.
+    wall_mm : (M, 2)
+        Where on the wall a ring's points lie, along and around; NaN for other kinds.
     """
 
     frame: Int
@@ -56,6 +62,7 @@ class Equations:
     weight: Float
     cell: Int
     kind: Int
+    wall_mm: Float
 
     def of(self, part: Part) -> Equations:
         """Return the measurements of a part of the run."""
@@ -78,6 +85,8 @@ class Reduced:
     pose_by_global : (N, 6, G)
         How poses follow the globals: δpose = δpose₀ − pose_by_global · δglobal.
     pose_step : (N, 6)
+    taken : (N,)
+        How many numbers of each pose its own measurements determine, its neighbours being known.
     """
 
     information: Float
@@ -85,6 +94,7 @@ class Reduced:
     misfit: float
     pose_by_global: Float
     pose_step: Float
+    taken: Float
 
 
 def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
@@ -115,7 +125,7 @@ def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
     misfit = float(corner[-1, -1] + motion.weight @ motion.residual**2)
     return Reduced(
         (corner[:-1, :-1] + corner[:-1, :-1].T) / 2, -corner[:-1, -1], misfit,
-        by_global[..., :-1], -by_global[..., -1],
+        by_global[..., :-1], -by_global[..., -1], np.trace(np.linalg.solve(band[:, 0], blocks), axis1=1, axis2=2),
     )  # fmt: skip
 
 
@@ -157,7 +167,7 @@ def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> tuple[Marginal, flo
 
 
 def score_inflation(
-    equations: Equations, reduced: Reduced, left: Marginal, out: Int, group: Int
+    equations: Equations, reduced: Reduced, left: Marginal, out: Int, group: Int, known: Float
 ) -> tuple[Float, Float]:
     """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1.
 
@@ -165,7 +175,8 @@ def score_inflation(
 
     ``out`` (O,) are the globals that were eliminated, ``left`` what is left without them.
     Columns of one ``group`` (K,) are one effect: what they explain together is no error of theirs, else a
-    large effect would hide itself. −1 is none.
+    large effect would hide itself. −1 is the instrument's, which follows effects as far as its information
+    ``known`` (I, I) lets it: an effect's score is that of what the instrument cannot take up.
     """
     pose_by_kept = reduced.pose_by_global @ left.follow
     # An effect's column is gone through again and again, so that it lies in one piece.
@@ -180,13 +191,42 @@ def score_inflation(
     for k, (own, by_pose) in enumerate(_by_frame(equations, len(pose_by_kept))):
         follow[:, own] -= (by_pose @ pose_by_kept[k]).T
         step[own] += by_pose @ (reduced.pose_step[k] - reduced.pose_by_global[k] @ left.step)
+    free, asked = np.flatnonzero(group < 0), np.flatnonzero(group >= 0)
+    taken_up = left.information[np.ix_(free, free)] + known
+    follow[asked] -= np.linalg.solve(taken_up, left.information[np.ix_(free, asked)]).T @ follow[free]
     residual = equations.residual + step
     plain = follow**2 @ equations.weight
-    scores = follow * equations.weight * _unexplained(equations.weight, follow, residual, group)
-    by_row = np.ascontiguousarray(scores.T)
-    robust = two_way_variance(by_row, equations.cell, equations.frame)
+    left_over = _unexplained(equations.weight, follow, residual, group)
+    by_row = np.ascontiguousarray((follow * equations.weight * left_over).T)
+    lost = _lost(equations, reduced.taken)
+    # What is independent from point to point loses next to nothing to the few unknowns of a frame.
+    cells = cluster_variance(by_row * np.sqrt(lost)[:, None], equations.cell) - (lost - 1) @ by_row**2
+    # Sums over frames lose nothing to poses, but a few frames may hold all of a score.
+    robust = np.maximum(two_way_variance(by_row, equations.cell, equations.frame), cells)
+    ring = np.flatnonzero((equations.kind == RING) & (equations.weight > 0))
+    robust += beyond_cells(
+        follow[:, ring], equations.weight[ring], left_over[:, ring], equations.wall_mm[ring]
+    )
     ratio = robust / np.maximum(plain, 1e-300)
     return np.sqrt(np.maximum(ratio, 1.0)), np.where(ratio > 1, degrees_of(by_row, equations.cell), np.inf)
+
+
+def _lost(equations: Equations, taken: Float) -> Float:
+    """Return (M,) by how much errors that cells share have a larger variance than what a frame's fit leaves.
+
+    A pose and the places of fiducials' edges follow what is alike in a cell: of n cells of a frame they take up
+    as many as they have unknowns (J. MacKinnon, H. White, "Some heteroskedasticity-consistent covariance matrix
+    estimators", 1985). Each edge's place is shared by the frames that see it.
+    """
+    used = equations.weight > 0
+    pair, first = np.unique(np.stack([equations.frame, equations.cell])[:, used], axis=1, return_index=True)
+    kind = equations.kind[used][first]
+    seen, visits = np.unique(pair[1], return_counts=True)
+    shared = np.where(kind == EDGE, 1 / visits[np.searchsorted(seen, pair[1])], 0.0)
+    cells = np.bincount(pair[0], minlength=len(taken)) * 1.0
+    gone = taken + np.bincount(pair[0], shared, minlength=len(taken))
+    factor = cells / np.maximum(cells - gone, cells / _MOST_LOST)
+    return np.where(equations.kind == ENCODER, 1.0, np.where(cells > 0, factor, 1.0)[equations.frame])
 
 
 def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> Float:

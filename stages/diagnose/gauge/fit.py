@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.levenberg_marquardt import Watch
@@ -178,7 +179,9 @@ def _reduced(
     own = own_unknowns(run, found, equations.by_global.shape[1])
     left, misfit = eliminate_globals(reduced, own)
     names, value = kept_columns(found, asked)
-    inflation, degrees = score_inflation(equations, reduced, left, own.out, _by_effect(names))
+    stated = found.state.stated
+    before = block_diag(stated.encoder_scale_sigma**-2, instrument_information(stated))
+    inflation, degrees = score_inflation(equations, reduced, left, own.out, _by_effect(names), before)
     information, right = left.information, left.right
     # From the linearisation's place back to nothing beyond the stated.
     misfit += float(2 * right @ value + value @ information @ value)

@@ -237,7 +237,7 @@ def _ring_part(
     mm_per_px = ring_mm_per_px(points)
     shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
     rows, _ = ring_rows(state, rings, residual, points.uv)
-    return _with_effects(rows, -mm_per_px[:, None], shift, run.ring_weight, wall_cells(rings.wall_mm), RING)
+    return _with_effects(rows, -mm_per_px[:, None], shift, run.ring_weight, wall_cells(rings.wall_mm), RING, rings.wall_mm)
 
 
 def _edge_part(
@@ -250,11 +250,11 @@ def _edge_part(
     # Cells of fiducials, one an edge, count on where those of wall end.
     cell = -1 - (4 * edges.marker + edges.side)
     rows = edge_rows(state, edges)
-    return _with_effects(rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, cell, EDGE)
+    return _with_effects(rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, cell, EDGE, np.full((len(cell), 2), np.nan))
 
 
 def _with_effects(
-    rows: Rows, sign: Float, shift: list[Float], weight: Float, cell: Int, kind: int
+    rows: Rows, sign: Float, shift: list[Float], weight: Float, cell: Int, kind: int, wall_mm: Float
 ) -> Equations:
     effects = [sign * s for s in shift]
     bad = (
@@ -265,7 +265,7 @@ def _with_effects(
     usable = (rows.weight > 0) & np.isfinite(weight) & ~bad
     return Equations(
         rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual,
-        np.where(usable, weight, 0.0), cell, np.full(len(cell), kind),
+        np.where(usable, weight, 0.0), cell, np.full(len(cell), kind), wall_mm,
     )  # fmt: skip
 
 
@@ -305,4 +305,4 @@ def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Seque
     weight = np.full(count, _ENCODER_SIGMA_MM**-2)
     residual = state.T_pc[:, 2, 3] - scale * reading - offset
     kind = np.full(count, ENCODER_ROW)
-    return Equations(np.arange(count), by_pose, by_global, residual, weight, cell, kind)
+    return Equations(np.arange(count), by_pose, by_global, residual, weight, cell, kind, np.full((count, 2), np.nan))
