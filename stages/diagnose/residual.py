@@ -18,8 +18,9 @@ from stages.diagnose.field.run import ring_points as field_points
 from stages.diagnose.field.system import field_system
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.fit import Fit, fit
+from stages.diagnose.gauge.linearise import ring_mm_per_px
 from stages.diagnose.gauge.points import ring_points as gauge_points
-from stages.diagnose.gauge.run import GaugeRun, Term, ring_mm_per_px
+from stages.diagnose.gauge.run import GaugeRun, Term
 
 AZIMUTHS = 72
 WALL_STEP_MM = 2.0

@@ -55,8 +55,12 @@ def test_scores_of_a_large_effect_are_not_widened_by_the_effect_itself():
     e.by_global[:, 2] = pattern
     e = replace(e, residual=e.residual / np.sqrt(e.weight) - 3 * pattern)
     reduced = Reduced(
-        np.eye(GLOBALS), np.zeros(GLOBALS), 0.0, np.zeros((FRAMES, 6, GLOBALS)), np.zeros((FRAMES, 6)),
-        np.zeros(FRAMES)
+        np.eye(GLOBALS),
+        np.zeros(GLOBALS),
+        0.0,
+        np.zeros((FRAMES, 6, GLOBALS)),
+        np.zeros((FRAMES, 6)),
+        np.zeros(FRAMES),
     )
     left = Marginal(np.eye(GLOBALS), np.zeros(GLOBALS), np.eye(GLOBALS), np.zeros(GLOBALS), 0.0)
     none, fast = np.zeros(0, np.int64), 1e12 * np.eye(GLOBALS)

@@ -24,8 +24,8 @@ RING, EDGE, ENCODER = 0, 1, 2
 _REACH = 4
 # Information, relative to that of the best determined pose, that keeps an undetermined pose in its place.
 _HOLD = 1e-10
-# Frames with few cells tell little of errors: that these are larger than what is left by more than this factor is
-# not said of them. Debt: data/debts.md.
+# The most by which errors are taken to be larger than what is left of them: where a frame has few cells, how
+# many unknowns it has tells it roughly. Debt: data/debts.md.
 _MOST_LOST = 4.0
 
 
@@ -125,7 +125,8 @@ def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
     misfit = float(corner[-1, -1] + motion.weight @ motion.residual**2)
     return Reduced(
         (corner[:-1, :-1] + corner[:-1, :-1].T) / 2, -corner[:-1, -1], misfit,
-        by_global[..., :-1], -by_global[..., -1], np.trace(np.linalg.solve(band[:, 0], blocks), axis1=1, axis2=2),
+        by_global[..., :-1], -by_global[..., -1],
+        np.trace(np.linalg.solve(band[:, 0], blocks), axis1=1, axis2=2),
     )  # fmt: skip
 
 
@@ -214,9 +215,9 @@ def score_inflation(
 def _lost(equations: Equations, taken: Float) -> Float:
     """Return (M,) by how much errors that cells share have a larger variance than what a frame's fit leaves.
 
-    A pose and the places of fiducials' edges follow what is alike in a cell: of n cells of a frame they take up
-    as many as they have unknowns (J. MacKinnon, H. White, "Some heteroskedasticity-consistent covariance matrix
-    estimators", 1985). Each edge's place is shared by the frames that see it.
+    A pose and the places of fiducials' edges follow what is alike in a cell: of n cells of a frame they take
+    up as many as they have unknowns (J. MacKinnon, H. White, "Some heteroskedasticity-consistent covariance
+    matrix estimators", 1985). Each edge's place is shared by the frames that see it.
     """
     used = equations.weight > 0
     pair, first = np.unique(np.stack([equations.frame, equations.cell])[:, used], axis=1, return_index=True)

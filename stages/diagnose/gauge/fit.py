@@ -25,8 +25,9 @@ from stages.diagnose.gauge.elimination import (
     eliminate_poses,
     score_inflation,
 )
+from stages.diagnose.gauge.linearise import asking, beside, linearise
 from stages.diagnose.gauge.points import BASELINE_SIGMA_PX, BASELINE_SIZE
-from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, asking, beside, linearise
+from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, instrument_information
 
 _CONVERGED = 0.5
@@ -180,7 +181,7 @@ def _reduced(
     left, misfit = eliminate_globals(reduced, own)
     names, value = kept_columns(found, asked)
     stated = found.state.stated
-    before = block_diag(stated.encoder_scale_sigma**-2, instrument_information(stated))
+    before = block_diag(np.diag([stated.encoder_scale_sigma**-2.0]), instrument_information(stated))
     inflation, degrees = score_inflation(equations, reduced, left, own.out, _by_effect(names), before)
     information, right = left.information, left.right
     # From the linearisation's place back to nothing beyond the stated.

@@ -20,7 +20,8 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.nameless import SWINGS, VOCABULARY, Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.run import GaugeRun, Term, asking, linearise
+from stages.diagnose.gauge.linearise import asking, linearise
+from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan
 from stages.diagnose.inference import (
     DEGREES,

@@ -1,8 +1,9 @@
 """What errors of rings in neighbouring cells of wall add to the variance of scores.
 
-Scores are taken as independent from cell to cell, but print, wear and stains on a wall pass from one cell to the
-next. How alike errors are at each distance follows from the residuals of the whole run: scores of one column at
-the cells' borders are too few for that (T. Conley, "GMM estimation with cross sectional dependence", 1999).
+Scores are taken as independent from cell to cell, but print, wear and stains on a wall pass from one cell to
+the next. How alike errors are at each distance follows from the residuals of the whole run: one column's scores
+at the borders of cells are too few for that (T. Conley, "GMM estimation with cross sectional dependence",
+1999).
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.terms import WALL_CELL_MM
 
-# Squares of wall to each side of a cell, each as long as a few frames' advance; errors farther apart than a cell
-# are taken as independent. Debt: data/debts.md.
+# Squares of wall to each side of a cell; errors farther apart than a cell are taken as independent.
+# Debt: data/debts.md.
 _TO_A_SIDE = 4
 _REACH = np.arange(-_TO_A_SIDE, _TO_A_SIDE + 1)
 

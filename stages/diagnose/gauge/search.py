@@ -18,8 +18,9 @@ from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
 from stages.diagnose.gauge.fit import Fit, fit, fit_beside, own_parameters
+from stages.diagnose.gauge.linearise import linearise
 from stages.diagnose.gauge.points import bin_widths
-from stages.diagnose.gauge.run import GaugeRun, Linearised, Term, linearise
+from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.scan import Scored, refined, scan
 from stages.diagnose.inference import Stated
 

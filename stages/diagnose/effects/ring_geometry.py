@@ -1,0 +1,93 @@
+"""The line on the wall, seen in the image: how far it is found to move when sheet, wall or image move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+
+_STEP_RAD = 1e-5
+
+
+@dataclass(frozen=True)
+class RingGeometry:
+    """The line at M points, seen in the half-planes of their azimuths in C.
+
+    Attributes
+    ----------
+    per_sheet_c, per_wall_c : (M, 3)
+        Way of the line's point in its half-plane, mm in C, per mm by which the sheet lies farther along the
+        optical axis, and per mm by which the wall lies farther out.
+    tangent_px : (M, 2)
+        Direction of the line in the image.
+    outward_px : (M, 2)
+        Unit direction of the image radius.
+    rho_px : (M,)
+        Image radius.
+    by_point : (M, 2, 3)
+        Derivative of the image by the point.
+    """
+
+    per_sheet_c: Float
+    per_wall_c: Float
+    tangent_px: Float
+    outward_px: Float
+    rho_px: Float
+    by_point: Float
+
+    def read(self, shift_px: Float) -> Float:
+        """Return (M,) how much farther out the line is found, at the same image azimuth, after shifts (M, 2).
+
+        What a shift moves across the radius counts by the line's inclination to the circle through it, which
+        tells a shifted image from a tilted sheet in an off-centre ring, and by the circle's curvature.
+        """
+        across = _cross(self.outward_px, shift_px)
+        return self.read_small(shift_px) - across**2 / (2 * self.rho_px)
+
+    def read_small(self, shift_px: Float) -> Float:
+        """Return `read` to first order in the shifts."""
+        return _cross(shift_px, self.tangent_px) / _cross(self.outward_px, self.tangent_px)
+
+    def read_move(self, way_c: Float) -> Float:
+        """Return `read_small` (M,) of small moves (M, 3), mm in C, of the line's points."""
+        return self.read_small(np.einsum("mij,mj->mi", self.by_point, way_c))
+
+
+def ring_geometry(probe: Probe, xyz_c: Float, normal_c: Float, uv: Float) -> RingGeometry:
+    """Return the geometry of the stated sheet's line at wall points (M, 3) with outward normals (M, 3)."""
+    psi = np.arctan2(xyz_c[:, 1], xyz_c[:, 0])
+    slope = probe.laser.slope(psi)
+    unit_q = np.stack([np.cos(psi), np.sin(psi), np.zeros_like(psi)], axis=1)
+    unit_z = np.array([0.0, 0.0, 1.0])
+    along_sheet = unit_q + slope[:, None] * unit_z
+    steepness = np.sum(normal_c * along_sheet, axis=1)
+    per_wall = along_sheet / steepness[:, None]
+    per_sheet = unit_z - normal_c[:, 2:] * per_wall
+    by_point = probe.camera.project_jacobian(xyz_c).by_point
+    tangent = np.cross(normal_c, _sheet_normal(probe.laser, xyz_c, psi, unit_q))
+    away = uv - probe.camera.centre_px
+    rho = np.linalg.norm(away, axis=1)
+    return RingGeometry(
+        per_sheet, per_wall, np.einsum("mij,mj->mi", by_point, tangent), away / rho[:, None], rho, by_point
+    )
+
+
+def _sheet_normal(laser: LaserSheet, xyz_c: Float, psi: Float, unit_q: Float) -> Float:
+    """Return (M, 3) the gradient of z − height(ψ) − q slope(ψ)."""
+    q = np.hypot(xyz_c[:, 0], xyz_c[:, 1])
+
+    def height(azimuth: Float) -> Float:
+        return np.asarray(laser.height(azimuth) + q * laser.slope(azimuth))
+
+    turn = (height(psi + _STEP_RAD) - height(psi - _STEP_RAD)) / (2 * _STEP_RAD)
+    unit_psi = np.stack([-unit_q[:, 1], unit_q[:, 0], np.zeros_like(psi)], axis=1)
+    rise = laser.slope(psi)[:, None] * unit_q + (turn / q)[:, None] * unit_psi
+    return np.asarray(np.array([0.0, 0.0, 1.0]) - rise)
+
+
+def _cross(a: Float, b: Float) -> Float:
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -1,0 +1,238 @@
+"""Measurements of a gauge run as equations about a state and a few effects at their present size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.motion_priors import smooth_motion_rows
+from pipeline.arrays import Float, Int
+from pipeline.recording.base import Encoder
+from stages.calibrate.gauge.edges import Edges
+from stages.calibrate.gauge.geometry import BoreRings
+from stages.calibrate.gauge.state import ENCODER, Unknowns
+from stages.calibrate.gauge.terms import edge_rows, expected_ring, ring_residual, ring_rows, wall_cells
+from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.effects.library import (
+    columns,
+    reading_columns,
+    ring_shift_px,
+    texture_columns,
+    texture_shift_px,
+)
+from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations
+from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
+from stages.diagnose.gauge.points import (
+    BASELINE_SIZE,
+    edge_baseline,
+    edge_points,
+    ring_baseline,
+    ring_points,
+    speed_along,
+)
+from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
+
+_ROUNDS = 2
+_ENCODER_SIGMA_MM = 1.0
+# Encoder readings this many frames apart are taken as independent. Debt: data/debts.md.
+_ENCODER_CELL = 8
+
+
+def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearised:
+    """Return the equations with columns for globals and terms."""
+    run.watch()
+    edges, edge_at = _without_edge_shift(run, state, terms)
+    ring_at = ring_points(state, _on_bore(run, state), run.time_s, run.width_px)
+    each = (ring_shift_px(t.model, ring_at, *t.at(t.amplitude)) for t in terms)
+    shift = sum(each, np.zeros(len(run.rings.uv)))
+    rings = replace(run.rings, uv=run.rings.uv - shift[:, None] * run.rings.outward)
+    residual = ring_residual(state, rings, rings.uv)
+    parts = [_edge_part(run, state, edges, edge_at, terms)]
+    parts.append(_ring_part(run, state, rings, ring_at, residual, terms))
+    if run.encoder is not None:
+        parts.append(_encoder_part(run, run.encoder, state, terms))
+    joined = {k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])}
+    smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
+    motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
+    return Linearised(Equations(**joined), motion, ring_at, edge_at)
+
+
+def beside(run: GaugeRun, state: Unknowns, at: Linearised, model: EffectModel, shape: Shape) -> Linearised:
+    """Return the linearisation with an effect of size zero behind the others."""
+    return replace(at, equations=asking(run, state, at, [(model, shape)]))
+
+
+def asking(
+    run: GaugeRun, state: Unknowns, at: Linearised, asked: Sequence[tuple[EffectModel, Shape]],
+    with_baseline: bool = False,
+) -> Equations:  # fmt: skip
+    """Return equations with columns, behind the others, for the effects asked about and for the baseline.
+
+    Where a prediction fails, measurements do not count.
+    """
+    run.watch()
+    equations, mm_per_px = at.equations, ring_mm_per_px(at.rings)
+    own, count = equations.by_global.shape[1], sum(len(model.amplitudes) for model, _ in asked)
+    size = own + count + BASELINE_SIZE * with_baseline
+    by_global = np.zeros((len(equations.frame), size))
+    by_global[:, :own] = equations.by_global
+    _ask(run, state, at, mm_per_px, asked, by_global[:, own : own + count])
+    bad = ~np.isfinite(by_global[:, own : own + count]).all(1)
+    if with_baseline:
+        by_global[:, own + count :] = _baseline(run, at, mm_per_px)
+    by_global[bad] = 0.0
+    return replace(equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight))
+
+
+def _ask(
+    run: GaugeRun, state: Unknowns, at: Linearised, mm_per_px: Float,
+    asked: Sequence[tuple[EffectModel, Shape]], out: Float,
+) -> None:  # fmt: skip
+    """Write the derivatives of the residuals by the effects' amplitudes into ``out`` (M, Q)."""
+    edges, rings = len(at.edges.uv), len(at.edges.uv) + len(at.rings.uv)
+    travel = travel_of(run, run.encoder, state) if run.encoder is not None else None
+    first = 0
+    for model, shape in asked:
+        own = slice(first, first + len(model.amplitudes))
+        out[:edges, own] = _across(texture_columns(model, at.edges, shape), run.edges)
+        out[edges:rings, own] = -mm_per_px[:, None] * columns(model, at.rings, shape)
+        if travel is not None:
+            out[rings:, own] = state.encoder[0] * reading_columns(model, travel, shape)
+        first = own.stop
+
+
+def _across(shift: Float, edges: Edges) -> Float:
+    """Return shifts (E, 2, ...) of edges along their normals."""
+    return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
+
+
+def travel_of(run: GaugeRun, encoder: Encoder, state: Unknowns) -> Travel:
+    """Return the camera's way and the readings at the frames' times."""
+    reading = np.interp(run.time_s, encoder.time_s, encoder.distance_mm)
+    return Travel(run.time_s, state.T_pc[:, 2, 3], speed_along(state, run.time_s), reading)
+
+
+def _baseline(run: GaugeRun, at: Linearised, mm_per_px: Float) -> Float:
+    """Return (M, 38) derivatives of the residuals by the baseline's patterns, in px."""
+    on_edges = edge_baseline(at.edges, run.edges.normal)
+    # The residual of a ring falls with its outward shift by the millimetres of a pixel.
+    on_rings = -mm_per_px[:, None] * ring_baseline(at.rings)
+    rest = len(at.equations.frame) - len(on_edges) - len(on_rings)
+    # At the edge of the camera model's domain the derivative does not exist; such points are left out.
+    return np.nan_to_num(block_diag(on_edges, on_rings, np.zeros((rest, 0))), posinf=0.0, neginf=0.0)
+
+
+def ring_mm_per_px(points: ImagePoints) -> Float:
+    """Return (M,) by how much the radius grows with the ring's outward shift in the image."""
+    assert points.per_px_c is not None
+    return np.asarray(np.sum(points.normal_c * points.per_px_c, axis=1))
+
+
+def _on_bore(run: GaugeRun, state: Unknowns) -> BoreRings:
+    """Return the ring bins where the state without any effect has them.
+
+    Derivatives taken where a ring was measured would share its noise, and scores would be off for it.
+    """
+    rings = run.rings
+    for _ in range(_ROUNDS):
+        rings = replace(rings, uv=expected_ring(state, rings)[1])
+    return rings
+
+
+def _without_edge_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> tuple[Edges, ImagePoints]:
+    points = edge_points(state, run.edges, run.time_s)
+    # Where they are predicted, for the same reason as rings.
+    points = replace(points, uv=points.projected_uv)
+    uv = run.edges.uv
+    for t in terms:
+        uv = uv - texture_shift_px(t.model, points, *t.at(t.amplitude))
+    return replace(run.edges, uv=uv), points
+
+
+def _ring_part(
+    run: GaugeRun, state: Unknowns, rings: BoreRings, points: ImagePoints, residual: Float,
+    terms: Sequence[Term],
+) -> Equations:  # fmt: skip
+    mm_per_px = ring_mm_per_px(points)
+    shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
+    rows, _ = ring_rows(state, rings, residual, points.uv)
+    return _with_effects(
+        rows, -mm_per_px[:, None], shift, run.ring_weight, wall_cells(rings.wall_mm), RING, rings.wall_mm
+    )
+
+
+def _edge_part(
+    run: GaugeRun, state: Unknowns, edges: Edges, points: ImagePoints, terms: Sequence[Term]
+) -> Equations:
+    def texture_shift(term: Term, amplitude: Float) -> Float:
+        return _across(texture_shift_px(term.model, points, *term.at(amplitude)), edges)
+
+    shift = [_term_slope(t, partial(texture_shift, t)) for t in terms]
+    # Cells of fiducials, one an edge, count on where those of wall end.
+    cell = -1 - (4 * edges.marker + edges.side)
+    rows = edge_rows(state, edges)
+    return _with_effects(
+        rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, cell, EDGE, np.full((len(cell), 2), np.nan)
+    )
+
+
+def _with_effects(
+    rows: Rows, sign: Float, shift: list[Float], weight: Float, cell: Int, kind: int, wall_mm: Float
+) -> Equations:
+    effects = [sign * s for s in shift]
+    bad = (
+        ~np.all([np.isfinite(e).all(1) for e in effects], axis=0) if effects else np.zeros(len(weight), bool)
+    )
+    by_global = np.concatenate([rows.by_border, *effects], 1)
+    by_global[bad] = 0.0
+    usable = (rows.weight > 0) & np.isfinite(weight) & ~bad
+    return Equations(
+        rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual,
+        np.where(usable, weight, 0.0), cell, np.full(len(cell), kind), wall_mm,
+    )  # fmt: skip
+
+
+def _reading_shift(term: Term, travel: Travel, amplitude: Float) -> Float:
+    return term.model.reading_shift_mm(travel, *term.at(amplitude))
+
+
+def _ring_shift(term: Term, points: ImagePoints, amplitude: Float) -> Float:
+    return ring_shift_px(term.model, points, *term.at(amplitude))
+
+
+def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
+    """Return (M, Q) derivatives of a shift by the term's amplitudes, where they are."""
+    out = []
+    for k, amplitude in enumerate(term.amplitudes):
+        step = np.zeros(len(term.amplitude))
+        step[k] = 0.05 * amplitude.plausible
+        out.append((shift_of(term.amplitude + step) - shift_of(term.amplitude - step)) / (2 * step[k]))
+    return np.stack(out, -1)
+
+
+def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Sequence[Term]) -> Equations:
+    count = len(run.time_s)
+    scale, offset, delay = state.encoder
+    travel = travel_of(run, encoder, state)
+    reading = np.interp(run.time_s - delay, encoder.time_s, encoder.distance_mm)
+    for t in terms:
+        reading = reading - t.model.reading_shift_mm(travel, *t.at(t.amplitude))
+    by_pose = np.zeros((count, POSE))
+    by_pose[:, 2] = 1
+    by_border = np.zeros((count, state.border_size))
+    by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
+    shift = [_term_slope(t, partial(_reading_shift, t, travel)) for t in terms]
+    by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
+    cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
+    # The weight is small: the encoder is examined separately, and a slip must not move the poses.
+    weight = np.full(count, _ENCODER_SIGMA_MM**-2)
+    residual = state.T_pc[:, 2, 3] - scale * reading - offset
+    kind = np.full(count, ENCODER_ROW)
+    return Equations(
+        np.arange(count), by_pose, by_global, residual, weight, cell, kind, np.full((count, 2), np.nan)
+    )
