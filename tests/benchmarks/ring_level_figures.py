@@ -48,6 +48,15 @@ def _of_nulls(nulls: Sequence[Line]) -> Iterator[str]:
         # Corrected for all that is tried, p may be conservative, never the other way.
         test = kstest(p_values, "uniform", alternative="greater").pvalue
         yield f"share of {len(p_values)} nulls with p below {below}; chance of so many small ones {test:.2g}"
+    yield from _expected(nulls)
+
+
+def _expected(nulls: Sequence[Line]) -> Iterator[str]:
+    """Yield what `stages.diagnose.gauge.examine` takes over: how many of the scores expected are independent."""
+    expected = [e for line in nulls if (e := line.get("expected")) is not None]
+    if expected:
+        one = 1 / np.mean(expected)
+        yield f"one over the mean number of scores expected by chance, {len(expected)} nulls: {one:.3f}"
 
 
 def _of_courses(lines: Sequence[Line]) -> Iterator[str]:

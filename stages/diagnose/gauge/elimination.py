@@ -219,15 +219,15 @@ def _lost(equations: Equations, taken: Float) -> Float:
     up as many as they have unknowns (J. MacKinnon, H. White, "Some heteroskedasticity-consistent covariance
     matrix estimators", 1985). Each edge's place is shared by the frames that see it.
     """
-    used = equations.weight > 0
+    used = (equations.weight > 0) & (equations.kind != ENCODER)
     pair, first = np.unique(np.stack([equations.frame, equations.cell])[:, used], axis=1, return_index=True)
     kind = equations.kind[used][first]
     seen, visits = np.unique(pair[1], return_counts=True)
     shared = np.where(kind == EDGE, 1 / visits[np.searchsorted(seen, pair[1])], 0.0)
-    cells = np.bincount(pair[0], minlength=len(taken)) * 1.0
+    cells = np.maximum(np.bincount(pair[0], minlength=len(taken)), 1.0)
     gone = taken + np.bincount(pair[0], shared, minlength=len(taken))
     factor = cells / np.maximum(cells - gone, cells / _MOST_LOST)
-    return np.where(equations.kind == ENCODER, 1.0, np.where(cells > 0, factor, 1.0)[equations.frame])
+    return np.where(equations.kind == ENCODER, 1.0, factor[equations.frame])
 
 
 def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> Float:

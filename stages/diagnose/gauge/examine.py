@@ -35,9 +35,9 @@ OF_A_PIPE = frozenset({"ovality", "pipe_bend"})
 # Of an examination: preparation, search, judgement of what was found.
 _PARTS = 3
 # Of so many scores expected by chance one is independent: laws, courses and patterns are like each other. One
-# over the mean expected in 36 runs without any effect (`bench_diagnosis --mode nulls`, seeds 1000 to 1035);
-# fitted on half of them, p of the other half is uniform (KS .6).
-_APART = 0.27
+# over the mean expected in runs without any effect, seeds 0 to 59 (`bench_diagnosis run FILE --mode nulls --count
+# 60`, then `bench_diagnosis summary FILE`); p of the next 41 seeds is uniform (KS .09, of too many small ones .24).
+_APART = 0.265
 
 
 def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated: Stated) -> Location | None:
@@ -136,10 +136,14 @@ class Examined:
     patterns_by_chance: float = 1.0
 
     @property
+    def expected(self) -> float:
+        """How many scores as large, of all that are looked at, are expected when nothing is hidden."""
+        return 2 * min(self.searched.steps[0].by_chance, self.patterns_by_chance)
+
+    @property
     def global_p(self) -> float:
         """Chance of this when nothing is hidden, by the library or by patterns without a cause."""
-        expected = 2 * min(self.searched.steps[0].by_chance, self.patterns_by_chance)
-        return float(-np.expm1(-_APART * expected))
+        return float(-np.expm1(-_APART * self.expected))
 
     @property
     def best(self) -> Judged | None:

@@ -1,9 +1,9 @@
 """What errors of rings in neighbouring cells of wall add to the variance of scores.
 
 Scores are taken as independent from cell to cell, but print, wear and stains on a wall pass from one cell to
-the next. How alike errors are at each distance follows from the residuals of the whole run: one column's scores
-at the borders of cells are too few for that (T. Conley, "GMM estimation with cross sectional dependence",
-1999).
+the next. How alike errors are at each distance follows from the residuals of the whole run: the scores of one
+column at the cells' borders are too few for that (T. Conley, "GMM estimation with cross sectional
+dependence", 1999).
 """
 
 from __future__ import annotations
