@@ -34,9 +34,10 @@ from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 OF_A_PIPE = frozenset({"ovality", "pipe_bend"})
 # Of an examination: preparation, search, judgement of what was found.
 _PARTS = 3
-# Of so many scores expected by chance one is independent: laws, courses and patterns are like each other. One
-# over the mean expected in runs without any effect, seeds 0 to 59 (`bench_diagnosis run FILE --mode nulls
-# --count 60`, `bench_diagnosis summary FILE`); p of the next 41 is uniform (KS .09, of too many small ones .24).
+# Of so many scores expected by chance one is independent: laws, courses and patterns are like each other.
+# One over the mean expected in runs without any effect, seeds 0 to 59 (`bench_diagnosis run FILE --mode nulls
+# --count 60`, then `bench_diagnosis summary FILE`); p of the next 41 is uniform (KS .09, of too many small
+# ones .24).
 _APART = 0.265
 
 
