@@ -52,11 +52,11 @@ def _of_nulls(nulls: Sequence[Line]) -> Iterator[str]:
 
 
 def _expected(nulls: Sequence[Line]) -> Iterator[str]:
-    """Yield what `stages.diagnose.gauge.examine` takes over: how many of the scores expected are independent."""
+    """Yield how many of the scores that are expected by chance count as one."""
     expected = [e for line in nulls if (e := line.get("expected")) is not None]
     if expected:
         one = 1 / np.mean(expected)
-        yield f"one over the mean number of scores expected by chance, {len(expected)} nulls: {one:.3f}"
+        yield f"one over the mean number expected by chance, {len(expected)} nulls: {one:.3f}"
 
 
 def _of_courses(lines: Sequence[Line]) -> Iterator[str]:

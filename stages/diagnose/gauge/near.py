@@ -9,6 +9,7 @@ dependence", 1999).
 from __future__ import annotations
 
 import numpy as np
+from scipy.fft import irfft2, next_fast_len, rfft2
 
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.terms import WALL_CELL_MM
@@ -67,9 +68,9 @@ def _alike(weight: Float, left: Float, square: Int, shape: Int) -> Float:
 
 def _correlated(grids: Float) -> Float:
     """Return (K, 9, 9) the products of grids (K, X, Y) with themselves displaced as in `_REACH`."""
-    along, around = (n + _TO_A_SIDE for n in grids.shape[1:])
-    power = np.abs(np.fft.rfft2(grids, (along, around))) ** 2
-    return np.asarray(np.fft.irfft2(power, (along, around))[:, _REACH[:, None] % along, _REACH % around])
+    along, around = (next_fast_len(n + _TO_A_SIDE, real=True) for n in grids.shape[1:])
+    power = np.abs(rfft2(grids, (along, around))) ** 2
+    return np.asarray(irfft2(power, (along, around))[:, _REACH[:, None] % along, _REACH % around])
 
 
 def _within(columns: Float, alike: Float) -> Float:
