@@ -6,20 +6,22 @@ import os
 import shutil
 import threading
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import IO
+from typing import IO, TypeVar
 
 import av
 import numpy as np
+from av.video.reformatter import Colorspace
 
 from pipeline.arrays import Byte, Image, Int
 from pipeline.errors import InputError
 from pipeline.machine.scratch import Scratch
 from pipeline.recording.base import Illumination, Planes, Recording, ascending, in_background
-from pipeline.recording.images import FULL_CHROMA, bgr_444, plane_of, shown
+from pipeline.recording.images import FULL_CHROMA, SplitImage, bgr_444, plane_of, shown, split
 from pipeline.recording.video import AHEAD, FEW, VideoSource
 
+Made = TypeVar("Made")
 # Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
 # Frames beyond it are decoded again. A disk that is nearly full is left to the results.
 _MOST_BYTES, _SHARE_OF_FREE = 4 << 30, 0.25
@@ -100,6 +102,16 @@ class FrameStore:
             return bgr_444(content, kept.pixel_format, kept.color_range, kept.colorspace)
         return shown(_rebuilt(kept, content), planes)
 
+    def take_split(self, number: int) -> SplitImage | None:
+        """Return a frame that is there as `pipeline.recording.images.split` gives it."""
+        kept = self._kept[number]
+        if kept is None:
+            return None
+        content = self._read(kept, len(kept.planes))
+        if kept.pixel_format in FULL_CHROMA and kept.colorspace != Colorspace.ITU709:
+            return SplitImage.of_planes(content, kept.pixel_format, kept.color_range, kept.colorspace)
+        return split(_rebuilt(kept, content))
+
     def _write(self, number: int, frame: av.VideoFrame, planes: list[Byte]) -> None:
         size = sum(p.nbytes for p in planes)
         with self._lock:
@@ -160,19 +172,40 @@ class DecodedOnce:
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`."""
         wanted = ascending(frames)
-        found = self._found(wanted.tolist(), planes)
+        found = self._found(
+            wanted.tolist(), planes, lambda n: self.store.take(n, planes), lambda f: shown(f, planes)
+        )
         return found if wanted.size < FEW else in_background(found, AHEAD)
 
-    def _found(self, wanted: list[int], planes: Planes) -> Iterator[tuple[int, Image | None]]:
+    def read_split(self, frames: Sequence[int] | Int) -> Iterator[tuple[int, SplitImage | None]]:
+        """Yield frames as `read` does, each as luma and colours of half its size."""
+        found = self._found(ascending(frames).tolist(), "bgr", self.store.take_split, split)
+        return in_background(found, AHEAD)
+
+    def _found(
+        self,
+        wanted: list[int],
+        planes: Planes,
+        take: Callable[[int], Made],
+        make: Callable[[av.VideoFrame | None], Made],
+    ) -> Iterator[tuple[int, Made]]:
         missing = [n for n in wanted if not self.store.holds(n, planes)]
         decoded, due = self.video.decoded(np.array(missing, np.int64)), set(missing)
         for number in wanted:
             if number not in due:
-                yield number, self.store.take(number, planes)
+                yield number, take(number)
                 continue
             _, frame = next(decoded)
             self.store.put(number, frame, number in self.dim)
-            yield number, shown(frame, planes)
+            yield number, make(frame)
+
+
+def read_split(recording: Recording, frames: Sequence[int] | Int) -> Iterator[tuple[int, SplitImage | None]]:
+    """Yield frames as luma and colours of half their size; None where one cannot be decoded."""
+    if isinstance(recording.source, DecodedOnce):
+        return recording.source.read_split(frames)
+    read = recording.read(frames, "bgr")
+    return ((number, None if image is None else SplitImage.of(image)) for number, image in read)
 
 
 def decoded_once(recording: Recording, scratch: Scratch) -> Recording:

@@ -8,12 +8,14 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from pydantic import Field
 
-from pipeline.arrays import Image, Int
+from pipeline.arrays import Int
 from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
+from pipeline.recording.decoded_once import read_split
+from pipeline.recording.images import SplitImage
 from stages.texture.blend import REFLECTANCE_SCALE
 from stages.texture.grid import FlatGrid, flat_grid
 from stages.texture.mosaic import Blended, Mosaic
@@ -82,7 +84,7 @@ def photograph_wall(
     picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe, ring)
     for stretch in stretches:
         for view, image in images.read(stretch.wanted):
-            sampler.add(view, image)
+            sampler.add(view, None if image is None else image.luma)
         light = lights.add(sampler.take(stretch.wanted), stretch.wanted, sampler.reference)
         mosaic = Mosaic(
             grid, surface, probe, views, plan, stretch.tiles, light, parameters.laser_band_mm,
@@ -102,10 +104,10 @@ class _Images:
         self._recording, self._views, self._wanted, self._context = recording, views, wanted, context
         self._done = 0
 
-    def read(self, wanted: Int) -> Iterator[tuple[int, Image | None]]:
+    def read(self, wanted: Int) -> Iterator[tuple[int, SplitImage | None]]:
         """Yield (view, image) in order; None where a frame cannot be decoded."""
         frames = self._views.frame[wanted]
-        for view, (_, image) in zip(wanted, self._recording.read(frames, "bgr"), strict=True):
+        for view, (_, image) in zip(wanted, read_split(self._recording, frames), strict=True):
             yield int(view), image
             self._done += 1
             self._context.progress(self._done, 2 * self._wanted)
@@ -171,7 +173,7 @@ def _texture_of_run(
 
 TEXTURE = Stage(
     "texture",
-    "7",
+    "8",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",

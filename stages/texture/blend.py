@@ -6,8 +6,6 @@ half as fine, and a block is sampled in less than half of the time of four pixel
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numba import njit
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA
 from pipeline.arrays import Byte, Float32, Image, Int
+from pipeline.recording.images import SplitImage
 from stages.texture.project import TileProjection
 
 Short = NDArray[np.uint16]
@@ -41,33 +40,6 @@ _LEAST_KNOWN = np.float32(0.25)
 """Share of the nearest block in the interpolation of its colour: no pixel has less of its own block."""
 
 
-@dataclass(frozen=True)
-class SplitImage:
-    """A picture as ``luma`` (H, W) and as colours of half its size, ``small`` (H / 2, W / 2, 3)."""
-
-    luma: Image
-    small: Image
-
-    @staticmethod
-    def of(image: Image) -> SplitImage:
-        """Split a picture (H, W, 3)."""
-        size = (image.shape[1] // 2, image.shape[0] // 2)
-        luma, small = (
-            cv2.cvtColor(image, cv2.COLOR_BGR2GRAY),
-            cv2.resize(image, size, None, 0, 0, cv2.INTER_AREA),
-        )
-        return SplitImage(np.asarray(luma, np.uint8), np.asarray(small, np.uint8))
-
-    def small_at(self, uv: Float32) -> list[Image]:
-        """Return the blue, green and red (n, m) of the small picture at places (n, m, 2) of the large one."""
-        u, v = (
-            (uv[..., k] + _HALF) * np.float32(self.small.shape[1 - k] / self.luma.shape[1 - k]) - _HALF
-            for k in range(2)
-        )
-        # With both maps in one, OpenCV 5.0 reads beyond them when it interpolates linearly.
-        return [np.asarray(c, np.uint8) for c in cv2.split(cv2.remap(self.small, u, v, cv2.INTER_LINEAR))]
-
-
 class TileStack:
     """Samples of one tile's pixels in up to ``views`` views, each view's one after the other.
 
@@ -90,7 +62,7 @@ class TileStack:
             rows = slice(2 * blocks.start, 2 * blocks.stop)
             _store(
                 cv2.remap(image.luma, projection.uv[rows], _NO_SECOND_MAP, cv2.INTER_CUBIC),
-                tuple(image.small_at(projection.block_uv[blocks])),
+                tuple(_colours_at(image, projection.block_uv[blocks])),
                 projection.inverse_brightness[rows], projection.weight[rows],
                 self._luma[self._used, rows], self._colour[self._used, blocks],
                 self._weights[self._used, rows],
@@ -104,6 +76,16 @@ class TileStack:
         self._used = 0
         columns, blocks = slice(self._columns), slice(self._columns // 2)
         return _in_colour(luma[:, columns], colour[:, blocks]), count[:, columns]
+
+
+def _colours_at(image: SplitImage, uv: Float32) -> list[Image]:
+    """Return the blue, green and red (n, m) of the small picture at places (n, m, 2) of the large one."""
+    u, v = (
+        (uv[..., k] + _HALF) * np.float32(image.small.shape[1 - k] / image.luma.shape[1 - k]) - _HALF
+        for k in range(2)
+    )
+    # With both maps in one, OpenCV 5.0 reads beyond them when it interpolates linearly.
+    return [np.asarray(c, np.uint8) for c in cv2.split(cv2.remap(image.small, u, v, cv2.INTER_LINEAR))]
 
 
 @njit(cache=True, nogil=True)

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Byte, Image
+from pipeline.arrays import Byte
 from pipeline.geometry.image_places import ImagePlaces
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
-from stages.texture.blend import SplitImage, TileStack
+from pipeline.recording.images import SplitImage
+from stages.texture.blend import TileStack
 from stages.texture.grid import FlatGrid
 from stages.texture.photometry import Light
 from stages.texture.project import project_tile
@@ -73,14 +74,13 @@ class Mosaic:
         self._most_views = max((len(plan[tile].views) for tile in tiles), default=0)
         self._picture = picture
 
-    def add(self, view: int, image: Image | None, pool: Executor) -> None:
+    def add(self, view: int, image: SplitImage | None, pool: Executor) -> None:
         """Sample one view, in order, into every tile that wants it; None when there is no such image."""
         tiles = self._tiles_of[view]
         for tile in tiles:
             self._ensure_open(tile)
         if image is not None and np.isfinite(self._light.gain[view]):
-            split = SplitImage.of(image)
-            list(pool.map(lambda tile: self._sample(tile, view, split), tiles))
+            list(pool.map(lambda tile: self._sample(tile, view, image), tiles))
         done = [tile for tile in tiles if self._plan[tile].views[-1] == view]
         list(pool.map(self._close, done))
 

@@ -67,7 +67,7 @@ class LightSampler:
         self._parts: list[LightSamples] = []
 
     def add(self, view: int, image: Image | None) -> None:
-        """Take the samples of one frame, ``image`` (H, W, 3); none where there is no image."""
+        """Take the samples of one frame, its luma ``image`` (H, W); none where there is no image."""
         if image is None:
             return
         rows = self._rows_near(view)
@@ -75,8 +75,7 @@ class LightSampler:
         xyz_c = transform(T_cp, self._patch.xyz_p[rows])
         normal_c = self._patch.normal_p[rows] @ T_cp[:3, :3].T
         size = (image.shape[1] // _SHRINK, image.shape[0] // _SHRINK)
-        luma = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-        small = cv2.resize(luma, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+        small = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.float32)
         scale = np.array(size) / np.array([image.shape[1], image.shape[0]])
         seen_at = self._probe.camera.project(xyz_c).uv
         uv = ((seen_at + 0.5) * scale - 0.5).astype(np.float32)

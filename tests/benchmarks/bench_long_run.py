@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -31,11 +30,10 @@ from pipeline.review.run_files import RunFiles
 from pipeline.simulator.scene import read_scene, write_scene
 from tests.benchmarks.bench_findings import counted, true_wall
 from tests.benchmarks.long_scene import lengthened
-from tests.benchmarks.watch import Watch
+from tests.benchmarks.watch import Progress, Watch
 
 ROOT = Path(__file__).resolve().parents[2]
 TEMPLATE, CONFIG = Path(__file__).with_name("pulled_4_inch.yaml"), ROOT / "configs/long.yaml"
-_CHANGE = re.compile(r" INFO stage (\w+) (starts|completed|reused)")
 
 
 @dataclass(frozen=True)
@@ -106,30 +104,6 @@ def boresight(*arguments: str) -> subprocess.Popen[bytes]:
     """Start the program as its user does."""
     command = [sys.executable, "-m", "pipeline.cli", *arguments]
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-
-
-class Progress:
-    """Tells from a run's log, read on as it grows, at which stages it is."""
-
-    def __init__(self, log: Path) -> None:
-        self._log, self._read, self._at = log, 0, ["start"]
-
-    def __call__(self) -> str:
-        if self._log.exists():
-            with self._log.open("rb") as file:
-                file.seek(self._read)
-                for line in file:
-                    self._take(line.decode())
-                self._read = file.tell()
-        return " and ".join(self._at) or "files"
-
-    def _take(self, line: str) -> None:
-        change = _CHANGE.search(line)
-        if change is None:
-            return
-        self._at = [stage for stage in self._at if stage not in ("start", change[1])]
-        if change[2] == "starts":
-            self._at.append(change[1])
 
 
 def against_truth(place: Place) -> str:

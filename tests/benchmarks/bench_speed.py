@@ -31,8 +31,9 @@ from pipeline.api.run import configuration, prepare
 from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection
-from tests.benchmarks.bench_long_run import ROOT, Progress
-from tests.benchmarks.watch import Watch
+from tests.benchmarks.watch import Progress, Watch
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 _TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 _EVERY_S = 0.05
 _UTIME, _AFTER_CSTIME = 11, 15
+_CHANGE = re.compile(r" INFO stage (\w+) (starts|completed|reused)")
 
 
 class Watch:
@@ -67,6 +69,30 @@ class Watch:
         # a helper that has ended is counted by its parent once that has waited for it
         self.cpu_s[phase] = self.cpu_s.get(phase, 0.0) + max(used - self._used, 0.0)
         self._used = max(used, self._used)
+
+
+class Progress:
+    """Tells from a run's log, read on as it grows, at which stages it is."""
+
+    def __init__(self, log: Path) -> None:
+        self._log, self._read, self._at = log, 0, ["start"]
+
+    def __call__(self) -> str:
+        if self._log.exists():
+            with self._log.open("rb") as file:
+                file.seek(self._read)
+                for line in file:
+                    self._take(line.decode())
+                self._read = file.tell()
+        return " and ".join(self._at) or "files"
+
+    def _take(self, line: str) -> None:
+        change = _CHANGE.search(line)
+        if change is None:
+            return
+        self._at = [stage for stage in self._at if stage not in ("start", change[1])]
+        if change[2] == "starts":
+            self._at.append(change[1])
 
 
 def family(pid: int) -> list[int]:

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from pipeline.machine.scratch import Scratch
 from pipeline.recording import open_recording
 from pipeline.recording.base import FrameTable, Illumination, Recording
-from pipeline.recording.decoded_once import DecodedOnce, decoded_once
+from pipeline.recording.decoded_once import DecodedOnce, decoded_once, read_split
 from pipeline.recording.video import VideoSource, open_video
 from tests.made_recording import COUNT, write_folder, write_video
 
@@ -41,6 +42,29 @@ def _count_decoded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     monkeypatch.setattr(VideoSource, "decoded", counted)
     return decoded
+
+
+@pytest.mark.parametrize("made", FORMATS)
+def test_luma_and_small_colours_are_those_of_the_whole_picture(
+    tmp_path: Path, made: tuple[str, str, str]
+) -> None:
+    ext, codec, pixel_format = made
+    write_video(tmp_path / f"v.{ext}", codec, pixel_format, {"g": "4"} if codec == "libx264" else {})
+    video = open_video(tmp_path / f"v.{ext}")
+    shared = _shared(tmp_path, video)
+    recording = replace(open_recording(tmp_path / "recording"), source=shared)
+    first, again = (list(read_split(recording, range(COUNT + 1))) for _ in range(2))
+    for (n, one), (m, other), (_, bgr) in zip(first, again, video.read(range(COUNT + 1), "bgr"), strict=True):
+        assert n == m
+        if bgr is None:
+            assert one is None
+            assert other is None
+            continue
+        np.testing.assert_array_equal(one.luma, other.luma)
+        np.testing.assert_array_equal(one.small, other.small)
+        assert np.abs(one.luma - bgr @ [0.114, 0.587, 0.299]).mean() < 1.0
+        small = cv2.resize(bgr, one.small.shape[1::-1], interpolation=cv2.INTER_AREA)
+        assert np.abs(one.small - small.astype(float)).mean() < 1.0
 
 
 @pytest.mark.parametrize("made", FORMATS)

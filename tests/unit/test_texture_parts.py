@@ -6,8 +6,9 @@ import pytest
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Lighting
+from pipeline.recording.images import SplitImage
 from stages.rings.kernels import median
-from stages.texture.blend import REFLECTANCE_SCALE, SplitImage, TileStack, blend_samples
+from stages.texture.blend import REFLECTANCE_SCALE, TileStack, blend_samples
 from stages.texture.grid import NODE_PX, FlatGrid, flat_grid, footprint_mm
 from stages.texture.light import irradiance
 from stages.texture.photometry import solve_light
