@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,16 @@ class LocalSpread:
     at_mm: Float
     spread: Float
     columns: int
+
+    @staticmethod
+    def of_one(columns: int) -> LocalSpread:
+        """Return a spread of 1 everywhere."""
+        return LocalSpread(np.zeros(1), np.ones((1, _SECTORS)), columns)
+
+    def over_median(self, least: float) -> LocalSpread:
+        """Return it in units of the median place, no less than ``least``."""
+        usual = max(float(np.median(self.spread)), 1e-12)
+        return replace(self, spread=np.maximum(self.spread / usual, least))
 
     def at(self, distance_mm: Float) -> Float:
         """Return the spread (S, A) at each distance (S,) and column, without steps between places."""

@@ -45,8 +45,9 @@ from stages.defects.credibility import (
 )
 from stages.defects.depth import allowed_by_neighbours, measure_depth
 from stages.defects.describe import Scene, describe
-from stages.defects.detect import Detection, NoiseTail, detect, noise_tail
+from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
+from stages.defects.noise_tail import NoiseTail, noise_tail
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed

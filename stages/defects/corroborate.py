@@ -60,6 +60,8 @@ class Evidence:
         Whether the line is brighter there than at nine of ten places of the ring that shows it deepest.
     contradicted : bool
         Whether lit pictures, taken when the line was elsewhere, show the wall without it.
+    in_the_way : bool
+        Whether the probe would have driven through it.
     """
 
     rings: int
@@ -69,11 +71,12 @@ class Evidence:
     edge: bool = False
     bright: bool = False
     contradicted: bool = False
+    in_the_way: bool = False
 
     @property
     def on_wall(self) -> bool:
         """Whether it is the wall's, and not as likely of the probe or of where the line ends."""
-        return not (self.fixed or self.edge or self.contradicted)
+        return not (self.fixed or self.edge or self.contradicted or self.in_the_way)
 
     @property
     def corroborated(self) -> bool:
@@ -92,6 +95,11 @@ class Evidence:
             return (
                 "Lit pictures taken before and after, when the line was elsewhere, show the wall without it: "
                 "a drop or dirt on the window may have moved the line while it passed"
+            )
+        if self.in_the_way:
+            return (
+                "The probe drove past it, and its lamps would have struck it there: a reflection or stray "
+                "light was taken for the line"
             )
         if self.edge:
             return (
@@ -136,6 +144,7 @@ def evidence_for(
         lies_at_edge(region, relief),
         seen_by.rings is not None and line_is_bright(region, depth.depth_mm, surface, seen_by.rings),
         seen_by.pictures is not None and seen_by.pictures.contradict(region, relief),
+        seen_by.pictures is not None and seen_by.pictures.drove_through(region, depth, relief),
     )
 
 

@@ -2,7 +2,7 @@
 
 Two things imitate defects, and of both the recording itself tells how often. Noise, compression and texture
 that draws the line aside make peaks of the wall: how their number falls off with height is counted over the
-wall without its findings (`stages.defects.detect.NoiseTail`). A glint or a splash stands in one ring at a
+wall without its findings (`stages.defects.noise_tail`). A glint or a splash stands in one ring at a
 place of its own; that neighbouring rings show some in one place is a meeting by chance, and its frequency
 follows from how many findings one ring alone shows, and how wide they are. Where the codec hands it on to
 other pictures, several rings show it; it is brighter than the line, as a defect is by chance only, and how
@@ -24,7 +24,7 @@ from scipy.special import ndtr
 
 from pipeline.artefacts.findings import Defect
 from stages.defects.corroborate import LEAST_RINGS, Evidence
-from stages.defects.detect import NoiseTail
+from stages.defects.noise_tail import NoiseTail
 
 # Real findings are as frequent at any score up to so many times the least, on a logarithmic scale.
 _SCORES = 20.0

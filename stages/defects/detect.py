@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
-from scipy.ndimage import maximum_filter
 from scipy.optimize import brentq
 
 from pipeline.adjustment.robust import robust_spread
@@ -22,10 +21,6 @@ _ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
 _SMALL = 1  # the template for a bump of 3 mm × 3 mm
-# Cells beside a peak within which another is the same one: 2 mm, the reach of the smaller templates.
-_BESIDE = 4
-# Peaks of Gaussian noise that are added to those of the wall: so few move a tail of fifty by a tenth.
-_AS_GAUSSIAN = 5
 
 
 @dataclass(frozen=True)
@@ -143,34 +138,6 @@ class Detection:
     filters: tuple[Filter, ...]
 
 
-@dataclass(frozen=True)
-class NoiseTail:
-    """How many peaks of a height the same search finds in a wall without its findings.
-
-    Peaks of noise above a level fall off as exp(−h² / 2 w²), with w = 1 for Gaussian noise, and more where
-    compression, texture or clutter make great errors more frequent.
-
-    Attributes
-    ----------
-    peaks : float
-        Above `FROM` σ, on the whole wall.
-    width2 : float
-        w².
-    """
-
-    peaks: float
-    width2: float
-    FROM = 3.0
-
-    def above(self, score: float) -> float:
-        """Return how many peaks of noise to expect above a score."""
-        return float(self.peaks * np.exp(-max(score**2 - self.FROM**2, 0.0) / (2 * self.width2)))
-
-    def density(self, score: float) -> float:
-        """Return how many peaks of noise to expect at a score, per σ."""
-        return self.above(score) * score / self.width2
-
-
 def templates() -> tuple[Template, ...]:
     """Return round bumps over scales and thin ones over directions."""
     turns = [np.pi * k / _DIRECTIONS for k in range(_DIRECTIONS)]
@@ -183,14 +150,14 @@ def templates() -> tuple[Template, ...]:
 def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: Progress) -> Detection:
     """Find cells that stand out of noise and roughness, some rows after the others."""
     bank = templates()
-    threshold = _threshold(_seen_mm2(relief), bank, false_alarms)
+    threshold = _threshold(seen_mm2(relief), bank, false_alarms)
     filters = _fitted(relief, [template.kernel(relief.cell_mm) for template in bank])
     into, inward = (scratch.zeros(relief.shape, bool) for _ in range(2))
     best = scratch.zeros(relief.shape, np.float32)
     overlap = max(len(f.kernel) for f in filters) // 2
     parts = stretches(relief.shape[0], overlap)
     for done, part in enumerate(parts, 1):
-        near = _weighed(relief.rows(part.wide), overlap)
+        near = weighed(relief.rows(part.wide), overlap)
         for used in filters:
             score = used.standardised(near)[part.inner]
             into[part.own] |= score > threshold
@@ -200,33 +167,7 @@ def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: 
     return Detection(into, inward, threshold, filters[_SMALL].height_sigma_mm, best, tuple(filters))
 
 
-def noise_tail(relief: WallRelief, seeds: Detection, known: Bool) -> NoiseTail:
-    """Return what the search finds where it found no defect: in sampled rows, ``known`` (S, A) left out."""
-    overlap = max(len(f.kernel) for f in seeds.filters) // 2
-    heights, seen = [np.empty(0)], 0
-    for rows in relief.sampled:
-        part = widened(rows, relief.shape[0], overlap)
-        wide = relief.rows(part.wide)
-        free = np.where(known[part.wide], np.nan, wide.sigma_mm)
-        wall = _weighed(replace(wide, sigma_mm=free), overlap)
-        score = np.max([np.abs(f.standardised(wall)) for f in seeds.filters], axis=0)[part.inner]
-        heights.append(_peaks(np.where(known[rows], 0.0, score)))
-        seen += int(wall.seen[part.inner].sum())
-    peaks = np.concatenate(heights)
-    # A few peaks as Gaussian noise has them stand for what so many cannot tell.
-    excess = np.append((peaks**2 - NoiseTail.FROM**2) / 2, np.ones(_AS_GAUSSIAN))
-    whole = _seen_mm2(relief) / (seen * relief.cell_mm[0] * relief.cell_mm[1])
-    return NoiseTail((len(peaks) + 0.5) * whole, float(excess.mean()))
-
-
-def _peaks(score: Float) -> Float:
-    """Return the heights (n,) of the maxima of a score (rows, A) that are above `NoiseTail.FROM`."""
-    wide = np.concatenate([score[:, -_BESIDE:], score, score[:, :_BESIDE]], 1)
-    top = maximum_filter(wide, 2 * _BESIDE + 1)[:, _BESIDE:-_BESIDE]
-    return np.asarray(score[(score == top) & (score > NoiseTail.FROM)])
-
-
-def _seen_mm2(relief: WallRelief) -> float:
+def seen_mm2(relief: WallRelief) -> float:
     """Return how much of the wall was measured."""
     cells = sum(int(relief.rows(s.own).seen.sum()) for s in stretches(relief.shape[0]))
     return cells * relief.cell_mm[0] * relief.cell_mm[1]
@@ -248,7 +189,8 @@ def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float)
     return float(brentq(excess, 1.0, 40.0)) if excess(1.0) > 0 else 1.0
 
 
-def _weighed(relief: Relief, reach: int) -> Weighed:
+def weighed(relief: Relief, reach: int) -> Weighed:
+    """Return the relief as the filters take it, with room for templates that reach so many rows."""
     weight = np.where(relief.seen, 1 / relief.sigma_mm**2, 0.0)
     return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen, reach)
 
@@ -261,7 +203,7 @@ def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
     """
     overlap = max(map(len, kernels)) // 2
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
-    walls = [_weighed(relief.rows(part.wide), overlap) for part in parts]
+    walls = [weighed(relief.rows(part.wide), overlap) for part in parts]
     seen = np.concatenate([w.seen[part.inner] for w, part in zip(walls, parts, strict=True)])
     filters = []
     for kernel in kernels:

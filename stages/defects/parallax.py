@@ -22,6 +22,7 @@ from pipeline.geometry.axis import distance_along, from_pipe
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
+from stages.defects.depth import Depth
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 
@@ -83,6 +84,19 @@ class LitPictures:
             return None
         without, with_it = (1 - _agreement(np.array(p)) for p in zip(*both, strict=True))
         return int(inside.sum()), float(np.log(with_it / without))
+
+    def drove_through(self, region: Region, depth: Depth, relief: Relief) -> bool:
+        """Whether the top of what stands inward is nearer to the camera's way than its own lamps are."""
+        row, column = region.row + depth.peak[0], region.column + depth.peak[1]
+        along = distance_along(self.motion.axis, self.motion.T_pc)
+        s = relief.distance_mm[row]
+        if depth.depth_mm >= 0 or not along.min() <= s <= along.max():
+            return False
+        psi = relief.azimuth_rad[column % len(relief.azimuth_rad)]
+        radius = float(relief.shape_at(np.array([row]), np.array([column]))[0]) + depth.depth_mm
+        top = from_pipe(self.motion.axis, np.array([s]), np.array([psi]), np.array([radius]))[0]
+        camera = self.motion.T_pc[np.argmin(np.abs(along - s)), :3, 3]
+        return bool(np.linalg.norm(top - camera) < self.probe.lighting.radius_mm)
 
     def _places(self, part: Region, relief: Relief, height: Float) -> tuple[Float, Float]:
         """Return the wall's points (n, m, 3) in P without and with a finding's ``height`` (H, W)."""

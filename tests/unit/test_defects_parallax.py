@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.geometry.axis import straight_axis
 from pipeline.recording.base import FrameTable
+from stages.defects.depth import Depth
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
@@ -55,7 +56,9 @@ def pictures(depth_mm):
         return ((int(k), picture(CAMERA_S[k], depth_mm)) for k in frames)
 
     probe = SimpleNamespace(
-        camera=SimpleNamespace(project=project), laser=SimpleNamespace(baseline_mm=BASELINE)
+        camera=SimpleNamespace(project=project),
+        laser=SimpleNamespace(baseline_mm=BASELINE),
+        lighting=SimpleNamespace(radius_mm=11.0),
     )
     motion = SimpleNamespace(frame=np.arange(count), T_pc=T_pc, axis=straight_axis(-100.0, 200.0))
     return LitPictures(SimpleNamespace(frames=table, read=read), probe, motion)
@@ -77,3 +80,15 @@ def test_pictures_are_not_asked_of_a_short_finding():
     rows = SimpleNamespace(cell_mm=(0.5, 0.35))
     short = Region(90, 355, np.ones((10, 11), bool), 1.0)
     assert not pictures(0.0).contradict(short, rows)
+
+
+@pytest.mark.parametrize(
+    ("depth_mm", "row", "struck"),
+    [(-35.0, 60, True), (-20.0, 60, False), (35.0, 60, False), (-35.0, 150, False)],
+)
+def test_the_probe_did_not_drive_through_what_stands_nearer_than_its_lamps(depth_mm, row, struck):
+    """A reflection 20 mm inside a pipe of 25 mm radius was a deposit at p .98; ahead of the probe one may be."""
+    radius = RADIUS + smooth_noise(np.random.default_rng(1), (len(DISTANCE), len(AZIMUTH)), 0.02, 1.0)
+    relief = smooth_shape_removed(wall_of(DISTANCE, AZIMUTH, radius).radius_map, DefectParameters())
+    rows, region = relief.rows(slice(0, len(DISTANCE))), Region(row, 700, np.ones((8, 40), bool), -1.0)
+    assert pictures(0.0).drove_through(region, Depth(depth_mm, 0.1, 0.0, (4, 30)), rows) is struck

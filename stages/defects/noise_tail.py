@@ -1,0 +1,131 @@
+"""How many peaks of noise the search finds: counted below its threshold, and carried on above it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+from scipy.optimize import minimize_scalar
+
+from pipeline.arrays import Bool, Float
+from stages.defects.along import widened
+from stages.defects.detect import Detection, seen_mm2, weighed
+from stages.defects.relief import WallRelief
+
+# Cells beside a peak within which another is the same one: 2 mm, the reach of the smaller templates.
+_BESIDE = 4
+# Peaks of Gaussian noise that are added to those of the wall: so few move a tail of fifty by a tenth.
+_AS_GAUSSIAN = 5
+# ln of a law's scale: from half of Gaussian noise to noise of which any peak may be as high as a defect.
+_SCALES = (math.log(0.1), math.log(30.0))
+
+
+@dataclass(frozen=True)
+class Law:
+    """Peaks fall off above `NoiseTail.FROM` as exp(−x / scale) with x = (h^power − FROM^power) / power."""
+
+    power: int
+    scale: float
+    share: float = 1.0
+
+    def excess(self, score: float) -> float:
+        """Return x of a score."""
+        return max(score**self.power - NoiseTail.FROM**self.power, 0.0) / self.power
+
+    def above(self, score: float) -> float:
+        """Return the share of all peaks that is above a score, times the law's own share."""
+        return self.share * math.exp(-self.excess(score) / self.scale)
+
+    def density(self, score: float) -> float:
+        """Return the same per σ at a score."""
+        return self.above(score) * score ** (self.power - 1) / self.scale
+
+
+@dataclass(frozen=True)
+class NoiseTail:
+    """How many peaks of a height the same search finds in a wall without its findings.
+
+    Gaussian noise falls off as exp(−h² / 2 w²), with w = 1. Where its size varies from place to place, and
+    where a codec holds errors over, great ones are more frequent, up to exp(−h / λ). Below the threshold
+    both laws look alike, so that each has a share by how well it fits what is seen there.
+
+    Attributes
+    ----------
+    peaks : float
+        Above `FROM` σ, on the whole wall.
+    laws : tuple of Law
+    """
+
+    peaks: float
+    laws: tuple[Law, ...]
+    FROM = 3.0
+
+    def above(self, score: float) -> float:
+        """Return how many peaks of noise to expect above a score."""
+        return self.peaks * sum(law.above(score) for law in self.laws)
+
+    def density(self, score: float) -> float:
+        """Return how many peaks of noise to expect at a score, per σ."""
+        return self.peaks * sum(law.density(score) for law in self.laws)
+
+
+def noise_tail(relief: WallRelief, seeds: Detection, known: Bool) -> NoiseTail:
+    """Return what the search finds where it found no defect: in sampled rows, ``known`` (S, A) left out."""
+    overlap = max(len(f.kernel) for f in seeds.filters) // 2
+    heights, seen = [np.empty(0)], 0
+    for rows in relief.sampled:
+        part = widened(rows, relief.shape[0], overlap)
+        wide = relief.rows(part.wide)
+        free = np.where(known[part.wide], np.nan, wide.sigma_mm)
+        wall = weighed(replace(wide, sigma_mm=free), overlap)
+        score = np.max([np.abs(f.standardised(wall)) for f in seeds.filters], axis=0)[part.inner]
+        heights.append(_peaks(np.where(known[rows], 0.0, score)))
+        seen += int(wall.seen[part.inner].sum())
+    whole = seen_mm2(relief) / (seen * relief.cell_mm[0] * relief.cell_mm[1])
+    return tail_of(np.concatenate(heights), seeds.threshold, whole)
+
+
+def tail_of(peaks: Float, threshold: float, whole: float = 1.0) -> NoiseTail:
+    """Return the tail of noise by its peaks (n,) in a part of a wall that is ``whole`` times as large.
+
+    Peaks above the threshold became findings, whatever made them: those below tell how fast noise falls off,
+    as a sample that ends there. Taken as one without an end, it gave too thin a tail just for the findings
+    that noise makes.
+    """
+    below = peaks[peaks <= threshold]
+    fits = [_fitted_law(power, below, threshold) for power in (2, 1)]
+    best = min(surprise for _, surprise in fits)
+    weight = np.array([math.exp(best - surprise) for _, surprise in fits])
+    laws = [replace(law, share=float(w)) for (law, _), w in zip(fits, weight / weight.sum(), strict=True)]
+    missing = sum(law.above(threshold) for law in laws)
+    return NoiseTail((len(below) + 0.5) / (1 - missing) * whole, tuple(laws))
+
+
+def _fitted_law(power: int, below: Float, threshold: float) -> tuple[Law, float]:
+    """Return a law and how surprising under it the peaks (n,) below the threshold are, −ln of likelihood."""
+    unit = Law(power, 1.0)
+    most = max(unit.excess(threshold), 1e-6)
+    excess = np.array([unit.excess(float(h)) for h in below])
+    # Gaussian noise has x = 1 in the mean by its own law, and 1 / FROM by the other.
+    usual = NoiseTail.FROM ** (power - 2)
+
+    def surprise(log_scale: float) -> float:
+        scale = math.exp(log_scale)
+        cut = len(excess) * math.log(-math.expm1(-most / scale))
+        few = _AS_GAUSSIAN * (log_scale + usual / scale)
+        return len(excess) * log_scale + float(excess.sum()) / scale + cut + few
+
+    found = minimize_scalar(surprise, bounds=_SCALES, method="bounded")
+    # The density is that of h: dx / dh = h^(power − 1).
+    slope = (power - 1) * float(np.log(below).sum())
+    lost = _AS_GAUSSIAN * (float(found.x) + usual / math.exp(found.x))
+    return Law(power, math.exp(float(found.x))), float(found.fun) - lost - slope
+
+
+def _peaks(score: Float) -> Float:
+    """Return the heights (n,) of the maxima of a score (rows, A) that are above `NoiseTail.FROM`."""
+    wide = np.concatenate([score[:, -_BESIDE:], score, score[:, :_BESIDE]], 1)
+    top = maximum_filter(wide, 2 * _BESIDE + 1)[:, _BESIDE:-_BESIDE]
+    return np.asarray(score[(score == top) & (score > NoiseTail.FROM)])
