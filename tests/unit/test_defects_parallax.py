@@ -87,7 +87,7 @@ def test_pictures_are_not_asked_of_a_short_finding():
     [(-35.0, 60, True), (-20.0, 60, False), (35.0, 60, False), (-35.0, 150, False)],
 )
 def test_the_probe_did_not_drive_through_what_stands_nearer_than_its_lamps(depth_mm, row, struck):
-    """A reflection 20 mm inside a pipe of 25 mm radius was a deposit at p .98; ahead of the probe one may be."""
+    """A reflection was a deposit of 21 mm in a pipe of 25 mm radius; ahead of the probe one may be."""
     radius = RADIUS + smooth_noise(np.random.default_rng(1), (len(DISTANCE), len(AZIMUTH)), 0.02, 1.0)
     relief = smooth_shape_removed(wall_of(DISTANCE, AZIMUTH, radius).radius_map, DefectParameters())
     rows, region = relief.rows(slice(0, len(DISTANCE))), Region(row, 700, np.ones((8, 40), bool), -1.0)
