@@ -22,25 +22,20 @@ class CleanWall:
 
     Attributes
     ----------
-    local : (S, A)
-        In units of the relief's own σ at each cell.
+    local_mm : (S, A)
     clean : (S, A) bool
         Away from all defects.
     scale : float
         Share of noise in the scatter of the clean wall; the rest is its natural roughness.
     """
 
-    local: Float
+    local_mm: Float
     clean: Bool
     scale: float
 
-    def draw(self, sigma_mm: Float, random: np.random.Generator) -> Float:
-        """Return a patch (H, W) of the clean wall, cleanest of some tries; its sign is drawn too.
-
-        It is as large as the relief's σ (H, W) makes it at its new place: behind grease noise is greater.
-        """
-        shape = sigma_mm.shape
-        rows, columns = self.local.shape
+    def draw(self, shape: tuple[int, int], random: np.random.Generator) -> Float:
+        """Return a patch (H, W) of the clean wall, cleanest of some tries; its sign is drawn too."""
+        rows, columns = self.local_mm.shape
         best, share = np.zeros(shape), -1.0
         for _ in range(_TRIES):
             i = np.arange(shape[0]) + int(random.integers(0, max(1, rows - shape[0] + 1)))
@@ -48,10 +43,10 @@ class CleanWall:
             at = np.ix_(_reflected(i, rows), j % columns)
             clean = self.clean[at]
             if clean.mean() > share:
-                best, share = np.where(clean, self.local[at], 0.0), float(clean.mean())
+                best, share = np.where(clean, self.local_mm[at], 0.0), float(clean.mean())
             if share > 0.98:
                 break
-        return np.asarray(best * sigma_mm * self.scale * (1 if random.random() < 0.5 else -1))
+        return np.asarray(best * self.scale * (1 if random.random() < 0.5 else -1))
 
 
 def _reflected(i: Int, count: int) -> Int:
@@ -63,16 +58,14 @@ def clean_wall(wall: MeasuredWall, regions: tuple[Region, ...]) -> CleanWall:
     """Return the wall's sampled rows, regions with a margin marked in them."""
     parts = [_sampled(wall, rows, regions) for rows in wall.relief.sampled]
     local, clean = (np.concatenate(p) for p in zip(*parts, strict=True))
-    typical = wall.relief.typical
-    return CleanWall(local, clean, _noise_share(typical, local[clean] * typical.sigma_mm))
+    return CleanWall(local, clean, _noise_share(wall.relief.typical, local[clean]))
 
 
 def _sampled(wall: MeasuredWall, rows: slice, regions: tuple[Region, ...]) -> tuple[Float, Bool]:
     part = wall.with_margin(rows)
     wanted = np.zeros((part.wide.stop - part.wide.start, wall.relief.shape[1]), bool)
     wanted[part.inner] = True
-    surface = wall.surface(part.wide, wanted)
-    local = (surface.local_mm / surface.relief.sigma_mm)[part.inner]
+    local = wall.surface(part.wide, wanted).local_mm[part.inner]
     clean = np.isfinite(local)
     margin = [round(_CLEAR_MM / c) for c in wall.relief.cell_mm]
     for region in regions:

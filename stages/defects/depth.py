@@ -69,8 +69,7 @@ def measure_depth(
     top = float(smooth[inside].max())
     # where points show nothing of what the map shows, the top of a defect may lie below zero
     near = inside & (smooth >= top - 0.5 * abs(top))
-    noise = np.nan_to_num(region.cut(relief.sigma_mm), nan=relief.typical.sigma_mm)
-    drawn = np.array([(smooth + clean.draw(noise, random))[near].max() for _ in range(draws)])
+    drawn = np.array([(smooth + clean.draw(height.shape, random))[near].max() for _ in range(draws)])
     bias = float(drawn.mean()) - top
     depth = float(height[peak]) - bias
     sharpened = float((region.cut(surface.all_mm) - region.cut(surface.coarse_mm))[peak])

@@ -8,7 +8,6 @@ from scipy.ndimage import maximum_filter
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
-from stages.defects.clean import CleanWall
 from stages.defects.corroborate import Evidence
 from stages.defects.credibility import chance_of_depth, credibility_of, is_depth_known
 from stages.defects.detect import detect
@@ -160,14 +159,6 @@ def test_where_streaks_are_held_over_sigma_is_larger():
     sigma = smooth_shape_removed(wall.radius_map, DefectParameters()).rows(slice(0, len(DISTANCE))).sigma_mm
     streaky, quiet = np.abs(AZIMUTH - np.pi / 2) < 1.2, np.abs(AZIMUTH + np.pi / 2) < 1.2
     assert np.median(sigma[:, streaky]) > 2.5 * np.median(sigma[:, quiet])
-
-
-def test_noise_is_drawn_as_large_as_it_is_at_a_finding():
-    random, here = np.random.default_rng(9), np.full((20, 20), SIGMA)
-    here[10:] = 3 * SIGMA
-    wall = CleanWall(random.normal(size=(60, 360)), np.ones((60, 360), bool), 1.0)
-    drawn = np.array([wall.draw(here, random) for _ in range(20)])
-    assert drawn[:, 10:].std() / drawn[:, :10].std() == pytest.approx(3, rel=0.1)
 
 
 def evidence(rings, score=30.0, bright=False):
