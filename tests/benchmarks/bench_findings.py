@@ -175,7 +175,8 @@ def make(seed: int, out: Path) -> Path:
         rendered(scene, out)
         footage = drawn_footage(np.random.default_rng([seed, 1]))
         centre = scene.probe["camera"]["centre_px"]
-        repaint(folder, painter(footage, seed, (centre[0], centre[1])), seed, footage.crf)
+        codec = {"crf": str(footage.crf), "preset": "veryfast"}
+        repaint(folder, painter(footage, seed, (centre[0], centre[1])), seed, "libx264", codec)
         (out / f"{scene.name}.footage.json").write_text(json.dumps(asdict(footage)), "utf-8")
     return folder
 

@@ -23,9 +23,20 @@ from pathlib import Path
 import av
 import numpy as np
 
-from tests.benchmarks.hard_kinds import DAMAGED, FROZEN, KINDS, PAINTED, REWRITTEN, Paint, held_still
+from tests.benchmarks.hard_kinds import (
+    CODED,
+    DAMAGED,
+    FROZEN,
+    KINDS,
+    PAINTED,
+    REWRITTEN,
+    Paint,
+    held_still,
+    unspoilt,
+)
 from tests.shared_data import shared
 
+CAREFUL = {"crf": "16", "preset": "veryfast"}
 SPOILT = {
     "clean": ["crf=18"],
     "crf30": ["crf=30"],
@@ -57,20 +68,24 @@ def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
     random, video = np.random.default_rng(seed), folder / "frames.mkv"
     if kind in PAINTED or kind in FROZEN:
         repaint(folder, PAINTED.get(kind) or held_still(FROZEN[kind]), seed)
+    if kind in CODED:
+        repaint(folder, unspoilt, seed, "libx265", CODED[kind])
     if kind in REWRITTEN:
         REWRITTEN[kind](folder, random)
     if kind in DAMAGED:
         video.write_bytes(DAMAGED[kind](video.read_bytes(), random))
 
 
-def repaint(folder: Path, paint: Paint, seed: int, crf: int = 16) -> None:
-    """Put every frame of a recording through ``paint``, and store them at a constant rate factor."""
+def repaint(
+    folder: Path, paint: Paint, seed: int, codec: str = "libx264", options: dict[str, str] = CAREFUL
+) -> None:
+    """Put every frame of a recording through ``paint``, and store them with a codec."""
     random, video, painted = np.random.default_rng(seed), folder / "frames.mkv", folder / "painted.mkv"
     rows = (folder / "frames.csv").read_text("utf-8").splitlines()[1:]
     laser = [not row.endswith("led") for row in rows]
     with av.open(str(video)) as old, av.open(str(painted), "w") as new:
-        stream = new.add_stream("libx264", rate=old.streams.video[0].average_rate)
-        stream.pix_fmt, stream.options = "yuv420p", {"crf": str(crf), "preset": "veryfast"}
+        stream = new.add_stream(codec, rate=old.streams.video[0].average_rate)
+        stream.pix_fmt, stream.options = "yuv420p", options
         for k, frame in enumerate(old.decode(video=0)):
             image = paint(frame.to_ndarray(format="bgr24").astype(np.float32), laser[k], k, random)
             if k == 0:

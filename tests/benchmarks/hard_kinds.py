@@ -196,6 +196,18 @@ def fouled_lens(image: Image, laser: bool, k: int, random: np.random.Generator) 
     return np.asarray(image + weight * (greasy - image), np.float32)
 
 
+def greasy_half(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Grease over the lower half: blurred by four pixels."""
+    lower = len(image) // 2
+    image[lower:] = cv2.GaussianBlur(image, (0, 0), 4)[lower:]
+    return image
+
+
+def unspoilt(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The picture as it is, for what only the codec spoils."""
+    return image
+
+
 def lamp_out(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
     """Half of the lamps are out: a quarter of the wall is nearly dark."""
     if laser:
@@ -291,7 +303,7 @@ PAINTED: dict[str, Paint] = {
     for f in (
         hot_pixels, static_reflection, droplet, banding, interlaced, dim_sector, second_ring, sliding_drop,
         text_overlay, clock_and_logo, cable, debris, black_frames, fog, grey_camera, standing_water, shake,
-        dark_edges, exposure_pumping, fouled_lens, lamp_out, laser_flicker, mirrored, half_size,
+        dark_edges, exposure_pumping, fouled_lens, greasy_half, lamp_out, laser_flicker, mirrored, half_size,
         scale_shrinks, scale_grows, scale_settles,
     )
 }  # fmt: skip
@@ -299,4 +311,9 @@ PAINTED: dict[str, Paint] = {
 FROZEN = {"frozen-picture": range(90, 99)}
 REWRITTEN = {"half-size": half_size_probe, "late-stamps": late_stamps}
 DAMAGED = {"damaged-stream": damaged_stream}
-KINDS = sorted({*PAINTED, *FROZEN, *REWRITTEN, *DAMAGED})
+# Stored as HEVC, from careful to hasty: what is held over from picture to picture differs.
+CODED = {
+    f"hevc-{crf}-{preset}": {"crf": str(crf), "preset": preset, "x265-params": "log-level=none"}
+    for crf, preset in ((30, "medium"), (30, "veryfast"), (30, "ultrafast"), (32, "fast"))
+}
+KINDS = sorted({*PAINTED, *FROZEN, *REWRITTEN, *DAMAGED, *CODED})
