@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Int
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, estimate_with_shared
 from stages.motion.bundle_adjustment.unknowns import State
@@ -51,6 +51,8 @@ class RunEstimate:
     excess : float
         Median over the windows of how many times the σ predicted by matching that error is; samples that are
         blurred together count as one.
+    lasting : float
+        The part of ``excess`` that matches of one landmark in neighbouring pictures have in common.
     encoder : EncoderCheck
         Against what rings and texture of the first window show.
     steady : SteadyRun
@@ -62,6 +64,7 @@ class RunEstimate:
     unsettled: int
     reprojection_px: float
     excess: float
+    lasting: float
     encoder: EncoderCheck
     steady: SteadyRun
 
@@ -83,16 +86,33 @@ class _End:
     settled: bool
     reprojection_px: float
     excess: float
+    lasting: float
 
     @staticmethod
     def of(estimate: Estimate, measured: Measurements, step_mm: float) -> _End:
         adjusted = estimate.adjusted
-        size = np.linalg.norm(adjusted.equations.texture.residual, axis=1)
         away_px = np.linalg.norm(measured.tracks.uv - measured.probe.camera.centre_px, axis=1)
         alike = alike_samples(away_px * step_mm / estimate.state.nominal_radius_mm)
-        in_sigma = size / (_RAYLEIGH_MEDIAN * measured.tracks.sigma_px * np.sqrt(alike))
-        excess = float(np.median(in_sigma)) if size.size else 0.0
-        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, excess)
+        sigma_px = measured.tracks.sigma_px * np.sqrt(alike)
+        in_sigma = adjusted.equations.texture.residual / sigma_px[:, None]
+        errors = excess_of(in_sigma), lasting_excess(in_sigma, measured.tracks.landmark)
+        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, *errors)
+
+
+def excess_of(in_sigma: Float) -> float:
+    """Return how many times its σ an error is that is known in σ (M, 2)."""
+    size = np.linalg.norm(in_sigma, axis=1)
+    return float(np.median(size)) / _RAYLEIGH_MEDIAN if size.size else 0.0
+
+
+def lasting_excess(in_sigma: Float, landmark: Int) -> float:
+    """Return the part of the errors (M, 2), in σ, that a landmark's neighbouring observations share.
+
+    Noise is new in every picture: it shows whole in the difference of two, and distance hardly feels it.
+    What lasts moves poses along.
+    """
+    step = np.diff(in_sigma, axis=0)[np.diff(landmark) == 0] / np.sqrt(2)
+    return float(np.sqrt(max(excess_of(in_sigma) ** 2 - excess_of(step) ** 2, 0.0)))
 
 
 def adjust_run(
@@ -147,9 +167,10 @@ def joined_at_once(estimate: Estimate) -> JoinedRun:
 
 
 def _run_estimate(joined: JoinedRun, ends: Sequence[_End], first: FirstWindow) -> RunEstimate:
-    error, excess = (float(np.median([getattr(e, n) for e in ends])) for n in ("reprojection_px", "excess"))
+    names = ("reprojection_px", "excess", "lasting")
+    error, excess, lasting = (float(np.median([getattr(end, name) for end in ends])) for name in names)
     trials, unsettled = sum(e.trials for e in ends), sum(not e.settled for e in ends)
-    return RunEstimate(joined, trials, unsettled, error, excess, first.encoder, first.steady)
+    return RunEstimate(joined, trials, unsettled, error, excess, lasting, first.encoder, first.steady)
 
 
 def _adjusted(
