@@ -204,7 +204,7 @@ def examined(
     shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
     left: float = 0.5, pattern_order: int = 2, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),), heldout: float = 0.11,
-    unknown: float = 0.0, other_order: int = 3,
+    unknown: float = 0.0, other_order: int = 3, rival_heldout: float = 1.0,
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
@@ -215,9 +215,13 @@ def examined(
     )
     library = terms[: len(shifts_px)]
     fit = SimpleNamespace(terms=terms)
-    best = SimpleNamespace(named=bool(library) and not patterns_px, library_terms=library, fit=fit)
+    best = SimpleNamespace(
+        named=bool(library) and not patterns_px, library_terms=library, fit=fit, heldout=0.0
+    )
+    rival = SimpleNamespace(named=True, library_terms=terms[:1], laws=("cone",), heldout=rival_heldout)
     verdicts = SimpleNamespace(
         adequacy=left,
+        judged=(best, rival),
         chance_of=lambda name: chance / (1 + unknown),
         unknown=((Rival("image outward", unknown),),) * len(library),
     )
@@ -242,6 +246,7 @@ def examined(
         (examined((1.0, 1.0), other_order=1, confirmed=((AGREES,),) * 2), Verdict.CLASS),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
         (examined(heldout=0.2), Verdict.CLASS),
+        (examined(rival_heldout=-1.0), Verdict.CLASS),
         (examined(unknown=0.5), Verdict.UNEXPLAINED),
         (examined(unknown=0.5, unsplit=("focal_scale",)), Verdict.CLASS),
         (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),

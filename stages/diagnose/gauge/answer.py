@@ -12,7 +12,7 @@ from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE, pattern_of
-from stages.diagnose.gauge.judge import Verdicts
+from stages.diagnose.gauge.judge import Judged, Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.search import shift_px
 from stages.diagnose.inference import SURE, UNKNOWN
@@ -51,7 +51,8 @@ def sure(examined: Examined) -> tuple[bool, ...]:
 
     It must be as likely as a name has to be, told from all that is like it and from every pattern without a
     cause, and confirmed; what was held out must fit to about the noise. Beside patterns for what is left it
-    must move rings or fiducials by more than they do, else it may make up for their error; and nothing else
+    must move rings or fiducials by more than they do, else it may make up for their error; no other names, as
+    many or fewer, may predict what was held out better; and nothing else
     that was found may have its harmonic and its course, else the two may make up for one law that the library
     does not have.
     """
@@ -71,8 +72,19 @@ def sure(examined: Examined) -> tuple[bool, ...]:
         and all(c.agrees for c in confirmed)
         and (not left or shift_px(best.fit, term) > max(left))
         and like[pattern_of(term)[1:]] == 1
+        and all(term.model.law in j.laws for j in better_held_out(verdicts))
         for term, alike, confirmed in each
     )
+
+
+def better_held_out(verdicts: Verdicts) -> tuple[Judged, ...]:
+    """Return hypotheses of as many names as the likeliest, or fewer, that predict better what was held out.
+
+    A drift of the focal length was once called one of the distortion, at 99 to 1.
+    """
+    best, *others = verdicts.judged
+    as_few = (j for j in others if j.named and len(j.library_terms) <= len(best.library_terms))
+    return tuple(j for j in as_few if j.heldout < best.heldout)
 
 
 def _fits(examined: Examined) -> bool:
@@ -129,7 +141,7 @@ def members(examined: Examined) -> tuple[str, ...]:
     certain = {t.model.law for t, is_sure in zip(best.library_terms, sure(examined), strict=False) if is_sure}
     before = np.cumsum(verdicts.probability) - verdicts.probability
     likely = [j for j, sum_before in zip(verdicts.judged, before, strict=True) if sum_before < SURE]
-    names = (t.model.law for j in likely for t in j.library_terms)
+    names = (t.model.law for j in (*likely, *better_held_out(verdicts)) for t in j.library_terms)
     return tuple(n for n in dict.fromkeys((*names, *chain(*examined.unsplit))) if n not in certain)
 
 
