@@ -14,6 +14,7 @@ from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import estimate_state
+from stages.motion.rings import BoreSteps
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
 from tests.motion_scene import scene
@@ -69,6 +70,25 @@ def test_a_little_change_of_the_rings_may_be_either() -> None:
     drift, _ = drift_in(widens=0.002)
     assert drift.ambiguous
     assert np.ptp(drift.stated_sigma) * drift.ring_mm > 0.05
+
+
+@pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])
+def test_what_drifts_goes_one_way(course: tuple[float, ...], told: bool) -> None:
+    """Grooves of a gauge left a course up and down in a sound probe, 6 σ from a steady scale."""
+    drift = drift_in()[0]
+    assert not drift.told
+    assert replace(drift, at_frames=GROWS * np.array(course), p_steady=1e-9).told == told
+
+
+def test_a_step_of_the_bore_may_explain_what_the_rings_do() -> None:
+    made = scene(FRAMES, LANDMARKS, noise=1.0, widens=0.002)
+    estimate = estimate_state(made.truth, made.measured, MotionParameters(match_bias_px=0.01))
+    plain = drift_of_scale(estimate, made.measured)
+    middle = float(np.median(made.truth.T_pc[:, 2, 3]))
+    bore = BoreSteps(np.array([middle + 20.0]), np.zeros(2))
+    state = replace(estimate.state, bore=bore)
+    stepped = drift_of_scale(replace(estimate, adjusted=replace(estimate.adjusted, state=state)), made.measured)
+    assert stepped.sigma[-1] > plain.sigma[-1]
 
 
 def test_radii_of_a_picture_that_grows_lie_within_their_sigma() -> None:

@@ -24,6 +24,7 @@ from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.equations import LEAST_REACH, Measurements, factorised
 from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.rings import BoreSteps
 
 _COURSE, _WIDTH = 3, 4
 """Degrees of the polynomials: warming up by an exponential of a third of the run is followed by three to a
@@ -34,6 +35,9 @@ _SURE_P = 1e-4
 """Chance of the equations by which a steady scale is refused: that of 4 σ."""
 _MAY_BE_P = 1e-3
 """Chance above which the rings' course may all be due to the scale: that of 3 σ."""
+_ONE_WAY = 0.5
+"""Share of its range by which a scale that drifts must have changed from first to last: what warms up or comes
+loose goes one way. What a gauge's grooves left in sound probes came to a fifth (a01), real drifts to 0.9."""
 _OTHER_CAUSE = 0.1
 """Share of the course that is unsure: a laser that moves changes the rings alone, a lens the wall seen in
 texture too, by a tenth as much, which is below the σ of texture."""
@@ -74,8 +78,14 @@ class ScaleDrift:
 
     @property
     def told(self) -> bool:
-        """Whether the scale cannot have been steady."""
-        return self.p_steady < _SURE_P
+        """Whether the scale cannot have been steady, and went one way."""
+        one_way = abs(self.change) > _ONE_WAY * float(np.ptp(self.at_frames))
+        return self.p_steady < _SURE_P and one_way
+
+    @property
+    def change(self) -> float:
+        """Return the relative gain of the scale from first to last."""
+        return float(self.at_frames[-1] - self.at_frames[0])
 
     @property
     def ambiguous(self) -> bool:
@@ -98,11 +108,12 @@ class ScaleDrift:
     def warn(self, context: Context, taken_out: bool) -> None:
         """Tell of a scale that drifts, or of a pipe of which that cannot be told."""
         if self.told:
-            change = float(np.ptp(self.at_frames) * np.sign(self.at_frames[-1] - self.at_frames[0]))
+            change = float(np.ptp(self.at_frames) * np.sign(self.change))
             outcome = (
                 "This is taken out of motion and radii, and what is left of it is in their σ"
                 if taken_out
-                else "So long a run is not corrected: radii and distances may be off by more than their σ"
+                else "The run is too long or the change too large to be corrected: radii and distances may be "
+                "off by more than their σ"
             )
             context.warn(
                 f"the picture {'grows' if change > 0 else 'shrinks'} by {100 * abs(change):.2f} % over the "
@@ -126,7 +137,8 @@ def drift_of_scale(estimate: Estimate, measured: Measurements, before: Float | N
     system, border = _widened(estimate, measured, course)
     factor = factorised(system)
     step, covariance = factor.step()[1][border:], factor.border_covariance()[border:, border:]
-    width, scale = np.arange(_WIDTH), np.arange(_WIDTH, _WIDTH + _COURSE)
+    widths = len(step) - _COURSE
+    width, scale = np.arange(widths), np.arange(widths, len(step))
     found, own = step[scale], covariance[np.ix_(scale, scale)]
     follow = covariance[np.ix_(scale, width)] @ np.linalg.inv(covariance[np.ix_(width, width)])
     before = np.zeros(len(course)) if before is None else before
@@ -147,13 +159,14 @@ def _widened(estimate: Estimate, measured: Measurements, course: Float) -> tuple
     by_ring, _ = _ring_gain(state, measured)
     in_rings = _points(state, measured)[1]
     span = np.concatenate([in_rings, to_pipe(state.axis, state.xyz_p)[0]])
-    width = _polynomials(span, _WIDTH)
+    width = _widths(span, state.bore)
     rings = np.concatenate([-width[: len(in_rings)], by_ring[:, None] * course[measured.rings.frame]], 1)
     texture, border = equations.texture, equations.rings.by_border.shape[1]
     away_px = measured.tracks.uv - measured.camera_at(state).centre_px
     away_px = away_px * np.asarray(texture.by_pose.any((1, 2)))[:, None]
     by_scale = away_px[:, :, None] * course[measured.tracks.frame][:, None, :]
-    unmoved = np.zeros((*away_px.shape, _WIDTH))
+    widths = width.shape[1]
+    unmoved = np.zeros((*away_px.shape, widths))
     landmarks = width[len(in_rings) :]
     more = np.concatenate([-landmarks, np.zeros((len(landmarks), _COURSE))], 1)
     texture = replace(
@@ -161,12 +174,12 @@ def _widened(estimate: Estimate, measured: Measurements, course: Float) -> tuple
         by_instrument=np.concatenate([texture.by_instrument, unmoved, by_scale], 2),
         surface_by_border=np.concatenate([texture.surface_by_border, more], 1),
     )
-    size = border + _WIDTH + _COURSE
+    size = border + widths + _COURSE
     system = BorderedSystem(equations.frames, size, max(texture.reach, LEAST_REACH))
     for rows in equations.rows:
-        system.add(_with(rows, np.zeros((len(rows.residual), _WIDTH + _COURSE))))
+        system.add(_with(rows, np.zeros((len(rows.residual), widths + _COURSE))))
     system.add(_with(equations.rings, rings))
-    system.add(_beforehand(border, state.nominal_radius_mm))
+    system.add(_beforehand(border, widths, state.nominal_radius_mm))
     system.add_landmarks(texture)
     return system, border
 
@@ -194,12 +207,18 @@ def _with(rows: Rows, more: Float) -> Rows:
     return replace(rows, by_border=np.concatenate([rows.by_border, more], 1))
 
 
-def _beforehand(border: int, radius_mm: float) -> Rows:
-    count = _WIDTH + _COURSE
+def _beforehand(border: int, widths: int, radius_mm: float) -> Rows:
+    count = widths + _COURSE
     by_border = np.concatenate([np.zeros((count, border)), np.eye(count)], 1)
-    sigma = _LARGEST * np.r_[np.full(_WIDTH, radius_mm), np.ones(_COURSE)]
+    sigma = _LARGEST * np.r_[np.full(widths, radius_mm), np.ones(_COURSE)]
     none = np.zeros((count, 0), np.int64)
     return Rows(none, np.zeros((count, 0, BLOCK)), by_border, np.zeros(count), sigma)
+
+
+def _widths(at_mm: Float, bore: BoreSteps) -> Float:
+    """Return what the pipe's width may add at distances (M,): (M, 4 + steps), smooth, and a step at each."""
+    steps = (at_mm[:, None] > bore.at_mm).astype(float)
+    return np.concatenate([_polynomials(at_mm, _WIDTH), steps], 1)
 
 
 def _polynomials(at: Float, degree: int) -> Float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float
 from pipeline.machine.stage import Context
@@ -16,6 +18,9 @@ from stages.motion.windows.submaps import Window
 
 _ROUNDS = 2
 """Times that the scale is taken out: the second finds what the linear step before it left."""
+_MOST = 0.005
+"""Course, relative, up to which it is taken out: twice what was tried. At 1 % the rings' change was taken for a
+step of the bore, and the adjustment went astray."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +71,15 @@ def with_steady_scale(
 ) -> SteadyRun:
     """Look whether the image scale drifts over a window, and take it out where the window is the whole run.
 
+    A large drift is told and not taken out.
+
     Raises
     ------
     UnusableError
         When the motion is not determined.
     """
     drift = drift_of_scale(estimate, measured)
-    if not drift.told or window != run.whole:
+    if not drift.told or window != run.whole or np.ptp(drift.at_frames) > _MOST:
         return SteadyRun(run, estimate, measured, drift, taken_out=False)
     first = drift
     for _ in range(_ROUNDS):
