@@ -165,7 +165,10 @@ def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: Rin
         return False
     # points lie in the order of their ring's samples
     line, there = rings.amplitude[ring[0], used], inside[deepest]
-    top = there & (height[deepest] >= height[deepest][there].max() / 2)
+    highest = float(height[deepest][there].max())
+    if highest <= 0:  # the deepest ring lies to the other side of the wall
+        return False
+    top = there & (height[deepest] >= highest / 2)
     return float(np.mean(line < np.median(line[top]))) > _BRIGHT
 
 

@@ -87,7 +87,9 @@ def test_a_step_of_the_bore_may_explain_what_the_rings_do() -> None:
     middle = float(np.median(made.truth.T_pc[:, 2, 3]))
     bore = BoreSteps(np.array([middle + 20.0]), np.zeros(2))
     state = replace(estimate.state, bore=bore)
-    stepped = drift_of_scale(replace(estimate, adjusted=replace(estimate.adjusted, state=state)), made.measured)
+    stepped = drift_of_scale(
+        replace(estimate, adjusted=replace(estimate.adjusted, state=state)), made.measured
+    )
     assert stepped.sigma[-1] > plain.sigma[-1]
 
 

@@ -36,8 +36,8 @@ _SURE_P = 1e-4
 _MAY_BE_P = 1e-3
 """Chance above which the rings' course may all be due to the scale: that of 3 σ."""
 _ONE_WAY = 0.5
-"""Share of its range by which a scale that drifts must have changed from first to last: what warms up or comes
-loose goes one way. What a gauge's grooves left in sound probes came to a fifth (a01), real drifts to 0.9."""
+"""Share of its range by which a scale that drifts must have changed from first to last: what warms up or
+comes loose goes one way. Grooves of a gauge left a fifth in a sound probe (a01), drifts have 0.9."""
 _OTHER_CAUSE = 0.1
 """Share of the course that is unsure: a laser that moves changes the rings alone, a lens the wall seen in
 texture too, by a tenth as much, which is below the σ of texture."""
@@ -112,8 +112,8 @@ class ScaleDrift:
             outcome = (
                 "This is taken out of motion and radii, and what is left of it is in their σ"
                 if taken_out
-                else "The run is too long or the change too large to be corrected: radii and distances may be "
-                "off by more than their σ"
+                else "The run is too long or the change too large to be corrected: radii and distances may "
+                "be off by more than their σ"
             )
             context.warn(
                 f"the picture {'grows' if change > 0 else 'shrinks'} by {100 * abs(change):.2f} % over the "

@@ -19,8 +19,8 @@ from stages.motion.windows.submaps import Window
 _ROUNDS = 2
 """Times that the scale is taken out: the second finds what the linear step before it left."""
 _MOST = 0.005
-"""Course, relative, up to which it is taken out: twice what was tried. At 1 % the rings' change was taken for a
-step of the bore, and the adjustment went astray."""
+"""Course, relative, up to which it is taken out: twice what was tried. At 1 % the rings' change was taken for
+a step of the bore, and the adjustment went astray."""
 
 
 @dataclass(frozen=True)
