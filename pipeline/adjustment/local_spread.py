@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,25 +19,15 @@ _FEWEST_CELLS = 100
 
 @dataclass(frozen=True)
 class LocalSpread:
-    """Spreads of places (B, K) about the distances ``at_mm`` (B,) of a wall with so many ``columns``."""
+    """Spreads of places (B, 24) about the distances ``at_mm`` (B,) of a wall with so many ``columns``."""
 
     at_mm: Float
     spread: Float
     columns: int
 
-    @staticmethod
-    def of_one(columns: int) -> LocalSpread:
-        """Return a spread of 1 everywhere."""
-        return LocalSpread(np.zeros(1), np.ones((1, 1)), columns)
-
-    def over_median(self, least: float) -> LocalSpread:
-        """Return it in units of the median place, no less than ``least``."""
-        usual = max(float(np.median(self.spread)), 1e-12)
-        return replace(self, spread=np.maximum(self.spread / usual, least))
-
     def at(self, distance_mm: Float) -> Float:
         """Return the spread (S, A) at each distance (S,) and column, without steps between places."""
-        middle = [float(c.mean()) for c in _sectors(self.columns, self.spread.shape[1])]
+        middle = [float(c.mean()) for c in _sectors(self.columns)]
         columns = np.arange(self.columns)
         around = np.array([np.interp(columns, middle, row, period=self.columns) for row in self.spread])
         place = np.clip(np.searchsorted(self.at_mm, distance_mm) - 1, 0, max(len(self.at_mm) - 2, 0))
@@ -47,22 +37,20 @@ class LocalSpread:
         return np.asarray((1 - part) * around[place] + part * around[after])
 
 
-def local_spread(
-    values: Callable[[slice], Float | Float32], distance_mm: Float, columns: int, sectors: int = _SECTORS
-) -> LocalSpread:
+def local_spread(values: Callable[[slice], Float | Float32], distance_mm: Float, columns: int) -> LocalSpread:
     """Return the robust spreads of the values (rows, A) that are given for some rows; NaN do not count."""
     place = np.floor(distance_mm / _PLACE_MM).astype(np.int64)
     starts = np.flatnonzero(np.diff(place, prepend=place[0] - 1))
     rows = [slice(int(a), int(b)) for a, b in zip(starts, [*starts[1:], len(place)], strict=True)]
-    spread = np.array([[_spread_of(v[:, c]) for c in _sectors(columns, sectors)] for v in map(values, rows)])
+    spread = np.array([[_spread_of(v[:, c]) for c in _sectors(columns)] for v in map(values, rows)])
     known = spread[np.isfinite(spread)]
     overall = float(np.median(known)) if known.size else 1.0
     at = np.array([float(distance_mm[r].mean()) for r in rows])
     return LocalSpread(at, np.where(np.isfinite(spread), spread, overall), columns)
 
 
-def _sectors(columns: int, count: int) -> list[Float]:
-    return np.array_split(np.arange(columns), count)
+def _sectors(columns: int) -> list[Float]:
+    return np.array_split(np.arange(columns), _SECTORS)
 
 
 def _spread_of(values: Float | Float32) -> float:

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import find_objects, gaussian_filter1d, label
 
-from pipeline.adjustment.local_spread import LocalSpread, local_spread
 from pipeline.adjustment.robust import MAD_TO_SIGMA, basis_of, ring_harmonics, robust_spread, row_median
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RadiusMap
 from stages.defects.along import sample, slow_along, stretches
 from stages.defects.parameters import DefectParameters
-
-# What a codec holds over from picture to picture is as wide as its blocks are on the wall, a few mm: it shows
-# against what lies so far to either side.
-_FINE_MM = 3.0
-# In sectors of 45° even a groove along the whole pipe, 6 mm wide, fills less than half of a place's cells.
-_SECTORS = 8
-# No place is taken to be quieter than by so much: with half of the window greasy the clean one was 0.5.
-_LEAST_UNEVEN = 0.5
 
 
 @dataclass(frozen=True)
@@ -99,8 +90,6 @@ class WallRelief:
     welds : tuple of slice
     roughness_mm2 : float
         Variance of the wall's natural roughness.
-    uneven : LocalSpread
-        By how much more than elsewhere a place is uneven around the pipe.
     typical : Typical
     sampled : tuple of slice
         The rows of which medians over the wall are taken.
@@ -112,7 +101,6 @@ class WallRelief:
     whole_shape_mm: Float
     welds: tuple[slice, ...]
     roughness_mm2: float
-    uneven: LocalSpread
     typical: Typical
     sampled: tuple[slice, ...]
 
@@ -137,12 +125,11 @@ class WallRelief:
         basis = basis_of(self.radius_map.azimuth_rad)
         local = measured - self.local_shape_mm[rows] @ basis.T
         noise = _noise(self.radius_map, rows, local)
-        uneven = self.uneven.at(self.radius_map.distance_mm[rows])
         welds = tuple(slice(w.start - rows.start, w.stop - rows.start) for w in self.welds)
         return Relief(
             self.radius_map.distance_mm[rows], self.radius_map.azimuth_rad, self.radius_mm,
             local, measured - self.whole_shape_mm[rows] @ basis.T,
-            _sigma(local, noise, self.roughness_mm2) * uneven, welds, self.whole_shape_mm[rows], self.typical,
+            _sigma(local, noise, self.roughness_mm2), welds, self.whole_shape_mm[rows], self.typical,
         )  # fmt: skip
 
 
@@ -197,22 +184,7 @@ def _with_spread(
     roughness = max(0.0, (MAD_TO_SIGMA * _median([np.abs(r) for r in rest])) ** 2 - noise_mm**2)
     sigma_mm = _median([_sigma(r, n, roughness) for r, n in zip(rest, noise, strict=True)])
     typical = Typical(sigma_mm, noise_mm)
-    even = LocalSpread.of_one(len(radius_map.azimuth_rad))
-    wall = WallRelief(radius_map, _median(measured), local, whole, welds, roughness, even, typical, sampled)
-    return replace(wall, uneven=_unevenness(wall))
-
-
-def _unevenness(wall: WallRelief) -> LocalSpread:
-    """Return how uneven a place is against others: what errs alike in many rings their scatter hides."""
-    reach = max(1, round(_FINE_MM / wall.cell_mm[1]))
-
-    def against_both_sides(rows: slice) -> Float:
-        relief = wall.rows(rows)
-        beside = (np.roll(relief.local_mm, reach, 1) + np.roll(relief.local_mm, -reach, 1)) / 2
-        return np.asarray((relief.local_mm - beside) / relief.sigma_mm)
-
-    spread = local_spread(against_both_sides, wall.radius_map.distance_mm, wall.shape[1], _SECTORS)
-    return spread.over_median(_LEAST_UNEVEN)
+    return WallRelief(radius_map, _median(measured), local, whole, welds, roughness, typical, sampled)
 
 
 def _median(parts: list[Float]) -> float:

@@ -149,18 +149,6 @@ def test_the_tail_is_told_by_what_lies_below_the_threshold(power, scale):
     assert counted / 2 < told + 1 < 2 * (counted + 1)
 
 
-def test_where_streaks_are_held_over_sigma_is_larger():
-    """Half of the picture is held over by the codec for a dozen rings, several times as uneven as stated."""
-    random, shape = np.random.default_rng(8), (len(DISTANCE), len(AZIMUTH))
-    noise = smooth_noise(random, shape, SIGMA, 1.0)
-    streaks = np.repeat(smooth_noise(random, (5, len(AZIMUTH)), 6 * SIGMA, 1.5), 12, axis=0)
-    radius = RADIUS + noise + np.where(AZIMUTH > 0, streaks, 0.0)
-    wall = wall_of(DISTANCE, AZIMUTH, radius, SIGMA)
-    sigma = smooth_shape_removed(wall.radius_map, DefectParameters()).rows(slice(0, len(DISTANCE))).sigma_mm
-    streaky, quiet = np.abs(AZIMUTH - np.pi / 2) < 1.2, np.abs(AZIMUTH + np.pi / 2) < 1.2
-    assert np.median(sigma[:, streaky]) > 2.5 * np.median(sigma[:, quiet])
-
-
 def evidence(rings, score=30.0, bright=False):
     return Evidence(rings, False, score, bright=bright)
 
