@@ -58,7 +58,8 @@ def test_water_is_measured_as_snell_has_it_and_not_as_stated(tmp_path: Path) -> 
     apparent = _through_water(true, baseline, 1 + scene.effects["outside_index"]["index_excess"])
     # the motion pulls the instrument some way towards the wrong medium, which takes half a millimetre back
     assert found.radius_mm == pytest.approx(apparent, abs=0.1 * (true - apparent))
-    assert found.inside_95 < 0.2
+    # rings and texture contradict each other in water, which widens σ to a part of the error
+    assert found.inside_95 < 0.5
 
 
 def _through_water(radius_mm: float, baseline_mm: float, index: float) -> float:

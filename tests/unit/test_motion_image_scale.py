@@ -80,6 +80,15 @@ def test_what_drifts_goes_one_way(course: tuple[float, ...], told: bool) -> None
     assert replace(drift, at_frames=GROWS * np.array(course), p_steady=1e-9).told == told
 
 
+def test_what_no_lens_does_is_told_with_other_causes() -> None:
+    drift, told = drift_in(picture_grows=GROWS)[0], []
+    context = replace(quiet_context(), warn=told.append)
+    for times in (1.0, 10.0):
+        replace(drift, at_frames=times * drift.at_frames).warn(context, taken_out=times == 1.0)
+    assert "warms up" in told[0] and "water" not in told[0]
+    assert "No lens changes so much" in told[1] and "water" in told[1]
+
+
 def test_a_step_of_the_bore_may_explain_what_the_rings_do() -> None:
     made = scene(FRAMES, LANDMARKS, noise=1.0, widens=0.002)
     estimate = estimate_state(made.truth, made.measured, MotionParameters(match_bias_px=0.01))

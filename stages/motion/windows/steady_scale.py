@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float
 from pipeline.machine.stage import Context
@@ -18,9 +16,6 @@ from stages.motion.windows.submaps import Window
 
 _ROUNDS = 2
 """Times that the scale is taken out: the second finds what the linear step before it left."""
-_MOST = 0.01
-"""Course, relative, up to which it is taken out. One of 0.8 % was, within its σ; at 1 % over 80 mm the rings'
-change was taken for a step of the bore, and the adjustment went astray."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +74,7 @@ def with_steady_scale(
         When the motion is not determined.
     """
     drift = drift_of_scale(estimate, measured)
-    if not drift.told or window != run.whole or np.ptp(drift.at_frames) > _MOST:
+    if not drift.told or window != run.whole or drift.large:
         return SteadyRun(run, estimate, measured, drift, taken_out=False)
     first = drift
     for _ in range(_ROUNDS):
