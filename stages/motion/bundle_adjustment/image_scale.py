@@ -136,8 +136,8 @@ class ScaleDrift:
             return (
                 f"as if {what}. No lens changes so much by warming up: zoom or stabilisation is on, the "
                 "laser is loose, or the pipe's filling (water) or the probe is not as stated. This is not "
-                "corrected: radii and distances may be off by more than their σ. What to do: look at the pictures and the "
-                "probe file, run boresight diagnose"
+                "corrected: radii and distances may be off by more than their σ. What to do: look at the "
+                "pictures and the probe file, run boresight diagnose"
             )
         outcome = (
             "This is taken out of motion and radii, and what is left of it is in their σ"
