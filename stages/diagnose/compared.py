@@ -28,6 +28,10 @@ from stages.diagnose.residual import (
 from stages.diagnose.result import Diagnosis, FitQuality, Picture, ReadingPicture, WallPicture
 from stages.diagnose.travel.model import TravelFit
 
+# A frame that is shown has at least this share of the bins of the fullest ring: chosen, so that the picture
+# shows the pattern all round.
+_MOST_OF_BINS = 0.8
+
 Linear = tuple[tuple[EffectModel, Shape, Float], ...]
 
 
@@ -173,14 +177,13 @@ class OnImage:
 
 
 def image_of(seen: Compared | None, field: Recording | None, gauge: Recording | None) -> OnImage | None:
-    """Return the ring frame with the most usable bins, or None where there is none."""
+    """Return the ring frame that departs most from what was expected, or None where no ring is usable."""
     if seen is None or not seen.before.usable.any():
         return None
     recording = field if seen.before.source == "field" else gauge
     if recording is None:
         return None
-    frames, count = np.unique(seen.before.frame[seen.before.usable], return_counts=True)
-    number = int(frames[np.argmax(count)])
+    number = worst_frame(seen.before)
     picture = next(iter(recording.read([number], "grey")))[1]
     if picture is None:
         return None
@@ -189,3 +192,16 @@ def image_of(seen: Compared | None, field: Recording | None, gauge: Recording | 
         number, picture.copy(), seen.before.uv[before], seen.after.uv[after],
         seen.before.residual_px[before], seen.after.residual_px[after],
     )  # fmt: skip
+
+
+def worst_frame(residual: RingResidual) -> int:
+    """Return the number of the frame with the largest median residual, among frames with most of a ring.
+
+    An effect that begins during the recording is not there in every frame; the median does not follow a
+    single bad bin.
+    """
+    frames, count = np.unique(residual.frame[residual.usable], return_counts=True)
+    whole = frames[count >= _MOST_OF_BINS * count.max()]
+    sizes = np.abs(residual.residual_px)
+    middle = [np.median(sizes[residual.usable & (residual.frame == f)]) for f in whole]
+    return int(whole[np.argmax(middle)])

@@ -7,7 +7,8 @@ import pytest
 
 from pipeline.api.diagnosis.apply import DefectChange, GeometryChange
 from pipeline.api.diagnosis.report import Shown, headline, write_page
-from stages.diagnose.compared import OnImage
+from stages.diagnose.compared import OnImage, worst_frame
+from stages.diagnose.residual import RingResidual
 from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import (
     Candidate,
@@ -61,6 +62,15 @@ def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
     assert "understated by 0.21 mm: the pit is 1.01 ± 0.03 mm, not 0.80 mm" in page
     assert "laser_tilt=0.6@40" in page
     assert "below 10⁻⁹" in page
+
+
+def test_the_frame_shown_is_the_one_that_departs_most_and_has_most_of_a_ring():
+    frame = np.repeat([3, 5, 7, 9], [24, 22, 6, 24])
+    residual = np.select([frame == 5, frame == 7], [0.2, 0.9], 0.01)
+    residual[0] = 5.0  # a single bad bin
+    none, usable = np.zeros(len(frame)), np.ones(len(frame), bool)
+    seen = RingResidual("gauge", frame, none, none, none, np.zeros((len(frame), 2)), none, residual, usable)
+    assert worst_frame(seen) == 5
 
 
 def test_a_place_that_was_not_measured_is_said_to_be_not_measured(tmp_path):
