@@ -6,6 +6,7 @@ import hashlib
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -219,31 +220,55 @@ def source_digest(function: Callable[..., Any]) -> str:
     pinned by the lock file. Imports are followed as written, also those inside functions.
     """
     packages = {*OWN_PACKAGES, function.__module__.partition(".")[0]}
-    texts: dict[str, str] = {}
-    waiting = [function.__module__]
+    digests: dict[str, bytes] = {}
+    met, waiting = set[str](), [function.__module__]
     while waiting:
         name = waiting.pop()
-        if name in texts or name.partition(".")[0] not in packages:
+        if name in met or name.partition(".")[0] not in packages:
             continue
-        text = _source(name)
-        if text is not None:
-            texts[name] = text
-            waiting.extend([name.rpartition(".")[0], *_imported(text)])
+        met.add(name)
+        file = _file(name)
+        if file is not None:
+            stat = file.stat()
+            text = _read(file, stat.st_mtime_ns, stat.st_size)
+            digests[name] = text.digest
+            waiting.extend([name.rpartition(".")[0], *text.imported])
     total = hashlib.sha256()
-    for name, text in sorted(texts.items()):
-        total.update(name.encode() + b"\0" + hashlib.sha256(text.encode()).digest())
+    for name, digest in sorted(digests.items()):
+        total.update(name.encode() + b"\0" + digest)
     return total.hexdigest()
 
 
-def _source(module: str) -> str | None:
-    """Return a module's text; None when there is no such module, or no text of it."""
+def _file(module: str) -> Path | None:
+    """Return the file of a module, found without importing the packages above it; None without one."""
+    package, *inner = module.split(".")
     try:
-        spec = find_spec(module)
+        spec = find_spec(package)
     except (ImportError, ValueError):
         return None
-    if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
+    if spec is None:
         return None
-    return Path(spec.origin).read_text(encoding="utf-8")
+    if not inner:
+        places = [Path(spec.origin)] if spec.origin is not None and spec.origin.endswith(".py") else []
+    else:
+        roots = [Path(root, *inner) for root in spec.submodule_search_locations or ()]
+        places = [p for root in roots for p in (root / "__init__.py", root.parent / f"{root.name}.py")]
+    return next((place for place in places if place.is_file()), None)
+
+
+@dataclass(frozen=True)
+class _Text:
+    """SHA-256 of a module's text, and the modules that it imports."""
+
+    digest: bytes
+    imported: tuple[str, ...]
+
+
+@cache
+def _read(file: Path, changed_ns: int, size: int) -> _Text:
+    """Return what a file holds that was last changed then; all stages and exporters ask for it."""
+    text = file.read_text(encoding="utf-8")
+    return _Text(hashlib.sha256(text.encode()).digest(), tuple(_imported(text)))
 
 
 def _imported(text: str) -> Iterator[str]:

@@ -7,7 +7,8 @@ decoded again: the ratio takes the mean of both, so that a machine that is busy 
 alike. Told are the processor time of each stage, the ratio, the most memory, and which part of the cores was
 busy. Stages that work side by side have a line together, unless ``--apart`` runs them one after the other.
 ``--score`` names a script that is called with run folder and recording and prints figures as JSON, from the
-truth beside the recording. ``--flame`` draws OUT/NAME.svg with py-spy where it is installed; it slows the run
+truth beside the recording. Modules are started from bytecode in OUT, as those of an installed program are.
+``--flame`` draws OUT/NAME.svg with py-spy where it is installed; it slows the run
 down.
 """
 
@@ -101,9 +102,10 @@ def measured(recording: Path, given: argparse.Namespace) -> Measured:
     log = folder / ".boresight" / "run.log"
     log.unlink(missing_ok=True)
     command = [sys.executable, "-m", "tests.benchmarks.bench_speed", str(folder), str(recording), "--child"]
+    environment = with_bytecode(given.out)
     started = time.monotonic()
     process = subprocess.Popen(
-        [*flame(given, recording.name), *command, *["--apart"] * given.apart], cwd=ROOT
+        [*flame(given, recording.name), *command, *["--apart"] * given.apart], cwd=ROOT, env=environment
     )
     with Watch(process.pid, Progress(log)) as watch:
         if process.wait():
@@ -120,6 +122,15 @@ def flame(given: argparse.Namespace, name: str) -> Sequence[str]:
     if not given.flame:
         return ()
     return ("py-spy", "record", "--threads", "--output", str(given.out.resolve() / f"{name}.svg"), "--")
+
+
+def with_bytecode(out: Path) -> dict[str, str]:
+    """Return an environment in which modules are started from bytecode, which is written first."""
+    environment = os.environ | {"PYTHONPYCACHEPREFIX": str(out.resolve() / "bytecode")}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    once = [sys.executable, "-c", "import pipeline.api.run, tests.benchmarks.bench_speed"]
+    subprocess.run(once, cwd=ROOT, env=environment, check=True)
+    return environment
 
 
 def decoding(video: Path) -> tuple[int, float]:

@@ -44,3 +44,8 @@ def test_the_text_of_what_is_imported_matters_and_no_other(house: Path, name: st
     with (house / name).open("a") as stream:
         stream.write("# changed\n")
     assert (source_digest(work) != before) == matters
+
+
+def test_modules_are_read_and_not_started(house: Path) -> None:
+    (house / "sub" / "far.py").write_text("raise RuntimeError('started')\n")
+    assert source_digest(import_module("toy_house.stage").work)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from pipeline.adjustment.bordered import BorderedSystem, Rows
 from pipeline.adjustment.elimination import BLOCK
@@ -249,4 +249,4 @@ def _polynomials(at: Float, degree: int) -> Float:
 
 def _chance(value: Float, covariance: Float) -> float:
     """Return the chance by which values (K,) lie as far from 0 or farther."""
-    return float(chi2.sf(value @ np.linalg.solve(covariance, value), len(value)))
+    return float(chdtrc(len(value), value @ np.linalg.solve(covariance, value)))
