@@ -14,8 +14,8 @@ from stages.motion.tracking.landmarks import TrackedPoses
 
 _JUMP_MM = 3.0
 _JUMP_TIMES = 5.0
-"""A step between frames is a jump of the counter, not motion, if it is longer than 3 mm and than five times
-the step that nine in ten frames do not exceed. Not measured."""
+"""A step between frames is a jump of the counter, not motion, if it is longer than 3 mm and five times as fast
+as nine in ten steps are at most. Not measured."""
 _LEAST_COVERED = 0.2
 """Share of the frames that an encoder must cover. Not measured."""
 _LEAST_STEPS = 8
@@ -68,7 +68,7 @@ def encoder_at_frames(
     read_s, read_mm = _without_held(encoder.time_s, encoder.distance_mm)
     known = (time_s >= read_s[0] - slack) & (time_s <= read_s[-1] + slack)
     known &= ~_in_gaps(time_s, read_s, read_mm, slack)
-    at_frames, jumps = _without_jumps(np.interp(time_s, read_s, read_mm))
+    at_frames, jumps = _without_jumps(time_s, np.interp(time_s, read_s, read_mm))
     context.report("frames outside the encoder's time", int((~known).sum()), "frames")
     context.report("encoder jumps taken out", jumps, "")
     if known.mean() < _LEAST_COVERED or _usual(np.diff(at_frames)) > farthest_mm:
@@ -131,10 +131,13 @@ def _in_gaps(time_s: Float, read_s: Float, read_mm: Float, frame_s: float) -> Bo
     return np.asarray(gap[at] & (time_s > read_s[at]) & (time_s < read_s[at + 1]))
 
 
-def _without_jumps(distance_mm: Float) -> tuple[Float, int]:
-    """Return distances (N,) from 0 with impossible steps removed, and how many."""
-    step = np.diff(distance_mm)
-    jump = np.abs(step) > max(_JUMP_TIMES * _usual(step), _JUMP_MM)
+def _without_jumps(time_s: Float, distance_mm: Float) -> tuple[Float, int]:
+    """Return distances (N,) from 0 with impossible steps removed, and how many.
+
+    Where frames were lost or left out a step takes longer, and the probe goes farther meanwhile.
+    """
+    step, passed = np.diff(distance_mm), np.diff(time_s)
+    jump = np.abs(step) > np.maximum(_JUMP_TIMES * _usual(step / passed) * passed, _JUMP_MM)
     return np.concatenate([[0.0], np.cumsum(np.where(jump, 0.0, step))]), int(jump.sum())
 
 

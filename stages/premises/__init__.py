@@ -292,7 +292,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: _Changes, context: Co
 
 PREMISES = Stage(
     "premises",
-    "4",
+    "5",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

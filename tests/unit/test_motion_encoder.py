@@ -59,6 +59,16 @@ def test_jump_is_taken_out() -> None:
     assert found.distance_mm[-1] == pytest.approx(SPEED * (FRAMES - 1) / RATE, abs=1.0)
 
 
+def test_the_way_over_frames_that_are_missing_is_no_jump() -> None:
+    """A camera hung for a second: the wall had gone on by 18 mm, which were taken for a jump of the counter."""
+    frames = recorded(*clean()).frames
+    there = (frames.time_s < 0.5) | (frames.time_s > 1.5)
+    table = FrameTable(frames.frame[there], frames.time_s[there], frames.illumination[there])
+    found = encoder_at_frames(Recorded(table, Encoder(*clean())), 0.0, 60.0, quiet_context())  # type: ignore[arg-type]
+    assert found is not None
+    np.testing.assert_allclose(found.distance_mm, SPEED * table.time_s, atol=0.05)
+
+
 @pytest.mark.parametrize("silent", [True, False])
 def test_an_encoder_that_hangs_and_catches_up_is_unknown_meanwhile(silent: bool) -> None:
     """The jump is a right reading: taken out, half a second of way was missing from there on."""

@@ -11,6 +11,7 @@ import pytest
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from stages.premises import PremisesParameters, check_premises
+from stages.premises.light import Steps, rows_by_motion
 from tests.drawn_run import BASELINE, RADIUS, drawn_run
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
@@ -289,3 +290,16 @@ def test_scratches_on_the_window_are_not_taken_for_the_wall(good, run, monkeypat
     assert found.applied_to(scratched).stays is not None
     monkeypatch.setattr("stages.premises.places_that_stay", lambda *parts: None)
     assert checked(scratched, run.probe)[0].encoder_factor == 1, "the control: scratches are followed"
+
+
+def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():
+    """After a camera hung for a second, 6 pictures "were lost": the probe had gone 20 % faster meanwhile."""
+    frame = np.arange(0, 120, 2)
+    there = (frame < 60) | (frame >= 90)
+    place = np.cumsum(np.where(there, 0.02 + 0.001 * np.sin(frame / 3), 0.024))
+    seen, way = frame[there], place[there]
+    steps = Steps(seen[:-1], seen[1:], np.diff(way))
+    table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
+    encoder = Encoder(table.time_s, 10.0 * table.time_s)
+    row = rows_by_motion(np.arange(120), steps, 2, table, encoder)
+    np.testing.assert_array_equal(row, np.arange(120))
