@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from pipeline.arrays import Byte, Float, Float32
+from pipeline.arrays import Bool, Byte, Float, Float32
 from pipeline.artefacts.measured import WallTexture
 from pipeline.artefacts.model import VARIANTS, ErrorTexture, MeshTile, Overlays, PackedTiles
 from pipeline.machine.scratch import Scratch, Spool
@@ -23,10 +23,11 @@ _UNTEXTURED = 128  # middle grey
 
 @dataclass(frozen=True)
 class TexelPlaces:
-    """Pipe coordinates of texels (H, W): distance, mm, and azimuth, rad; NaN where there is no wall."""
+    """Of texels (H, W): distance, mm, azimuth from −π to π, rad, and whether there is wall."""
 
     distance_mm: Float32
     azimuth_rad: Float32
+    on_wall: Bool
 
 
 def bake_tile(
@@ -51,7 +52,7 @@ def bake_tile(
         uv.astype(np.float32),
         face.astype(np.int32),
         _photo(texture, fine),
-        tuple(_error(v, overlays, coarse) for v in VARIANTS[1:]),
+        _errors(overlays, coarse),
         _span(unrolled.distance_mm[np.concatenate([c.face for c in atlas.charts])]),
     )
 
@@ -64,27 +65,28 @@ def texel_places(atlas: Atlas, unrolled: Unrolled, texel_mm: float, coarser: int
     """Return where on the wall each texel of the atlas lies, ``coarser`` times larger texels than packed."""
     size = [max(1, round(n / coarser)) for n in atlas.size_px]
     step = np.array(atlas.size_px) / size
-    distance = np.full((size[1], size[0]), np.nan, np.float32)
-    azimuth = distance.copy()
+    distance = np.full((size[1], size[0]), unrolled.distance_mm[atlas.charts[0].face[0], 0], np.float32)
+    azimuth, on_wall = np.zeros_like(distance), np.zeros(distance.shape, bool)
     for chart, px in zip(atlas.charts, atlas.corner_px, strict=True):
         low = np.maximum(np.floor((px.min(axis=0) - PADDING_PX / 2) / step), 0).astype(int)
         high = np.minimum(np.ceil((px.max(axis=0) + PADDING_PX / 2) / step), size).astype(int)
         box = (slice(low[1], high[1]), slice(low[0], high[0]))
         x, y = ((np.arange(low[i], high[i]) + 0.5) * step[i] for i in (0, 1))
-        azimuth[box], distance[box] = _chart_places(chart, px, x, y, unrolled, texel_mm)
-    return TexelPlaces(distance, azimuth)
+        turned, distance[box] = _chart_places(chart, px, x, y, unrolled, texel_mm)
+        azimuth[box], on_wall[box] = (turned + np.pi) % (2 * np.pi) - np.pi, True
+    return TexelPlaces(distance, azimuth, on_wall)
 
 
 def _chart_places(
     chart: Chart, px: Float, x: Float, y: Float, unrolled: Unrolled, texel_mm: float
 ) -> tuple[Float, Float]:
-    """Return azimuth and distance at texture columns ``x`` (W,) and rows ``y`` (H,), px, broadcasting."""
+    """Return azimuth and distance at texture columns ``x`` (W,) and rows ``y`` (H,), px, to be broadcast."""
     if chart.origin is None:
         return _nearest_places(chart, px, x, y, unrolled)
     flat = chart.xy_mm[0] - px[0] * texel_mm
     azimuth = chart.origin[0] + (x * texel_mm + flat[0]) / unrolled.reference_mm
     distance = chart.origin[1] + y * texel_mm + flat[1]
-    return np.broadcast_to(azimuth, (len(y), len(x))), np.broadcast_to(distance[:, None], (len(y), len(x)))
+    return azimuth, distance[:, None]
 
 
 def _nearest_places(chart: Chart, px: Float, x: Float, y: Float, unrolled: Unrolled) -> tuple[Float, Float]:
@@ -105,38 +107,43 @@ def _nearest_places(chart: Chart, px: Float, x: Float, y: Float, unrolled: Unrol
 
 def _photo(texture: WallTexture, places: TexelPlaces) -> Byte:
     """Return the photo (H, W, 3) at texels."""
-    rows = len(texture.bgra)
+    rows, columns = texture.bgra.shape[:2]
     row = (places.distance_mm - texture.distance_from_mm) / texture.mm_per_px
-    first = int(np.clip(np.nanmin(row) - 1, 0, rows - 1))
-    last = int(np.clip(np.nanmax(row) + 2, first + 1, rows))
-    picture = texture.bgra[first:last]
-    picture = np.where(picture[..., 3:] > 0, picture, 0).astype(np.uint8)
-    columns = picture.shape[1]
-    column = ((places.azimuth_rad - texture.azimuth_from_rad) / texture.rad_per_px) % columns
-    beyond = np.isnan(row) | (row < -0.5) | (row > rows - 0.5)
-    sampled = cv2.remap(
-        np.concatenate([picture, picture[:, :1]], axis=1),
-        np.nan_to_num(column),
-        np.clip(np.nan_to_num(row - first), 0, last - first - 1),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    sampled[beyond] = 0
-    grey = ((255 - sampled[..., 3:].astype(np.uint16)) * _UNTEXTURED // 255).astype(np.uint8)
-    return np.asarray(cv2.add(sampled[..., :3], np.repeat(grey, 3, axis=-1)))
+    first = int(np.clip(row.min() - 1, 0, rows - 1))
+    last = int(np.clip(row.max() + 2, first + 1, rows))
+    picture = texture.bgra[first:last, :, :3].copy()
+    picture[texture.bgra[first:last, :, 3] == 0] = _UNTEXTURED
+    column = _columns(places.azimuth_rad, texture.azimuth_from_rad, texture.rad_per_px, columns)
+    sampled = _sampled(picture, column, np.clip(row, first, last - 1) - first, cv2.INTER_LINEAR)
+    sampled[~places.on_wall | (row < -0.5) | (row > rows - 0.5)] = _UNTEXTURED
+    return sampled
 
 
-def _error(variant: str, overlays: Overlays, places: TexelPlaces) -> ErrorTexture:
-    """Return the levels of an overlay at texels; 0 off the wall and where nothing was measured."""
-    overlay = overlays.of_variant(variant)
-    rows, columns = overlay.level.shape
+def _columns(azimuth_rad: Float32, from_rad: float, step_rad: float, columns: int) -> Float32:
+    """Return azimuths in px from the first of ``columns``, between 0 and ``columns``."""
+    column = (azimuth_rad - np.float32(from_rad)) / np.float32(step_rad)
+    return np.asarray(np.add(column, columns, out=column, where=column < 0), np.float32)
+
+
+def _sampled(picture: Byte, column: Float32, row: Float32, method: int) -> Byte:
+    """Return a picture that goes on from its last column to its first, at places (H, W)."""
+    around = np.concatenate([picture, picture[:, :1]], axis=1)
+    rows = row.astype(np.float32, copy=False)
+    return np.asarray(cv2.remap(around, column, rows, method, borderMode=cv2.BORDER_REPLICATE))
+
+
+def _errors(overlays: Overlays, places: TexelPlaces) -> tuple[ErrorTexture, ...]:
+    """Return the levels of the overlays at texels; 0 off the wall and where nothing was measured."""
+    shown = [overlays.of_variant(v) for v in VARIANTS[1:]]
+    rows, columns = shown[0].level.shape
     spacing = (overlays.distance_mm[-1] - overlays.distance_mm[0]) / max(rows - 1, 1)
-    row = np.rint((places.distance_mm - overlays.distance_mm[0]) / spacing)
-    column = np.rint((places.azimuth_rad - overlays.azimuth_rad[0]) * columns / (2 * np.pi)) % columns
-    outside = np.isnan(row)
-    row = np.clip(np.nan_to_num(row), 0, rows - 1).astype(np.int64)
-    level = overlay.level[row, np.nan_to_num(column).astype(np.int64)]
-    return ErrorTexture(variant, overlay.palette_bgr, np.where(outside, 0, level).astype(np.uint8))
+    row = (places.distance_mm - overlays.distance_mm[0]) / spacing
+    column = _columns(places.azimuth_rad, overlays.azimuth_rad[0], 2 * np.pi / columns, columns)
+    levels = [_sampled(overlay.level, column, row, cv2.INTER_NEAREST) for overlay in shown]
+    return tuple(
+        ErrorTexture(variant, overlay.palette_bgr, level * places.on_wall)
+        for variant, overlay, level in zip(VARIANTS[1:], shown, levels, strict=True)
+    )
 
 
 _ARRAYS: dict[str, tuple[str, tuple[int, ...]]] = {

@@ -128,10 +128,10 @@ def _without_outliers(xyz_p: Float) -> Int:
     return np.asarray(kept, np.int64)
 
 
-def seen_part(mesh: OpenMesh, reach_mm: float, allowance_mm: float) -> Surface:
+def seen_part(mesh: OpenMesh, reach_mm: float) -> Surface:
     """Return the triangles within ``reach_mm`` of a measured point: what was not seen stays a hole."""
     corners = mesh.face
     whole = (np.roll(corners, 1, axis=1) != corners).all(1)
     used, compact = np.unique(corners[whole & (mesh.gap_mm <= reach_mm)[corners].all(1)], return_inverse=True)
     corner = compact.reshape(-1, 3).astype(np.int32)
-    return Surface(mesh.vertex_p[used], corner, np.full(len(used), allowance_mm), mesh.joined[used])
+    return Surface(mesh.vertex_p[used], corner, mesh.joined[used])

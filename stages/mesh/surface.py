@@ -1,18 +1,15 @@
-"""Triangle surfaces: the structured one of a radius map, and decimation with its largest error measured."""
+"""Triangle surfaces: joined, with normals, and decimated with the largest error measured."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 import pyfqmr
 from numpy.typing import NDArray
 
 from pipeline.arrays import Bool, Float
-from pipeline.artefacts.measured import Wall
-from pipeline.geometry.axis import from_pipe
 from pipeline.system.native import open3d
 
 Face = NDArray[np.int32]
@@ -32,53 +29,13 @@ class Surface:
         mm.
     face : (T, 3) int32
         Counter-clockwise seen from inside the pipe.
-    allowance_mm : (V,)
-        How far decimation may leave each vertex.
     locked : (V,) bool
         Vertices that decimation must keep, because the neighbouring piece has them too.
     """
 
     vertex_p: Float
     face: Face
-    allowance_mm: Float
     locked: Bool
-
-
-def row_pieces(rows: int, pieces: int) -> list[slice]:
-    """Return slices that cut ``rows`` grid rows in pieces sharing their border rows."""
-    cut = np.unique(np.rint(np.linspace(0, rows - 1, pieces + 1)).astype(int))
-    return [slice(int(a), int(b) + 1) for a, b in pairwise(cut)]
-
-
-def grid_surface(wall: Wall, rows: slice, allowance_mm: Float) -> Surface:
-    """Return the structured surface of some rows of the radius map: a vertex for each measured cell.
-
-    The first azimuth follows the last, so the tube is closed; cells that were not measured stay holes.
-    ``allowance_mm`` is that of the same rows.
-    """
-    radius_map = wall.radius_map
-    radius = radius_map.radius_mm[rows].astype(float)
-    measured = np.isfinite(radius)
-    xyz = from_pipe(wall.axis, radius_map.distance_mm[rows, None], radius_map.azimuth_rad, radius)
-    number = np.cumsum(measured).reshape(measured.shape) - 1
-    corner = np.where(measured, number, -1)
-    border = np.zeros(measured.shape, bool)
-    border[0] = rows.start > 0
-    border[-1] |= rows.stop < len(radius_map.distance_mm)
-    return Surface(xyz[measured], _grid_faces(corner), allowance_mm[measured], border[measured])
-
-
-def _grid_faces(corner: Index) -> Face:
-    """Return the triangles between vertices (S, A) numbered by cell, −1 where there is none."""
-    around = np.roll(corner, -1, axis=1)
-    a, b, c, d = corner[:-1], around[:-1], corner[1:], around[1:]
-    whole = np.stack([np.stack([a, c, b], -1), np.stack([b, c, d], -1)], 2)
-    lacks_b = (b < 0)[..., None]
-    lacks_c = (c < 0)[..., None]
-    three = np.where(lacks_b, np.stack([a, c, d], -1), np.stack([a, d, b], -1))
-    first = np.where(lacks_b | lacks_c, three, whole[:, :, 0])
-    face = np.stack([first, np.where(lacks_b | lacks_c, -1, whole[:, :, 1])], 2).reshape(-1, 3)
-    return face[(face >= 0).all(1)].astype(np.int32)
 
 
 def weld(pieces: Sequence[Surface]) -> Surface:
@@ -86,14 +43,13 @@ def weld(pieces: Sequence[Surface]) -> Surface:
     starts = np.cumsum([0, *(len(p.vertex_p) for p in pieces)])
     vertex = np.concatenate([p.vertex_p for p in pieces])
     face = np.concatenate([p.face + s for p, s in zip(pieces, starts, strict=False)])
-    allowance = np.concatenate([p.allowance_mm for p in pieces])
     border = np.flatnonzero(np.concatenate([p.locked for p in pieces]))
     _, first, same = np.unique(vertex[border], axis=0, return_index=True, return_inverse=True)
     target = np.arange(len(vertex))
     target[border] = border[first[same.ravel()]]
     used, compact = np.unique(target[face], return_inverse=True)
     face = compact.reshape(-1, 3).astype(np.int32)
-    return Surface(vertex[used], face, allowance[used], np.zeros(len(used), bool))
+    return Surface(vertex[used], face, np.zeros(len(used), bool))
 
 
 def vertex_normals(surface: Surface) -> Float:
@@ -136,7 +92,7 @@ def _compact(surface: Surface) -> Surface:
     """Return the surface without the vertices that no triangle uses."""
     used, face = np.unique(surface.face, return_inverse=True)
     corner = face.reshape(-1, 3).astype(np.int32)
-    return Surface(surface.vertex_p[used], corner, surface.allowance_mm[used], surface.locked[used])
+    return Surface(surface.vertex_p[used], corner, surface.locked[used])
 
 
 def _at_border(piece: Surface) -> Surface:
@@ -147,7 +103,7 @@ def _at_border(piece: Surface) -> Surface:
 
 @dataclass(frozen=True)
 class Decimated:
-    """A decimated surface and its error: largest and mean square distance of the original's vertices."""
+    """A surface of fewer triangles: largest and mean square distance of the original's vertices from it."""
 
     surface: Surface
     original_faces: int
@@ -156,12 +112,12 @@ class Decimated:
     mean_square_mm2: float
 
 
-def decimate(original: Surface, target_faces: int) -> Decimated:
-    """Return ``original`` with about ``target_faces`` triangles, or more where its allowance asks for it.
+def decimate(original: Surface, target_faces: int, allowance_mm: float) -> Decimated:
+    """Return ``original`` with about ``target_faces`` triangles, or more where the allowance asks for it.
 
     The distance of every original vertex from the new surface is measured (one-sided Hausdorff distance), and
     that of the new vertices from the original, as a collapse on a flat wall may throw a vertex far along it.
-    Where one is larger than its vertex' allowance, the original is decimated again, half as much; if nothing
+    Where one is larger than the allowance, the original is decimated again, half as much; if nothing
     is left to take away, the original itself is returned.
     """
     goal = target_faces
@@ -169,7 +125,7 @@ def decimate(original: Surface, target_faces: int) -> Decimated:
         found = _collapse(original, goal)
         distance = distance_to_surface(original.vertex_p, found)
         back = distance_to_surface(found.vertex_p, original)
-        if np.all(distance <= original.allowance_mm) and np.all(back <= original.allowance_mm.max()):
+        if max(distance.max(), back.max()) <= allowance_mm:
             return _decimated(original, found, distance)
         goal *= 2
     return _decimated(original, original, np.zeros(len(original.vertex_p)))
@@ -205,7 +161,7 @@ def _collapse(surface: Surface, goal: int) -> Surface:
         target_count=goal, aggressiveness=_AGGRESSIVENESS, preserve_border=True, verbose=False
     )
     vertex, face, _ = simplifier.getMesh()
-    return Surface(vertex, face, np.zeros(len(vertex)), _those_of(vertex, surface.vertex_p[surface.locked]))
+    return Surface(vertex, face, _those_of(vertex, surface.vertex_p[surface.locked]))
 
 
 def _those_of(vertex_p: Float, locked_p: Float) -> Bool:

@@ -1,7 +1,6 @@
 """The wall as a mesh: geometry, holes, decimation, charts and baked textures."""
 
 import dataclasses
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +12,8 @@ from pipeline.files.codec import digest
 from pipeline.geometry.axis import PipeAxis, from_pipe, straight_axis, to_pipe
 from pipeline.system.native import open3d
 from stages.mesh import MeshParameters, make_mesh
-from stages.mesh.surface import decimate, grid_surface, row_pieces, vertex_normals, weld, with_normals
+from stages.mesh.fitted import cells_of, fitted_surface
+from stages.mesh.surface import Surface, decimate, vertex_normals, weld, with_normals
 from stages.overlays import OverlayParameters, overlays_of
 from tests.quiet import quiet_context
 from tests.unit.small_wall import PIT, RADIUS, bent_axis, drawn_radius, small_wall, smooth_photo, tee
@@ -34,6 +34,11 @@ def meshed(wall: Wall, **parameters: object) -> TexturedMesh:
 def plain() -> TexturedMesh:
     """Two tiles, decimated with a strict bound."""
     return meshed(small_wall(), tile_mm=25.0, noise_factor=0.0, error_mm=0.01)
+
+
+def grid(wall: Wall, pieces: int = 1) -> list[Surface]:
+    """The surface with a vertex at every cell: no cell may be smoothed. Walls without noise need fewer."""
+    return [p.surface for p in fitted_surface(cells_of(wall, 1e-6, 0.0), wall.axis, pieces, 0.0)]
 
 
 def boundary_edges(face: np.ndarray) -> np.ndarray:
@@ -70,9 +75,9 @@ def radius_seen(mesh: TexturedMesh, wall: Wall, s: np.ndarray, psi: np.ndarray) 
 
 @pytest.mark.parametrize("axis", [straight_axis(-40.0, 120.0), bent_axis(2e-3)])
 def test_grid_reproduces_the_radius_map(axis: PipeAxis) -> None:
-    wall = small_wall(axis=axis)
+    wall = small_wall(axis=axis, noise_mm=0.02)
     radius = wall.radius_map.radius_mm
-    surface = grid_surface(wall, slice(0, len(radius)), np.zeros(radius.shape))
+    (surface,) = grid(wall)
     s, psi, r = to_pipe(axis, surface.vertex_p)
     np.testing.assert_allclose(r.reshape(radius.shape), radius, atol=1e-3)
     np.testing.assert_allclose(
@@ -84,10 +89,12 @@ def test_grid_reproduces_the_radius_map(axis: PipeAxis) -> None:
     assert far.max() * RADIUS < 1e-3
 
 
-def test_grid_is_closed_around_and_faces_inward() -> None:
-    wall = small_wall()
-    rows, columns = wall.radius_map.radius_mm.shape
-    surface = grid_surface(wall, slice(0, rows), np.zeros((rows, columns)))
+@pytest.mark.parametrize("columns", [360, 225])
+def test_grid_is_closed_around_and_faces_inward(columns: int) -> None:
+    wall = small_wall(noise_mm=0.02, columns=columns)
+    rows = len(wall.radius_map.radius_mm)
+    (surface,) = grid(wall)
+    assert len(surface.face) == 2 * (rows - 1) * columns
     open_edges = boundary_edges(surface.face)
     assert len(open_edges) == 2 * columns
     assert set(np.unique(surface.vertex_p[open_edges][..., 2])) == {0.0, 50.0}
@@ -95,24 +102,47 @@ def test_grid_is_closed_around_and_faces_inward() -> None:
     assert np.all(np.sum(np.cross(b - a, c - a)[:, :2] * a[:, :2], axis=1) < 0)
 
 
-def test_holes_stay_and_single_missing_cells_leave_triangles() -> None:
-    wall = small_wall(hole=(slice(10, 11), slice(20, 21)))
+@pytest.mark.parametrize("at", [(10, 20), (11, 20), (11, 21), (8, 16), (13, 0), (10, 359)])
+def test_holes_stay_and_single_missing_cells_leave_triangles(at: tuple[int, int]) -> None:
+    wall = small_wall(noise_mm=0.02, hole=(slice(at[0], at[0] + 1), slice(at[1], at[1] + 1)))
     rows, columns = wall.radius_map.radius_mm.shape
-    surface = grid_surface(wall, slice(0, rows), np.zeros((rows, columns)))
+    (surface,) = grid(wall)
     assert len(surface.face) == 2 * (rows - 1) * columns - 4
     assert len(boundary_edges(surface.face)) == 2 * columns + 4
 
 
-def test_pieces_share_their_border_rows() -> None:
-    pieces = row_pieces(101, 3)
-    assert pieces[0].start == 0
-    assert pieces[-1].stop == 101
-    assert all(a.stop - 1 == b.start for a, b in pairwise(pieces))
-    wall = small_wall()
-    none = np.zeros(wall.radius_map.radius_mm.shape)
-    surface = weld([grid_surface(wall, p, none[p]) for p in pieces])
+@pytest.mark.parametrize("pieces", [3, 40])
+def test_pieces_share_their_border_rows(pieces: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stages.mesh.bisection._SQUARES_AT_ONCE", 10_000)
+    wall = small_wall(noise_mm=0.02)
+    coarse = [p.surface for p in fitted_surface(cells_of(wall, 0.02, 4.0), wall.axis, pieces, 3.0)]
+    assert len(coarse) == min(pieces, 13)  # of 8 rows
+    assert len(boundary_edges(weld(coarse).face)) == len(
+        boundary_edges(next(fitted_surface(cells_of(wall, 0.02, 4.0), wall.axis, 1, 3.0)).surface.face)
+    )
+    surface = weld(grid(wall, pieces))
     assert len(boundary_edges(surface.face)) == 2 * 360
-    assert len(surface.vertex_p) == none.size
+    assert len(surface.vertex_p) == wall.radius_map.radius_mm.size
+
+
+def test_noise_is_averaged_and_pits_are_not() -> None:
+    """Against the drawn wall, which the surface never saw, it is nearer than the cells it is made of."""
+    wall = small_wall(noise_mm=0.02)
+    at, around, _, width = PIT
+    radius_map = wall.radius_map
+    s, psi = np.meshgrid(radius_map.distance_mm[1:-1], radius_map.azimuth_rad, indexing="ij")
+    true, cells = drawn_radius(s, psi), radius_map.radius_mm[1:-1]
+    found = radius_seen(meshed(wall), wall, s, psi)
+    turn = (psi - around + np.pi) % (2 * np.pi) - np.pi
+    near = np.hypot(s - at, RADIUS * turn) < 2 * width
+    assert np.std(found - true) < 0.6 * np.std(cells - true)
+    assert np.std((found - true)[near]) < np.std((cells - true)[near])
+    assert abs((found - true)[near].mean()) < 0.004
+    # The controls: cuts that cost nothing follow the noise, cuts so dear that none is made lose the pit.
+    noisy = radius_seen(meshed(wall, triangle_cost=0.0), wall, s, psi)
+    assert np.std(noisy - true) > 0.9 * np.std(cells - true)
+    lost = radius_seen(meshed(wall, triangle_cost=1e6, error_mm=5.0), wall, s, psi)
+    assert np.std((lost - true)[near]) > 5 * np.std((cells - true)[near])
 
 
 def test_decimated_tiles_close_around_the_seam_and_to_each_other(plain: TexturedMesh) -> None:
@@ -146,9 +176,8 @@ def test_no_vertex_leaves_the_wall(plain: TexturedMesh) -> None:
 
 
 def test_a_bound_that_cannot_be_kept_leaves_the_grid_alone() -> None:
-    wall = small_wall(noise_mm=0.05, length_mm=10.0)
-    surface = grid_surface(wall, slice(0, 21), np.full((21, 360), 1e-5))
-    kept = decimate(surface, 500)
+    (surface,) = grid(small_wall(noise_mm=0.05, length_mm=10.0))
+    kept = decimate(surface, 500, 1e-5)
     assert len(kept.surface.face) == len(surface.face)
     assert kept.largest_error_mm < 1e-5
 
@@ -246,9 +275,7 @@ def test_a_wall_of_nothing_is_refused() -> None:
 
 
 def test_normals_go_on_from_piece_to_piece() -> None:
-    wall = small_wall(noise_mm=0.05, hole=HOLE)
-    radius = wall.radius_map.radius_mm
-    pieces = [grid_surface(wall, p, np.zeros(radius.shape)[p]) for p in row_pieces(len(radius), 3)]
+    pieces = grid(small_wall(noise_mm=0.05, hole=HOLE), 3)
     whole = weld(pieces)
     wanted = {tuple(v): n for v, n in zip(whole.vertex_p, vertex_normals(whole), strict=True)}
     found = list(with_normals(iter(pieces)))

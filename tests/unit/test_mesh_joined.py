@@ -33,7 +33,7 @@ def pieces(*cuts):
     made = joined_pieces(
         along, axis, np.array(cuts), lambda c: poisson_surface(c.xyz_p, c.normal_p, CELL, REACH)
     )
-    found = [(seen_part(mesh, REACH, 0.1), unjoined) for mesh, unjoined in made]
+    found = [(seen_part(mesh, REACH), unjoined) for mesh, unjoined in made]
     return [surface for surface, _ in found], sum(unjoined for _, unjoined in found)
 
 
@@ -82,7 +82,7 @@ def test_the_model_has_no_gap_where_pieces_meet(monkeypatch):
     mesh = make_mesh(wall, smooth_photo(length_mm=LENGTH), colours, parameters, context)
     assert numbers["mesh: borders between pieces that do not meet"] == 0
     assert mesh.triangles < 0.9 * mesh.wall_triangles  # thinned out, and still
-    tiles = [Surface(t.vertex_p, t.face, *np.ones((2, len(t.vertex_p)), bool)) for t in mesh.tiles]
+    tiles = [Surface(t.vertex_p, t.face, np.ones(len(t.vertex_p), bool)) for t in mesh.tiles]
     whole = weld(tiles)
     first, last = float(along.nearest_mm.min()), float(along.farthest_mm.max())
     cuts = piece_cuts(first, last, 40.0, CELL)
@@ -97,7 +97,7 @@ def test_pieces_that_are_only_clipped_do_not_meet():
         cloud = along.between(first - 25, last + 25)
         mesh = poisson_surface(cloud.xyz_p, cloud.normal_p, CELL, REACH)
         halves.append(clip(mesh, 60.0 * UP, way * UP)[0])
-    assert open_at(weld([seen_part(h, REACH, 0.1) for h in halves]), 60.0) > 50
+    assert open_at(weld([seen_part(h, REACH) for h in halves]), 60.0) > 50
 
 
 def test_the_surface_is_that_of_one_piece():
@@ -142,8 +142,8 @@ def test_an_unseen_stretch_is_a_hole_between_pieces():
     made = iter([tube, empty, tube])
     found = list(joined_pieces(along, axis, np.array([0.0, 40.0, 80.0, LENGTH]), lambda cloud: next(made)))
     assert [unjoined for _, unjoined in found] == [1, 0, 0] or [u for _, u in found] == [1, 1, 0]
-    assert len(seen_part(found[1][0], REACH, 0.1).face) == 0
-    assert len(seen_part(found[0][0], REACH, 0.1).face) > 0
+    assert len(seen_part(found[1][0], REACH).face) == 0
+    assert len(seen_part(found[0][0], REACH).face) > 0
 
 
 def test_no_piece_outgrows_the_finest_octree():

@@ -1,0 +1,250 @@
+"""A radius map's surface of few triangles: vertices fitted to all cells, more of them where the wall asks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.ndimage import binary_dilation
+from scipy.sparse import csr_matrix
+
+from pipeline.arrays import Bool, Float, Int, Int32
+from pipeline.artefacts.measured import Wall
+from pipeline.geometry.axis import PipeAxis, frames_at, from_pipe
+from stages.mesh.bisection import Cuts, Lattice, beside_holes, triangles, without_gaps, worthwhile
+from stages.mesh.surface import Decimated, Surface
+
+# Steps of the conjugate gradients: the matrix, scaled by its diagonal, has eigenvalues between 1/2 and 2
+# (A. Wathen, "Realistic eigenvalue bounds for the Galerkin mass matrix", 1987): each takes away two thirds.
+_STEPS = 14
+# Share of the bound that cells without noise are taken to scatter by.
+_SCATTER = 0.25
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The radius map on the nodes of its lattice, row by row, and the way each node looks.
+
+    Attributes
+    ----------
+    radius_mm, sigma_mm : (nodes,)
+        0 where nothing was measured.
+    allowance_mm : (nodes,)
+        How far the surface may lie off the cell.
+    measured : (nodes,) bool
+    distance_mm, origin_p, frame : (R,), (R, 3), (R, 3, 3)
+        Of the axis at every row.
+    azimuth_rad : (A,)
+    """
+
+    lattice: Lattice
+    radius_mm: Float
+    sigma_mm: Float
+    allowance_mm: Float
+    measured: Bool
+    distance_mm: Float
+    origin_p: Float
+    frame: Float
+    azimuth_rad: Float
+
+    def outward(self, rows: slice) -> Float:
+        """Return unit vectors (R, A, 3) from the axis to the wall at the nodes of some rows."""
+        psi, frame = self.azimuth_rad[:, None], self.frame[rows, None]
+        return np.asarray(frame[..., 0] * np.cos(psi) + frame[..., 1] * np.sin(psi))
+
+
+def cells_of(wall: Wall, error_mm: float, noise_factor: float) -> Cells:
+    """Return a wall's cells; a surface may lie off them by ``error_mm`` and ``noise_factor`` of their 1 σ."""
+    found = wall.radius_map
+    rows, columns = found.radius_mm.shape
+    lattice = Lattice(rows, columns)
+    step = (found.distance_mm[-1] - found.distance_mm[0]) / max(rows - 1, 1)
+    distance = found.distance_mm[0] + step * np.arange(lattice.nodes // columns)
+    distance[:rows] = found.distance_mm
+    radius, noise = np.zeros(lattice.nodes), np.zeros(lattice.nodes)
+    radius[: rows * columns] = np.nan_to_num(found.radius_mm.ravel())
+    noise[: rows * columns] = np.nan_to_num(found.sigma_random_mm.ravel())
+    return Cells(
+        lattice, radius, np.hypot(noise, _SCATTER * error_mm), error_mm + noise_factor * noise,
+        radius > 0, distance, *frames_at(wall.axis, distance), found.azimuth_rad,
+    )  # fmt: skip
+
+
+def fitted_surface(cells: Cells, axis: PipeAxis, pieces: int, triangle_cost: float) -> Iterator[Decimated]:
+    """Yield the wall's surface in pieces, in order of distance, that share the vertices where they meet.
+
+    Triangles are cut where that takes away more χ² than they cost, and where a cell is too far off.
+    """
+    lattice = cells.lattice
+    wanted = _joined([worthwhile(lattice, *_in_blocks(cells, s), triangle_cost) for s in lattice.slabs()])
+    vertex = np.zeros(lattice.nodes, bool)
+    while True:
+        cuts = without_gaps(lattice, wanted, vertex)
+        radius, off = _fit(cells, cuts)
+        beyond = np.abs(off) > cells.allowance_mm
+        if not beyond.any():
+            break
+        vertex |= _with_neighbours(beyond, lattice.columns)
+    for along in _rows_of_blocks(lattice, pieces):
+        yield _piece(cells, cuts, radius, off, axis, along)
+
+
+def _rows_of_blocks(lattice: Lattice, pieces: int) -> list[slice]:
+    """Return slices that cut a lattice in pieces."""
+    cut = np.unique(np.rint(np.linspace(0, lattice.blocks[0], pieces + 1)).astype(int))
+    return [slice(int(a), int(b)) for a, b in pairwise(cut)]
+
+
+def _joined(slabs: list[Cuts]) -> Cuts:
+    """Return the cuts of all blocks."""
+    cut, whole = ([np.concatenate(level, axis=1) for level in zip(*part, strict=True)] for part in (
+        [s.cut for s in slabs], [s.whole for s in slabs]
+    ))  # fmt: skip
+    return Cuts(cut, whole)
+
+
+def _with_neighbours(node: Bool, columns: int) -> Bool:
+    """Return the nodes and the eight around each."""
+    ring = np.pad(node.reshape(-1, columns), ((0, 0), (1, 1)), mode="wrap")
+    return np.asarray(binary_dilation(ring, np.ones((3, 3), bool))[:, 1:-1].ravel())
+
+
+def _in_blocks(cells: Cells, along: slice) -> tuple[Float, Float]:
+    """Return the nodes of blocks (n, n, N, 3), mm along the block's plane and over it, and their weights."""
+    lattice, n = cells.lattice, cells.lattice.block
+    (row, column), step = lattice.origin(along), np.arange(n + 1)[:, None]
+    rows, columns = (row + step)[:, None], ((column + step) % lattice.columns)[None]
+    node, first = rows * lattice.columns + columns, along.start * n
+    outward = cells.outward(slice(first, along.stop * n + 1))
+    seen, radius = cells.measured[node], cells.radius_mm[node]
+    xyz = cells.origin_p[rows] + radius[..., None] * outward[rows - first, columns]
+    normal, ahead = outward[rows - first, columns][n // 2, n // 2], cells.frame[row + n // 2, :, 2]
+    plane = np.stack([ahead, np.cross(ahead, normal), normal], 1)
+    middle = radius.sum((0, 1)) / np.maximum(seen.sum((0, 1)), 1)
+    centre = cells.origin_p[row + n // 2] + middle[:, None] * normal
+    return np.einsum("nij,abnj->abni", plane, xyz - centre), seen / cells.sigma_mm[node] ** 2
+
+
+def _fit(cells: Cells, cuts: Cuts) -> tuple[Float, Float]:
+    """Return the radius (nodes,) of each vertex, and how far each cell (nodes,) lies outside of the surface.
+
+    Radii are the weighted least squares' over all cells, some rows of blocks after the other, each with the
+    next row of blocks, on which it hardly depends.
+    """
+    lattice = cells.lattice
+    radius, off = cells.radius_mm.copy(), np.zeros(lattice.nodes)
+    for along in lattice.slabs():
+        ahead = slice(along.start, min(along.stop + 1, lattice.blocks[0]))
+        known = (along.start * lattice.block + (along.start > 0)) * lattice.columns
+        end = (along.stop * lattice.block + 1) * lattice.columns
+        node, vertex, weight, shift = _equations(cells, cuts, ahead)
+        wanted = cells.radius_mm[node] - shift
+        found = _least_squares(radius, wanted, 1 / cells.sigma_mm[node], vertex, weight, known)
+        radius[known:end] = found[known:end]
+        mine = node < end
+        off[node[mine]] = (wanted - (weight * radius[vertex]).sum(1))[mine]
+    return radius, off
+
+
+def _equations(cells: Cells, cuts: Cuts, along: slice) -> tuple[Int, Int, Float, Float]:
+    """Return how the surface at each cell follows from its vertices.
+
+    The surface's radius at node (M,) is the sum over its triangle's vertices (M, 3) of weight (M, 3) times
+    radius, plus shift (M,); what slopes displace along a triangle is left out.
+    """
+    lattice = cells.lattice
+    owner, level = _owners(lattice, cuts, along)
+    finest = lattice.corner[lattice.finest]
+    number = lattice.number(finest, along)
+    pick = np.full(lattice.nodes, -1)
+    covered = np.broadcast_to((level >= 0)[:, None], number.shape)
+    pick[number[covered]] = np.flatnonzero(covered)
+    node = np.flatnonzero(pick >= 0)
+    half, corner, block = np.unravel_index(pick[node], number.shape)
+    start = np.cumsum([0, *(len(c) for c in lattice.corner)])
+    place = np.concatenate(lattice.corner)[start[level[half, block]] + owner[half, block]]
+    share = _barycentric(finest[half, corner], place)
+    row, column = (o[block] for o in lattice.origin(along))
+    rows, columns = row[:, None] + place[..., 0], (column[:, None] + place[..., 1]) % lattice.columns
+    vertex, first = rows * lattice.columns + columns, along.start * lattice.block
+    outward = cells.outward(slice(first, along.stop * lattice.block + 1)).reshape(-1, 3)
+    here, base = outward[node - first * lattice.columns], first * lattice.columns
+    weight = share * np.einsum("mki,mi->mk", outward[vertex - base], here)
+    away = cells.origin_p[rows] - cells.origin_p[node // lattice.columns][:, None]
+    return node, vertex, weight, (share * np.einsum("mki,mi->mk", away, here)).sum(1)
+
+
+def _owners(lattice: Lattice, cuts: Cuts, along: slice) -> tuple[Int, Int]:
+    """Return number and level (T, N) of the triangle that each half square is part of; level −1: none."""
+    blocks = lattice.of_blocks(along)
+    level_of = np.full((len(lattice.corner[-1]), blocks.stop - blocks.start), -1)
+    for level in range(lattice.finest + 1):
+        leaf = np.repeat(cuts.leaves(level, blocks), 1 << (lattice.finest - level), axis=0)
+        level_of[leaf] = level
+    half = np.arange(len(level_of))[:, None]
+    return half >> (lattice.finest - level_of), level_of
+
+
+def _barycentric(place: Int32, corner: Int32) -> Float:
+    """Return the weights (M, 3) of triangles' corners (M, 3, 2) at places (M, 2)."""
+    a, b, p = (x - corner[:, 0] for x in (corner[:, 1], corner[:, 2], place))
+    double = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    u = (p[:, 0] * b[:, 1] - p[:, 1] * b[:, 0]) / double
+    v = (a[:, 0] * p[:, 1] - a[:, 1] * p[:, 0]) / double
+    return np.stack([1 - u - v, u, v], -1)
+
+
+def _least_squares(
+    radius: Float, wanted: Float, weight: Float, vertex: Int, share: Float, known: int
+) -> Float:
+    """Return ``radius`` (nodes,) with those vertices fitted whose number is ``known`` or higher.
+
+    Of each cell (M,), ``share`` (M, 3) times its vertices' radii is to be ``wanted``, counted by ``weight``.
+    M. Hestenes, E. Stiefel, "Methods of conjugate gradients", 1952, scaled by the diagonal.
+    """
+    used = np.zeros(len(radius), bool)
+    used[vertex] = True
+    place = np.cumsum(used) - 1
+    matrix = csr_matrix(
+        ((share * weight[:, None]).ravel(), place[vertex].ravel(), np.arange(0, vertex.size + 1, 3)),
+        (len(vertex), int(used.sum())),
+    )
+    transposed = matrix.T.tocsr()
+    number = np.flatnonzero(used)
+    scale = np.where(number >= known, 1 / (transposed.multiply(transposed) @ np.ones(len(vertex))), 0.0)
+    x = radius[number]
+    residual = transposed @ (wanted * weight - matrix @ x)
+    step, size = scale * residual, residual @ (scale * residual)
+    for _ in range(_STEPS):
+        if size == 0:
+            break
+        product = transposed @ (matrix @ step)
+        length = size / (step @ product)
+        x, residual = x + length * step, residual - length * product
+        before, size = size, residual @ (scale * residual)
+        step = scale * residual + size / before * step
+    fitted = radius.copy()
+    fitted[number] = x
+    return fitted
+
+
+def _piece(cells: Cells, cuts: Cuts, radius: Float, off: Float, axis: PipeAxis, along: slice) -> Decimated:
+    """Return some rows of blocks as a surface, with the errors of its cells but those of its first row."""
+    lattice = cells.lattice
+    node, corner = np.unique(triangles(lattice, cuts, cells.measured, along), return_inverse=True)
+    row, column = node // lattice.columns, node % lattice.columns
+    xyz = from_pipe(axis, cells.distance_mm[row], cells.azimuth_rad[column], radius[node])
+    first, last = along.start * lattice.block, along.stop * lattice.block
+    border = ((row == first) & (first > 0)) | ((row == last) & (along.stop < lattice.blocks[0]))
+    mine = slice((first + (first > 0)) * lattice.columns, (last + 1) * lattice.columns)
+    error, measured = off[mine], cells.measured[mine]
+    whole = cuts.whole[-1][:, lattice.of_blocks(along)].sum()
+    return Decimated(
+        Surface(xyz, corner.reshape(-1, 3).astype(np.int32), border),
+        int(whole) + len(beside_holes(lattice, cells.measured, along)),
+        int(measured.sum()),
+        float(np.abs(error).max(initial=0.0)),
+        float((error**2).sum() / max(measured.sum(), 1)),
+    )
