@@ -72,3 +72,22 @@ def test_page_and_figures_say_the_same(tmp_path):
     assert "(2.5×)" in page
     assert "third: not installed" in page
     assert "<svg>drawn</svg>" in page
+
+
+def test_the_page_says_where_boresight_is_behind():
+    quantities = (
+        Quantity("error", "error", "mm"),
+        Quantity("rate", "rate", "1/s", "more"),
+        Quantity("triangles", "triangles", better=None),
+    )
+    methods = (
+        Method("boresight", {"error": 0.5, "rate": 9.0, "triangles": 7.0}),
+        Method("other", {"error": 0.4, "rate": 8.0, "triangles": 3.0}),
+        Method("third", {"error": None, "rate": 10.0}),
+    )
+    told = Section("one", "One", (), quantities, methods, why_behind={"rate": "It only measures."}).behind()
+    assert told == (
+        "error: better by other. The cause is not known.",
+        "rate: better by third. It only measures.",
+    )
+    assert Section("one", "One", (), quantities, methods[:1]).behind() == ()

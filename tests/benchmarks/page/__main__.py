@@ -69,7 +69,7 @@ def write(sections: list[Section], made: dict[str, str], folder: Path) -> None:
 def _tree(section: Section) -> dict[str, object]:
     tree = asdict(section)
     del tree["charts"]
-    return tree | {"ratios_to_boresight": section.ratios()}
+    return tree | {"ratios_to_boresight": section.ratios(), "behind": section.behind()}
 
 
 def _figure(value: float | None) -> str:

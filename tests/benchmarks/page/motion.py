@@ -25,7 +25,7 @@ _QUANTITIES = (
     Quantity("roll_end_deg", "roll at the end", "°"),
     Quantity("roll_rms_deg", "roll, rms", "°"),
     Quantity("across_rms_mm", "across, rms", "mm"),
-    Quantity("unscaled_percent", "distance before the encoder's total", "%"),
+    Quantity("unscaled_percent", "distance before the encoder's total", "%", None),
     *TIMES,
 )
 

@@ -60,11 +60,11 @@ def section(inputs: Inputs) -> Section:
 _QUANTITIES = (
     Quantity("best_over_bound", "error over the Cramér–Rao bound, least"),
     Quantity("worst_over_bound", "largest"),
-    Quantity("rings_per_cpu_s", "rings", "1/s of processor time"),
-    Quantity("decoding_per_s", "decoding alone", "frames/s"),
-    Quantity("with_decoding_per_s", "decoding and extraction", "frames/s"),
-    Quantity("share_of_decoding", "rate over decoding's, by the clock"),
-    Quantity("share_of_decoding_cpu", "by processor time"),
+    Quantity("rings_per_cpu_s", "rings", "1/s of processor time", "more"),
+    Quantity("decoding_per_s", "decoding alone", "frames/s", "more"),
+    Quantity("with_decoding_per_s", "decoding and extraction", "frames/s", "more"),
+    Quantity("share_of_decoding", "rate over decoding's, by the clock", better="more"),
+    Quantity("share_of_decoding_cpu", "by processor time", better="more"),
 )
 
 

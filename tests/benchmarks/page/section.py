@@ -7,15 +7,17 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Literal
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column: ``key`` in the figures, what it is called, and its unit."""
+    """A column: ``key`` in the figures, its name and unit, and whether more or less of it is better."""
 
     key: str
     name: str
     unit: str = ""
+    better: Literal["less", "more"] | None = "less"
 
     @property
     def head(self) -> str:
@@ -41,6 +43,8 @@ class Section:
         Paragraphs: what was given to whom, so that the reader can judge whether it is fair.
     charts : tuple of str
         SVG.
+    why_behind : dict
+        Why boresight is behind in a quantity, by its key; as far as known.
     """
 
     key: str
@@ -49,6 +53,7 @@ class Section:
     quantities: tuple[Quantity, ...]
     methods: tuple[Method, ...]
     charts: tuple[str, ...] = ()
+    why_behind: dict[str, str] = field(default_factory=dict)
 
     def ratios(self) -> dict[str, dict[str, float]]:
         """Return each other method's figures over boresight's, where both are there and not zero."""
@@ -57,6 +62,20 @@ class Section:
             m.name: {k: v / own[k] for k, v in m.figures.items() if v is not None and own.get(k)}
             for m in self.methods[1:]
         }
+
+    def behind(self) -> tuple[str, ...]:
+        """Return a sentence for each quantity in which a method is better than boresight's."""
+        return tuple(
+            f"{q.name}: better by {', '.join(ahead)}. {self.why_behind.get(q.key, 'The cause is not known.')}"
+            for q in self.quantities
+            if (ahead := [m.name for m in self.methods[1:] if self._is_ahead(m, q)])
+        )
+
+    def _is_ahead(self, method: Method, quantity: Quantity) -> bool:
+        own, other = (m.figures.get(quantity.key) for m in (self.methods[0], method))
+        if own is None or other is None or quantity.better is None:
+            return False
+        return other < own if quantity.better == "less" else other > own
 
 
 @dataclass

@@ -36,9 +36,9 @@ _SETUP = (
     "Boresight's time is that of its stage texture, with decoding.",
 )
 _QUANTITIES = (
-    Quantity("psnr_db", "PSNR against the true albedo", "dB"),
+    Quantity("psnr_db", "PSNR against the true albedo", "dB", "more"),
     Quantity("registration_p95_mm", "shift of patches, 95 % below", "mm"),
-    Quantity("textured_percent", "textured", "%"),
+    Quantity("textured_percent", "textured", "%", "more"),
     *TIMES,
 )
 

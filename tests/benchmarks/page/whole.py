@@ -27,9 +27,9 @@ _SETUP = (
     "report. The recording's own duration is the time the camera took.",
 )
 _QUANTITIES = (
-    Quantity("registered_percent", "LED frames with a pose, of those given", "%"),
+    Quantity("registered_percent", "LED frames with a pose, of those given", "%", "more"),
     Quantity("diameter_error_percent", "error of the mean diameter", "%"),
-    Quantity("points", "points on the wall"),
+    Quantity("points", "points on the wall", better="more"),
     *TIMES,
     Quantity("over_duration", "time over the recording's duration"),
 )
