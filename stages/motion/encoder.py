@@ -14,8 +14,8 @@ from stages.motion.tracking.landmarks import TrackedPoses
 
 _JUMP_MM = 3.0
 _JUMP_TIMES = 5.0
-"""A step between frames is a jump of the counter, not motion, if it is longer than 3 mm and five times as fast
-as nine in ten steps are at most. Not measured."""
+"""A step between frames is a jump of the counter, not motion, if it is longer than 3 mm and five times as
+fast as nine in ten steps are at most. Not measured."""
 _LEAST_COVERED = 0.2
 """Share of the frames that an encoder must cover. Not measured."""
 _LEAST_STEPS = 8

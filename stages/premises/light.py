@@ -41,8 +41,8 @@ _LEAST_STEPS = 12
 # A picture repeats the one before where it changes by so small a part of what is usual; half as much again
 # as a usual step tells one step from two.
 _STANDS, _ONE_STEP = 0.25, 1.5
-# A step that took so many times as long as is usual counts no lost pictures: over 32 frames, 30 of them left out,
-# phase correlation erred by the way of 6 (open-1-field at half its size).
+# A step that took so many times as long as is usual counts no lost pictures: over 32 frames, 30 of them left
+# out, phase correlation erred by the way of 6 (open-1-field at half its size).
 _LONGEST_STEP = 4.0
 # The encoder is asked within so many frames whether the probe itself leapt.
 _NEARBY = 10

@@ -60,7 +60,7 @@ def test_jump_is_taken_out() -> None:
 
 
 def test_the_way_over_frames_that_are_missing_is_no_jump() -> None:
-    """A camera hung for a second: the wall had gone on by 18 mm, which were taken for a jump of the counter."""
+    """A camera hung for a second: the wall had gone on by 18 mm, which were taken for a jump."""
     frames = recorded(*clean()).frames
     there = (frames.time_s < 0.5) | (frames.time_s > 1.5)
     table = FrameTable(frames.frame[there], frames.time_s[there], frames.illumination[there])
