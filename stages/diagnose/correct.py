@@ -22,8 +22,8 @@ from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.run import FieldRun, with_probe
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
-from stages.diagnose.gauge.judge import prior_sigma
 from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.sets import prior_sigma
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, stated_belief
 from stages.diagnose.result import EffectFound
 

@@ -175,14 +175,16 @@ def summary(
     """Print the table of figures with 95 % intervals."""
     lines = list(_lines(results))
     if spoil_answers:
-        answers = [t.answer.model_dump(by_alias=True) for t in shuffled([trial_from(n) for n in lines])]
-        lines = [line | {"answer": answer} for line, answer in zip(lines, answers, strict=True)]
-    for row in figures([trial_from(line) for line in lines]):
+        true = [trial_from(line) for line in lines]
+        whose = {id(t.answer): line["answer"] for t, line in zip(true, lines, strict=True)}
+        lines = [n | {"answer": whose[id(t.answer)]} for n, t in zip(lines, shuffled(true), strict=True)]
+    trials = [trial_from(line) for line in lines]
+    for row in figures(trials):
         typer.echo(f"ring level | {row.text}")
     for file in proof or ():
         for rate in json.loads(file.read_text("utf-8"))["figures"]:
             typer.echo(f"rendered   | {rate['text']}")
-    for text in more_figures(lines):
+    for text in more_figures(lines, trials):
         typer.echo(text)
     typer.echo(f"versions: {', '.join(sorted({line['version'] for line in lines}))}")
 

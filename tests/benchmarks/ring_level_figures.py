@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
@@ -11,7 +10,8 @@ import numpy as np
 from scipy.stats import kstest
 
 from pipeline.physics.effect import CourseKind
-from stages.diagnose.drill.score import SNR, Rate, rate
+from stages.diagnose.channels import TRAVEL_EFFECTS
+from stages.diagnose.drill.score import SNR, Rate, Trial, rate
 from stages.diagnose.effects.library import LIBRARY
 
 Line = dict[str, Any]
@@ -21,12 +21,13 @@ _BINS = (0.0, 1e-3, 0.01, 0.1, 0.5, 0.9, 0.99, 1.000001)
 _CREDIBLE = 0.9
 
 
-def more_figures(lines: Sequence[Line]) -> Iterator[str]:
-    """Yield sentences with the figures of these results."""
+def more_figures(lines: Sequence[Line], trials: Sequence[Trial]) -> Iterator[str]:
+    """Yield sentences with the figures of these results and of the trials made of them."""
     answered = [line for line in lines if "failed" not in line]
+    of_several = [(line, t) for line, t in zip(lines, trials, strict=True) if "failed" not in line]
     yield from _of_nulls([line for line in answered if not line["concealed"]])
     yield from _of_courses(answered)
-    yield from _of_each([line for line in answered if len(line["concealed"]) > 1 and not line["left_out"]])
+    yield from _of_each([one for one in of_several if len(one[1].concealed) > 1 and not one[1].left_out])
     known = [line for line in answered if not line["left_out"]]
     yield from _of_probabilities(known)
     sets = [hit for line in known if (hit := _in_credible_set(line)) is not None]
@@ -76,28 +77,18 @@ def _of_courses(lines: Sequence[Line]) -> Iterator[str]:
         yield f"steps within 2 σ: {_words(rate(abs(f['value'] - t) <= 2 * f['sd'] for t, f in steps))}"
 
 
-def _of_each(lines: Sequence[Line]) -> Iterator[str]:
+def _of_each(cases: Sequence[tuple[Line, Trial]]) -> Iterator[str]:
     """Yield precision and recall of single names where several effects are concealed."""
-    right = said = 0
-    recalled = []
-    for line in lines:
-        true, names = Counter(c[0] for c in line["concealed"]), _said(line)
-        right, said = right + sum((true & names).values()), said + sum(names.values())
-        clear = Counter(c[0] for c, snr in zip(line["concealed"], line["snr"], strict=True) if _clear(snr))
-        recalled += [k < min(of, names[n]) for n, of in clear.items() for k in range(of)]
-    if lines:
-        yield f"several effects, {len(lines)} cases: names that are right {_words(Rate(right, said))}"
+    right, said = sum(len(t.right) for _, t in cases), sum(len(t.given) for _, t in cases)
+    recalled = [
+        any(found is c for _, found in t.right)
+        for line, t in cases
+        for c, snr in zip(t.concealed, line["snr"], strict=True)
+        if snr is not None and snr >= SNR
+    ]
+    if cases:
+        yield f"several effects, {len(cases)} cases: names that are right {_words(Rate(right, said))}"
         yield f"several effects: of those at SNR ≥ {SNR:g} named {_words(rate(recalled))}"
-
-
-def _clear(snr: float | None) -> bool:
-    return snr is not None and snr >= SNR
-
-
-def _said(line: Line) -> Counter[str]:
-    answer = line["answer"]
-    sure = answer["effects"] if answer["verdict"] in ("named", "partly") else ()
-    return Counter(e["name"] for e in sure)
 
 
 def _law(name: str) -> str:
@@ -125,11 +116,14 @@ def _of_probabilities(lines: Sequence[Line]) -> Iterator[str]:
 
 
 def _in_credible_set(line: Line) -> bool | None:
-    """Return whether the likeliest that reach `_CREDIBLE` hold the truth; None where nothing is told."""
+    """Return whether the likeliest that reach `_CREDIBLE` hold the truth; None where nothing is told.
+
+    Rings and fiducials do not tell of what motion and encoder do.
+    """
+    true = sorted(c[0] for c in line["concealed"] if c[0] not in TRAVEL_EFFECTS)
     each = sorted(line["answer"].get("candidates", ()), key=lambda c: -c["probability"])
-    if not each or not line["concealed"]:
+    if not each or not true:
         return None
     before = np.cumsum([c["probability"] for c in each]) - [c["probability"] for c in each]
     inside = [c for c, sum_before in zip(each, before, strict=True) if sum_before < _CREDIBLE]
-    true = sorted(c[0] for c in line["concealed"])
     return any(sorted(map(_law, c["names"])) == true for c in inside)

@@ -258,5 +258,11 @@ def test_sizes_of_a_law_that_comes_twice_are_compared_with_their_own():
     trial = Trial("a", (waves(2.0, 2), waves(0.5, 3), TILT), answer)
     assert sorted(size_errors(trial)) == pytest.approx([0.1, 0.2])
     # A size is compared with one truth only, however near it is to that of a second.
-    one = replace(trial, answer=Answer(verdict="named", effects=(told(0.5, 3), told(0.5, 3))))
+    one = Trial("b", (waves(2.0, 3), waves(0.5, 3)), Answer(verdict="named", effects=(told(0.5, 3),) * 2))
     assert sorted(map(abs, size_errors(one))) == pytest.approx([0.0, 15.0])
+    assert (one.exact, one.misnamed) == (True, False)
+    # Waves of another order, or once too often, are a wrong name, though the law is concealed.
+    for wrong in ((told(0.5, 3), told(2.0, 4)), (told(0.5, 3), told(0.5, 3))):
+        trial = Trial("c", (waves(2.0, 2), waves(0.5, 3)), Answer(verdict="named", effects=wrong))
+        assert (trial.exact, trial.misnamed) == (False, True)
+        assert size_errors(trial) == pytest.approx([0.0])

@@ -20,8 +20,7 @@ from stages.diagnose.gauge.elimination import (
     eliminate_poses,
 )
 from stages.diagnose.gauge.feasible import expected_gain
-from stages.diagnose.gauge.formula import APART, Rival, joint_p, rival_patterns
-from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.formula import APART, joint_p
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
 from stages.diagnose.result import Confirmation, FitQuality, Verdict
 
@@ -198,6 +197,7 @@ def test_what_is_left_is_noise_or_is_not(hidden, low, high):
 
 
 AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
+AT_OTHER_RADII = Confirmation("bore 1: 1", "bore 2: 1", True)
 
 
 def examined(
@@ -208,7 +208,7 @@ def examined(
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
-    orders = (*[1, other_order][: len(shifts_px)], *([pattern_order] * len(patterns_px)))
+    orders = (*[1, other_order, other_order][: len(shifts_px)], *([pattern_order] * len(patterns_px)))
     terms = tuple(
         SimpleNamespace(model=law, shift_px=s, order=m)
         for s, m in zip((*shifts_px, *patterns_px), orders, strict=True)
@@ -222,8 +222,8 @@ def examined(
     verdicts = SimpleNamespace(
         adequacy=left,
         judged=(best, rival),
-        chance_of=lambda name: chance / (1 + unknown),
-        unknown=((Rival("image outward", unknown),),) * len(library),
+        chance_of=lambda term: chance / (1 + unknown),
+        patterns_beside=lambda term: {"image outward": unknown / (1 + unknown)},
     )
     each = (unsplit, *[()] * (len(library) - 1)) if library else ()
     quality = FitQuality("px", 1.0, 0.1, 1.0, heldout, 0.1)
@@ -244,6 +244,8 @@ def examined(
         (examined(patterns_px=(0.5,), chance=0.98), Verdict.UNEXPLAINED),
         (examined((1.0, 1.0), unsplit=("principal_point",), confirmed=((AGREES,),) * 2), Verdict.PARTLY),
         (examined((1.0, 1.0), other_order=1, confirmed=((AGREES,),) * 2), Verdict.CLASS),
+        (examined((1.0, 1.0), other_order=1, confirmed=((AT_OTHER_RADII,),) * 2), Verdict.NAMED),
+        (examined((1.0,) * 3, other_order=1, confirmed=((AT_OTHER_RADII,),) * 3), Verdict.CLASS),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
         (examined(heldout=0.2), Verdict.CLASS),
         (examined(rival_heldout=-1.0), Verdict.CLASS),
@@ -260,40 +262,6 @@ def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(se
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     monkeypatch.setattr(answer, "pattern_of", lambda term: ("laser", "static", term.order))
     assert answer.verdict_of(seen) is verdict
-
-
-def names_and_patterns(scale_of_cone: float, share: float, measured: float) -> Evidence:
-    """Return evidence of a cone, 1 as measured, and of all patterns; two are like the cone.
-
-    The first is the cone but for a hundredth; the image's scale leaves ``share`` of the cone's information.
-    ``measured`` is how much of the cone's score the image's scale has.
-    """
-    patterns = [Column(m.name, a.name, shape) for m, shape in VOCABULARY for a in m.amplitudes]
-    columns = (Column("laser_cone", CONE.amplitudes[0].name), *patterns)
-    information = np.eye(len(columns))
-    line = columns.index(Column("generic_line_0_2", "cosine", (0.0,)))
-    image = columns.index(Column("generic_outward_0_1", "cosine", (0.0,)))
-    for at, left in ((line, 0.01), (image, share)):
-        information[0, at] = information[at, 0] = np.sqrt(1 - left)
-    information[line, image] = information[image, line] = np.sqrt(0.99 * (1 - share))
-    information *= scale_of_cone
-    right = np.zeros(len(columns))
-    right[[0, line, image]] = scale_of_cone * np.array([1.0, np.sqrt(0.99), measured])
-    return Evidence(columns, information, right, information, 0.0, np.full(len(columns), np.inf))
-
-
-@pytest.mark.parametrize(
-    ("strength", "measured", "likely"),
-    [(1000.0, 0.7, {}), (20.0, 1.1, {"image": 0.286}), (1000.0, 0.999, {"image": 0.0129})],
-)
-def test_a_pattern_without_a_cause_has_odds_by_likelihood_and_prior(strength, measured, likely):
-    about = names_and_patterns(strength, 0.5, measured)
-    terms = [Term(CONE, (), np.array([1.0]))]
-    (found,) = rival_patterns(about, terms, Stated((), np.zeros((0, 0))), 1.0, (0.035,))
-    odds = {r.formula.split()[0]: r.odds for r in found[::-1] if r.odds > 1e-3}
-    own = 0.035 * np.exp(-0.005 * strength)
-    assert odds.pop("δr", 0.0) == pytest.approx(own if own > 1e-3 else 0.0)
-    assert odds == pytest.approx(likely, rel=0.02)
 
 
 def test_a_score_that_few_cells_hold_is_less_surprising():

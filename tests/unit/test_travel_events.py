@@ -78,6 +78,20 @@ def test_a_stray_picture_is_no_slip() -> None:
     assert [e.kind for e in fit.events] == [EventKind.OUTLIER]
 
 
+@pytest.mark.parametrize(("stray_at", "slips_at"), [(-1, -5), (0, 4)])
+def test_a_slip_beside_a_stray_picture_at_the_end_ends_there(stray_at: int, slips_at: int) -> None:
+    sight = seen(np.random.default_rng(7), False)
+    few = replace(
+        sight, **{k: v[:40] for k, v in vars(sight).items() if np.shape(v)[:1] == sight.time_s.shape}
+    )
+    distance_mm = few.distance_mm.copy()
+    distance_mm[stray_at] += 2.0
+    encoder = read(False, slips=((float(few.time_s[slips_at]) + 0.001, 3.0),))
+    events = with_events(replace(few, distance_mm=distance_mm), encoder).events
+    assert events
+    assert all(e.place - e.during > 0 and e.place < 40 for e in events if e.kind is EventKind.STEP)
+
+
 def test_missing_pictures_at_steady_speed_are_not_called_a_slip() -> None:
     sight, encoder = seen(np.random.default_rng(5), False), read(False)
     noise = sight.distance_mm - way(sight.time_s, False)

@@ -21,6 +21,8 @@ _WITH_NAMES = ("named", "partly")
 NOTHING = "nothing"
 # More than the numbers of one law can differ: each by its whole range.
 _STRANGERS = 1e3
+# The quantity that is a whole number.
+_WHOLE = "order"
 _PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 1.0001)
 
 
@@ -71,10 +73,19 @@ class Trial:
         return frozenset(c.name for c in self.concealed)
 
     @property
+    def given(self) -> tuple[NamedEffect, ...]:
+        """Effects that the answer names with confidence."""
+        return self.answer.effects if self.answer.verdict in _WITH_NAMES else ()
+
+    @property
     def said(self) -> frozenset[str]:
         """Names that the answer gives with confidence."""
-        given = self.answer.effects if self.answer.verdict in _WITH_NAMES else ()
-        return frozenset(e.name for e in given)
+        return frozenset(e.name for e in self.given)
+
+    @property
+    def right(self) -> list[tuple[NamedEffect, Concealed]]:
+        """Names with what they rightly name, one to one."""
+        return matched(self.given, self.concealed)
 
     @property
     def found(self) -> bool:
@@ -84,12 +95,13 @@ class Trial:
     @property
     def exact(self) -> bool:
         """Whether all that is concealed, and nothing else, is named, and nothing said to be left."""
-        return self.answer.verdict == "named" and bool(self.said) and self.said == self.truth
+        count = len(self.right)
+        return self.answer.verdict == "named" and 0 < count == len(self.given) == len(self.concealed)
 
     @property
     def misnamed(self) -> bool:
-        """Whether a name is given that is not concealed."""
-        return bool(self.said - self.truth)
+        """Whether a name is given that is not concealed, or more often than it is, or with another order."""
+        return len(self.right) < len(self.given)
 
     @property
     def contained(self) -> bool:
@@ -244,8 +256,7 @@ def owned(trial: Trial) -> bool:
 
 def size_errors(trial: Trial) -> list[float]:
     """Return (estimate − truth) / σ of the first quantity of every effect that is rightly named."""
-    given = trial.answer.effects if trial.answer.verdict in _WITH_NAMES else ()
-    return [error for e, c in matched(given, trial.concealed) if (error := _size_error(e, c)) is not None]
+    return [error for e, c in trial.right if (error := _size_error(e, c)) is not None]
 
 
 def matched(
@@ -253,7 +264,7 @@ def matched(
 ) -> list[tuple[NamedEffect, Concealed]]:
     """Return names with what they name, one to one; laws that come twice so that their numbers differ least.
 
-    Numbers differ by shares of what the catalogue allows them.
+    Numbers differ by shares of what the catalogue allows them. Waves of another order are another effect.
     """
     apart = np.array([[_apart(e, c) for c in concealed] for e in given]).reshape(len(given), len(concealed))
     pairs = np.stack(linear_sum_assignment(np.minimum(apart, _STRANGERS)), -1).tolist()
@@ -261,10 +272,13 @@ def matched(
 
 
 def _apart(named: NamedEffect, truth: Concealed) -> float:
-    if named.name != truth.name or named.name not in EFFECTS:
+    if named.name != truth.name:
         return np.inf
-    each = zip(EFFECTS[truth.name].quantities, truth.values, strict=False)
-    known = ((q, named.parameters[q.name].value - v) for q, v in each if q.name in named.parameters)
+    # What is on pictures alone is not in the catalogue.
+    each = zip(EFFECTS[truth.name].quantities, truth.values, strict=False) if truth.name in EFFECTS else ()
+    known = [(q, named.parameters[q.name].value - v) for q, v in each if q.name in named.parameters]
+    if any(q.name == _WHOLE and abs(d) > 0.5 for q, d in known):
+        return np.inf
     return float(sum(min(abs(d) / (q.high - q.low), 1.0) for q, d in known if np.isfinite(d)))
 
 
@@ -309,6 +323,8 @@ def _located(trial: Trial, what: str) -> bool:
 
 
 def _size_error(named: NamedEffect, truth: Concealed) -> float | None:
+    if truth.name not in EFFECTS:
+        return None
     first = EFFECTS[truth.name].quantities[0].name
     if first not in named.parameters or not truth.values or not named.parameters[first].sd > 0:
         return None

@@ -14,9 +14,10 @@ from stages.diagnose.agreement import TELLING, same, sized
 from stages.diagnose.effects.base import Shape
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
-from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
+from stages.diagnose.gauge.hypotheses import Judged, Regime
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import change_time, freed
+from stages.diagnose.gauge.sets import prior_sigma
 from stages.diagnose.inference import Evidence, Stated, estimate
 from stages.diagnose.result import Confirmation, CourseFound, Value
 
@@ -24,6 +25,7 @@ from stages.diagnose.result import Confirmation, CourseFound, Value
 # compared about five times, and noise may contradict it once in a thousand times.
 _AGREE = 2e-4
 _LEAST_FRAMES = 8
+_BORE = "bore"
 _DRAWS = 400
 
 
@@ -37,18 +39,30 @@ class Partial:
 
 
 def confirmations(
-    run: GaugeRun, judged: Judged, regimes: Sequence[Regime], term: Term, stated: Stated
-) -> tuple[Confirmation, ...]:
-    """Return what disjoint parts of the run say of a term, each against all the others."""
-    parts = [*by_bore(regimes), *_by_direction(run, judged), *_by_half(run, term)]
-    _, *each = evidence(run, judged.fit, (), [part for _, part in parts])
-    found = [
-        partial
-        for (where, _), e in zip(parts, each, strict=True)
-        if (partial := partial_of(where, e, judged, term, stated)) is not None
-    ]
-    out = [_compared(a, b, term) for a, b in _pairs(found)]
-    return (*(c for c in out if c is not None), *_by_kind(run, judged, term, stated))
+    run: GaugeRun, judged: Judged, regimes: Sequence[Regime], terms: Sequence[Term], stated: Stated
+) -> tuple[tuple[Confirmation, ...], ...]:
+    """Return for each term what disjoint parts of the run say of it, each against all the others."""
+    shared = [*by_bore(regimes), *_by_direction(run, judged)]
+    parts = [[*shared, *_by_half(run, term)] for term in terms]
+    everything = np.ones(len(run.time_s), bool)
+    distinct = {(where, p.frames.tobytes()): p for each in parts for where, p in each}
+    kinds = [Part(everything, (EDGE,)), Part(everything, (EDGE, RING))]
+    _, edges, both, *said = evidence(run, judged.fit, (), [*kinds, *distinct.values()])
+    known = dict(zip(distinct, said, strict=True))
+    out = []
+    for term, each in zip(terms, parts, strict=True):
+        of_parts = [(where, known[where, p.frames.tobytes()]) for where, p in each]
+        partial = [partial_of(where, e, judged, term, stated) for where, e in of_parts]
+        pairs = _pairs([p for p in partial if p is not None])
+        compared = [_compared(a, b, term) for a, b in pairs]
+        compared.append(_by_kind(edges, both, judged, term, stated))
+        out.append(tuple(c for c in compared if c is not None))
+    return tuple(out)
+
+
+def tells_law(confirmation: Confirmation) -> bool:
+    """Return whether a comparison tells how an effect grows with the radius."""
+    return confirmation.prediction.startswith(_BORE)
 
 
 def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: Stated) -> Partial | None:
@@ -71,7 +85,7 @@ def by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
     out = []
     for section in sorted({r.section for r in regimes}):
         mask = np.any([r.part.frames for r in regimes if r.section == section], axis=0)
-        out.append((f"bore {section + 1}", Part(mask)))
+        out.append((f"{_BORE} {section + 1}", Part(mask)))
     return out
 
 
@@ -97,7 +111,7 @@ def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
     """Return neighbours of one kind: bores with the next bore, forward with backward, half with half."""
     by_kind: dict[str, list[Partial]] = {}
     for p in found:
-        kind = "bore" if p.where.startswith("bore") else p.where.split()[-1]
+        kind = _BORE if p.where.startswith(_BORE) else p.where.split()[-1]
         by_kind.setdefault(kind, []).append(p)
     return [(a, b) for group in by_kind.values() for a, b in itertools.pairwise(group)]
 
@@ -115,14 +129,12 @@ def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | Non
     )
 
 
-def _by_kind(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> tuple[Confirmation, ...]:
+def _by_kind(
+    edges: Evidence, both: Evidence, judged: Judged, term: Term, stated: Stated
+) -> Confirmation | None:
     """Return fiducials against rings: both show what the camera does, only rings what the sheet does."""
-    everything = np.ones(len(run.time_s), bool)
-    _, edges, both = evidence(
-        run, judged.fit, (), [Part(everything, (EDGE,)), Part(everything, (EDGE, RING))]
-    )
     if not _seen(edges, term):
-        return ()
+        return None
     from_edges = partial_of("fiducials alone", edges, judged, term, stated)
     rings = Evidence(
         both.columns, both.information - edges.information, both.right - edges.right,
@@ -130,9 +142,8 @@ def _by_kind(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> tuple
     )  # fmt: skip
     from_rings = partial_of("rings alone", rings, judged, term, stated)
     if from_edges is None or from_rings is None:
-        return ()
-    compared = _compared(from_edges, from_rings, term)
-    return () if compared is None else (compared,)
+        return None
+    return _compared(from_edges, from_rings, term)
 
 
 def _seen(edges: Evidence, term: Term) -> bool:

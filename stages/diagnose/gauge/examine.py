@@ -24,7 +24,8 @@ from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, no
 from stages.diagnose.gauge.fit import evidence, fit
 from stages.diagnose.gauge.formula import ADEQUATE, pattern_of, patterns_by_chance, swings
 from stages.diagnose.gauge.heldout import fit_quality
-from stages.diagnose.gauge.judge import Judged, Regime, Verdicts, judge, judged_of, regimes_of
+from stages.diagnose.gauge.hypotheses import Judged, Regime, judged_of, regimes_of
+from stages.diagnose.gauge.judge import Verdicts, judge
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
 from stages.diagnose.inference import Stated, stated_belief
@@ -207,7 +208,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
     shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula
     return replace(
         seen,
-        confirmed=tuple(confirmations(run, best, regimes, term, stated) for term in terms),
+        confirmed=confirmations(run, best, regimes, terms, stated) if terms else (),
         unsplit=unsplit,
         sizes=sizes_of(run, best, stated, alike) if terms else (),
         location=location_of(run, shown, regimes, stated),

@@ -148,14 +148,17 @@ def _shortened(run: GaugeRun, found: Fit, step: Float, parts: Sequence[float]) -
 
 
 def evidence(
-    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], parts: Sequence[Part] = ()
-) -> tuple[Evidence, ...]:
+    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], parts: Sequence[Part] = (),
+    with_spread: bool = True,
+) -> tuple[Evidence, ...]:  # fmt: skip
     """Return what the run says about the fit's terms and the effects asked about, together.
 
     Parameters
     ----------
     parts : sequence of Part
         Each gives evidence of its own after that of the whole.
+    with_spread : bool
+        Whether to look how far the scores spread; without it they spread as independent errors do.
 
     Returns
     -------
@@ -165,7 +168,7 @@ def evidence(
     at = found.at(run)
     whole = asking(run, found.state, at, asked, with_baseline=True)
     each = [whole, *(whole.of(part) for part in parts)]
-    return tuple(_reduced(run, found, asked, equations, at.motion) for equations in each)
+    return tuple(_reduced(run, found, asked, equations, at.motion, with_spread) for equations in each)
 
 
 def _reduced(
@@ -174,15 +177,18 @@ def _reduced(
     asked: Sequence[tuple[EffectModel, Shape]],
     equations: Equations,
     motion: Rows,
+    with_spread: bool,
 ) -> Evidence:
     """Return the evidence of equations, all but the shared columns eliminated."""
     reduced = eliminate_poses(equations, motion, len(found.state.T_pc))
     own = own_unknowns(run, found, equations.by_global.shape[1])
     left, misfit = eliminate_globals(reduced, own)
     names, value = kept_columns(found, asked)
-    stated = found.state.stated
-    before = block_diag(np.diag([stated.encoder_scale_sigma**-2.0]), instrument_information(stated))
-    inflation, degrees = score_inflation(equations, reduced, left, own.out, _by_effect(names), before)
+    inflation, degrees = np.ones(len(names)), np.full(len(names), np.inf)
+    if with_spread:
+        stated = found.state.stated
+        before = block_diag(np.diag([stated.encoder_scale_sigma**-2.0]), instrument_information(stated))
+        inflation, degrees = score_inflation(equations, reduced, left, own.out, _by_effect(names), before)
     information, right = left.information, left.right
     # From the linearisation's place back to nothing beyond the stated.
     misfit += float(2 * right @ value + value @ information @ value)

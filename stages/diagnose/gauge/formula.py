@@ -7,7 +7,6 @@ from which poses and the stated instrument have been taken out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -23,6 +22,7 @@ from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.linearise import asking, linearise
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import Scored, freed, refined, scan
+from stages.diagnose.gauge.sets import SAME
 from stages.diagnose.inference import (
     DEGREES,
     Evidence,
@@ -38,15 +38,11 @@ _MOST_TERMS = 4
 # A further term is added when its probability by chance, corrected for all tried, is below this.
 # Debt: data/debts.md.
 _NEEDED = 1e-4
-# Relative error of laws: large patterns are measured far more exactly than laws predict. Debt: data/debts.md.
-_SAME = 0.02
 # A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
 # Twice the logarithm of the expected Bayes factor (1000 to 1) from which two causes count as told apart.
 APART = 14.0
-# Odds below which a pattern without a cause changes no answer; logarithm of odds that are as good as sure.
-_SHOWN, _MOST = 1e-6, 100.0
 # Directions with less information than this share of the best one are left out of the test of adequacy.
 # Debt: data/debts.md.
 _WEAK = 1e-3
@@ -92,6 +88,11 @@ def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored
     return refined(run, fit(run, before.state, (*before.terms, *terms)))
 
 
+def is_more(left: float, swung: Sequence[Scored]) -> bool:
+    """Return whether a pattern or swing could be needed for what is noise with a chance of ``left``."""
+    return left < 2 * _NEEDED or any(s.p_value * len(SWINGS) < _NEEDED for s in swung)
+
+
 def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
     """Return what each swing without a cause takes up at its best frequency."""
     return scan(run, found, {model.name: model for model in SWINGS}, stated)
@@ -117,7 +118,7 @@ def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
     effects = weighted[:, : sum(size[0])]
     scale = np.maximum(np.linalg.norm(effects, axis=0), 1e-300)
     left = pattern - effects @ (np.linalg.lstsq(effects / scale, pattern, rcond=1e-10)[0] / scale)
-    return bool(np.linalg.norm(left) < _SAME * np.linalg.norm(pattern))
+    return bool(np.linalg.norm(left) < SAME * np.linalg.norm(pattern))
 
 
 def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
@@ -133,51 +134,6 @@ def _by_chance(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
     each = [_score(about, stated, m, s, given) for m, s in VOCABULARY]
     single = min((s.p_value for s in each if s is not None), default=1.0) * len(VOCABULARY)
     return float(2 * min(single, joint_p(about, stated, given)))
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A pattern without a cause in a named effect's place: its formula, and its odds against the effect."""
-
-    formula: str
-    odds: float
-
-
-def rival_patterns(
-    about: Evidence, terms: Sequence[Term], stated: Stated, believed: float, beforehand: Sequence[float]
-) -> tuple[tuple[Rival, ...], ...]:
-    """Return for each effect among the terms the patterns that may be in its place, the likeliest first.
-
-    They stand for causes that the library does not know. What the effect and a pattern each take up of the
-    measurements, the other terms and the instrument being free, is their likelihood.
-
-    Parameters
-    ----------
-    about : Evidence
-        Over the terms and `VOCABULARY`.
-    believed : float
-        What a difference of χ² is divided by before it is believed.
-    beforehand : sequence of float
-        For each effect, the odds of a single pattern against it before anything was measured.
-    """
-    own = [(t.model, t.shape) for t in terms]
-    out = []
-    for k, odds in enumerate(beforehand):
-        others = _places(about, own[:k] + own[k + 1 :])
-        alone = score(about, stated, _places(about, own[k : k + 1]), others)
-        gain = alone.gain if alone is not None else 0.0
-        found = [
-            Rival(model.formula(shape), odds * _likelihood((tried.gain - gain) / believed))
-            for model, shape in VOCABULARY
-            if (tried := _score(about, stated, model, shape, others)) is not None
-        ]
-        out.append(tuple(sorted((r for r in found if r.odds > _SHOWN), key=lambda r: -r.odds)))
-    return tuple(out)
-
-
-def _likelihood(gain: float) -> float:
-    """Return the ratio of likelihoods for a difference of χ², within what numbers hold."""
-    return float(np.exp(min(gain / 2, _MOST)))
 
 
 def joint_p(about: Evidence, stated: Stated, given: Int) -> float:

@@ -12,10 +12,11 @@ from pipeline.arrays import Bool, Float, Int
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
 from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
-from stages.diagnose.gauge.judge import Judged, Regime, prior_sigma
+from stages.diagnose.gauge.hypotheses import Judged, Regime
 from stages.diagnose.gauge.linearise import asking, ring_mm_per_px
 from stages.diagnose.gauge.points import BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun
+from stages.diagnose.gauge.sets import prior_sigma
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, total
 from stages.diagnose.result import FitQuality
 

@@ -2,97 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.arrays import Bool, Float
-from stages.diagnose.effects.base import EffectModel
-from stages.diagnose.effects.courses import SEARCHED, Coursed
-from stages.diagnose.effects.nameless import VOCABULARY, Nameless
-from stages.diagnose.gauge.elimination import Part
-from stages.diagnose.gauge.fit import Fit, evidence
-from stages.diagnose.gauge.formula import (
-    Rival,
-    adequacy,
-    empirical,
-    rival_patterns,
-    says_the_same,
-    swings,
-)
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.gauge.fit import Fit, evidence, fit
+from stages.diagnose.gauge.formula import adequacy, empirical, is_more, says_the_same, swings
+from stages.diagnose.gauge.hypotheses import Judged, Regime, judged_of, regimes_of
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.scan import Scored, refined, span
-from stages.diagnose.gauge.search import LEAST_SHARE, Search, shift_px
-from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Evidence, Stated, estimate, total
+from stages.diagnose.gauge.scan import Scored, refined
+from stages.diagnose.gauge.search import LEAST_SHARE, MOST_EFFECTS, Search, shift_px
+from stages.diagnose.gauge.sets import (
+    Cause,
+    Member,
+    Sets,
+    beforehand,
+    believed,
+    cause_of,
+    members_of,
+    terms_of,
+)
+from stages.diagnose.inference import Stated
 
-_STRETCHES = 2
-_LEAST_FRAMES = 8
-# Prior: all effects of the library are equally likely, and a pattern without a cause is 50 times less likely
-# than one of them, because such a pattern can imitate any law. Whether a law suffices is tested separately.
-# Debt: data/debts.md.
-_NAMELESS = 1 / 50
-_PEAK = 2
-# Likelihoods do not contain the small errors of laws and of image formation: what looks like odds of 1000 to
-# 1 counts as 100 to 1. A drawn focal length was once called a cone at 100 to 1. Debt: data/debts.md.
-_TEMPERED = 1.5
-# Rivals that are tried with patterns for what is left, as the found effects are.
-_WITH_PATTERNS = 3
-
-
-@dataclass(frozen=True)
-class Regime:
-    """A part of the run that can be held out: its name, its frames (N,), the bore its rings lie in."""
-
-    name: str
-    part: Part
-    section: int
+# Sets that are less likely than the best by more than this in −2 ln are not kept: a thousand of them weigh
+# less than a hundredth of what a name may be wrong by.
+_FAR = 30.0
+# How often the likeliest is replaced by what is likelier still, as its own equations show.
+_ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A hypothesis with its fit and how it does.
+class Unfitted:
+    """A set of effects that was weighed by the equations of another fit: its members and their amplitudes."""
 
-    Attributes
-    ----------
-    fit : Fit
-    evidence : Evidence
-        Of the whole run.
-    by_regime : tuple of Evidence
-        Of each regime on its own.
-    surprise, heldout : float
-        −2 ln of the likelihood of all, and of each regime given the others, over by how much neighbours err
-        alike.
-    beforehand : float
-        −2 ln of its chance before anything was measured.
-    """
-
-    fit: Fit
-    evidence: Evidence
-    by_regime: tuple[Evidence, ...]
+    members: tuple[Member, ...]
+    amplitudes: tuple[Float, ...]
     surprise: float
-    heldout: float
-    beforehand: float
+    probability: float
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the effects, in order."""
-        return tuple(sorted(t.model.name for t in self.fit.terms))
-
-    @property
-    def laws(self) -> tuple[str, ...]:
-        """Names of the effects' laws, in order."""
-        return tuple(sorted({t.model.law for t in self.fit.terms}))
-
-    @property
-    def library_terms(self) -> tuple[Term, ...]:
-        """The effects of the library; patterns for what they leave stand behind them."""
-        return tuple(t for t in self.fit.terms if not isinstance(t.model, Nameless))
-
-    @property
-    def named(self) -> bool:
-        """Whether all its effects are of the library, and there are some."""
-        return bool(self.fit.terms) and not any(isinstance(t.model, Nameless) for t in self.fit.terms)
+    def statement(self) -> str:
+        """What it would be."""
+        each = zip(self.members, self.amplitudes, strict=True)
+        return " ".join(m.model.statement(m.shape, a) for m, a in each)
 
 
 @dataclass(frozen=True)
@@ -109,8 +65,8 @@ class Verdicts:
         The empirical formula, whether it is the likeliest or not.
     alike : float
         How many measurements that err alike count as one.
-    unknown : tuple of tuple of Rival
-        For each effect of the likeliest, the patterns without a cause that may be in its place.
+    unfitted : tuple of Unfitted
+        Sets of effects and patterns that were weighed and not fitted.
     """
 
     regimes: tuple[Regime, ...]
@@ -119,94 +75,151 @@ class Verdicts:
     adequacy: float
     formula: Judged
     alike: float
-    unknown: tuple[tuple[Rival, ...], ...] = ()
+    unfitted: tuple[Unfitted, ...] = ()
 
-    def chance_of(self, law: str) -> float:
-        """Return the chance that a law is among the causes, with whatever course."""
-        named = zip(self.judged[0].library_terms, self.unknown, strict=True) if self.unknown else ()
-        against = [r.odds for term, rivals in named if term.model.law == law for r in rivals]
-        return self._listed(law) / (1 + sum(against))
+    def chance_of(self, term: Term) -> float:
+        """Return the chance that a term's law is among the causes, with whatever course."""
+        return sum(p for p, causes, _ in self._each() if cause_of(term.model, term.shape) in causes)
 
-    def _listed(self, law: str) -> float:
-        """Return the chance of a law among the hypotheses that were fitted."""
-        return float(sum(p for p, j in zip(self.probability, self.judged, strict=True) if law in j.laws))
+    def chance_of_course(self, term: Term) -> float:
+        """Return the chance of a term's course if its law is among the causes."""
+        both = sum(p for p, _, names in self._each() if term.model.name in names)
+        return min(both / max(self.chance_of(term), 1e-300), 1.0)
 
-    def chance_of_course(self, model: EffectModel) -> float:
-        """Return the chance of an effect's course if its law is among the causes."""
-        pairs = zip(self.probability, self.judged, strict=True)
-        both = sum(p for p, j in pairs if model.name in j.names)
-        return float(min(both / max(self._listed(model.law), 1e-300), 1.0))
+    def likely_laws(self, sure: float) -> tuple[str, ...]:
+        """Return the laws of the likeliest hypotheses that together are as likely as ``sure``."""
+        each = sorted(self._each(), key=lambda one: -one[0])
+        before = np.cumsum([p for p, _, _ in each]) - [p for p, _, _ in each]
+        likely = (
+            causes for (_, causes, _), sum_before in zip(each, before, strict=True) if sum_before < sure
+        )
+        return tuple(dict.fromkeys(law for causes in likely for law, _ in sorted(causes)))
 
+    def patterns_beside(self, term: Term) -> dict[str, float]:
+        """Return the chance of each pattern that may be in a term's place, the likeliest first."""
+        cause, found = cause_of(term.model, term.shape), dict[str, float]()
+        for one in self.unfitted:
+            if cause not in {m.cause for m in one.members}:
+                for m in one.members:
+                    if isinstance(m.model, Nameless):
+                        formula = m.model.formula(m.shape)
+                        found[formula] = found.get(formula, 0.0) + one.probability
+        return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
-def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
-    """Return stretches of the run within one bore each."""
-    count = len(run.time_s)
-    votes = np.zeros((count, int(run.rings.section.max(initial=0)) + 1))
-    np.add.at(votes, (run.rings.frame, run.rings.section), 1)
-    seen = np.flatnonzero(votes.sum(1))
-    nearest = seen[np.abs(np.arange(count)[:, None] - seen).argmin(1)] if len(seen) else np.zeros(count, int)
-    section = votes.argmax(1)[nearest]
-    out = []
-    for k in range(votes.shape[1]):
-        frames = np.flatnonzero(section == k)
-        for n, piece in enumerate(np.array_split(frames, _STRETCHES)):
-            if len(piece) >= _LEAST_FRAMES:
-                mask = np.zeros(count, bool)
-                mask[piece] = True
-                out.append(Regime(f"bore {k + 1}, stretch {n + 1}", Part(mask), k))
-    return tuple(out)
+    def _each(self) -> Iterator[tuple[float, set[Cause], set[str]]]:
+        """Yield every hypothesis' chance, its causes, and the names of its effects."""
+        for p, j in zip(self.probability, self.judged, strict=True):
+            terms = j.library_terms
+            yield float(p), {cause_of(t.model, t.shape) for t in terms}, {t.model.name for t in terms}
+        for one in self.unfitted:
+            named = [m for m in one.members if not m.nameless]
+            yield one.probability, {m.cause for m in named}, {m.model.name for m in named}
 
 
 def judge(
     searched: Search, library: Mapping[str, EffectModel], stated: Stated, swung: Sequence[Scored]
 ) -> Verdicts:
-    """Rank the found hypothesis, its rivals and an empirical formula.
+    """Weigh the found hypothesis, its rivals, an empirical formula, and all sets near the likeliest.
 
     ``swung`` are the swings without a cause about the stated instrument.
     """
-    run, regimes, alike = searched.run, regimes_of(searched.run), searched.alike
-    formula = empirical(run, searched.nothing, stated, swung)
-    fits = _distinct(
-        [
-            searched.nothing, searched.found, *searched.rivals, formula,
-            *_with_patterns(searched, stated),
-        ]
-    )  # fmt: skip
-    fits = [refined(run, f) for f in fits]
+    run, regimes = searched.run, regimes_of(searched.run)
     laws = len({model.law for model in library.values()})
-    judged = [judged_of(run, f, regimes, stated, alike, beforehand(run, f, laws)) for f in fits]
+    ratio = believed(evidence(run, searched.found, ())[0], searched.alike)
+    formula = empirical(run, searched.nothing, stated, swung)
+
+    def weighed(found: Fit) -> Judged:
+        return judged_of(run, found, regimes, stated, ratio, _beforehand(run, found, laws))
+
+    judged = [weighed(f) for f in _distinct([searched.nothing, searched.found, *searched.rivals, formula])]
+    for _ in range(_ROUNDS):
+        ranked, allowed = _ranked(run, judged, formula)
+        best = ranked[0]
+        left, sets = _near(run, best, searched.steps[-1].scores, laws, stated, ratio)
+        near = _unfitted(sets, ranked)
+        more = _better(run, best, near) or _with_patterns(run, best, left, stated)
+        if more is None:
+            break
+        judged.append(weighed(more))
+    surprise = np.array([*(j.surprise + j.beforehand for j in ranked), *(u.surprise for u in near)])
+    weight = np.where([*allowed, *(True for _ in near)], np.exp(-0.5 * (surprise - surprise[0])), 0.0)
+    chance, count = weight / weight.sum(), len(ranked)
+    each = (replace(u, probability=float(p)) for u, p in zip(near, chance[count:], strict=True))
+    unfitted = tuple(sorted(each, key=lambda u: -u.probability))
+    of_formula = _of(judged, formula)
+    return Verdicts(regimes, ranked, chance[:count], left, of_formula, searched.alike, unfitted)
+
+
+def _of(judged: Sequence[Judged], formula: Fit) -> Judged:
+    """Return the formula's hypothesis."""
     patterns = [t.model.name for t in formula.terms]
-    of_formula = next((j for j in judged if [t.model.name for t in j.fit.terms] == patterns), judged[0])
+    return next((j for j in judged if [t.model.name for t in j.fit.terms] == patterns), judged[0])
+
+
+def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tuple[Judged, ...], Bool]:
+    """Return the hypotheses, the likeliest first, and which (H,) are allowed at all.
+
+    One that predicts held-out regimes worse than the stated instrument is discarded.
+    """
     nothing = next(j for j in judged if not j.fit.terms)
-    # A hypothesis that predicts held-out regimes worse than the stated instrument is discarded.
     allowed = np.array([j.heldout <= nothing.heldout for j in judged])
-    total_surprise = np.array([j.surprise + j.beforehand for j in judged])
-    allowed &= ~_redundant(run, judged, of_formula, total_surprise)
-    behind = (total_surprise - total_surprise[allowed].min()) / _TEMPERED
-    weight = np.where(allowed, np.exp(-0.5 * behind), 0.0)
-    order = np.lexsort((total_surprise, -weight))
-    ranked = tuple(judged[k] for k in order)
-    about, terms = evidence(run, ranked[0].fit, VOCABULARY)[0], ranked[0].fit.terms
-    left = adequacy(about, terms, stated)
-    odds = [_NAMELESS / len(VOCABULARY) / _chance(run, t, laws) for t in ranked[0].library_terms]
-    rivals = rival_patterns(about, terms, stated, alike * _TEMPERED, odds)
-    return Verdicts(regimes, ranked, (weight / weight.sum())[order], left, of_formula, alike, rivals)
+    surprise = np.array([j.surprise + j.beforehand for j in judged])
+    allowed &= ~_redundant(run, judged, _of(judged, formula), surprise)
+    order = np.lexsort((surprise, ~allowed))
+    return tuple(judged[k] for k in order), np.asarray(allowed[order])
 
 
-def _with_patterns(searched: Search, stated: Stated) -> list[Fit]:
-    """Return the found effects and their nearest rivals, each with patterns for what is left, if it is."""
-    run, found = searched.run, searched.found
-    if not found.terms:
+def _better(run: GaugeRun, best: Judged, near: Sequence[Unfitted]) -> Fit | None:
+    """Return the fit of the likeliest set of named effects, where that is likelier than what was fitted."""
+    named = [u for u in near if u.members and not any(m.nameless for m in u.members)]
+    first = min(named, key=lambda u: u.surprise, default=None)
+    if first is None or first.surprise > best.surprise + best.beforehand:
+        return None
+    return refined(run, fit(run, best.fit.state, terms_of(first.members, best.fit)))
+
+
+def _near(
+    run: GaugeRun, best: Judged, scores: Sequence[Scored], laws: int, stated: Stated, ratio: float
+) -> tuple[float, Sets]:
+    """Return the chance that what the likeliest leaves is noise, and the sets of effects about it."""
+    members = members_of(run, best.fit, scores, laws)
+    own = {(t.model, t.shape) for t in best.fit.terms}
+    asked = [(m.model, m.shape) for m in members if (m.model, m.shape) not in own]
+    about = evidence(run, best.fit, asked)[0]
+    return adequacy(about, best.fit.terms, stated), Sets.of(about, members, stated, ratio)
+
+
+def _unfitted(sets: Sets, ranked: Sequence[Judged]) -> list[Unfitted]:
+    """Return the sets near the likeliest hypothesis that were not fitted themselves."""
+    best = ranked[0]
+    here = sets.set_of(best.fit)
+    if not here:
         return []
-    both = empirical(run, found, stated, swings(run, found, stated))
+    sets = sets.without_echoes(here)
+    here, fitted = sets.set_of(best.fit), {_key(j.fit.terms) for j in ranked}
+    offset = best.surprise + best.beforehand - sets.surprise(here)
+    out = []
+    for chosen, surprise in sets.likely([here], MOST_EFFECTS).items():
+        members = sets.in_order(chosen)
+        if _key(members) not in fitted and surprise + offset - best.surprise - best.beforehand < _FAR:
+            out.append(Unfitted(members, sets.amplitudes(chosen), surprise + offset, 0.0))
+    return out
+
+
+def _with_patterns(run: GaugeRun, best: Judged, left: float, stated: Stated) -> Fit | None:
+    """Return the likeliest effects with patterns for what they leave, if it is more than noise.
+
+    ``left`` is the chance that it is noise.
+    """
+    if not best.named:
+        return None
+    swung = swings(run, best.fit, stated)
+    if not is_more(left, swung):
+        return None
+    both = empirical(run, best.fit, stated, swung)
     sizes = [shift_px(both, t) for t in both.terms]
-    own = len(found.terms)
-    if max(sizes[own:], default=0.0) < LEAST_SHARE * max(sizes[:own]):
-        return []
-    laws = {t.model.law for t in found.terms}
-    rivals = (f for f in searched.rivals if f.terms and {t.model.law for t in f.terms} != laws)
-    near = sorted(rivals, key=lambda f: f.cost)[:_WITH_PATTERNS]
-    return [both, *(empirical(run, f, stated, swings(run, f, stated)) for f in near)]
+    own = len(best.fit.terms)
+    return both if max(sizes[own:], default=0.0) >= LEAST_SHARE * max(sizes[:own]) else None
 
 
 def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Bool:
@@ -219,49 +232,8 @@ def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_s
     return out
 
 
-def beforehand(run: GaugeRun, found: Fit, effects: int) -> float:
-    """Return −2 ln of a hypothesis' chance beforehand: how many others there are like it, shapes included."""
-    nameless = any(isinstance(t.model, Nameless) for t in found.terms)
-    chance = np.prod([_chance(run, t, effects) for t in found.terms]) * (_NAMELESS if nameless else 1.0)
-    return float(-2 * np.log(chance))
-
-
-def _chance(run: GaugeRun, term: Term, effects: int) -> float:
-    """Return the chance of a term beforehand, among its own kind."""
-    if (term.model, term.shape) in VOCABULARY:
-        return 1 / len(VOCABULARY)
-    courses = len(SEARCHED) if isinstance(term.model, Coursed) else 1
-    return 1 / (effects * courses * max(len(term.model.shapes(*span(run))) / _PEAK, 1.0))
-
-
-def judged_of(
-    run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, alike: float, before: float = 0.0
-) -> Judged:
-    """Return the hypothesis' evidence and its surprise, held out and not."""
-    whole, *parts = evidence(run, found, (), [r.part for r in regimes])
-    sigma = prior_sigma(whole, found.terms)
-
-    def surprise(of: Evidence) -> float:
-        return estimate(of.deflated(alike), stated, sigma).surprise
-
-    if len(parts) < 2:
-        return Judged(found, whole, tuple(parts), surprise(whole), surprise(whole), before)
-    together = surprise(total(parts).over(whole.columns))
-    heldout = [
-        together - surprise(total([p for p in parts if p is not left]).over(whole.columns)) for left in parts
-    ]
-    return Judged(found, whole, tuple(parts), surprise(whole), float(np.sum(heldout)), before)
-
-
-def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
-    """Return (K,) 1 σ of amplitudes beforehand; infinite for the instrument, which has its own."""
-    plausible = {(t.model.name, a.name): a.plausible for t in terms for a in t.amplitudes}
-    return np.array(
-        [
-            np.inf if c.effect == INSTRUMENT else PRIOR_PLAUSIBLE * plausible[c.effect, c.amplitude]
-            for c in of.columns
-        ]
-    )
+def _beforehand(run: GaugeRun, found: Fit, laws: int) -> float:
+    return beforehand(run, [(t.model, t.shape) for t in found.terms], laws)
 
 
 def _by_shape(model: EffectModel) -> bool:
@@ -269,12 +241,16 @@ def _by_shape(model: EffectModel) -> bool:
     return model.repeats or isinstance(model, Nameless)
 
 
+def _key(terms: Iterable[Term | Member]) -> frozenset[tuple[str, Shape]]:
+    """Return what makes two hypotheses the same."""
+    return frozenset((t.model.name, t.shape if _by_shape(t.model) else ()) for t in terms)
+
+
 def _distinct(fits: Sequence[Fit]) -> list[Fit]:
     """Return the best fit of each set of effects."""
-    best: dict[tuple[tuple[str, tuple[float, ...]], ...], Fit] = {}
+    best: dict[frozenset[tuple[str, Shape]], Fit] = {}
     for f in fits:
-        shaped = ((t.model.name, t.shape if _by_shape(t.model) else ()) for t in f.terms)
-        key = tuple(sorted(shaped))
+        key = _key(f.terms)
         if key not in best or f.cost < best[key].cost:
             best[key] = f
     return list(best.values())

@@ -52,12 +52,15 @@ def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: 
     known, there = {t.model.name for t in found.terms}, {(t.model.name, t.shape) for t in found.terms}
     models = [m for name, m in library.items() if name not in known or m.repeats]
     shapes = {m.name: [s for s in m.shapes(*span(run)) if (m.name, s) not in there] for m in models}
-    few = [(m, s) for m in models if len(shapes[m.name]) <= _MANY for s in shapes[m.name]]
-    best = _best(run, found, few, stated)
     many = [(m, s) for m in models if len(shapes[m.name]) > _MANY for s in shapes[m.name]]
-    coarse = _best(thinned(run), found, many, stated)
-    near = [(c.model, s) for c in coarse for s in _near(c.shape, shapes[c.model.name])]
-    best += [replace(f, tried=len(shapes[f.model.name])) for f in _best(run, found, near, stated)]
+    coarse = _best(thinned(run), found, many, stated, with_spread=False)
+    asked = [(m, s) for m in models if len(shapes[m.name]) <= _MANY for s in shapes[m.name]]
+    asked += [(c.model, s) for c in coarse for s in _near(c.shape, shapes[c.model.name])]
+    once, choice = ([(m, s) for m, s in asked if (len(shapes[m.name]) == 1) == one] for one in (True, False))
+    # How far scores spread is looked at where they are best: it takes longer than the scores themselves.
+    chosen = _best(run, found, choice, stated, with_spread=False)
+    scored = _best(run, found, [*once, *((c.model, c.shape) for c in chosen)], stated)
+    best = [replace(s, tried=len(shapes[s.model.name])) for s in scored]
     return sorted(best, key=lambda s: -s.score.statistic / max(len(s.score.amplitude), 1))
 
 
@@ -72,25 +75,24 @@ def thinned(run: GaugeRun) -> GaugeRun:
 
 
 def _best(
-    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], stated: Stated
-) -> list[Scored]:
+    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], stated: Stated,
+    with_spread: bool = True,
+) -> list[Scored]:  # fmt: skip
     """Return each effect's best shape."""
     found = found if run.measures_as(found.run) else replace(found, run=run)
     best: dict[str, Scored] = {}
-    tried: dict[str, int] = {}
     for part in _portions(asked):
-        here = evidence(run, found, part)[0]
+        here = evidence(run, found, part, with_spread=with_spread)[0]
         given = np.concatenate(
             [np.zeros(0, np.int64), *[places_of(here, t.model, t.shape) for t in found.terms]]
         ).astype(np.int64)
         for model, shape in part:
-            tried[model.name] = tried.get(model.name, 0) + 1
             result = score(here, stated, places_of(here, model, shape), given)
             if result is not None and (
                 model.name not in best or result.statistic > best[model.name].score.statistic
             ):
                 best[model.name] = Scored(model, shape, result, 1)
-    return [replace(s, tried=tried[name]) for name, s in best.items()]
+    return list(best.values())
 
 
 def _portions(asked: Sequence[tuple[EffectModel, Shape]]) -> list[list[tuple[EffectModel, Shape]]]:

@@ -17,11 +17,12 @@ from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, 
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
-from stages.diagnose.gauge.fit import Fit, fit, fit_beside, own_parameters
+from stages.diagnose.gauge.fit import Fit, evidence, fit, fit_beside, own_parameters
 from stages.diagnose.gauge.linearise import linearise
 from stages.diagnose.gauge.points import bin_widths
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.scan import Scored, refined, scan
+from stages.diagnose.gauge.sets import Sets, believed, members_of, surprise_of, terms_of
 from stages.diagnose.inference import Stated
 
 # Something was left out when its probability by chance, corrected for all tried, is below this.
@@ -29,15 +30,15 @@ from stages.diagnose.inference import Stated
 DETECTED = 1e-4
 _REFITTED = 4
 _OTHER_COURSES = 2
-_MOST_EFFECTS = 6
-# So many effects are looked through together, once; of two each way is tried at once.
-_FEW = 3
+MOST_EFFECTS = 6
+# So many of the likeliest sets about a fit are fitted.
+_PROPOSED = 3
 _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
 _RIVAL_ITERATIONS = 5
 # Rivals whose χ² is worse by more than this are not considered; how often and which weights are recomputed.
 # Debt: data/debts.md.
-_FAR, _REWEIGHED, _WEIGHINGS = 100.0, 4, 3
+_FAR, _REWEIGHED, _WEIGHINGS = 50.0, 3, 3
 # A further effect or pattern smaller than this share of the first may be an error of the first one's law.
 # Debt: data/debts.md.
 LEAST_SHARE = 0.01
@@ -162,48 +163,48 @@ class Search:
 
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
-    """Add effects while the data ask for them; then see whether rivals do better in their places.
-
-    A rival in an earlier one's place is looked for when the second effect comes, because the first was found
-    with all others still there, and once more when nothing more is asked for.
-    """
-    nothing, found, steps = start, start, []
-    rivals: tuple[Fit, ...] = ()
-    exchanged = False
+    """Add effects while the data ask for them; after each, see whether another set of them does better."""
+    laws = len({model.law for model in library.values()})
+    found, steps = start, []
+    tried: list[Fit] = []
     while True:
         step, better = _extended(run, found, library, stated)
         steps.append(step)
-        at_end = better is None or len(better.terms) > _MOST_EFFECTS
-        if at_end and (exchanged or len(found.terms) < _FEW):
+        if better is None or len(better.terms) > MOST_EFFECTS or len(steps) > 2 * MOST_EFFECTS:
             break
-        better, tried = refined(run, better) if better is not None and not at_end else found, step.tried
-        if at_end or len(better.terms) == _FEW - 1:
-            better, others = _exchanged(run, better, () if at_end else step.tried, library, stated)
-            tried, exchanged = (*others, found), at_end
-        run, found, rivals = _weighed_anew(run, better, (*tried, *rivals), alike(step.scores))
-        nothing = fit(run, start.state, ())
-    return Search(run, nothing, found, tuple(rivals), tuple(steps), alike(steps[-1].scores))
+        better = refined(run, better)
+        others: tuple[Fit, ...] = ()
+        if len(better.terms) > 1:
+            better, others = _exchanged(run, better, step.scores, stated, laws)
+        tried += [*step.tried, *others, found]
+        run, found = _weighed_anew(run, better)
+    ratio = alike(steps[-1].scores)
+    nothing, rivals = fit(run, start.state, ()), _rivals(run, found, tried, ratio)
+    return Search(run, nothing, found, rivals, tuple(steps), ratio)
 
 
-def _weighed_anew(
-    run: GaugeRun, found: Fit, tried: Sequence[Fit], ratio: float
-) -> tuple[GaugeRun, Fit, tuple[Fit, ...]]:
-    """Return the run with weights by what the fit leaves, and the fit and its near rivals with these.
+def _weighed_anew(run: GaugeRun, found: Fit) -> tuple[GaugeRun, Fit]:
+    """Return the run with weights by what the fit leaves, and the fit with these.
 
     Weights from a fit without an effect hold its size back: where it acts, measurements count as outliers.
     """
-    names = [t.model.name for t in found.terms]
-    near = [f for f in tried if f.cost < found.cost + _FAR * ratio]
-    others = [f for f in near if [t.model.name for t in f.terms] != names]
     for _ in range(_WEIGHINGS):
         run = weighed(run, found.linearised)
         found = fit(run, found.state, found.terms, 1)
-    found = refined(run, fit(run, found.state, found.terms, _RIVAL_ITERATIONS))
-    rest = (
-        refined(run, fit(run, f.state, f.terms, _RIVAL_ITERATIONS))
-        for f in sorted(others, key=lambda f: f.cost)[:_REWEIGHED]
-    )
-    return run, *_sorted(found, list(rest))
+    return run, refined(run, fit(run, found.state, found.terms, _RIVAL_ITERATIONS))
+
+
+def _rivals(run: GaugeRun, found: Fit, tried: Sequence[Fit], ratio: float) -> tuple[Fit, ...]:
+    """Return the nearest fits with other effects, with the run's weights."""
+    names = {frozenset((t.model.name, t.shape) for t in found.terms)}
+    near = []
+    for f in sorted(tried, key=lambda f: f.cost):
+        key = frozenset((t.model.name, t.shape) for t in f.terms)
+        if key not in names and f.cost < found.cost + _FAR * ratio:
+            near.append(f)
+            names.add(key)
+    again = (fit(run, f.state, f.terms, _RIVAL_ITERATIONS) for f in near[:_REWEIGHED])
+    return tuple(refined(run, f) for f in again)
 
 
 def by_chance(scores: Sequence[Scored]) -> float:
@@ -271,25 +272,27 @@ def _counts(found: Fit) -> bool:
 
 
 def _exchanged(
-    run: GaugeRun, found: Fit, tried: Sequence[Fit], library: Mapping[str, EffectModel], stated: Stated
+    run: GaugeRun, found: Fit, scores: Sequence[Scored], stated: Stated, laws: int
 ) -> tuple[Fit, tuple[Fit, ...]]:
-    """Try another effect in each earlier term's place; the last one's rivals were tried when it came.
+    """Return the likeliest of a fit and of the sets of effects that are likely about it, and the others.
 
-    An effect may come back with another frequency or time constant, now that what disturbed it is taken out.
+    The fit's first effects were found with all others still there. Sets are compared by the equations of this
+    fit; the best few are then fitted.
     """
-    every = [found, *tried]
-    for k in range(len(found.terms) - 1):
-        others = found.terms[:k] + found.terms[k + 1 :]
-        reduced = fit(run, found.state, others, _RIVAL_ITERATIONS)
-        term = found.terms[k]
-        taken = {term.model.name} if term.model.shape_step(term.shape) is None else set()
-        scores = [s for s in scan(run, reduced, library, stated) if s.model.name not in taken]
-        every += [reduced, *(refined(run, f) for f in refits(run, reduced, scores, 3))]
-    return _sorted(every[0], every[1:])
-
-
-def _sorted(found: Fit, others: Sequence[Fit]) -> tuple[Fit, tuple[Fit, ...]]:
-    """Return the fit of the least cost among those with as many terms, and all others."""
-    full = [f for f in (found, *others) if len(f.terms) == len(found.terms)]
-    best = min(full, key=lambda f: f.cost)
-    return best, tuple(f for f in (found, *others) if f is not best)
+    members = members_of(run, found, scores, laws)
+    own = [(t.model, t.shape) for t in found.terms]
+    asked = [(m.model, m.shape) for m in members if (m.model, m.shape) not in own]
+    ratio = believed(evidence(run, found, ())[0], alike(scores))
+    sets = Sets.of(evidence(run, found, asked, with_spread=False)[0], members, stated, ratio)
+    here = sets.set_of(found)
+    met = sets.likely([here], MOST_EFFECTS)
+    # What comes on top of the fit is for the next step.
+    named = [s for s in met if s and not s >= here and not any(sets.members[k].nameless for k in s)]
+    near = sorted((s for s in named if met[s] < met[here] + _LEAST_GAIN), key=met.__getitem__)
+    fits = [found]
+    for chosen in near[:_PROPOSED]:
+        terms = terms_of(sets.in_order(chosen), found)
+        fits.append(refined(run, fit(run, found.state, terms, _RIVAL_ITERATIONS)))
+    surprise = [surprise_of(f, laws, stated, ratio) for f in fits]
+    best = int(np.argmin(surprise))
+    return fits[best], tuple(f for k, f in enumerate(fits) if k != best)

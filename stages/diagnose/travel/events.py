@@ -72,7 +72,7 @@ def _joined(sight: Sight, events: tuple[Event, ...]) -> tuple[Event, ...]:
     """Return the events; a step with others that come while a wheel may still be slipping is one of them."""
     out: list[Event] = []
     for event in sorted(events, key=lambda e: e.place - e.during):
-        both = _one_slip(out[-1], event) if out else None
+        both = _one_slip(out[-1], event, len(sight.time_s) - 1) if out else None
         lasts_s = LONGEST_S if both is None else _around_s(sight, both)[1] - _around_s(sight, both)[0]
         # Between the pictures around it the slip is shorter than that by as much as a picture's time.
         if both is not None and lasts_s < LONGEST_S + sight.time_s[both.place] - sight.time_s[both.place - 1]:
@@ -82,12 +82,15 @@ def _joined(sight: Sight, events: tuple[Event, ...]) -> tuple[Event, ...]:
     return tuple(out)
 
 
-def _one_slip(first: Event, second: Event) -> Event | None:
-    """Return the slip that two events are together; None where both are stray pictures."""
+def _one_slip(first: Event, second: Event, last: int) -> Event | None:
+    """Return the slip that two events are together; None where both are stray pictures.
+
+    It begins behind the first picture and has ended at the ``last`` one.
+    """
     if EventKind.STEP not in (first.kind, second.kind):
         return None
-    begins = min(e.place - e.during for e in (first, second))
-    end = max(e.place + (e.kind is EventKind.OUTLIER) for e in (first, second))
+    begins = max(min(e.place - e.during for e in (first, second)), 1)
+    end = min(max(e.place + (e.kind is EventKind.OUTLIER) for e in (first, second)), last)
     return Event(EventKind.STEP, end, end - begins)
 
 

@@ -1,0 +1,113 @@
+"""Hypotheses of left-out effects, each with its likelihood on all measurements and on regimes held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.gauge.elimination import Part
+from stages.diagnose.gauge.fit import Fit, evidence
+from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.sets import (
+    prior_sigma,
+)
+from stages.diagnose.inference import Evidence, Stated, estimate, total
+
+_STRETCHES = 2
+_LEAST_FRAMES = 8
+
+
+@dataclass(frozen=True)
+class Regime:
+    """A part of the run that can be held out: its name, its frames (N,), the bore its rings lie in."""
+
+    name: str
+    part: Part
+    section: int
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A hypothesis with its fit and how it does.
+
+    Attributes
+    ----------
+    fit : Fit
+    evidence : Evidence
+        Of the whole run.
+    by_regime : tuple of Evidence
+        Of each regime on its own.
+    surprise, heldout : float
+        −2 ln of the likelihood of all, and of each regime given the others, over by how much neighbours err
+        alike.
+    beforehand : float
+        −2 ln of its chance before anything was measured.
+    """
+
+    fit: Fit
+    evidence: Evidence
+    by_regime: tuple[Evidence, ...]
+    surprise: float
+    heldout: float
+    beforehand: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects, in order."""
+        return tuple(sorted(t.model.name for t in self.fit.terms))
+
+    @property
+    def laws(self) -> tuple[str, ...]:
+        """Names of the effects' laws, in order."""
+        return tuple(sorted({t.model.law for t in self.fit.terms}))
+
+    @property
+    def library_terms(self) -> tuple[Term, ...]:
+        """The effects of the library; patterns for what they leave stand behind them."""
+        return tuple(t for t in self.fit.terms if not isinstance(t.model, Nameless))
+
+    @property
+    def named(self) -> bool:
+        """Whether all its effects are of the library, and there are some."""
+        return bool(self.fit.terms) and not any(isinstance(t.model, Nameless) for t in self.fit.terms)
+
+
+def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
+    """Return stretches of the run within one bore each."""
+    count = len(run.time_s)
+    votes = np.zeros((count, int(run.rings.section.max(initial=0)) + 1))
+    np.add.at(votes, (run.rings.frame, run.rings.section), 1)
+    seen = np.flatnonzero(votes.sum(1))
+    nearest = seen[np.abs(np.arange(count)[:, None] - seen).argmin(1)] if len(seen) else np.zeros(count, int)
+    section = votes.argmax(1)[nearest]
+    out = []
+    for k in range(votes.shape[1]):
+        frames = np.flatnonzero(section == k)
+        for n, piece in enumerate(np.array_split(frames, _STRETCHES)):
+            if len(piece) >= _LEAST_FRAMES:
+                mask = np.zeros(count, bool)
+                mask[piece] = True
+                out.append(Regime(f"bore {k + 1}, stretch {n + 1}", Part(mask), k))
+    return tuple(out)
+
+
+def judged_of(
+    run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, alike: float, before: float = 0.0
+) -> Judged:
+    """Return the hypothesis' evidence and its surprise, held out and not."""
+    whole, *parts = evidence(run, found, (), [r.part for r in regimes])
+    sigma = prior_sigma(whole, found.terms)
+
+    def surprise(of: Evidence) -> float:
+        return estimate(of.deflated(alike), stated, sigma).surprise
+
+    if len(parts) < 2:
+        return Judged(found, whole, tuple(parts), surprise(whole), surprise(whole), before)
+    together = surprise(total(parts).over(whole.columns))
+    heldout = [
+        together - surprise(total([p for p in parts if p is not left]).over(whole.columns)) for left in parts
+    ]
+    return Judged(found, whole, tuple(parts), surprise(whole), float(np.sum(heldout)), before)

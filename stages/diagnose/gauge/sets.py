@@ -1,0 +1,265 @@
+"""Sets of effects compared on one linearisation: none is left out because nobody fitted it.
+
+Around a fit all effects of the library, at their best shapes, and all patterns without a cause are columns of
+one evidence. The marginal likelihood of any set of them is then a matter of a few small factorisations, and
+sets are gone through from the likeliest to their neighbours: one added, one dropped, one exchanged. C. Hans,
+A. Dobra, M. West, "Shotgun stochastic search for large p regression", J. Am. Stat. Assoc., 2007, without its
+drawing of lots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from pipeline.adjustment.normal_equations import marginalised
+from pipeline.arrays import Float, Int
+from pipeline.physics.effect import CourseKind
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.courses import SEARCHED, Coursed
+from stages.diagnose.effects.free_profile import FREE_PROFILES
+from stages.diagnose.effects.nameless import VOCABULARY, Nameless
+from stages.diagnose.gauge.fit import Fit, evidence
+from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.scan import Scored, span
+from stages.diagnose.inference import (
+    INSTRUMENT,
+    PRIOR_PLAUSIBLE,
+    Evidence,
+    Stated,
+    estimate,
+    instrument_places,
+    places_of,
+)
+
+Set = frozenset[int]
+# A law and its order, whatever its course: what a name stands for.
+Cause = tuple[str, Shape]
+# Likelihoods do not contain the small errors of laws and of image formation: what looks like odds of 1000 to
+# 1 counts as 100 to 1. A drawn focal length was once called a cone at 100 to 1. Debt: data/debts.md.
+_TEMPERED = 1.5
+# Prior: all effects of the library are equally likely, and what has a pattern without a cause is 50 times
+# less likely, because such a pattern can imitate any law. Whether a law suffices is tested separately.
+# Debt: data/debts.md.
+_NAMELESS = 1 / 50
+_PEAK = 2
+# Relative error of laws: a pattern that differs less from an effect describes it. Debt: data/debts.md.
+SAME = 0.02
+PATTERNS: tuple[tuple[Nameless, Shape], ...] = (*VOCABULARY, *FREE_PROFILES)
+# Neighbours are looked at of the likeliest sets only, and of those that are at least so likely beside the
+# best: ten of them weigh less than what a name may be wrong by.
+_LOOKED_AT, _WORTH = 40, 1e-3
+
+
+@dataclass(frozen=True)
+class Member:
+    """What a set may hold: an effect at a shape, and −2 ln of its chance beforehand among its own kind."""
+
+    model: EffectModel
+    shape: Shape
+    beforehand: float
+
+    @property
+    def nameless(self) -> bool:
+        """Whether it is a pattern without a cause."""
+        return isinstance(self.model, Nameless)
+
+    @property
+    def cause(self) -> Cause:
+        """What its name stands for."""
+        return cause_of(self.model, self.shape)
+
+
+def cause_of(model: EffectModel, shape: Shape) -> Cause:
+    """Return the law and, where it may come more than once, its order."""
+    own = model.own if isinstance(model, Coursed) else shape if model.repeats else ()
+    return model.law, own
+
+
+def believed(of: Evidence, alike: float) -> float:
+    """Return what a difference of χ² is divided by before it is believed.
+
+    It is at least by how much the true variance of the scores of what was found exceeds that of independent
+    errors.
+    """
+    effects = np.array([c.effect != INSTRUMENT for c in of.columns], bool)
+    own, true = np.diag(of.information)[effects], np.diag(of.score_covariance)[effects]
+    return float(max(_TEMPERED * alike, np.max(true / np.maximum(own, 1e-300), initial=1.0)))
+
+
+def beforehand(run: GaugeRun, terms: Sequence[tuple[EffectModel, Shape]], laws: int) -> float:
+    """Return −2 ln of a set's chance beforehand: how many others there are like it, shapes included."""
+    unknown = any(isinstance(model, Nameless) for model, _ in terms)
+    each = sum(_one_beforehand(run, model, shape, laws) for model, shape in terms)
+    return float(each - 2 * np.log(_NAMELESS) * unknown)
+
+
+def _one_beforehand(run: GaugeRun, model: EffectModel, shape: Shape, laws: int) -> float:
+    """Return −2 ln of the chance of an effect or pattern among its own kind."""
+    if (model, shape) in PATTERNS:
+        return float(2 * np.log(len(PATTERNS)))
+    courses = len(SEARCHED) if isinstance(model, Coursed) else 1
+    return float(2 * np.log(laws * courses * max(len(model.shapes(*span(run))) / _PEAK, 1.0)))
+
+
+def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
+    """Return (K,) 1 σ of amplitudes beforehand; infinite for the instrument, which has its own."""
+    plausible = {(t.model.name, a.name): a.plausible for t in terms for a in t.amplitudes}
+    return np.array(
+        [
+            np.inf if c.effect == INSTRUMENT else PRIOR_PLAUSIBLE * plausible[c.effect, c.amplitude]
+            for c in of.columns
+        ]
+    )
+
+
+def surprise_of(found: Fit, laws: int, stated: Stated, believed: float) -> float:
+    """Return −2 ln of the chance of a fit's effects, up to a constant."""
+    of = evidence(found.run, found, (), with_spread=False)[0].deflated(believed)
+    chance = beforehand(found.run, [(t.model, t.shape) for t in found.terms], laws)
+    return estimate(of, stated, prior_sigma(of, found.terms)).surprise + chance
+
+
+def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -> tuple[Member, ...]:
+    """Return what may be in the place of a fit's effects or beside them: these, all scored, all patterns.
+
+    Laws that come at a time may come at that of a found one.
+    """
+    asked = [(t.model, t.shape) for t in found.terms]
+    asked += [(s.model, s.shape) for s in scores]
+    asked += [
+        (s.model, t.shape)
+        for s in scores
+        for t in found.terms
+        if s.model.kind is t.model.kind and s.model.kind is not CourseKind.CONSTANT
+    ]
+    each = dict.fromkeys((*asked, *PATTERNS))
+    return tuple(Member(model, shape, _one_beforehand(run, model, shape, laws)) for model, shape in each)
+
+
+def terms_of(members: Sequence[Member], found: Fit) -> tuple[Term, ...]:
+    """Return a set's terms to begin a fit with: those of another fit as they are, others of size zero."""
+    kept = {(t.model.name, t.shape): t for t in found.terms}
+    return tuple(
+        kept.get((m.model.name, m.shape), Term(m.model, m.shape, np.zeros(len(m.model.amplitudes))))
+        for m in members
+    )
+
+
+@dataclass(frozen=True)
+class Sets:
+    """Marginal likelihoods of sets of members.
+
+    Attributes
+    ----------
+    members : tuple of Member
+    place : tuple of (Q,) int
+        Each one's columns.
+    information, right : (K, K), (K,)
+        Normal equations of all columns in units of their 1 σ beforehand, the stated instrument eliminated.
+    sigma : (K,)
+        That 1 σ.
+    """
+
+    members: tuple[Member, ...]
+    place: tuple[Int, ...]
+    information: Float
+    right: Float
+    sigma: Float
+
+    @staticmethod
+    def of(about: Evidence, members: Sequence[Member], stated: Stated, believed: float) -> Sets:
+        """Return the sets of members that an evidence tells of; χ² is divided by ``believed``."""
+        out = instrument_places(about)
+        left = marginalised(
+            about.information / believed + stated.over(about.columns), about.right / believed, out, 1e-13
+        )
+        kept = np.setdiff1d(np.arange(len(about.columns)), out)
+        sigma = np.zeros(len(kept))
+        seen, place = [], []
+        for member in members:
+            at = np.searchsorted(kept, places_of(about, member.model, member.shape))
+            sigma[at] = [PRIOR_PLAUSIBLE * a.plausible for a in member.model.amplitudes]
+            if len(at) and np.diag(left.information)[at].min() > 0:
+                seen.append(member)
+                place.append(at)
+        scaled = left.information * np.outer(sigma, sigma)
+        return Sets(tuple(seen), tuple(place), scaled, left.right * sigma, sigma)
+
+    def surprise(self, chosen: Set) -> float:
+        """Return −2 ln of a set's chance, up to a constant."""
+        before = sum(self.members[k].beforehand for k in chosen)
+        before -= 2 * np.log(_NAMELESS) * any(self.members[k].nameless for k in chosen)
+        if not chosen:
+            return 0.0
+        at = np.concatenate([self.place[k] for k in sorted(chosen)])
+        root = cholesky(np.eye(len(at)) + self.information[np.ix_(at, at)], lower=True, check_finite=False)
+        gain = solve_triangular(root, self.right[at], lower=True, check_finite=False)
+        return float(before + 2 * np.sum(np.log(np.diag(root))) - gain @ gain)
+
+    def in_order(self, chosen: Set) -> tuple[Member, ...]:
+        """Return a set's members."""
+        return tuple(self.members[k] for k in sorted(chosen))
+
+    def amplitudes(self, chosen: Set) -> tuple[Float, ...]:
+        """Return the amplitudes (Q,) of each member of a set at their best."""
+        each = [self.place[k] for k in sorted(chosen)]
+        at = np.concatenate([np.zeros(0, np.int64), *each])
+        both = np.eye(len(at)) + self.information[np.ix_(at, at)]
+        best = np.linalg.solve(both, self.right[at]) * self.sigma[at]
+        return tuple(np.split(best, np.cumsum([len(p) for p in each])[:-1]))
+
+    def set_of(self, found: Fit) -> Set:
+        """Return the set of a fit's effects and patterns."""
+        own = {(t.model.name, t.shape) for t in found.terms}
+        return frozenset(k for k, m in enumerate(self.members) if (m.model.name, m.shape) in own)
+
+    def without_echoes(self, chosen: Set) -> Sets:
+        """Return the sets less the patterns that describe one of some effects: they are no rivals of it."""
+        echoes = {
+            k for k, member in enumerate(self.members)
+            if member.nameless and k not in chosen and any(self._apart(k, c) < SAME**2 for c in chosen)
+        }  # fmt: skip
+        kept = [k for k in range(len(self.members)) if k not in echoes]
+        return replace(
+            self, members=tuple(self.members[k] for k in kept), place=tuple(self.place[k] for k in kept)
+        )
+
+    def _apart(self, pattern: int, effect: int) -> float:
+        """Return the share of a pattern's information that is left when an effect is free."""
+        at, free = self.place[pattern], self.place[effect]
+        own, both = self.information[np.ix_(at, at)], self.information[np.ix_(free, at)]
+        taken = both.T @ np.linalg.lstsq(self.information[np.ix_(free, free)], both)[0]
+        return float(1 - np.trace(np.linalg.lstsq(own, taken)[0]) / len(at))
+
+    def likely(self, first: Collection[Set], most: int) -> dict[Set, float]:
+        """Return the surprise of all sets of up to ``most`` members that were met on the way from some."""
+        met = {chosen: self.surprise(chosen) for chosen in first}
+        looked_at: set[Set] = set()
+        while len(looked_at) < _LOOKED_AT:
+            best = min(met.values())
+            ahead = [s for s in met if s not in looked_at and met[s] < best - 2 * np.log(_WORTH)]
+            if not ahead:
+                break
+            here = min(ahead, key=met.__getitem__)
+            looked_at.add(here)
+            for near in self._near(here, most):
+                if near not in met:
+                    met[near] = self.surprise(near)
+        return met
+
+    def _near(self, chosen: Set, most: int) -> Iterator[Set]:
+        """Yield the sets with one member more, less or exchanged; a model that does not repeat comes once."""
+        for gone in (None, *chosen):
+            rest = chosen - {gone} if gone is not None else chosen
+            if gone is not None:
+                yield rest
+            if len(rest) == most:
+                continue
+            taken = {self.members[k].model.name for k in rest if not self.members[k].model.repeats}
+            for k, member in enumerate(self.members):
+                if k not in rest and member.model.name not in taken:
+                    yield rest | {k}

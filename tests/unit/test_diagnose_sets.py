@@ -1,0 +1,98 @@
+"""Sets of effects about one linearisation, against dense brute force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.free_profile import FREE_PROFILES
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.nameless import GENERIC, STEADY
+from stages.diagnose.gauge.sets import Member, Sets, believed, cause_of
+from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Column, Evidence, Stated
+
+CONE, BASELINE, FOCAL = (LIBRARY[name] for name in ("laser_cone", "baseline", "focal_scale"))
+LINE = next(t for t in GENERIC if t.name == "generic_line_0_2")
+EFFECTS: tuple[tuple[EffectModel, Shape], ...] = ((CONE, ()), (BASELINE, ()), (FOCAL, ()), (LINE, STEADY))
+STATED = Stated(("fx",), np.array([[4.0]]))
+ROWS = 300
+
+
+def columns_of(effects: tuple[tuple[EffectModel, Shape], ...]) -> tuple[Column, ...]:
+    return (
+        Column(INSTRUMENT, "fx"),
+        *(Column(m.name, a.name, shape) for m, shape in effects for a in m.amplitudes),
+    )
+
+
+def evidence_of(design: np.ndarray, measured: np.ndarray, columns: tuple[Column, ...]) -> Evidence:
+    a = design.T @ design
+    return Evidence(columns, a, design.T @ measured, a, float(measured @ measured), np.full(len(a), np.inf))
+
+
+def drawn(true: dict[int, float], like: float = 0.0) -> tuple[Sets, np.ndarray, np.ndarray]:
+    """Return sets of four, of which the amplitudes ``true`` are there, with rows and measurements.
+
+    The pattern is the cone but for a share ``1 - like`` of its rows' noise.
+    """
+    random = np.random.default_rng(5)
+    sigma = PRIOR_PLAUSIBLE * np.array([m.amplitudes[0].plausible for m, _ in EFFECTS])
+    design = random.normal(size=(ROWS, 5)) / np.array([1.0, *sigma])
+    if like:
+        design[:, 4] = (design[:, 1] * sigma[0] + (1 - like) * design[:, 4] * sigma[3]) / sigma[3]
+    measured = random.normal(size=ROWS) + sum(design[:, 1 + k] * size * sigma[k] for k, size in true.items())
+    members = [Member(m, shape, 2 * np.log(40)) for m, shape in EFFECTS]
+    of = evidence_of(design, np.asarray(measured), columns_of(EFFECTS))
+    return Sets.of(of, members, STATED, 1.0), design * np.array([1.0, *sigma]), np.asarray(measured)
+
+
+def test_the_surprise_of_a_set_is_its_marginal_likelihood_and_its_chance_beforehand():
+    sets, rows, measured = drawn({0: 0.5})
+
+    def exact(chosen: frozenset[int], nameless: bool) -> float:
+        used = rows[:, [0, *(1 + k for k in chosen)]]
+        covariance = np.eye(ROWS) + used @ np.diag([0.25, *np.ones(len(chosen))]) @ used.T
+        likelihood = stats.multivariate_normal(np.zeros(ROWS), covariance).logpdf(measured)
+        return float(-2 * likelihood + 2 * len(chosen) * np.log(40) + 2 * np.log(50) * nameless)
+
+    nothing = exact(frozenset(), False)
+    for chosen, nameless in ((frozenset({0}), False), (frozenset({1, 2}), False), (frozenset({0, 3}), True)):
+        assert sets.surprise(chosen) == pytest.approx(exact(chosen, nameless) - nothing, abs=1e-6)
+
+
+def test_what_is_there_is_reached_from_a_wrong_set_and_its_amplitudes_are_told():
+    sets, _, _ = drawn({0: 0.6, 1: -0.7})
+    met = sets.likely([frozenset({2, 3})], 3)
+    best = min(met, key=met.__getitem__)
+    assert best == {0, 1}
+    told = [a[0] / (PRIOR_PLAUSIBLE * m.amplitudes[0].plausible)
+            for m, a in zip((CONE, BASELINE), sets.amplitudes(best), strict=True)]  # fmt: skip
+    # 300 rows of noise 1 tell an amplitude to 0.06.
+    assert told == pytest.approx([0.6, -0.7], abs=0.25)
+    assert max(map(len, met)) == 3
+
+
+@pytest.mark.parametrize(("like", "left"), [(0.99, 3), (0.8, 4)])
+def test_a_pattern_that_describes_an_effect_is_no_rival_of_it(like, left):
+    sets, _, _ = drawn({0: 1.0}, like)
+    assert len(sets.without_echoes(frozenset({0})).members) == left
+
+
+def test_differences_are_believed_no_further_than_the_scores_of_what_was_found_spread():
+    of = evidence_of(np.eye(5), np.zeros(5), columns_of(EFFECTS))
+    assert believed(of, 2.0) == pytest.approx(3.0)
+    assert believed(replace(of, score_covariance=9.0 * of.information), 2.0) == pytest.approx(9.0)
+
+
+def test_a_name_is_a_law_and_an_order_whatever_the_course():
+    waves = LIBRARY["sheet_waviness"]
+    assert cause_of(waves, (2.0,)) != cause_of(waves, (3.0,))
+    assert cause_of(CONE, ()) == ("laser_cone", ())
+
+
+def test_a_free_profile_holds_every_power_of_its_harmonic():
+    names = {model.name: len(model.amplitudes) for model, _ in FREE_PROFILES}
+    assert names["generic_line_0_any"] == 4
+    assert names["generic_outward_1_any"] == 8
