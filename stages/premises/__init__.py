@@ -15,6 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
 from pipeline.recording.checks import CheckedFrames, withheld_frames
+from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
 from stages.premises.light import (
     Light,
     alike,
@@ -89,8 +90,10 @@ def check_premises(
     label = np.where(copy, _stated(table, story.row), label)
     steps = steps_of_wall(pictures, light, copy)
     row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder)
-    time_s = row_times(table, row)
-    changes = _Changes(recording.frames, label, row, story.swapped)
+    stated_s = row_times(table, row)
+    jumps = clock_jumps(stated_s, steps, recording.encoder)
+    time_s = without_jumps(stated_s, jumps)
+    changes = _Changes(recording.frames, label, row, time_s)
     _refuse_unmended(changes, parameters)
     _warn_of_frames(changes, pictures, light, table, context)
     _warn_of(
@@ -101,7 +104,7 @@ def check_premises(
     radius_mm = radius_seen_mm(pictures, probe)
     check_diameter(radius_mm, recording.pipe, context)
     factor = encoder_factor(recording, time_s, steps, radius_mm, context)
-    _warn_of_clock(time_s, recording, context)
+    warn_of_clock(jumps, time_s, recording, context)
     _report(pictures, radius_mm, changes, context)
     keep = np.concatenate([[True], np.diff(row) > 0]) & ~copy
     withheld = withheld_frames(label[keep], parameters.withhold)
@@ -199,7 +202,7 @@ class _Changes:
     frames: FrameTable
     label: Labels
     row: Int
-    swapped: Bool
+    time_s: Float
 
     @property
     def relabelled(self) -> Bool:
@@ -207,7 +210,7 @@ class _Changes:
 
     @property
     def retimed(self) -> Bool:
-        return np.asarray(self.row != np.arange(len(self.row)))
+        return np.asarray(self.time_s != self.frames.time_s)
 
     def lost(self) -> list[tuple[int, int]]:
         """Return (frame, number) wherever pictures were lost before a frame."""
@@ -268,19 +271,6 @@ def _warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
 def _listed(names: Sequence[str] | Int) -> str:
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     return ", ".join(map(str, names[:_SHOWN])) + more
-
-
-def _warn_of_clock(time_s: Float, recording: Recording, context: Context) -> None:
-    """Tell when frames do not follow each other at the stated rate."""
-    if len(time_s) < 2:
-        return
-    rate = 1 / float(np.median(np.diff(time_s)))
-    if max(rate / recording.frame_rate, recording.frame_rate / rate) > 1.2:
-        context.warn(
-            f"by frames.csv {rate:.3g} frames were taken a second, recording.yaml states "
-            f"{recording.frame_rate:g}. What to do: check the unit (s) of time_s; speeds and the encoder's "
-            "match rest on it"
-        )
 
 
 def _report(pictures: Pictures, radius_mm: float, changes: _Changes, context: Context) -> None:

@@ -303,3 +303,17 @@ def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():
     encoder = Encoder(table.time_s, 10.0 * table.time_s)
     row = rows_by_motion(np.arange(120), steps, 2, table, encoder)
     np.testing.assert_array_equal(row, np.arange(120))
+
+
+@pytest.mark.parametrize("stood", [False, True])
+def test_a_jump_of_the_clock_is_taken_out_and_a_probe_that_stood_is_not(stood, good, run):
+    """At 5 s the run came out more than twice as long as it was."""
+    time_s = good.frames.time_s + np.where(np.arange(COUNT) >= 30, 5.0, 0.0)
+    read_s = np.linspace(-1, 8, 900)
+    moved_s = read_s - np.clip(read_s - good.frames.time_s[30], 0, 5) if stood else read_s
+    encoder = Encoder(read_s, 30 * STEP_MM * moved_s)
+    spoiled = replace(good, frames=replace(good.frames, time_s=time_s), listed=None, encoder=encoder)
+    found, told = checked(spoiled, run.probe)
+    np.testing.assert_allclose(found.time_s, time_s if stood else good.frames.time_s, atol=1e-6)
+    assert len(told) == (not stood)
+    assert stood or "jumps by 5 s before frame 30" in told[0]

@@ -1,0 +1,92 @@
+"""The camera's clock: its rate, and jumps of it while wall and encoder went on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.machine.stage import Context
+from pipeline.recording.base import Encoder, Recording
+from stages.premises.light import Steps
+
+# Frame times from which a gap in the times is looked at: lost pictures that the table knows of are fewer.
+_GAP = 4.0
+# A step of the wall over the gap is a usual one within this factor. With the gap as stated the encoder must
+# differ from the wall by more than it, and by less without: steps err by a tenth.
+_LIKE = 2.0
+_FEWEST = 8
+
+
+@dataclass(frozen=True)
+class ClockJump:
+    """The clock jumped by ``by_s`` before picture ``place``."""
+
+    place: int
+    by_s: float
+
+
+def clock_jumps(time_s: Float, steps: Steps, encoder: Encoder | None) -> list[ClockJump]:
+    """Return the gaps in the times (F,) of pictures over which the wall went on as from picture to picture.
+
+    If the encoder shows such a step too once the gap is taken out, and not as stated, the clock jumped. If it
+    shows the step as stated, the probe stood meanwhile and the times are right.
+    """
+    period = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    if encoder is None or len(steps.end) < _FEWEST:
+        return []
+    gap = np.flatnonzero(np.diff(time_s) > _GAP * period) + 1
+    found = [ClockJump(int(k), float(time_s[k] - time_s[k - 1] - period)) for k in gap]
+    return [jump for jump in found if _jumped(jump, time_s, steps, encoder)]
+
+
+def without_jumps(time_s: Float, jumps: list[ClockJump]) -> Float:
+    """Return times (F,) without the jumps of the clock."""
+    out = time_s.copy()
+    for jump in jumps:
+        out[jump.place :] -= jump.by_s
+    return out
+
+
+def _jumped(jump: ClockJump, time_s: Float, steps: Steps, encoder: Encoder) -> bool:
+    over = (steps.start < jump.place) & (steps.end >= jump.place)
+    usual = float(np.median(steps.size[~over])) if not over.all() else 0.0
+    if not over.any() or usual == 0:
+        return False
+    by_encoder = _advance(time_s, steps, encoder)
+    moving = ~over & (steps.size / usual > 1 / _LIKE)
+    mm_per_radius = float(np.median(by_encoder[moving] / steps.size[moving]))
+    wall = float(np.median(steps.size[over])) * mm_per_radius
+    stated = float(np.median(by_encoder[over]))
+    mended = float(np.median(_advance(without_jumps(time_s, [jump]), steps, encoder)[over]))
+    return _alike(wall, usual * mm_per_radius) and not _alike(stated, wall) and _alike(mended, wall)
+
+
+def _advance(time_s: Float, steps: Steps, encoder: Encoder) -> Float:
+    """Return by how much the encoder advances over each step (K,), in its own unit."""
+    read = np.interp(time_s, encoder.time_s, encoder.distance_mm)
+    return np.asarray(read[steps.end] - read[steps.start])
+
+
+def _alike(one: float, other: float) -> bool:
+    return bool(one * other > 0 and 1 / _LIKE < one / other < _LIKE)
+
+
+def warn_of_clock(jumps: list[ClockJump], time_s: Float, recording: Recording, context: Context) -> None:
+    """Tell of jumps of the clock, and when frames do not follow each other at the stated rate."""
+    for jump in jumps:
+        context.warn(
+            f"the clock of frames.csv jumps by {jump.by_s:.3g} s before frame "
+            f"{recording.frames.frame[jump.place]}: wall and encoder go on as from one picture to the next. "
+            "The jump is taken out of the times. What to do: nothing, or see what set the recorder's clock"
+        )
+    if len(time_s) < 2:
+        return
+    rate = 1 / float(np.median(np.diff(time_s)))
+    if max(rate / recording.frame_rate, recording.frame_rate / rate) > 1.2:
+        context.warn(
+            f"by frames.csv {rate:.3g} frames were taken a second, recording.yaml states "
+            f"{recording.frame_rate:g}. What to do: check the unit (s) of time_s; speeds and the encoder's "
+            "match rest on it"
+        )
