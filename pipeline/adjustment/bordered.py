@@ -211,7 +211,10 @@ class BorderedSystem:
             band[:, 0, diagonal, diagonal] *= 1 + damping
         banded = BandedCholesky.of_band(band)
         solved = banded.solve(sums.border)
-        left = cho_factor(corner - sums.border.T @ solved)
+        reduced = corner - sums.border.T @ solved
+        if not np.isfinite(reduced).all():
+            raise np.linalg.LinAlgError("its equations are not finite")
+        left = cho_factor(reduced)
         return Factor(banded, sums.border, solved, left, sums.right, sums.right_border)
 
 

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from pipeline.arrays import Bool, Float, Int
+from pipeline.arrays import Int
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
 from pipeline.recording.checks import CheckedFrames, withheld_frames
+from stages.premises.changes import Changes, warn_of, warn_of_frames
 from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
 from stages.premises.light import (
     Light,
@@ -29,6 +27,7 @@ from stages.premises.light import (
     rows_of_repeats,
     steps_of_wall,
 )
+from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
 from stages.premises.rows import Lights, Story, cheapest_story
 from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm
@@ -36,7 +35,6 @@ from stages.premises.stays import places_that_stay
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
-_SHOWN = 8
 # Where all pictures look alike, the light that at least this share of the rows states is believed: the other
 # rows are slips of the pen. With a smaller share the table itself is refused.
 _MOST_ROWS = 2 / 3
@@ -79,7 +77,10 @@ def check_premises(
     """
     pictures = look_at_pictures(recording, probe, context)
     table = _table(recording)
-    light = _light(recording.frames, pictures)
+    seen_light = _light(recording.frames, pictures)
+    outside = off_the_pipe(pictures)
+    astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, seen_light))
+    light = np.where(astray | outside, Light.UNKNOWN, seen_light)
     shown = light if np.any(light == Light.WALL) else _lights_of(recording.frames.illumination)
     stays = places_that_stay(recording, probe, recording.frames.frame[shown == Light.WALL], context)
     if stays is not None:
@@ -93,10 +94,18 @@ def check_premises(
     stated_s = row_times(table, row)
     jumps = clock_jumps(stated_s, steps, recording.encoder)
     time_s = without_jumps(stated_s, jumps)
-    changes = _Changes(recording.frames, label, row, time_s)
+    changes = Changes(recording.frames, label, row, time_s)
     _refuse_unmended(changes, parameters)
-    _warn_of_frames(changes, pictures, light, table, context)
-    _warn_of(
+    warn_of_frames(changes, pictures, np.where(outside, Light.WALL, seen_light), table, context)
+    warn_of(
+        recording.frames.frame[outside], "before the first laser line or behind the last are left out",
+        "nothing, if the probe was outside the pipe there; else see why the laser was off", context,
+    )  # fmt: skip
+    warn_of(
+        recording.frames.frame[astray], "were stored in another order than they were taken, and are left out",
+        "look whether the recorder, or what cut the video, mixes pictures up", context,
+    )  # fmt: skip
+    warn_of(
         recording.frames.frame[copy],
         "show the picture before once more in place of their own and are left out: the recorder hung",
         "nothing, if what was passed meanwhile need not be seen", context,
@@ -106,7 +115,7 @@ def check_premises(
     factor = encoder_factor(recording, time_s, steps, radius_mm, context)
     warn_of_clock(jumps, time_s, recording, context)
     _report(pictures, radius_mm, changes, context)
-    keep = np.concatenate([[True], np.diff(row) > 0]) & ~copy
+    keep = np.concatenate([[True], np.diff(row) > 0]) & ~(copy | astray | outside)
     withheld = withheld_frames(label[keep], parameters.withhold)
     context.report("frames withheld from measurement", int(withheld.sum()), "frames")
     return CheckedFrames(
@@ -195,30 +204,7 @@ def _labels(table: FrameTable, story: Story, light: Int, pictures: Pictures) -> 
     return np.asarray(np.where(light == Light.UNKNOWN, believed, shown))
 
 
-@dataclass(frozen=True)
-class _Changes:
-    """What differs between the recording's frames and what the pictures show."""
-
-    frames: FrameTable
-    label: Labels
-    row: Int
-    time_s: Float
-
-    @property
-    def relabelled(self) -> Bool:
-        return np.asarray(self.label != self.frames.illumination)
-
-    @property
-    def retimed(self) -> Bool:
-        return np.asarray(self.time_s != self.frames.time_s)
-
-    def lost(self) -> list[tuple[int, int]]:
-        """Return (frame, number) wherever pictures were lost before a frame."""
-        skipped = np.diff(self.row, prepend=-1) - 1
-        return [(int(self.frames.frame[k]), int(skipped[k])) for k in np.flatnonzero(skipped > 0)]
-
-
-def _refuse_unmended(changes: _Changes, parameters: PremisesParameters) -> None:
+def _refuse_unmended(changes: Changes, parameters: PremisesParameters) -> None:
     wrong = changes.frames.frame[changes.relabelled | changes.retimed]
     if wrong.size and not parameters.mend:
         raise UnusableError(
@@ -229,51 +215,7 @@ def _refuse_unmended(changes: _Changes, parameters: PremisesParameters) -> None:
         )
 
 
-def _warn_of_frames(
-    changes: _Changes, pictures: Pictures, light: Int, table: FrameTable, context: Context
-) -> None:
-    """Tell of lost pictures, wrong labels, a video cut short and pictures that show nothing."""
-    frame, lost = changes.frames.frame, changes.lost()
-    if lost:
-        context.warn(
-            f"{sum(n for _, n in lost)} pictures were lost without frames.csv knowing: before "
-            f"{_listed([f'frame {f} ({n})' for f, n in lost])}. Times and lights of the "
-            f"{changes.retimed.sum()} frames behind were taken from the rows that belong to them. What to "
-            "do: nothing, if the recorder is known to drop frames; else correct frames.csv"
-        )
-    wrong = frame[changes.relabelled & ~changes.retimed]
-    if wrong.size:
-        context.warn(
-            f"the illumination in frames.csv is not what {len(wrong)} pictures show: frame {_listed(wrong)}. "
-            "The pictures are believed. What to do: correct the column illumination"
-        )
-    again = frame[np.diff(changes.row, prepend=-1) < 1]
-    left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
-    if left > 0:
-        context.warn(
-            f"the video ends early: frames.csv lists {left} of {len(table.frame)} frames more than there are "
-            "pictures. Only what was filmed is measured. What to do: copy the video again, it may be cut off"
-        )
-    _warn_of(again, "repeat the picture before and are left out", "nothing, or repair the recorder", context)
-    _warn_of(frame[~pictures.seen], "cannot be decoded", "copy the video again", context)
-    dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
-    _warn_of(
-        frame[dark], "show neither a closed laser line in the dark nor a lit wall, and count as stated",
-        "look at them: a covered lens, a lamp that failed, daylight", context,
-    )  # fmt: skip
-
-
-def _warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
-    if frame.size:
-        context.warn(f"{len(frame)} pictures {what}: frame {_listed(frame)}. What to do: {hint}")
-
-
-def _listed(names: Sequence[str] | Int) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(map(str, names[:_SHOWN])) + more
-
-
-def _report(pictures: Pictures, radius_mm: float, changes: _Changes, context: Context) -> None:
+def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Context) -> None:
     context.report("pictures looked at", int(pictures.seen.sum()), "frames")
     context.report("frames whose light was mended", int(changes.relabelled.sum()), "frames")
     context.report("frames whose time was mended", int(changes.retimed.sum()), "frames")

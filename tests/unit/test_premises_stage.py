@@ -317,3 +317,36 @@ def test_a_jump_of_the_clock_is_taken_out_and_a_probe_that_stood_is_not(stood, g
     np.testing.assert_allclose(found.time_s, time_s if stood else good.frames.time_s, atol=1e-6)
     assert len(told) == (not stood)
     assert stood or "jumps by 5 s before frame 30" in told[0]
+
+
+@pytest.mark.parametrize("first", [20, 31], ids=["laser-led", "led-laser"])
+@pytest.mark.parametrize("apart", [1, 2])
+def test_pictures_in_another_order_are_left_out_and_nothing_was_lost(first, apart, good, run):
+    """Neighbours exchanged in five places were told as "10 pictures lost", and 100 times were wrong."""
+    lit = first + (apart == 2 and first % 2 == 0)
+    order, wrong = np.arange(COUNT), [lit, lit + apart]
+    order[wrong] = order[wrong[::-1]]
+    shown = {k: good.source.images[order[k]] for k in range(COUNT)}
+    spoiled = replace(good, source=MemorySource(shown, run.probe.camera.image_size))
+    found, told = checked(spoiled, run.probe)
+    assert found.frame.tolist() == [k for k in range(COUNT) if k not in wrong]
+    np.testing.assert_allclose(found.time_s, good.frames.time_s[found.frame])
+    assert len(told) == 1
+    assert "2 pictures were stored in another order" in told[0]
+
+
+@pytest.mark.parametrize("outside", [slice(0, 20), slice(40, COUNT)], ids=["before", "behind"])
+def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
+    """A run that began outside ended with a fault of the program, after 4 pictures that were lost."""
+    width, height = run.probe.camera.image_size
+    draw = np.random.default_rng(1)
+    rooms = {
+        int(k): draw.uniform(0, 30 if k % 2 == 0 else 150, (height, width)) for k in range(COUNT)[outside]
+    }
+    away, shown = list(rooms), {k: room.astype(np.uint8) for k, room in rooms.items()}
+    source = MemorySource({**good.source.images, **shown}, run.probe.camera.image_size)
+    found, told = checked(replace(good, source=source), run.probe)
+    assert set(found.frame.tolist()) & set(away) <= {39, 41}
+    np.testing.assert_allclose(found.time_s, good.frames.time_s[found.frame])
+    assert len(told) == 1
+    assert "before the first laser line or behind the last" in told[0]

@@ -1,0 +1,87 @@
+"""What differs between a recording's tables and its pictures, and how it is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.arrays import Bool, Float, Int
+from pipeline.machine.stage import Context
+from pipeline.recording.base import FrameTable
+from stages.premises.light import Light
+from stages.premises.pictures import Pictures
+
+_SHOWN = 8
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What differs between the recording's frames and what the pictures show."""
+
+    frames: FrameTable
+    label: NDArray[np.str_]
+    row: Int
+    time_s: Float
+
+    @property
+    def relabelled(self) -> Bool:
+        """(F,) true where the light is another than stated."""
+        return np.asarray(self.label != self.frames.illumination)
+
+    @property
+    def retimed(self) -> Bool:
+        """(F,) true where the time is another than stated."""
+        return np.asarray(self.time_s != self.frames.time_s)
+
+    def lost(self) -> list[tuple[int, int]]:
+        """Return (frame, number) wherever pictures were lost before a frame."""
+        skipped = np.diff(self.row, prepend=-1) - 1
+        return [(int(self.frames.frame[k]), int(skipped[k])) for k in np.flatnonzero(skipped > 0)]
+
+
+def warn_of_frames(
+    changes: Changes, pictures: Pictures, light: Int, table: FrameTable, context: Context
+) -> None:
+    """Tell of lost pictures, wrong labels, a video cut short and pictures that show nothing."""
+    frame, lost = changes.frames.frame, changes.lost()
+    if lost:
+        context.warn(
+            f"{sum(n for _, n in lost)} pictures were lost without frames.csv knowing: before "
+            f"{_listed([f'frame {f} ({n})' for f, n in lost])}. Times and lights of the "
+            f"{changes.retimed.sum()} frames behind were taken from the rows that belong to them. What to "
+            "do: nothing, if the recorder is known to drop frames; else correct frames.csv"
+        )
+    wrong = frame[changes.relabelled & ~changes.retimed]
+    if wrong.size:
+        context.warn(
+            f"the illumination in frames.csv is not what {len(wrong)} pictures show: frame {_listed(wrong)}. "
+            "The pictures are believed. What to do: correct the column illumination"
+        )
+    again = frame[np.diff(changes.row, prepend=-1) < 1]
+    left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
+    if left > 0:
+        context.warn(
+            f"the video ends early: frames.csv lists {left} of {len(table.frame)} frames more than there are "
+            "pictures. Only what was filmed is measured. What to do: copy the video again, it may be cut off"
+        )
+    warn_of(again, "repeat the picture before and are left out", "nothing, or repair the recorder", context)
+    warn_of(frame[~pictures.seen], "cannot be decoded", "copy the video again", context)
+    dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
+    warn_of(
+        frame[dark], "show neither a closed laser line in the dark nor a lit wall, and count as stated",
+        "look at them: a covered lens, a lamp that failed, daylight", context,
+    )  # fmt: skip
+
+
+def warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
+    """Tell what some pictures do, their frames and what to do; nothing without any."""
+    if frame.size:
+        context.warn(f"{len(frame)} pictures {what}: frame {_listed(frame)}. What to do: {hint}")
+
+
+def _listed(names: Sequence[str] | Int) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(map(str, names[:_SHOWN])) + more

@@ -1,0 +1,86 @@
+"""Pictures stored in another order than they were taken, and those from before or behind the pipe."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from pipeline.arrays import Bool, Float, Int
+from stages.premises.light import Light, pattern_breaks
+from stages.premises.pictures import CLOSED, Pictures
+
+# In usual steps: two pictures exchanged go on by two, back by one, on by two. The middle between these and
+# one step on, or none.
+_ON, _BACK = 1.5, -0.5
+# Neighbours in two lights that were exchanged look like two losses, of which the wall shows nothing: it goes
+# on by 1 in place of 1.5 times the usual way at least.
+_NO_LOSS = 1.25
+_AROUND = 9
+_FEWEST = 12
+# The rhythm is looked at as far behind an exchange as its memory reaches.
+_BEHIND = 8
+# A run begins at its first closed line and ends at its last where none is seen for so many times as long as
+# is usual between two, and for a while: some rings in which nothing closes are no end.
+_LONG, _A_WHILE, _LEAST_LINES = 4, 8, 3
+
+
+def out_of_order(pictures: Pictures, light: Int) -> Bool:
+    """Return (F,) true for pictures that were exchanged with a neighbour, of the same light or of the other.
+
+    Those of the laser among themselves do not show it, and where lights are not told apart nothing does.
+    """
+    out = np.zeros(len(light), bool)
+    place = np.flatnonzero((light == Light.WALL) & (pictures.partner >= 0) & np.isfinite(pictures.step))
+    if len(place) < _FEWEST:
+        return out
+    size = pictures.step[place]
+    in_usual = size / median_filter(size, _AROUND, mode="nearest")
+    back = (in_usual[:-2] > _ON) & (in_usual[1:-1] < _BACK) & (in_usual[2:] > _ON)
+    out[place[:-2][back]] = out[place[1:-1][back]] = True
+    return out | _lights_exchanged(light, place, size)
+
+
+def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
+    """Return (F,) true for neighbours in two lights that break the rhythm, and would not the other way round.
+
+    Parameters
+    ----------
+    light : (F,)
+    place, size : (K,)
+        Pictures that show the wall, and its motion since the one before.
+    """
+    out = np.zeros(len(light), bool)
+    breaks = pattern_breaks(light)
+    way = np.cumsum(size)
+    speed = float(np.median(size / np.diff(place, prepend=place[0] - 1)))
+    for first in np.flatnonzero(breaks[:-1] & (light[:-1] != light[1:])):
+        last = int(np.searchsorted(place, first)) - 1
+        after = int(np.searchsorted(place, first + 1, side="right"))
+        if last < 0 or after >= len(place):
+            continue
+        usual = speed * (place[after] - place[last])
+        if 0 < (way[after] - way[last]) / usual < _NO_LOSS and _mends(light, breaks, int(first)):
+            out[first : first + 2] = True
+    return out
+
+
+def _mends(light: Int, breaks: Bool, first: int) -> bool:
+    """Return whether the rhythm is whole behind a picture that is exchanged with the next."""
+    other = light.copy()
+    other[[first, first + 1]] = light[[first + 1, first]]
+    behind = slice(first, first + _BEHIND)
+    return int(pattern_breaks(other)[behind].sum()) <= int(breaks[behind].sum()) - 2
+
+
+def off_the_pipe(pictures: Pictures) -> Bool:
+    """Return (F,) true for pictures before the first closed laser line and behind the last, if many."""
+    out = np.zeros(len(pictures.closed), bool)
+    lines = np.flatnonzero(pictures.closed > CLOSED)
+    if len(lines) < _LEAST_LINES:
+        return out
+    many = max(_LONG * float(np.median(np.diff(lines))), _A_WHILE)
+    if lines[0] > many:
+        out[: lines[0]] = True
+    if len(out) - 1 - lines[-1] > many:
+        out[lines[-1] + 1 :] = True
+    return out
