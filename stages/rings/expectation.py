@@ -65,9 +65,9 @@ def _warn_of_shares(validity: Byte, context: Context) -> None:
     if validity.size and unseen.mean() > _MOST_UNSEEN:
         context.warn(
             f"{100 * unseen.mean():.1f} % of the ring samples show no line that could be measured: it is too "
-            "faint or clipped, or there is no wall (a branch, an open joint); sound recordings lose none. What "
-            "to do: look where wall is missing in the model; else set the exposure of the laser frames anew, "
-            "clean window and laser"
+            "faint or clipped, or there is no wall (a branch, an open joint); sound recordings lose none. "
+            "What to do: look where wall is missing in the model; else set the exposure of the laser frames "
+            "anew, clean window and laser"
         )
     if validity.size and other.mean() > _MOST_NOT_THE_LINE:
         context.warn(
