@@ -1,13 +1,16 @@
 """A field alone gives a class, never a name; against the gauge it bears out or contradicts."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.answer import _alone, _met, field_answer
-from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.field.evidence import FieldEvidence, scale_by_line
 from stages.diagnose.inference import Column, Evidence, Stated
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
+from tests.gauge_runs import stated_probe
 
 NOTHING_STATED = Stated((), np.zeros((0, 0)))
 AZIMUTH = np.linspace(-np.pi, np.pi, 400, endpoint=False)
@@ -26,6 +29,20 @@ def field_with(signal):
     misfit, degrees = float(signal @ signal) / SIGMA**2, np.full(len(right), np.inf)
     whole = Evidence(tuple(columns), information, right, information, misfit, degrees)
     return FieldEvidence(None, whole)
+
+
+def test_the_scale_of_the_way_is_no_surer_than_the_place_of_the_line():
+    probe = stated_probe()
+    radius_mm, baseline_mm = 50.8, probe.laser.baseline_mm
+    xyz_c = np.stack([radius_mm * np.cos(AZIMUTH), radius_mm * np.sin(AZIMUTH), baseline_mm + 0 * AZIMUTH], 1)
+    uv = probe.camera.project(xyz_c).uv
+    away = uv - probe.camera.centre_px
+    outward = away / np.linalg.norm(away, axis=1)[:, None]
+    points = SimpleNamespace(probe=probe, uv=uv, outward=outward, radius_mm=radius_mm)
+    # 0.08 px are 0.02 to 0.04 mm of radius: dr/dθ is (l² + r²) / l, and a px some 1/360 rad.
+    per_px = (baseline_mm**2 + radius_mm**2) / baseline_mm / 360
+    assert scale_by_line(points) == pytest.approx(0.08 * per_px / radius_mm, rel=0.25)
+    assert scale_by_line(SimpleNamespace(uv=np.zeros((0, 2)))) == 0.0
 
 
 def test_noise_shows_nothing():
