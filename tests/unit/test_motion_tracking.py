@@ -115,8 +115,8 @@ def test_sample_is_a_bilinear_look_up() -> None:
     image = cv2.GaussianBlur(random.integers(0, 255, (60, 80)).astype(np.uint8), (0, 0), 2)
     coarse = np.stack(np.meshgrid(np.linspace(3, 70, 11), np.linspace(4, 50, 8)), -1).astype(np.float32)
     coarse += random.uniform(-0.5, 0.5, coarse.shape).astype(np.float32)
-    grey, seen = sample(image, coarse, 4)
-    i, j = np.meshgrid(np.arange(28) / 4, np.arange(40) / 4, indexing="ij")
+    grey, seen = sample(image, coarse, (8, 4))
+    i, j = np.meshgrid(np.arange(56) / 8, np.arange(40) / 4, indexing="ij")
     uv = [
         cv2.remap(coarse[..., c].copy(), j.astype(np.float32), i.astype(np.float32), cv2.INTER_LINEAR)
         for c in (0, 1)
@@ -128,7 +128,7 @@ def test_sample_is_a_bilinear_look_up() -> None:
 
 def test_sample_tells_what_lies_outside() -> None:
     coarse = np.stack(np.meshgrid(np.linspace(-20, 100, 11), np.linspace(-20, 80, 8)), -1).astype(np.float32)
-    grey, seen = sample(np.full((60, 80), 9, np.uint8), coarse, 4)
+    grey, seen = sample(np.full((60, 80), 9, np.uint8), coarse, (8, 4))
     assert 0 < seen.mean() < 1
     np.testing.assert_array_equal(grey[~seen], 0)
     np.testing.assert_allclose(grey[seen], 9, atol=1e-4)

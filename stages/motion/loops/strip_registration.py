@@ -209,7 +209,7 @@ def _halved(strip: StoredStrip) -> tuple[Float32, Float32]:
 def _corners(strip: Strip, parameters: MotionParameters) -> tuple[Int, Int]:
     """Return rows and columns of the best corner of every cell that can be matched well enough."""
     half, cell = parameters.patch_half_px, parameters.cell_px
-    corner = cornerness(strip.contrast, strip.usable, half)
+    corner = cornerness(strip.contrast, strip.usable, half, slice(0, len(strip.contrast)))
     rows, columns = (n // cell for n in corner.shape)
     cells = corner[: rows * cell, : columns * cell].reshape(rows, cell, columns, cell)
     block = cells.transpose(0, 2, 1, 3).reshape(rows, columns, -1)

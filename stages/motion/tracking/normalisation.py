@@ -47,7 +47,7 @@ def without_illumination(grey: Float32, usable: Bool) -> Float32:
     return np.asarray(_over(grey, usable, np.maximum(mean, 1.0).astype(np.float32)))
 
 
-def equally_sharp(contrast: Float32, coarse_uv: Float32, step: int) -> Float32:
+def equally_sharp(contrast: Float32, coarse_uv: Float32, steps: tuple[int, int]) -> Float32:
     """Return contrast (H, W) smoothed row by row until the near wall is as blurred as the far one.
 
     The blur of the picture covers more wall far ahead than near the camera. A few blurs are computed and
@@ -56,11 +56,12 @@ def equally_sharp(contrast: Float32, coarse_uv: Float32, step: int) -> Float32:
     Parameters
     ----------
     contrast : (H, W)
-    coarse_uv : (H / step + 1, W / step + 1, 2)
-        Pixels of every ``step``-th row and column.
-    step : int
+    coarse_uv : (H / n + 1, W / m + 1, 2)
+        Pixels of every nth row and mth column.
+    steps : (int, int)
+        n and m.
     """
-    along, around = (_blur_variance(coarse_uv, step, axis) for axis in (0, 1))
+    along, around = (_blur_variance(coarse_uv, steps, axis) for axis in (0, 1))
     wanted = np.sqrt(np.stack([along.max() - along, around.max() - around], -1) + _LEAST_SMOOTHING**2)
     share = np.linspace(0, 1, _BLURS)
     sizes = wanted.min(0) + share[:, None] * (wanted.max(0) - wanted.min(0))
@@ -100,13 +101,13 @@ def _blurred(contrast: Float32, part: slice, sigma_along: float, sigma_around: f
     return np.asarray(wide[part.start - first : part.stop - first])
 
 
-def _blur_variance(coarse_uv: Float32, step: int, axis: int) -> Float:
+def _blur_variance(coarse_uv: Float32, steps: tuple[int, int], axis: int) -> Float:
     """Return the variance (H,), squared strip samples, of the blur along (axis 0) or around the pipe (1)."""
-    moved_px = np.linalg.norm(np.diff(coarse_uv.astype(np.float64), axis=axis), axis=-1) / step
+    moved_px = np.linalg.norm(np.diff(coarse_uv.astype(np.float64), axis=axis), axis=-1) / steps[axis]
     # nan_to_num and median take a tenth of the time of nanmedian.
     px_per_sample = np.median(np.nan_to_num(moved_px, nan=1.0), axis=1)
     variance = (_IMAGE_BLUR_PX / np.maximum(px_per_sample, 1e-3)) ** 2
-    rows = (np.arange((coarse_uv.shape[0] - 1) * step) + 0.5) / step
+    rows = (np.arange((coarse_uv.shape[0] - 1) * steps[0]) + 0.5) / steps[0]
     return np.asarray(np.interp(rows, np.arange(len(variance)) + (0.5 if axis == 0 else 0.0), variance))
 
 

@@ -128,15 +128,21 @@ def cut(contrast: Float32, row: Int, column: Int, half: int) -> Patches:
     return Patches(value, by_row, by_column, information)
 
 
-def cornerness(contrast: Float32, usable: Bool, half: int) -> Float32:
-    """Return how well a patch (side 2 half + 1) around each sample (H, W) can be matched; 0: it is cut off.
+def cornerness(contrast: Float32, usable: Bool, half: int, rows: slice) -> Float32:
+    """Return how well a patch (side 2 half + 1) around each sample of some rows can be matched; 0: cut off.
 
     The smaller eigenvalue of the structure tensor: J. Shi, C. Tomasi, "Good features to track", CVPR 1994.
     """
-    corner = np.asarray(cv2.cornerMinEigenVal(contrast, 2 * half + 1), np.float32)
-    corner[~whole_patches(usable, half + 1)] = 0
-    corner[: half + 2], corner[-half - 3 :] = 0, 0
-    return corner
+    margin = half + 2  # a patch, and the derivatives at its edge
+    first, last = max(rows.start - margin, 0), rows.stop + margin
+    inner = slice(rows.start - first, rows.stop - first)
+    whole = whole_patches(usable[first:last], half + 1)[inner].copy()
+    row = np.arange(rows.start, rows.stop)
+    whole[(row < margin) | (row >= len(contrast) - margin - 1)] = False
+    if not whole.any():
+        return np.zeros(whole.shape, np.float32)
+    corner = cv2.cornerMinEigenVal(np.ascontiguousarray(contrast[first:last]), 2 * half + 1)[inner]
+    return np.where(whole, corner, np.float32(0))
 
 
 def whole_patches(usable: Bool, half: int) -> Bool:

@@ -27,9 +27,10 @@ from stages.motion.tracking.normalisation import (
 from stages.premises.stays import darkest_channel, in_full
 from stages.texture.light import irradiance
 
-_COARSE = 4
-"""The camera model is computed for every fourth row and column and interpolated between. `Strip.pixel` uses
-the same interpolation, so that no error of a position comes of it."""
+_COARSE = (8, 4)
+"""The camera model is computed for every eighth row and fourth column and interpolated between: around the
+pipe pixels lie on a curve. `Strip.pixel` uses the same interpolation, so that no error of a position comes
+of it."""
 _LEAST_LIGHT = 0.05
 """Predicted light is not believed below this share of the largest: the division would amplify noise."""
 _DARKEST, _BRIGHTEST = 5.0, 250.0
@@ -49,7 +50,7 @@ class StripGrid:
     radius_mm : float
         Of the cylinder on which the strip lies.
     columns : int
-        Samples around.
+        Samples around, a multiple of 4.
     near_mm, far_mm : float
         Wall ahead of the camera that is sampled.
     """
@@ -67,7 +68,7 @@ class StripGrid:
     @property
     def rows(self) -> int:
         """Number of rows, a multiple of the coarse grid's step."""
-        return int((self.far_mm - self.near_mm) / self.step_mm) // _COARSE * _COARSE
+        return int((self.far_mm - self.near_mm) / self.step_mm) // _COARSE[0] * _COARSE[0]
 
     def wall(self, row: Float, column: Float) -> Float:
         """Return points (..., 3) of strip positions (...) on the cylinder about the z-axis."""
@@ -92,8 +93,8 @@ class Strip:
     contrast : (H, W) float32
         Grey value over the mean of its row, minus 1; 0 where unusable.
     usable : (H, W) bool
-    coarse_uv : (H/4 + 1, W/4 + 1, 2) float32
-        Pixels of every fourth row and column.
+    coarse_uv : (H/8 + 1, W/4 + 1, 2) float32
+        Pixels of every eighth row and fourth column.
     noise : (H,) float32
         1 σ of ``contrast`` from one sample to the next, in each row.
     """
@@ -106,13 +107,14 @@ class Strip:
 
     def pixel(self, row: Float, column: Float) -> Float:
         """Return (..., 2) pixels of strip positions: exactly where `unroll` sampled the image."""
-        i, j = (row - self.first_row) / _COARSE, np.mod(column / _COARSE, self.coarse_uv.shape[1] - 1)
+        i = (row - self.first_row) / _COARSE[0]
+        j = np.mod(column / _COARSE[1], self.coarse_uv.shape[1] - 1)
         m = np.clip(np.floor(i).astype(int), 0, self.coarse_uv.shape[0] - 2)
         n = np.clip(np.floor(j).astype(int), 0, self.coarse_uv.shape[1] - 2)
         a, b = (i - m)[..., None], (j - n)[..., None]
-        g = self.coarse_uv.astype(np.float64)
-        top = g[m, n] * (1 - b) + g[m, n + 1] * b
-        low = g[m + 1, n] * (1 - b) + g[m + 1, n + 1] * b
+        g = self.coarse_uv
+        top = g[m, n].astype(np.float64) * (1 - b) + g[m, n + 1] * b
+        low = g[m + 1, n].astype(np.float64) * (1 - b) + g[m + 1, n + 1] * b
         return np.asarray(top * (1 - a) + low * a)
 
 
@@ -203,12 +205,12 @@ def unroll(image: Image, probe: Probe, T_pc: Float, grid: StripGrid, hidden: Hid
 
 
 def _coarse_view(probe: Probe, T_pc: Float, grid: StripGrid, first_row: int) -> tuple[Float32, Float32]:
-    """Return pixels (H/4 + 1, W/4 + 1, 2) of every fourth row and column, and the light that falls there.
+    """Return pixels (H/8 + 1, W/4 + 1, 2) of every eighth row and fourth column, and the light there.
 
     The LEDs' light is predicted, up to a factor: off the axis it is uneven around the wall.
     """
-    rows = first_row + _COARSE * np.arange(grid.rows // _COARSE + 1.0)
-    xyz = grid.wall(rows[:, None], _COARSE * np.arange(grid.columns // _COARSE + 1.0))
+    rows = first_row + _COARSE[0] * np.arange(grid.rows // _COARSE[0] + 1.0)
+    xyz = grid.wall(rows[:, None], _COARSE[1] * np.arange(grid.columns // _COARSE[1] + 1.0))
     T_cp = inverse(T_pc)
     xyz_c = transform(T_cp, xyz)
     normal_c = (xyz * [-1 / grid.radius_mm, -1 / grid.radius_mm, 0.0]) @ T_cp[:3, :3].T
@@ -218,9 +220,9 @@ def _coarse_view(probe: Probe, T_pc: Float, grid: StripGrid, first_row: int) -> 
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _refine(coarse, row, step, out):  # type: ignore[no-untyped-def]
-    """Fill ``out`` (W,) with a row of the bilinear refinement of values (H / step + 1, W / step + 1)."""
-    m, a = row // step, np.float32((row % step) / step)
+def _refine(coarse, row, steps, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` (W,) with a row of the bilinear refinement of values on a grid of so many ``steps``."""
+    m, a, step = row // steps[0], np.float32((row % steps[0]) / steps[0]), steps[1]
     before = coarse[m, 0] + a * (coarse[m + 1, 0] - coarse[m, 0])
     for n in range(1, coarse.shape[1]):
         after = coarse[m, n] + a * (coarse[m + 1, n] - coarse[m, n])
@@ -231,29 +233,29 @@ def _refine(coarse, row, step, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _refined(coarse, step):  # type: ignore[no-untyped-def]
+def _refined(coarse, steps):  # type: ignore[no-untyped-def]
     """Return the bilinear refinement (H, W) of values at every so many rows and columns."""
-    out = np.empty(((coarse.shape[0] - 1) * step, (coarse.shape[1] - 1) * step), np.float32)
+    out = np.empty(((coarse.shape[0] - 1) * steps[0], (coarse.shape[1] - 1) * steps[1]), np.float32)
     for row in range(out.shape[0]):
-        _refine(coarse, row, step, out[row])
+        _refine(coarse, row, steps, out[row])
     return out
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def sample(image, coarse, step):  # type: ignore[no-untyped-def]
-    """Return the image (H, W), looked up bilinearly on the coarse pixel grid refined ``step`` times.
+def sample(image, coarse, steps):  # type: ignore[no-untyped-def]
+    """Return the image (H, W), looked up bilinearly on the coarse pixel grid refined so many times.
 
     The second array (H, W) tells which samples lie in the image.
     """
-    rows, columns = (coarse.shape[0] - 1) * step, (coarse.shape[1] - 1) * step
+    rows, columns = (coarse.shape[0] - 1) * steps[0], (coarse.shape[1] - 1) * steps[1]
     grey = np.zeros((rows, columns), np.float32)
     seen = np.zeros((rows, columns), np.bool_)
     u, v = np.empty(columns, np.float32), np.empty(columns, np.float32)
     height, width = image.shape
     flat = image.ravel()
     for i in range(rows):
-        _refine(coarse[:, :, 0], i, step, u)
-        _refine(coarse[:, :, 1], i, step, v)
+        _refine(coarse[:, :, 0], i, steps, u)
+        _refine(coarse[:, :, 1], i, steps, v)
         for j in range(columns):
             if not (0 <= u[j] < width - 1 and 0 <= v[j] < height - 1):
                 continue

@@ -215,18 +215,23 @@ class TextureTracker:
 
     def _free_corners(self, strip: Strip) -> tuple[Int, Int]:
         """Return rows and columns (in the strip) of the best corner of each unoccupied cell."""
-        cell = self._parameters.cell_px
-        corner = cornerness(strip.contrast, strip.usable, self._map.half)
-        first_cell, last_cell = strip.first_row // cell, (strip.first_row + corner.shape[0]) // cell
-        columns = corner.shape[1] // cell
-        taken = np.zeros((last_cell - first_cell + 1, columns), bool)
+        cell, half = self._parameters.cell_px, self._map.half
+        first_cell, last_cell = strip.first_row // cell, (strip.first_row + len(strip.contrast)) // cell
+        free = np.ones((last_cell - first_cell + 1, strip.contrast.shape[1] // cell), bool)
         active = ~self._map.retired
         i = (self._map.row[active] // cell).astype(int) - first_cell
-        j = np.minimum((self._map.column[active] // cell).astype(int), columns - 1)
-        ok = (i >= 0) & (i < len(taken))
-        taken[i[ok], j[ok]] = True
-        offset = first_cell * cell - strip.first_row
-        return _best_of_cells(corner, taken, offset, cell)
+        j = np.minimum((self._map.column[active] // cell).astype(int), free.shape[1] - 1)
+        ok = (i >= 0) & (i < len(free))
+        free[i[ok], j[ok]] = False
+        rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        for k in np.flatnonzero(free.any(1)).tolist():
+            first = (first_cell + k) * cell - strip.first_row
+            top, end = max(first, 0), min(max(first + cell, 0), len(strip.contrast))
+            corner = cornerness(strip.contrast, strip.usable, half, slice(top, end))
+            row, column = _best_of_cells(corner, free[k], cell)
+            rows.append(top + row)
+            columns.append(column)
+        return np.concatenate(rows), np.concatenate(columns)
 
     def _shifted(self, T_pc: Float, drift: Float) -> Float:
         """Move a pose so that the strip moves by ``drift`` (rows, columns)."""
@@ -259,14 +264,13 @@ def _displacement(before: Strip, now: Strip) -> Float:
     return np.array([2 * dy, 2 * dx]) if response > _LEAST_RESPONSE else np.zeros(2)
 
 
-def _best_of_cells(corner: Float32, taken: Bool, offset: int, cell: int) -> tuple[Int, Int]:
-    """Return rows and columns of the best corner of each cell not taken; cells start at row ``offset``."""
-    rows, columns = [], []
-    for i, j in zip(*np.nonzero(~taken), strict=True):
-        r0 = max(i * cell + offset, 0)
-        block = corner[r0 : max((i + 1) * cell + offset, 0), j * cell : (j + 1) * cell]
-        if block.size and block.max() > 0:
-            r, c = np.unravel_index(np.argmax(block), block.shape)
-            rows.append(r0 + r)
-            columns.append(j * cell + c)
-    return np.array(rows, np.int64), np.array(columns, np.int64)
+def _best_of_cells(corner: Float32, free: Bool, cell: int) -> tuple[Int, Int]:
+    """Return rows and columns of the best corner of each of a row of cells (C,) that is free."""
+    blocks = corner[:, : len(free) * cell].reshape(len(corner), len(free), cell)[:, free]
+    flat = blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)
+    if not flat.size:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    best = flat.argmax(1)
+    there = flat.max(1) > 0
+    row, column = np.divmod(best[there], cell)
+    return row, np.flatnonzero(free)[there] * cell + column
