@@ -18,7 +18,7 @@ from pipeline.arrays import Byte, Image, Int
 from pipeline.errors import InputError
 from pipeline.machine.scratch import Scratch
 from pipeline.recording.base import Illumination, Planes, Recording, ascending, in_background
-from pipeline.recording.images import FULL_CHROMA, SplitImage, bgr_444, plane_of, shown, split
+from pipeline.recording.images import FULL_CHROMA, SplitImage, bgr_444, in_full_range, plane_of, shown, split
 from pipeline.recording.video import AHEAD, FEW, VideoSource
 
 Made = TypeVar("Made")
@@ -54,6 +54,11 @@ class Kept:
     pixel_format: str
     color_range: int
     colorspace: int
+
+    @property
+    def splits_planes(self) -> bool:
+        """Whether a `SplitImage` is made of its planes as they are."""
+        return self.pixel_format in FULL_CHROMA and self.colorspace != Colorspace.ITU709
 
 
 @dataclass
@@ -108,9 +113,16 @@ class FrameStore:
         if kept is None:
             return None
         content = self._read(kept, len(kept.planes))
-        if kept.pixel_format in FULL_CHROMA and kept.colorspace != Colorspace.ITU709:
+        if kept.splits_planes:
             return SplitImage.of_planes(content, kept.pixel_format, kept.color_range, kept.colorspace)
         return split(_rebuilt(kept, content))
+
+    def take_luma(self, number: int) -> Image | None:
+        """Return the luma of `take_split`, without reading the colours where they are apart."""
+        kept = self._kept[number]
+        if kept is not None and kept.splits_planes:
+            return in_full_range(self._read(kept, 1)[0], kept.pixel_format, kept.color_range)
+        return luma_of(self.take_split(number))
 
     def _write(self, number: int, frame: av.VideoFrame, planes: list[Byte]) -> None:
         size = sum(p.nbytes for p in planes)
@@ -182,6 +194,12 @@ class DecodedOnce:
         found = self._found(ascending(frames).tolist(), "bgr", self.store.take_split, split)
         return in_background(found, AHEAD)
 
+    def read_luma(self, frames: Sequence[int] | Int) -> Iterator[tuple[int, Image | None]]:
+        """Yield the luma of frames that `read_split` yields."""
+        numbers = ascending(frames).tolist()
+        found = self._found(numbers, "bgr", self.store.take_luma, lambda f: luma_of(split(f)))
+        return in_background(found, AHEAD)
+
     def _found(
         self,
         wanted: list[int],
@@ -206,6 +224,18 @@ def read_split(recording: Recording, frames: Sequence[int] | Int) -> Iterator[tu
         return recording.source.read_split(frames)
     read = recording.read(frames, "bgr")
     return ((number, None if image is None else SplitImage.of(image)) for number, image in read)
+
+
+def read_luma(recording: Recording, frames: Sequence[int] | Int) -> Iterator[tuple[int, Image | None]]:
+    """Yield the luma of frames that `read_split` yields: a part of its time where colours are kept apart."""
+    if isinstance(recording.source, DecodedOnce):
+        return recording.source.read_luma(frames)
+    return ((number, luma_of(image)) for number, image in read_split(recording, frames))
+
+
+def luma_of(image: SplitImage | None) -> Image | None:
+    """Return the luma of a picture; None where there is none."""
+    return None if image is None else image.luma
 
 
 def decoded_once(recording: Recording, scratch: Scratch) -> Recording:

@@ -86,10 +86,15 @@ class SplitImage:
     ) -> SplitImage:
         """Split planes of full-resolution chroma: the colours of the whole picture are not worked out."""
         small = bgr_444([_halved(p) for p in planes], pixel_format, color_range, colorspace)
-        if _is_full(pixel_format, color_range):
-            return SplitImage(planes[0], small)
-        stretched = np.clip((np.arange(256) - 16) * (255 / 219) + 0.5, 0, 255).astype(np.uint8)
-        return SplitImage(np.asarray(cv2.LUT(planes[0], stretched), np.uint8), small)
+        return SplitImage(in_full_range(planes[0], pixel_format, color_range), small)
+
+
+def in_full_range(luma: Image, pixel_format: str, color_range: int) -> Image:
+    """Return a luma plane (H, W) with black 0 and white 255."""
+    if _is_full(pixel_format, color_range):
+        return luma
+    stretched = np.clip((np.arange(256) - 16) * (255 / 219) + 0.5, 0, 255).astype(np.uint8)
+    return np.asarray(cv2.LUT(luma, stretched), np.uint8)
 
 
 def split(frame: av.VideoFrame | None) -> SplitImage | None:

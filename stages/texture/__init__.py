@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -14,8 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
-from pipeline.recording.decoded_once import read_split
-from pipeline.recording.images import SplitImage
+from pipeline.recording.decoded_once import read_luma, read_split
 from stages.texture.blend import REFLECTANCE_SCALE
 from stages.texture.grid import FlatGrid, flat_grid
 from stages.texture.mosaic import Blended, Mosaic
@@ -25,6 +25,8 @@ from stages.texture.surface import wall_surface
 from stages.texture.views import LitViews, lit_views, plan_tiles
 
 _WHITE = 250.0
+Read = TypeVar("Read")
+_Reader = Callable[[Recording, Int], Iterator[tuple[int, Read | None]]]
 
 
 class TextureParameters(Parameters):
@@ -83,15 +85,15 @@ def photograph_wall(
     sampler = LightSampler(surface, probe, views, reach, parameters.laser_band_mm, parameters.left_out)
     picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe, ring)
     for stretch in stretches:
-        for view, image in images.read(stretch.wanted):
-            sampler.add(view, None if image is None else image.luma)
+        for view, luma in images.read(stretch.wanted, read_luma):
+            sampler.add(view, luma)
         light = lights.add(sampler.take(stretch.wanted), stretch.wanted, sampler.reference)
         mosaic = Mosaic(
             grid, surface, probe, views, plan, stretch.tiles, light, parameters.laser_band_mm,
             parameters.left_out, picture,
         )  # fmt: skip
         with ThreadPoolExecutor(context.workers) as pool:
-            for view, image in images.read(stretch.wanted):
+            for view, image in images.read(stretch.wanted, read_split):
                 mosaic.add(view, image, pool)
     _report_light(lights, context)
     return _flat_picture(picture, grid, parameters.white_quantile, context)
@@ -104,10 +106,10 @@ class _Images:
         self._recording, self._views, self._wanted, self._context = recording, views, wanted, context
         self._done = 0
 
-    def read(self, wanted: Int) -> Iterator[tuple[int, SplitImage | None]]:
+    def read(self, wanted: Int, reader: _Reader[Read]) -> Iterator[tuple[int, Read | None]]:
         """Yield (view, image) in order; None where a frame cannot be decoded."""
         frames = self._views.frame[wanted]
-        for view, (_, image) in zip(wanted, read_split(self._recording, frames), strict=True):
+        for view, (_, image) in zip(wanted, reader(self._recording, frames), strict=True):
             yield int(view), image
             self._done += 1
             self._context.progress(self._done, 2 * self._wanted)

@@ -13,7 +13,7 @@ import pytest
 from pipeline.machine.scratch import Scratch
 from pipeline.recording import open_recording
 from pipeline.recording.base import FrameTable, Illumination, Recording
-from pipeline.recording.decoded_once import DecodedOnce, decoded_once, read_split
+from pipeline.recording.decoded_once import DecodedOnce, decoded_once, read_luma, read_split
 from pipeline.recording.video import VideoSource, open_video
 from tests.made_recording import COUNT, write_folder, write_video
 
@@ -65,6 +65,21 @@ def test_luma_and_small_colours_are_those_of_the_whole_picture(
         assert np.abs(one.luma - bgr @ [0.114, 0.587, 0.299]).mean() < 1.0
         small = cv2.resize(bgr, one.small.shape[1::-1], interpolation=cv2.INTER_AREA)
         assert np.abs(one.small - small.astype(float)).mean() < 1.0
+
+
+@pytest.mark.parametrize("made", FORMATS)
+def test_luma_alone_is_that_of_the_split_picture(tmp_path: Path, made: tuple[str, str, str]) -> None:
+    ext, codec, pixel_format = made
+    write_video(tmp_path / f"v.{ext}", codec, pixel_format, {"g": "4"} if codec == "libx264" else {})
+    source = _shared(tmp_path, open_video(tmp_path / f"v.{ext}"))
+    recording = replace(open_recording(tmp_path / "recording"), source=source)
+    first, again = (list(read_luma(recording, range(COUNT))) for _ in range(2))
+    for (n, one), (_, other), (m, split) in zip(
+        first, again, read_split(recording, range(COUNT)), strict=True
+    ):
+        assert n == m
+        np.testing.assert_array_equal(one, split.luma)
+        np.testing.assert_array_equal(other, split.luma)
 
 
 @pytest.mark.parametrize("made", FORMATS)
