@@ -247,7 +247,7 @@ def examined(
         (examined((1.0, 1.0), other_order=1, confirmed=((AT_OTHER_RADII,),) * 2), Verdict.NAMED),
         (examined((1.0,) * 3, other_order=1, confirmed=((AT_OTHER_RADII,),) * 3), Verdict.CLASS),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
-        (examined(heldout=0.2), Verdict.CLASS),
+        (examined(heldout=0.2), Verdict.UNEXPLAINED),
         (examined(rival_heldout=-1.0), Verdict.CLASS),
         (examined(unknown=0.5), Verdict.UNEXPLAINED),
         (examined(unknown=0.5, unsplit=("focal_scale",)), Verdict.CLASS),

@@ -1,6 +1,8 @@
 """Sets of effects about one linearisation, against dense brute force."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.free_profile import FREE_PROFILES
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import GENERIC, STEADY
-from stages.diagnose.gauge.sets import Member, Sets, believed, cause_of
+from stages.diagnose.gauge.sets import Member, Sets, believed, cause_of, members_of
 from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Column, Evidence, Stated
 
 CONE, BASELINE, FOCAL = (LIBRARY[name] for name in ("laser_cone", "baseline", "focal_scale"))
@@ -90,6 +92,15 @@ def test_a_name_is_a_law_and_an_order_whatever_the_course():
     waves = LIBRARY["sheet_waviness"]
     assert cause_of(waves, (2.0,)) != cause_of(waves, (3.0,))
     assert cause_of(CONE, ()) == ("laser_cone", ())
+
+
+def test_waves_of_every_order_may_be_in_a_set_whichever_was_the_best_alone():
+    waves = LIBRARY["sheet_waviness"]
+    run, found = SimpleNamespace(time_s=np.arange(10.0)), SimpleNamespace(terms=())
+    scores = [SimpleNamespace(model=waves, shape=(3.0,)), SimpleNamespace(model=CONE, shape=())]
+    members = members_of(cast(Any, run), cast(Any, found), cast(Any, scores), 30)
+    assert {m.shape[0] for m in members if m.model is waves} == {2.0, 3.0, 4.0, 5.0, 6.0}
+    assert sum(m.model is CONE for m in members) == 1
 
 
 def test_a_free_profile_holds_every_power_of_its_harmonic():

@@ -202,7 +202,8 @@ def verdict_of(examined: Examined) -> Verdict:
     if best is None or verdicts is None:
         return Verdict.CONSISTENT
     contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
-    if not best.library_terms or verdicts.adequacy < ADEQUATE or all(contradicted):
+    # What does not predict the measurements that were held out, leaves out what nobody knows.
+    if not best.library_terms or verdicts.adequacy < ADEQUATE or not _fits(examined) or all(contradicted):
         return Verdict.UNEXPLAINED
     if all(sure(examined)):
         return Verdict.NAMED if best.named else Verdict.PARTLY

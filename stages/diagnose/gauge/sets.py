@@ -130,6 +130,8 @@ def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -
     """
     asked = [(t.model, t.shape) for t in found.terms]
     asked += [(s.model, s.shape) for s in scores]
+    # What may come more than once is another cause at another shape.
+    asked += [(s.model, shape) for s in scores if s.model.repeats for shape in s.model.shapes(*span(run))]
     asked += [
         (s.model, t.shape)
         for s in scores
