@@ -91,6 +91,11 @@ class Lattice:
         """Return the blocks of some rows of blocks."""
         return slice(along.start * self.blocks[1], along.stop * self.blocks[1])
 
+    def of_rows(self, along: slice) -> slice:
+        """Return the nodes of some rows of blocks, the row that ends them among them."""
+        first, last = along.start * self.block, along.stop * self.block + 1
+        return slice(first * self.columns, last * self.columns)
+
     def slabs(self) -> list[slice]:
         """Return the rows of blocks, some at a time."""
         at_once = max(1, _SQUARES_AT_ONCE // (self.columns * self.block))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 from scipy.sparse import csr_matrix
 
-from pipeline.arrays import Bool, Float, Int, Int32
+from pipeline.arrays import Bool, Float, Float32, Int, Int32
 from pipeline.artefacts.measured import Wall
 from pipeline.geometry.axis import PipeAxis, frames_at, from_pipe
 from stages.mesh.bisection import Cuts, Lattice, beside_holes, triangles, without_gaps, worthwhile
@@ -25,29 +25,32 @@ _SCATTER = 0.25
 
 @dataclass(frozen=True)
 class Cells:
-    """The radius map on the nodes of its lattice, row by row, and the way each node looks.
+    """The radius map on the nodes of its lattice, row by row, and how closely a surface is to follow it.
 
     Attributes
     ----------
-    radius_mm, sigma_mm : (nodes,)
-        0 where nothing was measured.
-    allowance_mm : (nodes,)
-        How far the surface may lie off the cell.
-    measured : (nodes,) bool
+    radius_mm, noise_mm : (nodes,) float32
+        And random 1 σ; 0 where nothing was measured.
     distance_mm, origin_p, frame : (R,), (R, 3), (R, 3, 3)
         Of the axis at every row.
     azimuth_rad : (A,)
+    error_mm, noise_factor : float
+        The surface may lie off a cell by ``error_mm`` and ``noise_factor`` of its noise.
     """
 
     lattice: Lattice
-    radius_mm: Float
-    sigma_mm: Float
-    allowance_mm: Float
-    measured: Bool
+    radius_mm: Float32
+    noise_mm: Float32
     distance_mm: Float
     origin_p: Float
     frame: Float
     azimuth_rad: Float
+    error_mm: float
+    noise_factor: float
+
+    def sigma_mm(self, node: Int | slice) -> Float:
+        """Return the 1 σ that cells count by."""
+        return np.asarray(np.hypot(self.noise_mm[node].astype(float), _SCATTER * self.error_mm))
 
     def outward(self, rows: slice) -> Float:
         """Return unit vectors (R, A, 3) from the axis to the wall at the nodes of some rows."""
@@ -63,13 +66,11 @@ def cells_of(wall: Wall, error_mm: float, noise_factor: float) -> Cells:
     step = (found.distance_mm[-1] - found.distance_mm[0]) / max(rows - 1, 1)
     distance = found.distance_mm[0] + step * np.arange(lattice.nodes // columns)
     distance[:rows] = found.distance_mm
-    radius, noise = np.zeros(lattice.nodes), np.zeros(lattice.nodes)
+    radius, noise = np.zeros((2, lattice.nodes), np.float32)
     radius[: rows * columns] = np.nan_to_num(found.radius_mm.ravel())
     noise[: rows * columns] = np.nan_to_num(found.sigma_random_mm.ravel())
-    return Cells(
-        lattice, radius, np.hypot(noise, _SCATTER * error_mm), error_mm + noise_factor * noise,
-        radius > 0, distance, *frames_at(wall.axis, distance), found.azimuth_rad,
-    )  # fmt: skip
+    axis = frames_at(wall.axis, distance)
+    return Cells(lattice, radius, noise, distance, *axis, found.azimuth_rad, error_mm, noise_factor)
 
 
 def fitted_surface(cells: Cells, axis: PipeAxis, pieces: int, triangle_cost: float) -> Iterator[Decimated]:
@@ -79,14 +80,13 @@ def fitted_surface(cells: Cells, axis: PipeAxis, pieces: int, triangle_cost: flo
     """
     lattice = cells.lattice
     wanted = _joined([worthwhile(lattice, *_in_blocks(cells, s), triangle_cost) for s in lattice.slabs()])
-    vertex = np.zeros(lattice.nodes, bool)
-    while True:
+    vertex, more = None, np.zeros(lattice.nodes, bool)
+    while vertex is None or (more > vertex).any():
+        vertex = more
         cuts = without_gaps(lattice, wanted, vertex)
         radius, off = _fit(cells, cuts)
-        beyond = np.abs(off) > cells.allowance_mm
-        if not beyond.any():
-            break
-        vertex |= _with_neighbours(beyond, lattice.columns)
+        beyond = np.abs(off) > cells.error_mm + cells.noise_factor * cells.noise_mm
+        more = vertex | _with_neighbours(beyond, lattice.columns)
     for along in _rows_of_blocks(lattice, pieces):
         yield _piece(cells, cuts, radius, off, axis, along)
 
@@ -118,33 +118,34 @@ def _in_blocks(cells: Cells, along: slice) -> tuple[Float, Float]:
     rows, columns = (row + step)[:, None], ((column + step) % lattice.columns)[None]
     node, first = rows * lattice.columns + columns, along.start * n
     outward = cells.outward(slice(first, along.stop * n + 1))
-    seen, radius = cells.measured[node], cells.radius_mm[node]
+    radius = cells.radius_mm[node].astype(float)
+    seen = radius > 0
     xyz = cells.origin_p[rows] + radius[..., None] * outward[rows - first, columns]
     normal, ahead = outward[rows - first, columns][n // 2, n // 2], cells.frame[row + n // 2, :, 2]
     plane = np.stack([ahead, np.cross(ahead, normal), normal], 1)
     middle = radius.sum((0, 1)) / np.maximum(seen.sum((0, 1)), 1)
     centre = cells.origin_p[row + n // 2] + middle[:, None] * normal
-    return np.einsum("nij,abnj->abni", plane, xyz - centre), seen / cells.sigma_mm[node] ** 2
+    return np.einsum("nij,abnj->abni", plane, xyz - centre), seen / cells.sigma_mm(node) ** 2
 
 
-def _fit(cells: Cells, cuts: Cuts) -> tuple[Float, Float]:
+def _fit(cells: Cells, cuts: Cuts) -> tuple[Float, Float32]:
     """Return the radius (nodes,) of each vertex, and how far each cell (nodes,) lies outside of the surface.
 
     Radii are the weighted least squares' over all cells, some rows of blocks after the other, each with the
     next row of blocks, on which it hardly depends.
     """
     lattice = cells.lattice
-    radius, off = cells.radius_mm.copy(), np.zeros(lattice.nodes)
+    radius, off = cells.radius_mm.astype(float), np.zeros(lattice.nodes, np.float32)
     for along in lattice.slabs():
         ahead = slice(along.start, min(along.stop + 1, lattice.blocks[0]))
-        known = (along.start * lattice.block + (along.start > 0)) * lattice.columns
-        end = (along.stop * lattice.block + 1) * lattice.columns
+        here, own = (lattice.of_rows(part) for part in (ahead, along))
+        known = lattice.columns if along.start else 0  # the row that the blocks before have fitted
         node, vertex, weight, shift = _equations(cells, cuts, ahead)
-        wanted = cells.radius_mm[node] - shift
-        found = _least_squares(radius, wanted, 1 / cells.sigma_mm[node], vertex, weight, known)
-        radius[known:end] = found[known:end]
-        mine = node < end
-        off[node[mine]] = (wanted - (weight * radius[vertex]).sum(1))[mine]
+        wanted = cells.radius_mm[here][node] - shift
+        found = _least_squares(radius[here], wanted, 1 / cells.sigma_mm(here)[node], vertex, weight, known)
+        mine = node < own.stop - own.start
+        radius[own] = found[: own.stop - own.start]
+        off[own.start + node[mine]] = (wanted - (weight * found[vertex]).sum(1))[mine]
     return radius, off
 
 
@@ -152,13 +153,15 @@ def _equations(cells: Cells, cuts: Cuts, along: slice) -> tuple[Int, Int, Float,
     """Return how the surface at each cell follows from its vertices.
 
     The surface's radius at node (M,) is the sum over its triangle's vertices (M, 3) of weight (M, 3) times
-    radius, plus shift (M,); what slopes displace along a triangle is left out.
+    radius, plus shift (M,); what slopes displace along a triangle is left out. Nodes are counted from the
+    first of these rows of blocks.
     """
     lattice = cells.lattice
     owner, level = _owners(lattice, cuts, along)
     finest = lattice.corner[lattice.finest]
-    number = lattice.number(finest, along)
-    pick = np.full(lattice.nodes, -1)
+    region, columns = lattice.of_rows(along), lattice.columns
+    number = lattice.number(finest, along) - region.start
+    pick = np.full(region.stop - region.start, -1)
     covered = np.broadcast_to((level >= 0)[:, None], number.shape)
     pick[number[covered]] = np.flatnonzero(covered)
     node = np.flatnonzero(pick >= 0)
@@ -166,13 +169,14 @@ def _equations(cells: Cells, cuts: Cuts, along: slice) -> tuple[Int, Int, Float,
     start = np.cumsum([0, *(len(c) for c in lattice.corner)])
     place = np.concatenate(lattice.corner)[start[level[half, block]] + owner[half, block]]
     share = _barycentric(finest[half, corner], place)
-    row, column = (o[block] for o in lattice.origin(along))
-    rows, columns = row[:, None] + place[..., 0], (column[:, None] + place[..., 1]) % lattice.columns
-    vertex, first = rows * lattice.columns + columns, along.start * lattice.block
-    outward = cells.outward(slice(first, along.stop * lattice.block + 1)).reshape(-1, 3)
-    here, base = outward[node - first * lattice.columns], first * lattice.columns
-    weight = share * np.einsum("mki,mi->mk", outward[vertex - base], here)
-    away = cells.origin_p[rows] - cells.origin_p[node // lattice.columns][:, None]
+    first, around = (origin[block] for origin in lattice.origin(along))
+    first = first - along.start * lattice.block
+    vertex = (first[:, None] + place[..., 0]) * columns + (around[:, None] + place[..., 1]) % columns
+    rows = slice(along.start * lattice.block, along.stop * lattice.block + 1)
+    outward, origin = cells.outward(rows).reshape(-1, 3), cells.origin_p[rows]
+    here = outward[node]
+    weight = share * np.einsum("mki,mi->mk", outward[vertex], here)
+    away = origin[vertex // columns] - origin[node // columns][:, None]
     return node, vertex, weight, (share * np.einsum("mki,mi->mk", away, here)).sum(1)
 
 
@@ -230,21 +234,22 @@ def _least_squares(
     return fitted
 
 
-def _piece(cells: Cells, cuts: Cuts, radius: Float, off: Float, axis: PipeAxis, along: slice) -> Decimated:
+def _piece(cells: Cells, cuts: Cuts, radius: Float, off: Float32, axis: PipeAxis, along: slice) -> Decimated:
     """Return some rows of blocks as a surface, with the errors of its cells but those of its first row."""
     lattice = cells.lattice
-    node, corner = np.unique(triangles(lattice, cuts, cells.measured, along), return_inverse=True)
+    measured = cells.radius_mm > 0
+    node, corner = np.unique(triangles(lattice, cuts, measured, along), return_inverse=True)
     row, column = node // lattice.columns, node % lattice.columns
     xyz = from_pipe(axis, cells.distance_mm[row], cells.azimuth_rad[column], radius[node])
     first, last = along.start * lattice.block, along.stop * lattice.block
     border = ((row == first) & (first > 0)) | ((row == last) & (along.stop < lattice.blocks[0]))
     mine = slice((first + (first > 0)) * lattice.columns, (last + 1) * lattice.columns)
-    error, measured = off[mine], cells.measured[mine]
+    error, count = off[mine].astype(float), int(measured[mine].sum())
     whole = cuts.whole[-1][:, lattice.of_blocks(along)].sum()
     return Decimated(
         Surface(xyz, corner.reshape(-1, 3).astype(np.int32), border),
-        int(whole) + len(beside_holes(lattice, cells.measured, along)),
-        int(measured.sum()),
+        int(whole) + len(beside_holes(lattice, measured, along)),
+        count,
         float(np.abs(error).max(initial=0.0)),
-        float((error**2).sum() / max(measured.sum(), 1)),
+        float((error**2).sum() / max(count, 1)),
     )
