@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -155,7 +156,9 @@ def _by_pymeshlab(inputs: Inputs) -> Iterator[_Surface]:
     meshes.add_mesh(
         pymeshlab.Mesh(inputs.cloud.xyz_p.astype(float), v_normals_matrix=inputs.cloud.normal_p.astype(float))
     )
-    meshes.generate_surface_reconstruction_screened_poisson(depth=_depth(inputs))
+    # Its default of 16 threads takes minutes on two cores.
+    cores = len(os.sched_getaffinity(0))
+    meshes.generate_surface_reconstruction_screened_poisson(depth=_depth(inputs), threads=cores)
     yield meshes.current_mesh().vertex_matrix(), meshes.current_mesh().face_matrix()
     for count in _THINNED:
         meshes.meshing_decimation_quadric_edge_collapse(targetfacenum=count)
