@@ -35,9 +35,9 @@ _QUANTITIES = (
     Quantity("over_duration", "time over the recording's duration"),
 )
 _WHY_BEHIND = {
-    "diameter_error_percent": "Boresight's radius hangs on the stated distance from camera to laser, COLMAP's "
-    "on the encoder's total: each errs by one draw of its σ. Boresight states its own, and a calibrated probe "
-    "makes it smaller; COLMAP states none.",
+    "diameter_error_percent": "Boresight's radius hangs on the stated distance from camera to laser, "
+    "COLMAP's on the encoder's total: each errs by one draw of its σ. Boresight states its own, and a "
+    "calibrated probe makes it smaller; COLMAP states none.",
 }
 
 
