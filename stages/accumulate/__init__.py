@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import Field
 
+from pipeline.adjustment.held_over import HeldOver, held_over
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import (
@@ -159,18 +160,27 @@ def accumulate_wall(
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
     wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
     smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
+    held = _held_in(rings, survey, trajectory.radius_mm)
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
         systematic = spread.on(grid.rows(stretch.from_row, stretch.to_row))
         if fixed is not None:
             systematic = np.hypot(systematic, fixed.departure_mm[stretch.from_row : stretch.to_row])
-        radius_map = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm)
+        radius_map = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm, held)
         fill(wall, stretch, radius_map, on_wall, survey)
         context.progress(done, len(stretches))
     _judge_radii(wall, trajectory, context)
     _report(context, wall, spread)
+    context.report("likeness of neighbouring rings in what is finest", float(held.likeness[1:2].sum()), "")
     _warn_of_fixed(fixed, context)
     return wall
+
+
+def _held_in(rings: RingSamples, survey: RingSurvey, radius_mm: float) -> HeldOver:
+    """Return what a codec held over of the line: its height, its width and its place tell it together."""
+    lines = (np.log(np.maximum(rings.amplitude, 1.0)), rings.width_px, rings.radius_px)
+    known = [np.where(rings.valid, line, np.nan).astype(float) for line in lines]
+    return held_over(known, survey.middle_mm, 2 * np.pi * radius_mm / len(rings.azimuth_rad))
 
 
 def _warn_of_fixed(fixed: FixedToProbe | None, context: Context) -> None:
@@ -241,7 +251,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "4",
+    "5",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

@@ -14,7 +14,9 @@ import numba
 import numpy as np
 from scipy.ndimage import median_filter
 
+from pipeline.adjustment.held_over import HeldOver
 from pipeline.adjustment.local_spread import local_spread
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
 from pipeline.system.parallel import in_threads
 from stages.accumulate.survey import RingSurvey, WallSamples
@@ -29,6 +31,8 @@ _FINE_CELLS = (9, 9)
 # Share of a ring from which its distance belongs to the map: half and twice as much change nothing on open-1
 # and open-3, whose rings end within a cell.
 _SEEN_SHARE = 0.1
+# Columns of which the scatter of rings far apart is taken: every fourth, 2° apart, errs by 1 % of it.
+_SOME_COLUMNS = 4
 
 
 @dataclass(frozen=True)
@@ -108,20 +112,21 @@ def rings_on_columns(parts: Iterable[WallSamples], rings: int, grid: MapGrid) ->
 
 
 def gridded(
-    columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float
+    columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float, held: HeldOver
 ) -> tuple[Float32, Float32, Int, Float32]:
     """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen.
 
     The noise of single samples is not the whole error: speckle is correlated between neighbouring azimuths,
     and each ring has a pose error. The scatter of rings is therefore measured from two maps of every other
-    ring.
+    ring, and where a codec ``held`` light over, from rings that share none.
     """
-    width = max(smoothing_mm, WIDTH_IN_RINGS * _usual_spacing(columns))
+    spacing = _usual_spacing(columns)
+    width = max(smoothing_mm, WIDTH_IN_RINGS * spacing)
     radius, sigma, count, misalignment = _map_of(columns, grid, width, largest_gap_mm)
     halves = [
         _map_of(columns.every_other(first), grid, 2 * width, 2 * largest_gap_mm)[:2] for first in (0, 1)
     ]
-    sigma = sigma * _excess(halves, grid)
+    sigma = sigma * (_excess(halves, grid) * _shared(columns, held, width / max(spacing, 1e-9)))
     return radius, sigma * _roughness(radius, sigma, grid), count, misalignment
 
 
@@ -149,6 +154,35 @@ def _excess(halves: list[tuple[Float32, Float32]], grid: MapGrid) -> Float32:
     """Return the ratio (S, A) of the difference of two independent maps to its stated σ; at least 1."""
     (a, sigma_a), (b, sigma_b) = halves
     return _spread_by_place(np.abs(a - b) / np.hypot(sigma_a, sigma_b), grid)
+
+
+def _shared(columns: RingColumns, held: HeldOver, width: float) -> np.float32:
+    """Return how many times σ is that of neighbouring rings, in a mean over ``width`` rings; at least 1.
+
+    What a codec holds over for many rings is no scatter of neighbours. Rings are compared as far apart as
+    nothing is held over; the wall's own shape over that length then counts as error, too: nothing tells it
+    from what is held over.
+    """
+    if held.rings <= 1 or columns.distance_mm.shape[1] < 2 * held.rings + 1:
+        return np.float32(1.0)
+    near, far = (max(_scatter(columns, apart), 1.0) for apart in (1, held.rings))
+    return np.float32(max(far / near, 1.0) * held.gain_in_mean(width))
+
+
+def _scatter(columns: RingColumns, apart: int) -> float:
+    """Return the robust spread of rings about the line through those ``apart`` on either side, over their σ.
+
+    The line follows what slopes along the pipe.
+    """
+    some = slice(None, None, _SOME_COLUMNS)
+    at, radius, variance = (v[some] for v in (columns.distance_mm, columns.radius_mm, columns.variance))
+    before, middle, after = slice(None, -2 * apart), slice(apart, -apart), slice(2 * apart, None)
+    share = (at[:, middle] - at[:, before]) / np.maximum(at[:, after] - at[:, before], 1e-9)
+    error = radius[:, middle] - (1 - share) * radius[:, before] - share * radius[:, after]
+    usual = variance[:, middle] + (1 - share) ** 2 * variance[:, before] + share**2 * variance[:, after]
+    ratio = error / np.sqrt(usual)
+    known = ratio[np.isfinite(ratio)]
+    return robust_spread(known) if known.size else 1.0
 
 
 def _roughness(radius: Float32, sigma: Float32, grid: MapGrid) -> Float32:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.held_over import HeldOver
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
 from pipeline.artefacts.wall_map import FixedToProbe
@@ -67,12 +68,13 @@ def map_of(
     systematic_mm: Float,
     smoothing_mm: float,
     gap_mm: float,
+    held: HeldOver,
 ) -> RadiusMap:
     """Return the radius map of the rows that a stretch works out, of which ``systematic_mm`` is a 1 σ."""
     part = grid.rows(stretch.from_row, stretch.to_row)
     samples = (s for _, s in _centred_samples(rings, survey, stretch.near))
     columns = rings_on_columns(samples, len(stretch.near), part)
-    radius, random, count, misalignment = gridded(columns, part, smoothing_mm, gap_mm)
+    radius, random, count, misalignment = gridded(columns, part, smoothing_mm, gap_mm, held)
     total = np.hypot(random, systematic_mm).astype(np.float32)
     total[~np.isfinite(radius)] = np.nan
     return RadiusMap(part.distance_mm, part.azimuth_rad, radius, total, random, count, misalignment)

@@ -314,6 +314,13 @@ DAMAGED = {"damaged-stream": damaged_stream}
 # Stored as HEVC, from careful to hasty: what is held over from picture to picture differs.
 CODED = {
     f"hevc-{crf}-{preset}": {"crf": str(crf), "preset": preset, "x265-params": "log-level=none"}
-    for crf, preset in ((30, "medium"), (30, "veryfast"), (30, "ultrafast"), (32, "fast"))
+    for crf, preset in (
+        (30, "medium"),
+        (30, "fast"),
+        (30, "veryfast"),
+        (30, "superfast"),
+        (30, "ultrafast"),
+        (32, "fast"),
+    )
 }
 KINDS = sorted({*PAINTED, *FROZEN, *REWRITTEN, *DAMAGED, *CODED})

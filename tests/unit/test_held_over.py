@@ -1,0 +1,83 @@
+"""Light that a codec holds over: told by what is finest in the rings, and σ of the wall that goes by it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.adjustment.held_over import HeldOver, held_over
+from pipeline.arrays import Float
+from stages.accumulate.grid import MapGrid, RingColumns, gridded
+
+HELD, SAMPLE_MM = 0.7, 0.2
+
+
+def rings_of(held: float, shape: tuple[int, int], seed: int = 1) -> Float:
+    """Return values (F, A) of unit variance, each ``held`` times those of the ring before, and new noise."""
+    random = np.random.default_rng(seed)
+    rings = [random.standard_normal(shape[1])]
+    for _ in range(shape[0] - 1):
+        rings.append(held * rings[-1] + np.sqrt(1 - held**2) * random.standard_normal(shape[1]))
+    return np.array(rings)
+
+
+def found_in(held: float, step_mm: float = 1.2) -> HeldOver:
+    """Return what is told of such rings so far apart, on a wall of a wider shape than what is compared."""
+    values = rings_of(held, (120, 720))
+    wall = 5 * np.sin(np.linspace(0, 8 * np.pi, 720))
+    return held_over([values + wall], step_mm * np.arange(120), SAMPLE_MM)
+
+
+@pytest.mark.parametrize("held", [0.0, 0.4, HELD])
+def test_likeness_is_that_of_the_rings(held: float) -> None:
+    # 120 rings of some 400 independent samples: the correlation errs by 0.005, of rings far apart by 0.01
+    assert found_in(held).likeness == pytest.approx(held ** np.arange(17), abs=0.03)
+
+
+def test_rings_are_compared_as_far_apart_as_nothing_is_shared() -> None:
+    assert found_in(0.0).rings == 1
+    assert 0.7 ** found_in(HELD).rings == pytest.approx(0.1, abs=0.04)
+
+
+def test_a_standing_probe_sees_the_same_wall_and_nothing_is_held_over() -> None:
+    assert found_in(0.9, step_mm=0.01).rings == 1
+
+
+def test_missing_samples_and_short_passes_are_no_likeness() -> None:
+    values = rings_of(0.0, (30, 720))
+    values[:, 100:200] = np.nan
+    assert held_over([values], 1.2 * np.arange(30), SAMPLE_MM).likeness[1] < 0.05
+    assert held_over([values[:1]], np.zeros(1), SAMPLE_MM).rings == 0
+
+
+def test_a_mean_of_rings_that_share_their_error_is_less_sure() -> None:
+    """The formula is held against drawn rings."""
+    width, apart = 1.5, np.arange(-8, 9)
+    weight = np.exp(-0.5 * (apart / width) ** 2) / np.exp(-0.5 * (apart / width) ** 2).sum()
+    drawn = rings_of(HELD, (17, 20000))
+    gain = HeldOver(HELD ** np.arange(17.0)).gain_in_mean(width)
+    assert np.std(weight @ drawn) / np.linalg.norm(weight) == pytest.approx(gain, rel=0.03)
+
+
+def columns_with(held: float, sigma_mm: float) -> RingColumns:
+    """Return rings 0.6 mm apart on a round wall in 720 columns, which state a third of their errors.
+
+    Errors are 12° wide, as of a codec's blocks: roughness from cell to cell does not show them.
+    """
+    error = sigma_mm * np.repeat(rings_of(held, (150, 30)).T, 24, axis=0)
+    distance = np.broadcast_to(0.6 * np.arange(150), error.shape).copy()
+    variance = np.full(error.shape, (sigma_mm / 3) ** 2)
+    return RingColumns(distance, 50 + error, variance, np.zeros_like(error), np.ones(error.shape, np.int64))
+
+
+@pytest.mark.parametrize(("held", "told"), [(0.0, True), (HELD, True), (HELD, False)])
+def test_sigma_is_that_of_errors_held_over(held: float, told: bool) -> None:
+    """Stated by the scatter of neighbouring rings it is too small; that they are alike must be told."""
+    grid = MapGrid(0.5 * np.arange(4, 170), 2 * np.pi / 720 * np.arange(720) - np.pi)
+    alike = HeldOver(held ** np.arange(17.0) if told else np.eye(17)[0])
+    radius, sigma, *_ = gridded(columns_with(held, 0.05), grid, 0.3, 3.0, alike)
+    stated = float(np.median(sigma)) / float(np.std(radius - 50))
+    if told:
+        assert 0.85 < stated < 1.2
+    else:
+        assert stated < 0.75
