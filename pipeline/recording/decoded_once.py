@@ -8,7 +8,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import IO, TypeVar
+from typing import IO, Literal, TypeVar
 
 import av
 import numpy as np
@@ -18,10 +18,22 @@ from pipeline.arrays import Byte, Image, Int
 from pipeline.errors import InputError
 from pipeline.machine.scratch import Scratch
 from pipeline.recording.base import Illumination, Planes, Recording, ascending, in_background
-from pipeline.recording.images import FULL_CHROMA, SplitImage, bgr_444, in_full_range, plane_of, shown, split
+from pipeline.recording.images import (
+    FULL_CHROMA,
+    SplitImage,
+    bgr_444,
+    halved,
+    in_full_range,
+    plane_of,
+    shown,
+    split,
+)
 from pipeline.recording.video import AHEAD, FEW, VideoSource
 
 Made = TypeVar("Made")
+Form = Literal["grey", "split", "bgr"]
+_FORMS: tuple[Form, ...] = ("grey", "split", "bgr")
+"""What is kept of a frame: its luma, with chroma of half its size, all; each is made of those behind it."""
 # Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
 # Frames beyond it are decoded again. A disk that is nearly full is left to the results.
 _MOST_BYTES, _SHARE_OF_FREE = 4 << 30, 0.25
@@ -39,8 +51,8 @@ class Kept:
         Of the first plane in the file, bytes.
     planes : tuple of (int, int)
         Height and width of the planes that are kept, one after the other.
-    whole : bool
-        Whether all planes are kept, or the luma alone.
+    form : Form
+        What is kept.
     size : (int, int)
         Width and height of the frame, px.
     pixel_format, color_range, colorspace
@@ -49,7 +61,7 @@ class Kept:
 
     offset: int
     planes: tuple[tuple[int, int], ...]
-    whole: bool
+    form: Form
     size: tuple[int, int]
     pixel_format: str
     color_range: int
@@ -58,7 +70,7 @@ class Kept:
     @property
     def splits_planes(self) -> bool:
         """Whether a `SplitImage` is made of its planes as they are."""
-        return self.pixel_format in FULL_CHROMA and self.colorspace != Colorspace.ITU709
+        return _splits_planes(self.pixel_format, self.colorspace)
 
 
 @dataclass
@@ -82,18 +94,19 @@ class FrameStore:
     def __post_init__(self) -> None:
         weakref.finalize(self, self.stream.close)
 
-    def holds(self, number: int, planes: Planes) -> bool:
-        """Return whether a frame is there, or known to be unreadable."""
+    def holds(self, number: int, form: Form) -> bool:
+        """Return whether a frame is there in that form or a richer one, or known to be unreadable."""
         kept = self._kept.get(number)
-        return number in self._kept if kept is None else kept.whole or planes == "grey"
+        return number in self._kept if kept is None else _FORMS.index(kept.form) >= _FORMS.index(form)
 
-    def put(self, number: int, frame: av.VideoFrame | None, luma_only: bool) -> None:
-        """Keep a frame where its format, the limit and the disk allow it."""
+    def put(self, number: int, frame: av.VideoFrame | None, form: Form) -> None:
+        """Keep a frame in one form where its format, the limit and the disk allow it."""
         if frame is None:
             self._kept[number] = None
-        elif _is_planar(frame) and not (luma_only and self._kept.get(number)):
-            chosen = frame.planes[:1] if luma_only else frame.planes
-            self._write(number, frame, [np.ascontiguousarray(plane_of(p)) for p in chosen])
+        elif _is_planar(frame) and not (form != "bgr" and self._kept.get(number)):
+            if form == "split" and not _splits_planes(frame.format.name, int(frame.colorspace)):
+                form = "bgr"
+            self._write(number, frame, form)
 
     def take(self, number: int, planes: Planes) -> Image | None:
         """Return the pixels of a frame that is there, as `pipeline.recording.images.pixels` gives them."""
@@ -124,7 +137,11 @@ class FrameStore:
             return in_full_range(self._read(kept, 1)[0], kept.pixel_format, kept.color_range)
         return luma_of(self.take_split(number))
 
-    def _write(self, number: int, frame: av.VideoFrame, planes: list[Byte]) -> None:
+    def _write(self, number: int, frame: av.VideoFrame, form: Form) -> None:
+        planes = [plane_of(p) for p in (frame.planes[:1] if form == "grey" else frame.planes)]
+        if form == "split":
+            planes[1:] = [halved(p) for p in planes[1:]]
+        planes = [np.ascontiguousarray(p) for p in planes]
         size = sum(p.nbytes for p in planes)
         with self._lock:
             offset = self._end
@@ -140,7 +157,7 @@ class FrameStore:
             self.room = 0
             return
         self._kept[number] = Kept(
-            offset, tuple((p.shape[0], p.shape[1]) for p in planes), len(planes) == len(frame.planes),
+            offset, tuple((p.shape[0], p.shape[1]) for p in planes), form,
             (frame.width, frame.height), frame.format.name, int(frame.color_range), int(frame.colorspace),
         )  # fmt: skip
 
@@ -168,13 +185,15 @@ class DecodedOnce:
     ----------
     video : VideoSource
     store : FrameStore
-    dim : frozenset of int
-        Frames without the lamps' light, of which the luma alone is kept.
+    dim, lit : frozenset of int
+        Frames in the laser's light, of which the luma alone is kept, and in the lamps', whose chroma is
+        halved until it is asked for: a run does without, and what is kept costs time.
     """
 
     video: VideoSource
     store: FrameStore
     dim: frozenset[int]
+    lit: frozenset[int] = frozenset()
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -191,31 +210,36 @@ class DecodedOnce:
 
     def read_split(self, frames: Sequence[int] | Int) -> Iterator[tuple[int, SplitImage | None]]:
         """Yield frames as `read` does, each as luma and colours of half its size."""
-        found = self._found(ascending(frames).tolist(), "bgr", self.store.take_split, split)
+        found = self._found(ascending(frames).tolist(), "split", self.store.take_split, split)
         return in_background(found, AHEAD)
 
     def read_luma(self, frames: Sequence[int] | Int) -> Iterator[tuple[int, Image | None]]:
         """Yield the luma of frames that `read_split` yields."""
         numbers = ascending(frames).tolist()
-        found = self._found(numbers, "bgr", self.store.take_luma, lambda f: luma_of(split(f)))
+        found = self._found(numbers, "split", self.store.take_luma, lambda f: luma_of(split(f)))
         return in_background(found, AHEAD)
 
     def _found(
         self,
         wanted: list[int],
-        planes: Planes,
+        form: Form,
         take: Callable[[int], Made],
         make: Callable[[av.VideoFrame | None], Made],
     ) -> Iterator[tuple[int, Made]]:
-        missing = [n for n in wanted if not self.store.holds(n, planes)]
+        missing = [n for n in wanted if not self.store.holds(n, form)]
         decoded, due = self.video.decoded(np.array(missing, np.int64)), set(missing)
         for number in wanted:
             if number not in due:
                 yield number, take(number)
                 continue
             _, frame = next(decoded)
-            self.store.put(number, frame, number in self.dim)
+            self.store.put(number, frame, self._kept_form(number, form))
             yield number, make(frame)
+
+    def _kept_form(self, number: int, asked: Form) -> Form:
+        if number in self.dim:
+            return "grey"
+        return "split" if number in self.lit and asked != "bgr" else "bgr"
 
 
 def read_split(recording: Recording, frames: Sequence[int] | Int) -> Iterator[tuple[int, SplitImage | None]]:
@@ -251,8 +275,13 @@ def decoded_once(recording: Recording, scratch: Scratch) -> Recording:
     except InputError:  # the stages' own results will say so
         return recording
     room = int(min(_MOST_BYTES, _SHARE_OF_FREE * shutil.disk_usage(scratch.place).free))
-    dim = frozenset(recording.frames.of(Illumination.LASER).tolist())
-    return replace(recording, source=DecodedOnce(recording.source, FrameStore(stream, room), dim))
+    dim, lit = (frozenset(recording.frames.of(i).tolist()) for i in (Illumination.LASER, Illumination.LED))
+    return replace(recording, source=DecodedOnce(recording.source, FrameStore(stream, room), dim, lit))
+
+
+def _splits_planes(pixel_format: str, colorspace: int) -> bool:
+    """Return whether `SplitImage.of_planes` takes such a frame."""
+    return pixel_format in FULL_CHROMA and colorspace != Colorspace.ITU709
 
 
 def _is_planar(frame: av.VideoFrame) -> bool:

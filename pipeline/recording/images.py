@@ -78,14 +78,15 @@ class SplitImage:
     @staticmethod
     def of(image: Image) -> SplitImage:
         """Split a picture (H, W, 3)."""
-        return SplitImage(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8), _halved(image))
+        return SplitImage(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8), halved(image))
 
     @staticmethod
     def of_planes(
         planes: Sequence[Image], pixel_format: str, color_range: int, colorspace: int
     ) -> SplitImage:
-        """Split planes of full-resolution chroma: the colours of the whole picture are not worked out."""
-        small = bgr_444([_halved(p) for p in planes], pixel_format, color_range, colorspace)
+        """Split planes of full-resolution chroma, or of chroma halved: whole colours are not worked out."""
+        parts = [halved(p) if p.shape == planes[0].shape else p for p in planes]
+        small = bgr_444(parts, pixel_format, color_range, colorspace)
         return SplitImage(in_full_range(planes[0], pixel_format, color_range), small)
 
 
@@ -107,7 +108,7 @@ def split(frame: av.VideoFrame | None) -> SplitImage | None:
     return SplitImage.of(pixels(frame, "bgr"))
 
 
-def _halved(image: Image) -> Image:
+def halved(image: Image) -> Image:
     """Return a picture (H, W) or (H, W, 3) of half its size, four pixels to one."""
     size = (image.shape[1] // 2, image.shape[0] // 2)
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)

@@ -98,18 +98,21 @@ def test_pixels_are_those_of_the_video_however_often_they_are_read(
             np.testing.assert_array_equal(got, want, f"{planes} {n}", strict=True)
 
 
-def test_a_frame_is_decoded_once_and_colours_of_laser_frames_when_they_are_asked_for(
+def test_a_frame_is_decoded_once_and_whole_colours_when_they_are_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_video(tmp_path / "v.mkv", "libx264", "yuv444p", {"g": "4"})
     shared = _shared(tmp_path, open_video(tmp_path / "v.mkv"), lasers=(0, 2))
     decoded = _count_decoded(monkeypatch)
     list(shared.read(range(COUNT), "grey"))
-    list(shared.read(range(1, COUNT, 2), "bgr"))
+    list(shared.read_split(range(1, COUNT, 2)))
     list(shared.read(range(COUNT), "grey"))
     assert decoded == list(range(COUNT))
     list(shared.read([0], "bgr"))
     assert decoded == [*range(COUNT), 0]
+    for _ in range(2):
+        list(shared.read([1], "bgr"))
+    assert decoded == [*range(COUNT), 0, 1]
 
 
 def test_a_full_disk_costs_time_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
