@@ -18,22 +18,23 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import av
 import numpy as np
 
-from tests.benchmarks.hard_kinds import (
+from tests.benchmarks.hard_files import (
     CODED,
     DAMAGED,
+    EXCHANGED,
     FROZEN,
     KINDS,
-    PAINTED,
     REWRITTEN,
-    Paint,
+    exchanged,
     held_still,
-    unspoilt,
 )
+from tests.benchmarks.hard_kinds import PAINTED, Paint, unspoilt
 from tests.shared_data import shared
 
 CAREFUL = {"crf": "16", "preset": "veryfast"}
@@ -68,6 +69,8 @@ def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
     random, video = np.random.default_rng(seed), folder / "frames.mkv"
     if kind in PAINTED or kind in FROZEN:
         repaint(folder, PAINTED.get(kind) or held_still(FROZEN[kind]), seed)
+    if kind in EXCHANGED:
+        repaint(folder, unspoilt, seed, taken=EXCHANGED[kind])
     if kind in CODED:
         repaint(folder, unspoilt, seed, "libx265", CODED[kind])
     if kind in REWRITTEN:
@@ -77,16 +80,17 @@ def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
 
 
 def repaint(
-    folder: Path, paint: Paint, seed: int, codec: str = "libx264", options: dict[str, str] = CAREFUL
-) -> None:
-    """Put every frame of a recording through ``paint``, and store them with a codec."""
+    folder: Path, paint: Paint, seed: int, codec: str = "libx264", options: dict[str, str] = CAREFUL,
+    taken: Mapping[int, int] | None = None,
+) -> None:  # fmt: skip
+    """Put every frame of a recording through ``paint``, and store them with a codec, perhaps exchanged."""
     random, video, painted = np.random.default_rng(seed), folder / "frames.mkv", folder / "painted.mkv"
     rows = (folder / "frames.csv").read_text("utf-8").splitlines()[1:]
     laser = [not row.endswith("led") for row in rows]
     with av.open(str(video)) as old, av.open(str(painted), "w") as new:
         stream = new.add_stream(codec, rate=old.streams.video[0].average_rate)
         stream.pix_fmt, stream.options = "yuv420p", options
-        for k, frame in enumerate(old.decode(video=0)):
+        for k, frame in enumerate(exchanged(old.decode(video=0), taken or {})):
             image = paint(frame.to_ndarray(format="bgr24").astype(np.float32), laser[k], k, random)
             if k == 0:
                 stream.height, stream.width = image.shape[:2]

@@ -1,18 +1,15 @@
-"""Kinds of hard footage: how one picture of a recording is painted over, and which of its files are changed.
+"""Kinds of hard footage: how one picture of a recording is painted over.
 
 A kind of `PAINTED` takes (image (H, W, 3) in grey levels, whether the laser alone lights it, number of the
-frame, random numbers) and returns the picture that is stored; one of `REWRITTEN` changes other files of the
-recording, one of `DAMAGED` the bytes of its video. Sizes are of pictures 1200 px high.
+frame, random numbers) and returns the picture that is stored. Sizes are of pictures 1200 px high.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 Image = NDArray[np.float32]
@@ -231,16 +228,13 @@ def half_size(image: Image, laser: bool, k: int, random: np.random.Generator) ->
     return np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.float32)
 
 
-def held_still(frames: range) -> Paint:
-    """Return what shows the picture before ``frames`` in all of them."""
-    shown: list[Image] = []
-
-    def paint(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-        if k not in frames:
-            shown[:] = [image]
-        return shown[0]
-
-    return paint
+def outside_first(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The first 24 pictures show a room: the probe is not in the pipe yet, its lamps and laser are on."""
+    if k >= 24:
+        return image
+    coarse = np.random.default_rng(k // 8).normal(60, 20, (60, 80)).astype(np.float32)
+    room = cv2.resize(coarse, image.shape[1::-1], interpolation=cv2.INTER_CUBIC)
+    return np.repeat((0.15 if laser else 1.0) * room[..., None], 3, 2)
 
 
 def _azimuth(image: Image) -> NDArray[np.float64]:
@@ -267,60 +261,12 @@ def _shrunk(image: Image, factor: float) -> Image:
     return image[np.ix_(v, u)]
 
 
-def half_size_probe(folder: Path, random: np.random.Generator) -> None:
-    """State the camera of pictures of half the size."""
-    probe = yaml.safe_load((folder / "probe.yaml").read_text("utf-8"))
-    camera = probe["camera"]
-    camera["image_size"] = [n // 2 for n in camera["image_size"]]
-    camera["focal_px"] = [f / 2 for f in camera["focal_px"]]
-    camera["centre_px"] = [(c + 0.5) / 2 - 0.5 for c in camera["centre_px"]]
-    (folder / "probe.yaml").chmod(0o644)
-    (folder / "probe.yaml").write_text(yaml.safe_dump(probe), "utf-8")
-
-
-def late_stamps(folder: Path, random: np.random.Generator) -> None:
-    """Times are of arrival: late by an exponential part of a period, 0.2 in the mean, never out of order."""
-    head, *rows = (folder / "frames.csv").read_text("utf-8").splitlines()
-    cells = [row.split(",") for row in rows]
-    times = np.array([float(c[1]) for c in cells])
-    times = np.maximum.accumulate(
-        times + random.exponential(0.2 / 30, len(times)) + 1e-6 * np.arange(len(times))
-    )
-    lines = [f"{c[0]},{t:.6f},{c[2]}" for c, t in zip(cells, times, strict=True)]
-    (folder / "frames.csv").write_text("\n".join([head, *lines]) + "\n", "utf-8")
-
-
-def damaged_stream(video: bytes, random: np.random.Generator) -> bytes:
-    """Twenty bytes in the second third of the video are others, as after a bad copy."""
-    out = bytearray(video)
-    for at in random.integers(len(out) // 3, 2 * len(out) // 3, 20):
-        out[at] ^= 0x55
-    return bytes(out)
-
-
 PAINTED: dict[str, Paint] = {
     f.__name__.replace("_", "-"): f
     for f in (
         hot_pixels, static_reflection, droplet, banding, interlaced, dim_sector, second_ring, sliding_drop,
         text_overlay, clock_and_logo, cable, debris, black_frames, fog, grey_camera, standing_water, shake,
         dark_edges, exposure_pumping, fouled_lens, greasy_half, lamp_out, laser_flicker, mirrored, half_size,
-        scale_shrinks, scale_grows, scale_settles,
+        scale_shrinks, scale_grows, scale_settles, outside_first,
     )
 }  # fmt: skip
-# Frames whose pictures all are the one before the first of them.
-FROZEN = {"frozen-picture": range(90, 99)}
-REWRITTEN = {"half-size": half_size_probe, "late-stamps": late_stamps}
-DAMAGED = {"damaged-stream": damaged_stream}
-# Stored as HEVC, from careful to hasty: what is held over from picture to picture differs.
-CODED = {
-    f"hevc-{crf}-{preset}": {"crf": str(crf), "preset": preset, "x265-params": "log-level=none"}
-    for crf, preset in (
-        (30, "medium"),
-        (30, "fast"),
-        (30, "veryfast"),
-        (30, "superfast"),
-        (30, "ultrafast"),
-        (32, "fast"),
-    )
-}
-KINDS = sorted({*PAINTED, *FROZEN, *REWRITTEN, *DAMAGED, *CODED})

@@ -1,0 +1,105 @@
+"""Kinds of hard footage: pictures held, exchanged or coded hastily, and other files of a recording changed.
+
+`FROZEN` are frames that all show the picture before them, `EXCHANGED` pictures in another's place, `CODED`
+options of HEVC; one of `REWRITTEN` changes other files of the recording, one of `DAMAGED` the video's bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import yaml
+
+from tests.benchmarks.hard_kinds import PAINTED, Image, Paint
+
+Frame = TypeVar("Frame")
+
+
+def held_still(frames: range) -> Paint:
+    """Return what shows the picture before ``frames`` in all of them."""
+    shown: list[Image] = []
+
+    def paint(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+        if k not in frames:
+            shown[:] = [image]
+        return shown[0]
+
+    return paint
+
+
+def half_size_probe(folder: Path, random: np.random.Generator) -> None:
+    """State the camera of pictures of half the size."""
+    probe = yaml.safe_load((folder / "probe.yaml").read_text("utf-8"))
+    camera = probe["camera"]
+    camera["image_size"] = [n // 2 for n in camera["image_size"]]
+    camera["focal_px"] = [f / 2 for f in camera["focal_px"]]
+    camera["centre_px"] = [(c + 0.5) / 2 - 0.5 for c in camera["centre_px"]]
+    (folder / "probe.yaml").chmod(0o644)
+    (folder / "probe.yaml").write_text(yaml.safe_dump(probe), "utf-8")
+
+
+def late_stamps(folder: Path, random: np.random.Generator) -> None:
+    """Times are of arrival: late by an exponential part of a period, 0.2 in the mean, never out of order."""
+    head, *rows = (folder / "frames.csv").read_text("utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    times = np.array([float(c[1]) for c in cells])
+    times = np.maximum.accumulate(
+        times + random.exponential(0.2 / 30, len(times)) + 1e-6 * np.arange(len(times))
+    )
+    lines = [f"{c[0]},{t:.6f},{c[2]}" for c, t in zip(cells, times, strict=True)]
+    (folder / "frames.csv").write_text("\n".join([head, *lines]) + "\n", "utf-8")
+
+
+def damaged_stream(video: bytes, random: np.random.Generator) -> bytes:
+    """Twenty bytes in the second third of the video are others, as after a bad copy."""
+    out = bytearray(video)
+    for at in random.integers(len(out) // 3, 2 * len(out) // 3, 20):
+        out[at] ^= 0x55
+    return bytes(out)
+
+
+def exchanged(frames: Iterable[Frame], taken: Mapping[int, int]) -> Iterator[Frame]:
+    """Yield frames, each in the place of the one that is ``taken`` for it."""
+    held: dict[int, Frame] = {}
+    place = 0
+    for number, frame in enumerate(frames):
+        held[number] = frame
+        while (source := taken.get(place, place)) in held:
+            yield held.pop(source)
+            place += 1
+
+
+def clock_jump(folder: Path, random: np.random.Generator) -> None:
+    """The camera's clock is set 5 s ahead at frame 70; the encoder's goes on."""
+    head, *rows = (folder / "frames.csv").read_text("utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    lines = [f"{c[0]},{float(c[1]) + 5 * (int(c[0]) >= 70):.6f},{c[2]}" for c in cells]
+    (folder / "frames.csv").write_text("\n".join([head, *lines]) + "\n", "utf-8")
+
+
+# Frames whose pictures all are the one before the first of them.
+FROZEN = {"frozen-picture": range(90, 99), "frozen-second": range(60, 90)}
+REWRITTEN = {"half-size": half_size_probe, "late-stamps": late_stamps, "clock-jump": clock_jump}
+DAMAGED = {"damaged-stream": damaged_stream}
+# Stored as HEVC, from careful to hasty: what is held over from picture to picture differs.
+CODED = {
+    f"hevc-{crf}-{preset}": {"crf": str(crf), "preset": preset, "x265-params": "log-level=none"}
+    for crf, preset in (
+        (30, "medium"),
+        (30, "fast"),
+        (30, "veryfast"),
+        (30, "superfast"),
+        (30, "ultrafast"),
+        (32, "fast"),
+    )
+}
+# Pictures that change places, laser against led and led against led.
+_PAIRS = {
+    "neighbours-exchanged": [(k, k + 1) for k in (20, 41, 60, 77, 98, 112)],
+    "lit-exchanged": [(k, k + 2) for k in (41, 77, 113)],
+}
+EXCHANGED = {n: {a: b for p in pairs for a, b in (p, p[::-1])} for n, pairs in _PAIRS.items()}
+KINDS = sorted({*PAINTED, *FROZEN, *EXCHANGED, *REWRITTEN, *DAMAGED, *CODED})
