@@ -12,6 +12,7 @@ from pipeline.adjustment.bordered import Rows
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import VOCABULARY
 from stages.diagnose.gauge import answer
+from stages.diagnose.gauge.confirm import passes_again
 from stages.diagnose.gauge.elimination import (
     Equations,
     OwnUnknowns,
@@ -262,6 +263,17 @@ def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(se
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     monkeypatch.setattr(answer, "pattern_of", lambda term: ("laser", "static", term.order))
     assert answer.verdict_of(seen) is verdict
+
+
+@pytest.mark.parametrize(
+    ("step_s", "turns_s", "again"), [(3.0, 9.0, False), (3.0, 6.0, True), (0.0, 6.0, False)]
+)
+def test_a_step_is_borne_out_only_where_the_probe_comes_back_to_the_wall_before_it(step_s, turns_s, again):
+    time_s = np.arange(100) / 10
+    T_pc = np.tile(np.eye(4), (100, 1, 1))
+    T_pc[:, 2, 3] = 20 * (turns_s - np.abs(time_s - turns_s))
+    run = cast(Any, SimpleNamespace(time_s=time_s))
+    assert passes_again(run, T_pc, step_s) is again
 
 
 def test_a_score_that_few_cells_hold_is_less_surprising():

@@ -56,8 +56,25 @@ def confirmations(
         pairs = _pairs([p for p in partial if p is not None])
         compared = [_compared(a, b, term) for a, b in pairs]
         compared.append(_by_kind(edges, both, judged, term, stated))
-        out.append(tuple(c for c in compared if c is not None))
+        told = term.model.kind is not CourseKind.STEP or passes_again(
+            run, judged.fit.state.T_pc, term.shape[0]
+        )
+        out.append(tuple(c for c in compared if told and c is not None))
     return tuple(out)
+
+
+def passes_again(run: GaugeRun, T_pc: Float, step_s: float) -> bool:
+    """Return whether the probe is on the same stretch of the pipe before and after a step.
+
+    If not, the step may as well be a place: a gauge that is not as drawn from there on.
+    """
+    along, after = T_pc[:, 2, 3], run.time_s - run.time_s[0] >= step_s
+    if after.all() or not after.any():
+        return False
+    low = max(along[after].min(), along[~after].min())
+    high = min(along[after].max(), along[~after].max())
+    shared = (along >= low) & (along <= high)
+    return bool(min((shared & after).sum(), (shared & ~after).sum()) >= _LEAST_FRAMES)
 
 
 def tells_law(confirmation: Confirmation) -> bool:
