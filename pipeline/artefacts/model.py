@@ -217,9 +217,10 @@ class TexturedMesh:
     texel_mm : float
         Size of a photo texel on the wall.
     wall_triangles : int
-        Triangles before decimation.
+        Triangles before thinning out.
     decimation_error_mm : float
-        Largest distance of a point of the undecimated surface from the decimated one, as verified.
+        Largest distance of what the surface was made of from it, as verified: of the radius map's cells, with
+        their noise, or of the vertices of an undecimated Poisson surface.
     decimation_rms_mm : float
         Root mean square of the same distances.
     """

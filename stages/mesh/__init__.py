@@ -103,7 +103,7 @@ def make_mesh(
 
 @dataclass
 class Tally:
-    """Errors and sizes of decimation, summed over pieces."""
+    """Sizes of pieces, and how far what they were made of lies off them, summed."""
 
     faces: int = 0
     vertices: int = 0
@@ -195,10 +195,16 @@ def _assemble(tiles: PackedTiles, kind: str, tally: Tally, parameters: MeshParam
 
 def _report(mesh: TexturedMesh, context: Context) -> None:
     context.report("mesh: surface", mesh.surface)
-    context.report("mesh: triangles before decimation", mesh.wall_triangles)
+    context.report("mesh: triangles before thinning out", mesh.wall_triangles)
     context.report("mesh: triangles", mesh.triangles)
-    context.report("mesh: largest decimation error", mesh.decimation_error_mm, "mm")
-    context.report("mesh: RMS decimation error", mesh.decimation_rms_mm, "mm")
+    context.report(
+        "mesh: largest distance of the wall's points from the surface", mesh.decimation_error_mm, "mm"
+    )
+    context.report(
+        "mesh: RMS distance of the wall's points from the surface, their noise included",
+        mesh.decimation_rms_mm,
+        "mm",
+    )
 
 
 MESH = Stage("mesh", "5", MeshParameters, make_mesh, "wall, photo, error colours -> textured mesh")
