@@ -92,7 +92,7 @@ def effects(scene: Scene, frame: Int, random: np.random.Generator) -> list[Hidde
             )
         )
         lost = 0.5 if weak else 1.0
-        dim = 1 - lost * _led_share(theta, phi, azimuth, scene)
+        dim = 1 - lost * led_share(theta, phi, azimuth, scene)
         found.append(
             Hidden(f"LED fails, {kind}", _from(middle, dim, "led"), ("led_dead",), "time",
                    when | {"azimuth_deg": (deg, 20.0)}, lost)
@@ -215,7 +215,7 @@ def _droplet(u: Float32, v: Float32, at_u: float, at_v: float, radius: float) ->
     return lambda number, light, image: cv2.remap(image, map_u, map_v, cv2.INTER_LINEAR)
 
 
-def _led_share(theta: Float32, phi: Float32, azimuth: float, scene: Scene) -> Float32:
+def led_share(theta: Float32, phi: Float32, azimuth: float, scene: Scene) -> Float32:
     """Return an LED's share of the light on a straight, round bore, each LED shining as cos of its angle."""
     lamp, radius = scene.probe.lighting, scene.surface.mean_radius_mm
     ahead = radius / np.tan(np.clip(theta, 0.2, 2.4))

@@ -117,7 +117,7 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
         return ()
     file = Path(twin) / "twin.json"
     try:
-        on_image = [m for m in read_json(file)["found"] if m["fixed_to"] == "image" and m["place"]]
+        on_image = [m for m in read_json(file)["found"] if m["fixed_to"] == "image" and "u_px" in m["place"]]
         places = [[float(m["place"][k]["value"]) for k in _PLACE] for m in on_image]
         moved = [_moves_line(m, p[2]) for m, p in zip(on_image, places, strict=True)]
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -131,10 +131,8 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
 
 def _moves_line(found: dict[str, Any], radius_px: float) -> bool:
     """Return whether what is on the window moves the line: a drop, or a rim that is steep for its width."""
-    if (
-        found["name"] is None
-    ):  # brighter in lit frames: a reflection of the LEDs, which laser frames do not show
-        return False
+    if found["name"] in (None, "glint"):
+        return bool(found["channel"] == "line")  # the LEDs mirrored somewhere do not show in laser frames
     share = found["parameters"].get("share")
     if share is None:
         return True

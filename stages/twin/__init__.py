@@ -18,6 +18,7 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_contrasts, block_ratios
+from stages.twin.glints import told_apart
 from stages.twin.locate import LEAST_CONTRAST, ImagePlace, beside, full_size, places_in_image
 from stages.twin.name import (
     cannot_tell,
@@ -28,7 +29,7 @@ from stages.twin.name import (
     state_figures,
     worst_places,
 )
-from stages.twin.reference import unnamed
+from stages.twin.on_wall import unnamed
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
 from stages.twin.state import PhotometricState, Sampled, clipped_line, estimate_state, sample_frames
@@ -163,11 +164,14 @@ def compared_with(
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
-    whole, withdrawn = sums.named(samples, recording)
+    over_time = causes(*sums.cells(), scene.probe.lighting, scene.ring)
+    failed = any("led_dead" in m.name for m in over_time)
+    whole, withdrawn = sums.named(samples, recording, failed)
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
+    on_window, glints = told_apart(on_window, sums.glints())
     found: tuple[Mismatch, ...] = (
-        *causes(*sums.cells(), scene.probe.lighting, scene.ring), *on_window,
-        *unnamed(samples), *whole,
+        *over_time, *on_window,
+        *unnamed(samples and samples.clear_of((*on_window, *glints))), *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
@@ -207,7 +211,7 @@ def _blocks(
     scene: Scene, state: PhotometricState, sampled: list[Sampled]
 ) -> tuple[list[Float32], list[Float32]]:
     """Return recorded over predicted brightness, and texture, of blocks of the sampled lit frames."""
-    black, renderer = state.noise.black.value, Renderer(scene, state)
+    black, renderer = state.noise.black.value, Renderer(replace(scene, outside=state.outside), state)
     made = [
         [f(s.image - black, twin, state.noise.white - black) for f in (block_ratios, block_contrasts)]
         for s in sampled
@@ -234,7 +238,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "12",
+    "13",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -42,8 +42,9 @@ wall's reflectance for the laser's colour, by more, from place to place."""
 _LOBE = 0.15
 """Relative 1 σ of an LED's share for want of its lobe, which no probe states: even light and one that falls
 as the cosine differ by so much at the ring."""
-_SHAPE = 0.03
-"""1 σ of a sector's loss for want of its shape, whose width is tried in steps of a quarter."""
+_SHAPE, _NARROW_DEG, _OF_WIDTH = 0.03, 20.0, 0.08
+"""1 σ of a sector's loss for want of its shape. Of one narrower than two cells only loss times width shows,
+and widths are tried in steps of a quarter: relative 1 σ of the loss, half a step over √3."""
 _HALF_SECTORS = 3
 """Sectors side by side in the same half, when one half of the picture is to foretell the other."""
 
@@ -136,7 +137,9 @@ def size_of(found: Fitted) -> float:
 
 def _size_sd(found: Fitted) -> float:
     more = replace(found, size=found.size + found.sd)
-    beyond = {"led_dead": _LOBE * size_of(found), "laser_sector": _SHAPE}[found.law.name]
+    narrow = found.law.name == "laser_sector" and found.place[1] < _NARROW_DEG
+    of_shape = float(np.hypot(_SHAPE, _OF_WIDTH * size_of(found) * narrow))
+    beyond = {"led_dead": _LOBE * size_of(found), "laser_sector": of_shape}[found.law.name]
     return float(np.hypot(size_of(more) - size_of(found), beyond))
 
 

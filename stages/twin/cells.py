@@ -10,15 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numba
 import numpy as np
 from scipy.stats import t
 
-from pipeline.arrays import Bool, Float, Float32, Int
-from stages.twin.render import TwinFrame
+from pipeline.arrays import Bool, Byte, Float, Float32, Int
+from stages.twin.render import Region, TwinFrame
 
 SECTORS = 36
 _FEWEST_PIXELS, _LEAST_RATIO = 60, 0.02
-"""A sector counts with so many pixels, and if it has at least so small a share of the light foretold."""
+"""A sector counts with so many pixels; one with less than this share of the light foretold has none."""
 _DRIFT_KNOTS, _FRAMES_OF_KNOT = 4, 4
 """Most knots of the slow change of brightness that is granted to wall, photo and light without a name, and
 frames for each: fewer would be drawn along by a single frame."""
@@ -44,14 +45,14 @@ class Cells:
 
     @property
     def usable(self) -> Bool:
-        """(F, S) sectors with enough pixels and light."""
-        return (self.pixels >= _FEWEST_PIXELS) & (self.cross > _LEAST_RATIO * self.own) & (self.own > 0)
+        """(F, S) sectors with enough pixels of which light is foretold."""
+        return (self.pixels >= _FEWEST_PIXELS) & (self.own > 0)
 
     @property
     def log_ratio(self) -> Float:
-        """(F, S) logarithm of recorded over twin; 0 where a sector cannot be used."""
+        """(F, S) logarithm of recorded over twin, `_LEAST_RATIO` at least; 0 where it cannot be used."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.usable, np.log(self.cross / self.own), 0.0)
+            return np.where(self.usable, np.log(np.maximum(self.cross / self.own, _LEAST_RATIO)), 0.0)
 
     def chi2(self, log_factor: Float) -> Float:
         """Return χ² (F,) of frames, summed over their usable pixels, with a factor (F, S) on the twin."""
@@ -77,32 +78,54 @@ class CellsOfFrames:
     frame: list[int] = field(default_factory=list)
     parts: list[Float] = field(default_factory=list)
 
-    def add(self, frame: int, above: Float32, twin: TwinFrame, use: Bool, sector: Int) -> None:
-        """Take the pixels in ``use`` (H, W), in the sectors (H, W); ``above`` is given above black."""
-        at, level = sector[use], twin.level[use]
-        recorded, weight = above[use], 1 / twin.variance[use]
-        sums = (recorded**2 * weight, recorded * level * weight, level**2 * weight, None)
+    def add(self, frame: int, above: Float32, twin: TwinFrame, white: float, sector: Byte) -> None:
+        """Take the lit wall below ``white`` in the sectors (H, W); ``above`` is given above black."""
         self.frame.append(frame)
-        self.parts.append(np.stack([np.bincount(at, w, SECTORS).astype(float) for w in sums]))
+        self.parts.append(self._sums(above, twin, white, sector, (Region.WALL, Region.WALL))[:4])
 
-    def add_line(self, frame: int, above: Float32, twin: TwinFrame, use: Bool, sector: Int) -> None:
+    def add_line(self, frame: int, above: Float32, twin: TwinFrame, white: float, sector: Byte) -> None:
         """Take the pixels of a laser frame, whose light counts wherever across the line it lies.
 
         A line beside its predicted place, for want of the right sheet or radius, is no darker for that:
         sectors are compared by all light about the line, as if it had its twin's place and profile.
         """
-        at, level = sector[use], twin.level[use]
-        sums = (above[use], level, level**2 / twin.variance[use], None)
-        light, foretold, own, pixels = (np.bincount(at, w, SECTORS).astype(float) for w in sums)
+        sums = self._sums(above, twin, white, sector, (Region.LINE_CORE, Region.LINE_FLANK))
+        own, pixels, light, foretold = sums[2:]
         ratio = light / np.where(foretold > 0, foretold, np.inf)
         self.frame.append(frame)
         self.parts.append(np.stack([pixels + ratio**2 * own, ratio * own, own, pixels]))
+
+    @staticmethod
+    def _sums(above: Float32, twin: TwinFrame, white: float, sector: Byte, kinds: tuple[int, int]) -> Float:
+        kind = tuple(int(k) for k in kinds)
+        return np.asarray(
+            _sector_sums(above, twin.level, twin.variance, twin.region, sector, np.float32(white), *kind)
+        )
 
     def cells(self) -> Cells | None:
         """Return the cells of all frames; None without any."""
         if not self.parts:
             return None
         return Cells(np.array(self.frame), *np.stack(self.parts, 1))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _sector_sums(above, level, variance, region, sector, white, kind, other):  # type: ignore[no-untyped-def]
+    """Return Σ recorded²/σ², recorded · twin/σ², twin²/σ², pixels, recorded, twin (6, S) of two regions."""
+    sums = np.zeros((6, SECTORS))
+    for i in range(region.shape[0]):
+        for j in range(region.shape[1]):
+            r, value = region[i, j], above[i, j]
+            if (r != kind and r != other) or value >= white:
+                continue
+            s, twin, weight = sector[i, j], level[i, j], 1 / variance[i, j]
+            sums[0, s] += value * value * weight
+            sums[1, s] += value * twin * weight
+            sums[2, s] += twin * twin * weight
+            sums[3, s] += 1
+            sums[4, s] += value
+            sums[5, s] += twin
+    return sums
 
 
 @dataclass(frozen=True)
@@ -162,10 +185,10 @@ class Fitted:
         return np.asarray(self.law.places[self.column])
 
 
-def sectors_of(phi_rad: Float32) -> Int:
+def sectors_of(phi_rad: Float32) -> Byte:
     """Return the sector of image azimuths, the first beginning at −π."""
     turn = np.nan_to_num(phi_rad + np.pi) / (2 * np.pi)
-    return np.asarray((turn * SECTORS).astype(np.int64) % SECTORS)
+    return np.asarray((turn * SECTORS).astype(np.int64) % SECTORS, np.uint8)
 
 
 def sector_azimuth_rad() -> Float:

@@ -22,8 +22,8 @@ _SILENT = 0.92
 """Share of pixels at one grey level from which noise is less than that of rounding, 1/√12: erf(√1.5)."""
 _LEAST_TEXTURE = 4.0
 """Variance of fine texture, grey levels squared, from which its share shows through noise of 576 pixels."""
-_DARK, _AT_BLACK = int(Region.DARK), 0.5
-"""The region as the compiled sums know it; half a grey level: at black to the level."""
+_DARK, _WALL, _CORE, _AT_BLACK = int(Region.DARK), int(Region.WALL), int(Region.LINE_CORE), 0.5
+"""Regions as the compiled sums know them; half a grey level: at black to the level."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
 
@@ -75,24 +75,25 @@ class Comparison:
         noise: CameraNoise,
     ) -> None:  # fmt: skip
         """Count a frame, its grey levels (H, W) given above black."""
-        region = before.region
-        z, sums = _differences(region, above_black, *_pair(before), *_pair(after), _STRAY)
+        z, sums, of_wall, by_level = _differences(
+            before.region, above_black, *_pair(before), *_pair(after), np.array(noise.polynomial),
+            np.float32(noise.white - noise.black.value), np.array(_LEVELS, np.float32), _STRAY,
+        )  # fmt: skip
         size, before_sum, after_sum = sums[:3]
         self.pixels += size
         self.before += before_sum
         self.after += after_sum
         self.clipped = noise.clips_black
         self.stray, self.still = self.stray + sums[3, 0], self.still + sums[3, 1]
-        wall = region == Region.WALL
         if light != Illumination.LASER:
-            square = (above_black - after.level)[wall].astype(float) ** 2
-            self.square += float(square.sum())
-            self.camera += float((square / noise.variance(after.level[wall])).sum())
-            self.noise += float(after.variance[wall].sum(dtype=float))
-            self.lit += float(wall.sum())
-            self.clipped_wall += float((above_black[wall] >= noise.white - noise.black.value).sum())
-            level = np.digitize(after.level[wall], _LEVELS[1:])
-            self.by_level += [np.bincount(level, w, len(_LEVELS)) for w in (None, z[wall] ** 2)]
+            self.lit += float(size[Region.WALL])
+            self.square, self.camera, self.noise, self.clipped_wall = (
+                float(a + b)
+                for a, b in zip(
+                    (self.square, self.camera, self.noise, self.clipped_wall), of_wall, strict=True
+                )
+            )
+            self.by_level += by_level
             self.seen += float(size.sum() - size[Region.UNSEEN] - size[Region.DARK])
             self.view += float(size.sum() - size[Region.DARK])
         counted = [int(r) for r in _COUNTED]
@@ -150,21 +151,41 @@ def _pair(twin: TwinFrame) -> tuple[Float32, Float32]:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _differences(region, above, level, variance, level_after, variance_after, stray):  # type: ignore[no-untyped-def]
-    """Return z (H, W) after, and of each region pixels and χ² before and after; then stray and still dark."""
+def _differences(  # type: ignore[no-untyped-def]
+    region, above, level, variance, level_after, variance_after, noise, white, levels, stray
+):
+    """Return z (H, W) after; of each region pixels and χ² before and after, then stray and still dark.
+
+    Then of the wall its squared differences, those over the camera's noise alone, its variances and its
+    clipped pixels; at last its pixels and squares of z by brightness (2, L).
+    """
     z, sums = np.empty_like(above), np.zeros((4, 6))
+    of_wall, by_level = np.zeros(4), np.zeros((2, len(levels)))
     for i in range(region.shape[0]):
         for j in range(region.shape[1]):
-            r = region[i, j]
-            rest = above[i, j] - level[i, j]
-            z[i, j] = (above[i, j] - level_after[i, j]) / np.sqrt(variance_after[i, j])
+            r, value, twin = region[i, j], above[i, j], level_after[i, j]
+            rest = value - level[i, j]
+            one = (value - twin) / np.sqrt(variance_after[i, j])
+            z[i, j] = one
             sums[0, r] += 1
             sums[1, r] += rest * rest / variance[i, j]
-            sums[2, r] += z[i, j] * z[i, j]
+            sums[2, r] += one * one
             if r == _DARK:
-                sums[3, 0] += z[i, j] > stray
-                sums[3, 1] += abs(above[i, j]) < _AT_BLACK
-    return z, sums
+                sums[3, 0] += one > stray
+                sums[3, 1] += abs(value) < _AT_BLACK
+            elif r == _WALL:
+                bright = max(twin, 0.0)
+                square = (value - twin) ** 2
+                of_wall[0] += square
+                of_wall[1] += square / (noise[0] + bright * (noise[1] + bright * noise[2]))
+                of_wall[2] += variance_after[i, j]
+                of_wall[3] += value >= white
+                k = 0
+                while k + 1 < len(levels) and twin >= levels[k + 1]:
+                    k += 1
+                by_level[0, k] += 1
+                by_level[1, k] += one * one
+    return z, sums, of_wall, by_level
 
 
 def _view(
@@ -186,12 +207,21 @@ def _view(
 
 def exposure_of(above_black: Float32, twin: TwinFrame) -> float:
     """Return the logarithm by which a frame is brighter than its twin, over line and lit wall."""
-    use = np.isin(twin.region, [int(Region.LINE_CORE), int(Region.WALL)])
-    if not use.any():
-        return 0.0
-    level, weight = twin.level[use].astype(float), 1 / twin.variance[use].astype(float)
-    ratio = float((weight * level * above_black[use]).sum() / (weight * level**2).sum())
-    return float(np.log(max(ratio, 1e-3)))
+    cross, own = _exposure(above_black, twin.level, twin.variance, twin.region)
+    return float(np.log(max(cross / own, 1e-3))) if own > 0 else 0.0
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _exposure(above, level, variance, region):  # type: ignore[no-untyped-def]
+    """Return Σ recorded · twin/σ² and Σ twin²/σ² over the line's core and lit wall."""
+    cross, own = 0.0, 0.0
+    for i in range(region.shape[0]):
+        for j in range(region.shape[1]):
+            if region[i, j] == _WALL or region[i, j] == _CORE:
+                weighted = level[i, j] / variance[i, j]
+                cross += weighted * above[i, j]
+                own += weighted * level[i, j]
+    return cross, own
 
 
 def of_blocks(values: Float32 | Bool) -> Float32:

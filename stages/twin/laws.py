@@ -9,10 +9,15 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Lighting
 from stages.twin.cells import SECTORS, Cells, Law, drift, of_sectors, sector_azimuth_rad
-from stages.twin.scene import Ring, even_light
+from stages.twin.leds import even_light
+from stages.twin.scene import Ring
 
 LED_AZIMUTHS, _FINE = 24, 5
 _SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (10, 13, 16, 20, 25, 32, 40, 50, 65, 80, 100, 120), (0.3, 0.7, 0.95)
+
+
+_LEAST_AHEAD = 0.05
+"""Least distance ahead of the LEDs, in radii, at which they are taken to light the wall."""
 
 
 def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[Law]]:
@@ -65,6 +70,23 @@ def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:
         even_light(replace(lighting, leds=1), _turned(point, -a), _turned(inward, -a)) / lighting.leds / whole
         for a in azimuth_rad
     ])  # fmt: skip
+
+
+def dim_share(lighting: Lighting, azimuth_rad: float, radius_mm: float, theta_rad: Float) -> Float:
+    """Return the share (2, T, S) of the light from an LED at an azimuth, at polar angles (T,) of a bore.
+
+    First of LEDs that shine alike in every direction, then of those that shine as the cosine.
+    """
+    turn = azimuth_rad + 2 * np.pi * np.arange(lighting.leds) / lighting.leds
+    around, share = sector_azimuth_rad(), []
+    x, y = (radius_mm * f(around) - lighting.radius_mm * f(turn)[:, None] for f in (np.cos, np.sin))
+    toward = radius_mm - lighting.radius_mm * np.cos(around - turn[:, None])
+    for ahead_mm in radius_mm / np.tan(theta_rad):
+        z = max(ahead_mm - lighting.z_mm, _LEAST_AHEAD * radius_mm)
+        even = toward / (x**2 + y**2 + z**2) ** 1.5
+        cosine = even * z / np.sqrt(x**2 + y**2 + z**2)
+        share.append([light[0] / light.sum(0) for light in (even, cosine)])
+    return np.moveaxis(np.array(share), 1, 0)
 
 
 def _turned(vector: Float, angle: float) -> Float:

@@ -137,7 +137,7 @@ def _exponents(samples: BlockSamples, side: int) -> tuple[Int, Float]:
     place = (samples.row // side) * 10_000 + samples.column // side
     cell, of, count = np.unique(place + samples.frame * 10_000_000, return_inverse=True, return_counts=True)
     whole = count >= side**2 / 2
-    logs = (samples.log_level, np.log1p(samples.change) + samples.log_level)
+    logs = (samples.log_level, np.log1p(np.maximum(samples.change, -0.99)) + samples.log_level)
     frame, place = cell[whole] // 10_000_000, np.unique(cell[whole] % 10_000_000, return_inverse=True)[1]
     x, y = (centred((np.bincount(of, v) / count)[whole], place, frame) for v in logs)
     above, below = (np.bincount(frame, v, samples.frame.max() + 1) for v in (x * y, x * x))

@@ -1,7 +1,7 @@
 """The camera's noise from the frames themselves, by EMVA 1288's model of the photon transfer.
 
-Variance over level of what the twin leaves over in small windows of frames that it was made from. Model
-errors only add variance, so that in each range of levels the quietest windows show the noise: with an even
+Variance over level of what the twin leaves over in small windows, less what it leaves over alike in the next
+frame at the same places of the wall: errors of wall and photo come back, noise does not. With an even
 response variance = read² + level / (electrons per grey level) + (non-uniformity · level)². A power response
 I^(1/γ) makes the shot noise's variance go with level^(2 − γ) instead, which gives γ.
 """
@@ -12,16 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.stats import chi2
 
 from pipeline.arrays import Bool, Float, Float32
 from stages.twin.lamp_light import Figure
 
 _WINDOW_PX = 12
 """Side of a window: the variance of 144 pixels is known to some 12 %, also where neighbours are alike."""
-_QUIET = 0.25
-"""Quantile of the windows' variances that counts as noise alone. A quarter is quieter than the model's errors
-let the usual window be, and far from the tail of chance."""
+_MOST_ALIKE = 0.5
+"""Share of a window's variance that may come back in the next frame: noise alone gives 0 ± 0.08."""
 _LEVELS, _FEWEST = 14, 40
 _LEAST_VARIANCE = 1 / 12
 """Of rounding to whole grey levels."""
@@ -54,12 +52,19 @@ class CameraNoise:
 
     def variance(self, above_black: Float32) -> Float32:
         """Return the variance (...) of pixels so many grey levels above black."""
+        dark, shot, square = (np.float32(c) for c in self.polynomial)
         level = np.maximum(above_black, np.float32(0))
-        out = np.multiply(level, np.float32(self.uneven.value**2))
-        out += np.float32(self.variance_per_level.value)
+        out = np.multiply(level, square)
+        out += shot
         out *= level
-        out += np.float32(max(self.read_variance.value, _LEAST_VARIANCE))
+        out += dark
         return out
+
+    @property
+    def polynomial(self) -> tuple[float, float, float]:
+        """Coefficients of the variance over the level, from the constant on."""
+        dark = max(self.read_variance.value, _LEAST_VARIANCE)
+        return dark, self.variance_per_level.value, self.uneven.value**2
 
     @property
     def clips_black(self) -> bool:
@@ -81,24 +86,25 @@ class CameraNoise:
 
 
 @dataclass(frozen=True)
-class QuietWindows:
-    """Level above black and variance, (N,) each, of the windows of one frame.
-
-    ``freedom`` is the number of independent pixels in a window: a codec makes neighbours alike.
-    """
+class NoiseWindows:
+    """Level above black and variance of noise alone, (N,) each, of the windows of one frame."""
 
     level: Float
     variance: Float
-    freedom: float
 
 
-def windows_of(left_over: Float32, level: Float32, use: Bool) -> QuietWindows:
+def windows_of(left_over: Float32, again: Float32, level: Float32, use: Bool) -> NoiseWindows:
     """Return the windows of a frame in which all pixels may be used, slopes taken out of each.
+
+    What the next frame shows alike at the same places of the wall is no noise, and is taken off. Of the
+    windows, the half with the faintest texture counts: there poses that err leave least.
 
     Parameters
     ----------
     left_over, level, use : (H, W)
         Recorded less predicted, predicted above black, and which pixels count.
+    again : (H, W)
+        Recorded less predicted of the next frame, where that shows the wall of each pixel.
     """
     rows, columns = (n // _WINDOW_PX for n in left_over.shape)
 
@@ -108,34 +114,21 @@ def windows_of(left_over: Float32, level: Float32, use: Bool) -> QuietWindows:
         return inside.reshape(shape).transpose(0, 2, 1, 3).reshape(-1, _WINDOW_PX**2)
 
     whole = cut(use.astype(np.float32)).all(1)
-    rest = cut(np.nan_to_num(left_over))[whole].astype(float)
     side = np.arange(_WINDOW_PX) - (_WINDOW_PX - 1) / 2
     plane = np.stack([np.ones(_WINDOW_PX**2), np.repeat(side, _WINDOW_PX), np.tile(side, _WINDOW_PX)], 1)
     plane /= np.linalg.norm(plane, axis=0)
-    rest -= (rest @ plane) @ plane.T
-    variance = (rest**2).sum(1) / (_WINDOW_PX**2 - 3)
-    level_mean = cut(np.nan_to_num(level))[whole].mean(1).astype(float)
-    return QuietWindows(level_mean, variance, _freedom(rest.reshape(-1, _WINDOW_PX, _WINDOW_PX)))
+    mean = cut(np.nan_to_num(level))[whole].mean(1).astype(float)
+    rest, other, texture = (cut(np.nan_to_num(a))[whole].astype(float) for a in (left_over, again, level))
+    rest, other, texture = (a - (a @ plane) @ plane.T for a in (rest, other, texture))
+    square, alike = ((rest * a).sum(1) / (_WINDOW_PX**2 - 3) for a in (rest, other))
+    contrast = texture.std(1) / np.maximum(mean, 1.0)
+    quiet = (alike < _MOST_ALIKE * square) | (square < _LEAST_VARIANCE)
+    quiet &= contrast <= np.median(contrast) if len(contrast) else False
+    return NoiseWindows(mean[quiet], (square - alike)[quiet])
 
 
-def _freedom(rest: Float) -> float:
-    """Return how many independent pixels a window (N, n, n) is worth: its pixels over the sum of ρ²."""
-    if not len(rest):
-        return 1.0
-    total = (rest**2).mean()
-    square = 0.0
-    for down in range(-3, 4):
-        for right in range(-3, 4):
-            a = rest[:, max(down, 0) : _WINDOW_PX + min(down, 0), max(right, 0) : _WINDOW_PX + min(right, 0)]
-            b = rest[
-                :, max(-down, 0) : _WINDOW_PX + min(-down, 0), max(-right, 0) : _WINDOW_PX + min(-right, 0)
-            ]
-            square += float((a * b).mean() / max(total, 1e-12)) ** 2
-    return max((_WINDOW_PX**2 - 3) / max(square, 1.0), 1.0)  # every pixel is like itself
-
-
-def photon_transfer(windows: list[QuietWindows], black: Figure, white: float) -> CameraNoise:
-    """Return the noise that quiet windows of several frames show; σ from leaving out one frame at a time."""
+def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) -> CameraNoise:
+    """Return the noise that windows of several frames show; σ from leaving out one frame at a time."""
     whole = _fitted(windows)
     if len(windows) < 2:
         return _camera_noise(whole, np.full(4, np.inf), black, white)
@@ -152,7 +145,7 @@ def _camera_noise(value: Float, sd: Float, black: Figure, white: float) -> Camer
     return CameraNoise(black, white, read, per_level, uneven, gamma)
 
 
-def _fitted(windows: list[QuietWindows]) -> Float:
+def _fitted(windows: list[NoiseWindows]) -> Float:
     """Return read variance, variance per level, unevenness and γ."""
     level = np.concatenate([w.level for w in windows])
     variance = np.concatenate([w.variance for w in windows])
@@ -162,10 +155,8 @@ def _fitted(windows: list[QuietWindows]) -> Float:
     cell = np.clip(np.searchsorted(edges, level) - 1, 0, _LEVELS - 1)
     used = [k for k in range(_LEVELS) if (cell == k).sum() >= _FEWEST // 2]
     x = np.array([level[cell == k].mean() for k in used])
-    freedom = float(np.median([w.freedom for w in windows]))
-    quiet = chi2.ppf(_QUIET, freedom) / freedom
     # Where black cuts noise off, windows show none at all.
-    y = np.array([max(np.quantile(variance[cell == k], _QUIET) / quiet, _LEAST_VARIANCE) for k in used])
+    y = np.array([max(float(variance[cell == k].mean()), _LEAST_VARIANCE) for k in used])
     design = np.stack([np.ones_like(x), x, x**2], 1) / y[:, None]
     (read, per_level, square), _ = nnls(design, np.ones_like(x))
     shot = y - _LEAST_VARIANCE

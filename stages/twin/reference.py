@@ -8,27 +8,25 @@ between which frames do not decide cannot be told apart.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
-import cv2
 import numpy as np
-from scipy.stats import norm, t
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Float32, Int
-from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
+from pipeline.artefacts.twin import Look, Mismatch
 from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX, block_ratios, of_blocks
-from stages.twin.locate import FALSE_ALARM, ImagePlace
+from stages.twin.locate import ImagePlace
 from stages.twin.render import TwinFrame
+from stages.twin.scene import Ring
 
-_SURE, _FEWEST_FRAMES, _FEWEST_CELLS = 3.0, 4, 2
-"""σ from frame to frame by which an order must predict better, frames for that, and cells of a region."""
+_SURE, FEWEST_FRAMES = 3.0, 4
+"""σ from frame to frame by which an order must predict better, and frames for that."""
 WALL_COLUMNS = 128
 """Cells of the wall around the pipe; they are as long as wide: about two blocks at the laser ring."""
-_LEAST_ON_WALL, _LEAST_OF_ROWS = 0.05, 0.01
-"""Relative changes that count: at steps of the wall the photo itself errs by a few per cent."""
 _RING_BLOCKS, _LEAST_SPREAD, _NEAR_BLOCKS = 4, 1e-3, 3
 """Width of the rings in which blocks are alike, their least relative spread, and what is next to a block."""
 SHOWN_PX = 60.0
@@ -53,6 +51,8 @@ class BlockSamples:
         Of the block in the image.
     along, around : int
         Of its cell on the wall.
+    away : float
+        How far from the image's middle, in radii of the line: the wall is seen the more from the side.
     first_mm, cell_mm : float
         Distance at which the first cell begins, and the side of a cell.
     number : (F,) int
@@ -70,6 +70,7 @@ class BlockSamples:
     first_mm: float
     cell_mm: float
     number: Int
+    away: Float
 
     @cached_property
     def orders(self) -> dict[str, Int]:
@@ -106,6 +107,18 @@ class BlockSamples:
         passed = of_blocks(gain)[self.row, self.column].astype(float)
         return replace(self, change=(1 + self.change) / passed - 1, log_level=self.log_level + np.log(passed))
 
+    def clear_of(self, found: Sequence[Mismatch]) -> BlockSamples:
+        """Return the blocks that lie beside what was found at places of the image."""
+        keep = np.ones(len(self.change), bool)
+        for place in ({p.name: p.value for p in m.place} for m in found):
+            if "radius_px" in place:
+                u, v = ((a + 0.5) * BLOCK_PX for a in (self.column, self.row))
+                away = np.hypot(u - place["u_px"], v - place["v_px"])
+                keep &= away > place["radius_px"] + 2 * BLOCK_PX
+        whole = (a.name for a in fields(self))
+        values = {n: getattr(self, n) for n in whole if np.shape(getattr(self, n)) == keep.shape}
+        return replace(self, **{n: v[keep] for n, v in values.items()}) if keep.any() else self
+
     @cached_property
     def strength(self) -> Float:
         """(N,) change over the robust spread of the blocks as far from the image's middle."""
@@ -135,7 +148,7 @@ class BlockSamples:
         ``image or wall`` stands for two orders that cannot be told apart.
         """
         frames = np.unique(self.frame[use])
-        if len(frames) < _FEWEST_FRAMES:
+        if len(frames) < FEWEST_FRAMES:
             return ""
         found = sorted(((k, self.explained(k, use)[frames]) for k in self.orders), key=lambda e: -e[1].sum())
         (first, best), (second, next_best) = found[:2]
@@ -148,7 +161,7 @@ class BlockSamples:
 class BlocksOfFrames:
     """Collects the blocks of compared lit frames."""
 
-    mean_radius_mm: float
+    ring: Ring
     parts: list[tuple[Float32, ...]] = field(default_factory=list)
     number: list[int] = field(default_factory=list)
 
@@ -164,7 +177,7 @@ class BlocksOfFrames:
 
     def samples(self) -> BlockSamples | None:
         """Return all blocks; None where there are none."""
-        found, cell_mm = [], 2 * np.pi * self.mean_radius_mm / WALL_COLUMNS
+        found, cell_mm = [], 2 * np.pi * self.ring.radius_mm / WALL_COLUMNS
         for k, (ratio, level, variance, distance, azimuth) in enumerate(self.parts):
             row, column = np.nonzero(np.isfinite(ratio) & np.isfinite(distance))
             if not len(row):
@@ -174,10 +187,14 @@ class BlocksOfFrames:
             around = np.floor((azimuth[row, column] / (2 * np.pi)) % 1 * WALL_COLUMNS) % WALL_COLUMNS
             bright = np.log(np.maximum(level[row, column], 1))
             weight = BLOCK_PX**2 / variance[row, column]
-            found.append((change, bright, weight, np.full(len(row), k), row, column, along, around))
+            aside = [
+                (a + 0.5) * BLOCK_PX - c for a, c in zip((column, row), self.ring.centre_px, strict=True)
+            ]
+            away = np.hypot(*aside) / self.ring.radius_px
+            found.append((change, bright, weight, away, np.full(len(row), k), row, column, along, around))
         if not found:
             return None
-        change, bright, weight, *place = (np.concatenate(c) for c in zip(*found, strict=True))
+        change, bright, weight, away, *place = (np.concatenate(c) for c in zip(*found, strict=True))
         frame, row, column, along, around = (p.astype(np.int64) for p in place)
         first = int(along.min())
         return BlockSamples(
@@ -192,12 +209,13 @@ class BlocksOfFrames:
             first * cell_mm,
             cell_mm,
             np.array(self.number),
+            away,
         )
 
 
 def in_image(samples: BlockSamples | None, places: tuple[ImagePlace, ...]) -> tuple[str, ...]:
     """Return what each place of the image is fixed to; the image itself where frames are too few to tell."""
-    if samples is None or samples.frame.max() + 1 < _FEWEST_FRAMES:
+    if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
         return ("image",) * len(places)
     return tuple(_fixed_in_image(samples, p) for p in places)
 
@@ -215,78 +233,7 @@ def map_of(samples: BlockSamples, order: str, shape: tuple[int, int]) -> tuple[F
     count = np.bincount(cell, minlength=cells)[:cells]
     mean = np.bincount(cell, samples.change, cells)[:cells] / np.maximum(count, 1)
     scale = np.sqrt(np.maximum(count, 1))
-    known = count >= _FEWEST_FRAMES
+    known = count >= FEWEST_FRAMES
     # The spread of the means themselves holds whatever makes neighbours and frames alike.
     sd = spread_about_median((mean * scale)[known]) / scale if known.any() else np.full(cells, np.nan)
     return np.where(known, mean, np.nan).reshape(shape), np.reshape(sd, shape)
-
-
-def unnamed(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
-    """Return what is fixed to the wall or to rows."""
-    return () if samples is None else (*_regions_of_wall(samples), *_banding(samples))
-
-
-def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
-    """Return regions of the wall that stay brighter or darker than their photo, if frames bear it out."""
-    shape = (int(samples.along.max()) + 1, WALL_COLUMNS)
-    mean, sd = map_of(samples, "wall", shape)
-    known = np.isfinite(mean)
-    bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * max(known.sum(), 1)))) * sd, _LEAST_ON_WALL)
-    beyond = known & (np.abs(np.nan_to_num(mean)) > bound)
-    count, label = cv2.connectedComponents(beyond.astype(np.uint8))
-    found = []
-    for k in range(1, count):
-        cells = np.argwhere(label == k)
-        use = label[samples.along, samples.around] == k
-        if len(cells) < _FEWEST_CELLS or samples.fixed_to(use) != "wall":
-            continue
-        found.append(_on_wall(cells, mean, sd, int(known.sum()), samples, use))
-    return tuple(found)
-
-
-def _on_wall(cells: Int, mean: Float, sd: Float, known: int, samples: BlockSamples, use: Bool) -> Mismatch:
-    cell_mm = samples.cell_mm
-    value, spread = (a[tuple(cells.T)] for a in (mean, sd))
-    most = int(np.argmax(np.abs(value)))
-    chance = min(1.0, 2 * known * float(norm.sf(abs(value[most]) / max(float(spread[most]), 1e-9))))
-    distance = samples.first_mm + (cells[:, 0].mean() + 0.5) * cell_mm
-    azimuth = (cells[:, 1].mean() + 0.5) * 360 / WALL_COLUMNS
-    azimuth -= 360 * (azimuth > 180)
-    extent = cell_mm * float(np.sqrt(len(cells)))
-    nan, way = float("nan"), "brighter" if value[most] > 0 else "darker"
-    place = (
-        NamedFigure("distance_mm", distance, cell_mm / 2, "mm"),
-        NamedFigure("azimuth_deg", azimuth, 180 / WALL_COLUMNS, "deg"),
-        NamedFigure("extent_mm", extent, cell_mm, "mm"),
-    )
-    size = NamedFigure("change", float(value[most]), float(spread[most]), "relative")
-    return Mismatch(
-        "", "intensity", "wall", place, (size,), chance, nan, nan,
-        f"At {distance:.0f} mm, azimuth {azimuth:.0f}°, the wall is {100 * abs(value[most]):.0f} % {way} "
-        "than its photo: it shines differently from each side, or lies elsewhere than the radius map says.",
-        samples.look(use, SHOWN_PX),
-    )  # fmt: skip
-
-
-def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
-    """Return bands along rows that change from frame to frame."""
-    everywhere = np.ones(len(samples.change), bool)
-    if samples.frame.max() + 1 < _FEWEST_FRAMES or samples.fixed_to(everywhere) != "rows":
-        return ()
-    mean, _ = map_of(samples, "rows", (int(samples.frame.max()) + 1, int(samples.row.max()) + 1))
-    size = float(np.nanstd(mean))
-    frames = np.unique(samples.frame)
-    chance = float(t.sf(sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
-    sd = float(np.nanstd(np.nanstd(mean, axis=1))) / np.sqrt(len(frames))
-    if size < _LEAST_OF_ROWS:
-        return ()
-    nan = float("nan")
-    return (
-        Mismatch(
-            "banding", "intensity", "rows", (), (NamedFigure("change", size, sd, "relative"),), chance,
-            nan, nan,
-            f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as of lamps "
-            "that flicker within a frame of a rolling shutter.",
-            samples.look(everywhere, 2 * SHOWN_PX),
-        ),
-    )  # fmt: skip

@@ -11,7 +11,6 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.measured import WallTexture
 from pipeline.geometry.axis_kernels import section_frame
-from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from stages.texture.grid import footprint_mm
 from stages.texture.surface import WallSurface
@@ -194,18 +193,13 @@ def wall_seen(surface: WallSurface, T_pc: Float, ray_c: Float) -> WallSight:
     """Return what unit rays (N, 3) in C meet from a camera's pose (4, 4); NaN rays meet nothing."""
     count = len(ray_c)
     place, point, normal = np.full((count, 2), np.nan), np.full((count, 3), np.nan), np.zeros((count, 3))
-    ray_p = np.ascontiguousarray(ray_c @ T_pc[:3, :3].T)
     axis, step = surface.axis, float(surface.distance_mm[1] - surface.distance_mm[0])
     _meet(
         axis.distance_mm, axis.origin_p, axis.R_pa, surface.radius_mm, surface.along, surface.around,
-        float(surface.distance_mm[0]), step, surface.mean_radius_mm, np.ascontiguousarray(T_pc[:3, 3]),
-        ray_p, place, point, normal,
+        float(surface.distance_mm[0]), step, surface.mean_radius_mm, np.ascontiguousarray(T_pc, float),
+        np.ascontiguousarray(ray_c, float), place, point, normal,
     )  # fmt: skip
-    T_cp = inverse(T_pc)
-    return WallSight(
-        place[:, 0].astype(np.float32), place[:, 1].astype(np.float32),
-        transform(T_cp, point), normal @ T_cp[:3, :3].T,
-    )  # fmt: skip
+    return WallSight(place[:, 0].astype(np.float32), place[:, 1].astype(np.float32), point, normal)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -226,9 +220,8 @@ def _bilinear(values, row, column):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _section_of(axis_at, axis_origin, axis_frame, p, s, o, m, at):  # type: ignore[no-untyped-def]
     """Return the distance of a point (3,) from a guess; ``o``, ``m``: its section, ``at``: x and y there."""
-    for _ in range(2):
-        section_frame(axis_at, axis_origin, axis_frame, s, o, m)
-        s += m[0, 2] * (p[0] - o[0]) + m[1, 2] * (p[1] - o[1]) + m[2, 2] * (p[2] - o[2])
+    section_frame(axis_at, axis_origin, axis_frame, s, o, m)
+    s += m[0, 2] * (p[0] - o[0]) + m[1, 2] * (p[1] - o[1]) + m[2, 2] * (p[2] - o[2])
     for k in range(2):
         at[k] = m[0, k] * (p[0] - o[0]) + m[1, k] * (p[1] - o[1]) + m[2, k] * (p[2] - o[2])
     return s
@@ -259,14 +252,15 @@ def _write_normal(at, r, m, along, around, normal):  # type: ignore[no-untyped-d
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _meet(  # type: ignore[no-untyped-def]
-    axis_at, axis_origin, axis_frame, radius, along, around, s_from, s_step, mean, start, rays, place, point,
+    axis_at, axis_origin, axis_frame, radius, along, around, s_from, s_step, mean, T_pc, rays, place, point,
     normal,
 ):  # fmt: skip
     """Follow every ray by Newton steps to where its radius is the wall's; neighbours start from each other.
 
-    ``place`` (N, 2) gets distance and azimuth, ``point`` and ``normal`` (N, 3) are in P.
+    ``place`` (N, 2) gets distance and azimuth, ``point`` and ``normal`` (N, 3) are in C, as ``rays`` are.
     """
     o, m, at, p = np.empty(3), np.empty((3, 3)), np.empty(2), np.empty(3)
+    d, inward, start = np.empty(3), np.empty(3), T_pc[:3, 3].copy()
     columns, far = radius.shape[1], _FAR_RADII * mean
     home = _section_of(axis_at, axis_origin, axis_frame, start, start[2], o, m, at)
     way, s = -1.0, home
@@ -275,20 +269,24 @@ def _meet(  # type: ignore[no-untyped-def]
             continue
         if not 0.0 < way < far:
             way, s = mean, home
+        for i in range(3):
+            d[i] = T_pc[i, 0] * rays[n, 0] + T_pc[i, 1] * rays[n, 1] + T_pc[i, 2] * rays[n, 2]
         gap, r, psi, row, column = np.inf, 1.0, 0.0, 0.0, 0.0
         for _ in range(_STEPS):
             for i in range(3):
-                p[i] = start[i] + way * rays[n, i]
+                p[i] = start[i] + way * d[i]
             s = _section_of(axis_at, axis_origin, axis_frame, p, s, o, m, at)
             r, psi = np.sqrt(at[0] * at[0] + at[1] * at[1]), np.arctan2(at[1], at[0])
             row, column = (s - s_from) / s_step, (psi + np.pi) / (2 * np.pi) * columns
             gap = _bilinear(radius, row, column) - r
             if abs(gap) < _CLOSE_MM or way > far:
                 break
-            way += _step(at, r, rays[n], m, _bilinear(along, row, column), gap, way, mean)
+            way += _step(at, r, d, m, _bilinear(along, row, column), gap, way, mean)
         if not abs(gap) < _MET * _CLOSE_MM or way > far:
             way = -1.0
             continue
         place[n, 0], place[n, 1] = s, psi
-        point[n] = p
-        _write_normal(at, r, m, _bilinear(along, row, column), _bilinear(around, row, column), normal[n])
+        _write_normal(at, r, m, _bilinear(along, row, column), _bilinear(around, row, column), inward)
+        for i in range(3):
+            point[n, i] = way * rays[n, i]
+            normal[n, i] = T_pc[0, i] * inward[0] + T_pc[1, i] * inward[1] + T_pc[2, i] * inward[2]

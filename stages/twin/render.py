@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 
-import cv2
+import numba
 import numpy as np
 
 from pipeline.arrays import Byte, Float, Float32
 from pipeline.recording.base import Illumination
 from stages.twin.noise import CameraNoise
 from stages.twin.scene import Scene
-from stages.twin.state import PhotometricState, slope_squared
+from stages.twin.state import PhotometricState
 
 _DARK_LEVEL = 3.0
 """Grey levels above black below which lit wall counts as dark."""
@@ -57,10 +57,10 @@ class TwinFrame:
 
     def brighter(self, factor: float | Float32, noise: CameraNoise) -> TwinFrame:
         """Return the frame with another exposure, or seen through a window that lets pass (H, W)."""
-        scale = np.float32(factor) if isinstance(factor, float) else factor
-        level = np.minimum(scale * self.level, np.float32(noise.white - noise.black.value))
-        beyond = scale**2 * (self.variance - noise.variance(self.level))
-        return replace(self, level=level, variance=noise.variance(level) + beyond)
+        scale = np.full((1, 1), factor, np.float32) if isinstance(factor, float) else factor
+        white = np.float32(noise.white - noise.black.value)
+        level, variance = _brighter(self.level, self.variance, scale, white, *noise.polynomial)
+        return replace(self, level=level, variance=variance)
 
 
 @dataclass(frozen=True)
@@ -103,29 +103,21 @@ class Renderer:
         if light == Illumination.BOTH and state.line is None:
             near = self.scene.line(self.scene.pose(frame))
             made.region[near.row, near.column] = Region.UNSEEN
-        made.region[state.outside] = Region.DARK
-        made.level[state.outside] = 0.0
-        made.region[state.edge & (made.region != Region.UNSEEN)] = Region.EDGE
-        variance = state.noise.variance(made.level)
-        variance += made.variance
-        level = np.minimum(made.level, np.float32(state.noise.white - state.noise.black.value))
-        return TwinFrame(level, variance, made.region, made.distance_mm, made.azimuth_rad)
+        white = np.float32(state.noise.white - state.noise.black.value)
+        _finish(
+            made.level, made.variance, made.region, state.outside, state.edge, white, *state.noise.polynomial
+        )
+        return TwinFrame(made.level, made.variance, made.region, made.distance_mm, made.azimuth_rad)
 
     def _light_wall(self, made: _Canvas, frame: int) -> None:
         """Put lit wall into a dark frame."""
         assert self.state.lamp is not None
         sight = self.scene.lit(self.scene.pose(frame))
         exposure = np.float32(np.exp(self.state.lamp.gain.at(frame)))
-        level = self._white_wall * sight.reflectance * (sight.irradiance * exposure)
-        if self.state.power != 1.0:
-            level *= (sight.reflectance / np.float32(_MIDDLE_GREY)) ** np.float32(self.state.power - 1)
-        made.region[level > _DARK_LEVEL] = Region.WALL
-        made.region[np.isnan(level)] = Region.UNSEEN
-        level = np.nan_to_num(level, copy=False)
-        inside = cv2.erode(made.region, np.ones((3, 3), np.uint8)) > 0
-        made.variance[inside] = (self._place_variance * slope_squared(level))[inside]
-        level[inside] += (self._sharp * cv2.Laplacian(level, cv2.CV_32F))[inside]
-        made.level, made.distance_mm, made.azimuth_rad = level, sight.distance_mm, sight.azimuth_rad
+        even = _lit(self._white_wall, sight.reflectance, sight.irradiance, exposure,
+                    np.float32(self.state.power - 1), made.region)  # fmt: skip
+        _sharpened(even, made.region, self._sharp, self._place_variance, made.level, made.variance)
+        made.distance_mm, made.azimuth_rad = sight.distance_mm, sight.azimuth_rad
 
     def _draw_line(self, made: _Canvas, frame: int) -> None:
         """Put the laser line into a frame."""
@@ -160,3 +152,76 @@ class _Canvas:
         nowhere = [np.full(shape, np.nan, np.float32) for _ in range(2)]
         level, variance = (np.zeros(shape, np.float32) for _ in range(2))
         return _Canvas(level, variance, np.full(shape, Region.DARK, np.uint8), *nowhere)
+
+
+_UNSEEN, _WALL, _DARK, _EDGE = (int(r) for r in (Region.UNSEEN, Region.WALL, Region.DARK, Region.EDGE))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _lit(white, reflectance, irradiance, exposure, power, region):  # type: ignore[no-untyped-def]
+    """Return the grey levels (H, W) of lit wall, 0 where it is unknown; ``region`` is written."""
+    out = np.zeros_like(white)
+    for i in range(white.shape[0]):
+        for j in range(white.shape[1]):
+            level = white[i, j] * reflectance[i, j] * irradiance[i, j] * exposure
+            if power != 0:
+                level *= (reflectance[i, j] / np.float32(_MIDDLE_GREY)) ** power
+            if np.isnan(level):
+                region[i, j] = _UNSEEN
+                continue
+            region[i, j] = _WALL if level > _DARK_LEVEL else _DARK
+            out[i, j] = level
+    return out
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _sharpened(even, region, sharp, place, level, variance):  # type: ignore[no-untyped-def]
+    """Write levels blurred by ``sharp``, px², and the variance that a photo off by ``place``, px², makes."""
+    rows, columns = even.shape
+    for i in range(rows):
+        for j in range(columns):
+            here = even[i, j]
+            level[i, j] = here
+            if i == 0 or j == 0 or i == rows - 1 or j == columns - 1:
+                continue
+            whole = True
+            for k in range(-1, 2):
+                for m in range(-1, 2):
+                    whole &= region[i + k, j + m] != _UNSEEN
+            if not whole:
+                continue
+            up, down, left, right = even[i - 1, j], even[i + 1, j], even[i, j - 1], even[i, j + 1]
+            variance[i, j] = place[i, j] * ((down - up) ** 2 + (right - left) ** 2) / 4
+            level[i, j] = here + sharp[i, j] * (up + down + left + right - 4 * here)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _finish(level, variance, region, outside, edge, white, dark, shot, square):  # type: ignore[no-untyped-def]
+    """Take off what lies outside the view, add the camera's noise, and clip; all (H, W), in place."""
+    for i in range(level.shape[0]):
+        for j in range(level.shape[1]):
+            if outside[i, j]:
+                region[i, j], level[i, j] = _DARK, 0.0
+            if edge[i, j] and region[i, j] != _UNSEEN:
+                region[i, j] = _EDGE
+            bright = max(level[i, j], 0.0)
+            variance[i, j] += dark + bright * (shot + bright * square)
+            level[i, j] = min(level[i, j], white)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _brighter(level, variance, factor, white, dark, shot, square):  # type: ignore[no-untyped-def]
+    """Return level and variance (H, W) with factors (H, W) or (1, 1) on the light."""
+    out, spread, one = np.empty_like(level), np.empty_like(level), factor.shape == (1, 1)
+    scale = factor[0, 0]
+    for i in range(level.shape[0]):
+        for j in range(level.shape[1]):
+            if not one:
+                scale = factor[i, j]
+            before = max(level[i, j], 0.0)
+            beyond = scale * scale * (variance[i, j] - dark - before * (shot + before * square))
+            made = min(scale * level[i, j], white)
+            bright = max(made, 0.0)
+            out[i, j] = made
+            spread[i, j] = dark + bright * (shot + bright * square) + beyond
+    return out, spread

@@ -11,10 +11,11 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.artefacts.twin import Look
-from pipeline.geometry.rigid import transform
-from pipeline.instrument.probe import Lighting, Probe
+from pipeline.geometry.rigid import inverse, transform
+from pipeline.instrument.probe import Probe
 from stages.texture.surface import WallSurface, wall_surface
 from stages.texture.views import sheet_distance_mm
+from stages.twin.leds import even_light
 from stages.twin.reflectance import Reflectance, reflectance_of, wall_seen
 
 _STEP_PX = 4
@@ -111,12 +112,15 @@ class Scene:
     surface : WallSurface
     reflectance : Reflectance
     trajectory : Trajectory
+    outside : (H, W) bool, optional
+        Pixels that no frame shows: no ray is followed there.
     """
 
     probe: Probe
     surface: WallSurface
     reflectance: Reflectance
     trajectory: Trajectory
+    outside: Bool | None = None
 
     def pose(self, frame: int) -> Float:
         """Return T_pc (4, 4) of a frame."""
@@ -125,7 +129,7 @@ class Scene:
     @cached_property
     def polar(self) -> tuple[Float32, Float32, Bool]:
         """Polar angle, image azimuth and validity of every pixel, each (H, W)."""
-        nodes = self._rays
+        nodes = self._all_rays
         theta = np.arctan2(np.hypot(nodes[..., 0], nodes[..., 1]), nodes[..., 2])
         width, height = self.probe.camera.image_size
         centre = self.probe.camera.centre_px
@@ -143,11 +147,20 @@ class Scene:
         return Ring((float(u), float(v)), float(np.hypot(at[0] - u, at[1] - v)), radius, ahead)
 
     @cached_property
-    def _rays(self) -> Float:
+    def _all_rays(self) -> Float:
         width, height = self.probe.camera.image_size
         u, v = (np.arange(-(-n // _STEP_PX)) * _STEP_PX + (_STEP_PX - 1) / 2 for n in (width, height))
         rays = self.probe.camera.unproject(np.stack(np.meshgrid(u, v), -1))
         return np.where(rays.valid[..., None], rays.ray, np.nan)
+
+    @cached_property
+    def _rays(self) -> Float:
+        """Rays (h, w, 3) of the nodes that see wall, and of those beside the view, which lie between."""
+        if self.outside is None:
+            return self._all_rays
+        far = cv2.erode(self.outside.astype(np.uint8), np.ones((4 * _STEP_PX + 1,) * 2, np.uint8)) > 0
+        hidden = far[_STEP_PX // 2 :: _STEP_PX, _STEP_PX // 2 :: _STEP_PX]
+        return np.where(hidden[..., None], np.nan, self._all_rays)
 
     @cached_property
     def _phi_nodes(self) -> Float:
@@ -167,6 +180,13 @@ class Scene:
         azimuth = phi + self._enlarged(turn.reshape(shape)) + np.float32(middle)
         reflectance = self.reflectance.grey(distance, azimuth, theta)
         return LitSight(reflectance, self._enlarged(light.reshape(shape)), distance, azimuth)
+
+    def seen_again(self, T_pc: Float, next_T_pc: Float) -> tuple[Float32, Float32]:
+        """Return column and row (H, W) at which the next frame shows the wall that each pixel shows."""
+        seen = wall_seen(self.surface, T_pc, self._rays.reshape(-1, 3))
+        at = self.probe.camera.project(transform(inverse(next_T_pc) @ T_pc, seen.xyz_c))
+        uv = np.where((at.valid & seen.seen)[:, None], at.uv, -1e6).reshape(*self._rays.shape[:2], 2)
+        return self._enlarged(uv[..., 0]), self._enlarged(uv[..., 1])
 
     def line(self, T_pc: Float) -> LineSight:
         """Return the pixels near the laser line of a frame from a pose (4, 4)."""
@@ -246,20 +266,6 @@ def scene_of(probe: Probe, trajectory: Trajectory, wall: Wall, texture: WallText
     surface = wall_surface(wall, SMOOTHING_MM, SHADING_MM)
     reflectance = reflectance_of(texture, found, surface.mean_radius_mm, blur_px)
     return Scene(found, surface, reflectance, trajectory)
-
-
-def even_light(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
-    """Return the irradiance (...), 1/mm², of wall points (..., 3) by LEDs that shine alike in all directions.
-
-    cos(at wall) / distance², mean over the LEDs. Their own lobe is estimated from the frames.
-    """
-    turn = 2 * np.pi * np.arange(lighting.leds) / lighting.leds
-    total = np.zeros(xyz_c.shape[:-1])
-    for x, y in zip(lighting.radius_mm * np.cos(turn), lighting.radius_mm * np.sin(turn), strict=True):
-        away = xyz_c - np.array([x, y, lighting.z_mm])
-        square = np.einsum("...i,...i->...", away, away)
-        total += np.maximum(-np.einsum("...i,...i->...", away, normal_c), 0) / (square * np.sqrt(square))
-    return total / lighting.leds
 
 
 def _circular_middle(angle: Float) -> float:

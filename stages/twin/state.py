@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -76,26 +76,33 @@ class PhotometricState:
 
 @dataclass(frozen=True)
 class Sampled:
-    """A frame of the sample: number, light, and picture (H, W)."""
+    """A frame of the sample: number, light, and picture (H, W); perhaps the next of its light."""
 
     frame: int
     light: Illumination
     image: Float32
+    after: Sampled | None = None
 
 
 def sample_frames(recording: Recording, usable: Int, light: NDArray[np.str_], most: int) -> list[Sampled]:
-    """Read up to ``most`` frames of each light, spread over the recording."""
-    kinds = np.asarray(light)
-    chosen = np.sort(np.concatenate([
-        own[np.unique(np.linspace(0, len(own) - 1, min(most, len(own))).round().astype(int))]
-        for own in (np.asarray(usable)[kinds == kind] for kind in np.unique(kinds))
-    ]))  # fmt: skip
-    of = dict(zip(np.asarray(usable).tolist(), kinds.tolist(), strict=True))
-    return [
-        Sampled(frame, Illumination(of[frame]), image.astype(np.float32))
-        for frame, image in recording.read(chosen, "grey")
+    """Read up to ``most`` frames of each light, spread over the recording; after some the next one, too."""
+    numbers, kinds = np.asarray(usable), np.asarray(light)
+    after: dict[int, int] = {}
+    for kind in np.unique(kinds):
+        own = numbers[kinds == kind]
+        chosen = np.unique(np.linspace(0, len(own) - 1, min(most, len(own))).round().astype(int))
+        after |= {int(own[k]): -1 for k in chosen}
+        paired = chosen[:: max(len(chosen) // _NOISE_FRAMES, 1)]
+        if kind != Illumination.LASER.value:
+            after |= {int(own[k]): int(own[k + 1]) for k in paired if k + 1 < len(own)}
+    of = dict(zip(numbers.tolist(), kinds.tolist(), strict=True))
+    wanted = np.unique([n for n in (*after, *after.values()) if n >= 0])
+    read = {
+        frame: Sampled(frame, Illumination(of[frame]), image.astype(np.float32))
+        for frame, image in recording.read(wanted, "grey")
         if image is not None
-    ]
+    }
+    return [replace(read[n], after=read.get(after[n])) for n in sorted(after) if n in read]
 
 
 def estimate_state(
@@ -118,7 +125,9 @@ def estimate_state(
     lamp, line = lamps.solve(), lines.solve()
     outside, edge = _view([s.image for s, _ in lit], black.value, scene)
     at, sharpness, left = _sharpness(scene, lamp, lit, black.value, white, edge | outside)
-    noise = photon_transfer([windows_of(f.rest, f.level, f.use) for f in left], black, white)
+    twice = [(f, f.again) for f in left if f.again is not None]
+    windows = [windows_of(f.rest, again, f.level, f.use & np.isfinite(again)) for f, again in twice]
+    noise = photon_transfer(windows, black, white)
     place_px = _place_error(left, noise)
     if line is not None:
         line = lines.with_speckle(line, noise.variance)
@@ -160,12 +169,16 @@ def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
 
 @dataclass(frozen=True)
 class _LeftOver:
-    """Of a lit frame, (H, W): recorded less predicted, predicted, zone of the polar angle, what counts."""
+    """Of a lit frame, (H, W): recorded less predicted, predicted, zone of the polar angle, what counts.
+
+    ``again`` is recorded less predicted of the next frame, at the same places of the wall.
+    """
 
     rest: Float32
     level: Float32
     zone: Int
     use: Bool
+    again: Float32 | None
 
 
 def _sharpness(
@@ -178,7 +191,7 @@ def _sharpness(
         return np.arange(_ZONES, dtype=float), np.zeros(_ZONES), []
     zones = np.linspace(lamp.theta_rad[0], lamp.theta_rad[-1], _ZONES + 1)
     above, below = np.zeros(_ZONES), np.zeros(_ZONES)
-    left: list[tuple[Float32, Float32, Bool, Float32]] = []
+    left: list[tuple[Float32, Float32, Bool, Float32, Float32 | None]] = []
     zone_of = np.clip(np.searchsorted(zones, theta) - 1, 0, _ZONES - 1)
     white_wall = lamp.factor(theta, phi)
     for s, sight in lit[:: max(len(lit) // _NOISE_FRAMES, 1)]:
@@ -189,10 +202,27 @@ def _sharpness(
         zone = zone_of[use]
         above += np.bincount(zone, (rest * curved)[use], _ZONES)
         below += np.bincount(zone, (curved**2)[use], _ZONES)
-        left.append((rest, level, use, curved))
+        left.append((rest, level, use, curved, _again(scene, lamp, s, black, white, white_wall)))
     at, sharpness = (zones[1:] + zones[:-1]) / 2, above / np.maximum(below, 1e-9)
     sharp = np.interp(theta, at, sharpness).astype(np.float32)
-    return at, sharpness, [_LeftOver(r - sharp * c, level, zone_of, use) for r, level, use, c in left]
+    return at, sharpness, [_LeftOver(r - sharp * c, level, zone_of, use, a) for r, level, use, c, a in left]
+
+
+def _again(
+    scene: Scene, lamp: LampLight, first: Sampled, black: float, white: float, white_wall: Float32
+) -> Float32 | None:
+    """Return recorded less predicted (H, W) of the next frame, at the places of the wall shown here."""
+    if first.after is None:
+        return None
+    here, there = scene.pose(first.frame), scene.pose(first.after.frame)
+    sight, image = scene.lit(there), first.after.image
+    gain = np.float32(np.exp(lamp.gain.at(first.after.frame)))
+    level = white_wall * sight.reflectance * sight.irradiance * gain
+    rest = np.where(
+        (level > _LEAST_LEVEL) & (image < white), image - np.float32(black) - level, np.float32(np.nan)
+    )
+    u, v = scene.seen_again(here, there)
+    return np.asarray(cv2.remap(rest, u, v, cv2.INTER_NEAREST, borderValue=float("nan")), np.float32)
 
 
 def _place_error(left: list[_LeftOver], noise: CameraNoise) -> Float:

@@ -15,11 +15,13 @@ from pipeline.recording.base import Illumination, Recording
 from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, exposure_of
 from stages.twin.gate import judged
+from stages.twin.glints import SpotsOfFrames
+from stages.twin.lamps import uneven_lamps
 from stages.twin.locate import ImagePlace
 from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image
-from stages.twin.render import Region, Renderer
+from stages.twin.render import Renderer
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
 from stages.twin.switched import Shown
@@ -33,13 +35,15 @@ class Sums:
     """What is kept of the compared frames: χ², blocks, places of dirt, and brightness in sectors."""
 
     def __init__(self, scene: Scene, state: PhotometricState, places: tuple[ImagePlace, ...]) -> None:
+        scene = replace(scene, outside=state.outside)
         self._scene, self._state, self._light = scene, state, dict[int, Illumination]()
         self._renderer = Renderer(scene, state)
         self.comparison = Comparison()
         self.window = [WindowPlace(p) for p in places]
-        self.blocks = BlocksOfFrames(scene.surface.mean_radius_mm)
+        self.blocks = BlocksOfFrames(scene.ring)
         self.lit, self.line = CellsOfFrames(), CellsOfFrames()
         self.whole = WholePictures(scene)
+        self.spots = [SpotsOfFrames(kind, scene.ring) for kind in (Illumination.LED, Illumination.LASER)]
         self._sector = sectors_of(scene.polar[1])
 
     def add(self, frame: int, kind: Illumination, image: Image) -> None:
@@ -49,14 +53,14 @@ class Sums:
         before = self._renderer.frame(frame, kind)
         gain = self._state.gain_map
         after = before if gain is None else before.brighter(gain, noise)
-        free = above < noise.white - noise.black.value
+        white = noise.white - noise.black.value
+        free = above < white
         if kind != Illumination.LASER:
-            self.lit.add(frame, above, after, free & (after.region == Region.WALL), self._sector)
+            self.lit.add(frame, above, after, white, self._sector)
         if kind == Illumination.LASER:
-            near = (after.region == Region.LINE_CORE) | (after.region == Region.LINE_FLANK)
-            self.line.add_line(frame, above, after, free & near, self._sector)
+            self.line.add_line(frame, above, after, white, self._sector)
         if kind in self._state.shows_wall:
-            self.blocks.add(frame, above, before, noise.white - noise.black.value)
+            self.blocks.add(frame, above, before, white)
         exposure = float(np.exp(exposure_of(above, after)))
         after = after.brighter(exposure, noise)
         if kind in self._state.shows_wall:
@@ -64,8 +68,11 @@ class Sums:
             for place in self.window:
                 place.add(frame, above, exposed, free)
             self.whole.add_lit(frame, above, after, free)
+            self.spots[0].add(frame, above, exposed)
         if kind != Illumination.LED:
             self.whole.frame["line"].append(frame)
+        if kind == Illumination.LASER:
+            self.spots[1].add(frame, above, after)
         if kind == Illumination.LASER and len(self.whole.stray) < _MOST_STRAY:
             lit = self._renderer.frame(frame, Illumination.LED)
             self.whole.add_laser(frame, above, after, free, lit)
@@ -78,6 +85,10 @@ class Sums:
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
         return told_once([m for m in judged if m is not None])
 
+    def glints(self) -> tuple[Mismatch, ...]:
+        """Return spots that are far brighter than foretold."""
+        return tuple(m for spots in self.spots for m in spots.found())
+
     def cells(self) -> tuple[Cells | None, Cells | None]:
         """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser."""
         lit, line, state = self.lit.cells(), self.line.cells(), self._state
@@ -89,13 +100,21 @@ class Sums:
         return lit, line
 
     def named(
-        self, samples: BlockSamples | None, recording: Recording
+        self, samples: BlockSamples | None, recording: Recording, led_failed: bool = False
     ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-        """Return laws of whole pictures that frames rendered again bear out, and those that are withdrawn."""
+        """Return laws of whole pictures that frames rendered again bear out, and those that are withdrawn.
+
+        An LED that failed during the run leaves the lamps' mean pattern uneven, too, and is not told twice.
+        """
         again = partial(self._shown, recording)
         first = (
             *self.whole.suspected(self._state.sharpness),
             *response_of(samples, self._scene.ring),
+            *(
+                ()
+                if led_failed
+                else uneven_lamps(self._state.lamp, self._scene, self.whole.frames_of("blur"))
+            ),
         )
         kept, withdrawn = judged(first, again)
         focus, not_focus = judged(focus_of(self._state, self.whole, kept), again)
@@ -123,13 +142,13 @@ class Sums:
     def _again(self, frame: int, exposure: float, **changes: Any) -> Float32:
         """Return the grey levels (H, W) of a frame with attributes of the state changed.
 
-        ``sharpness=None`` is the photo as it is; ``line`` is a function of the line's light.
+        ``sharpness=None`` is the photo as it is; ``line`` and ``lamp`` are functions of what they change.
         """
         state, noise = self._state, self._state.noise
         if "sharpness" in changes:
             changes["sharpness"] = np.zeros_like(state.sharpness)
-        if "line" in changes:
-            changes["line"] = changes["line"](state.line)
+        for light in {"line", "lamp"} & changes.keys():
+            changes[light] = changes[light](getattr(state, light))
         made = Renderer(self._scene, replace(state, **changes)).frame(frame, self._light[frame])
         made = made if state.gain_map is None else made.brighter(state.gain_map, noise)
         return made.brighter(exposure, noise).level

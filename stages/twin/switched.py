@@ -13,7 +13,8 @@ import cv2
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
-from stages.twin.lamp_light import Figure
+from stages.twin.lamp_light import Figure, LampLight
+from stages.twin.laws import dim_share
 from stages.twin.line_light import LineLight
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
@@ -25,6 +26,11 @@ BLOOM_PX, _NEAR = 6.0, 0.02
 IN_FOCUS_PX = 1.2
 """1 σ of lens and pixel that lenses in focus stay below: a pixel's own is 0.29, and a spot two pixels wide at
 half height has 0.85."""
+_NEAREST_RAD, _THETAS = 0.2, 12
+"""Least polar angle at which the share of an LED is worked out, and number of angles."""
+_ANGLE_RAD, _MOST_PALE = 0.05, 3.0
+"""Step of polar angle within which the light changes by a few per cent, and the most that a place may be over
+the mean at its angle: more is no reflectance but an angle that hardly any wall is seen at."""
 _NODES = ((-1.732051, 1 / 6), (0.0, 2 / 3), (1.732051, 1 / 6))
 """Gauss and Hermite's nodes: three displacements whose mean blurs as a normal curve does, to the fifth power
 of its width. Two rounds of them make nine."""
@@ -146,12 +152,24 @@ def stray(which: int) -> Law:
 
 
 def bounced(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> Float32:
-    """Return light of the line bounced once in a round bore, up to a factor."""
+    """Return light of the line bounced once in a round bore, up to a factor: brighter on paler wall."""
     on = twin.distance_mm[twin.region == Region.LINE_CORE]
     middle = float(np.nanmedian(on)) if len(on) else np.nan
     x = np.abs(lit.distance_mm - np.float32(middle)) / np.float32(2 * scene.surface.mean_radius_mm)
     share = 1 - x * (2 * x**2 + 3) / (2 * (x**2 + 1) ** 1.5)
-    return np.asarray(np.nan_to_num(100 * share), np.float32)
+    paler = lit.level / _at_angle(scene.polar[0], lit)
+    return np.asarray(np.nan_to_num(100 * share) * np.minimum(paler, _MOST_PALE), np.float32)
+
+
+def _at_angle(theta_rad: Float32, lit: TwinFrame) -> Float32:
+    """Return the mean level (H, W) of lit wall at the same polar angle: what lamps and lens make of it."""
+    some = (slice(None, None, 4),) * 2
+    wall, theta = lit.region[some] == Region.WALL, np.nan_to_num(theta_rad[some])
+    cell = (theta[wall] / _ANGLE_RAD).astype(int)
+    count = np.bincount(cell, minlength=2)
+    mean = np.bincount(cell, lit.level[some][wall], len(count)) / np.maximum(count, 1)
+    at = np.interp(np.nan_to_num(theta_rad), (np.arange(len(mean)) + 0.5) * _ANGLE_RAD, mean)
+    return np.maximum(at, 1.0).astype(np.float32)
 
 
 def bloom(shown: Shown, told: Float) -> Pair:
@@ -212,6 +230,28 @@ def _copied(shown: Shown, ratio: float) -> Float32:
     line = np.where(on_line(shown.twin), shown.twin.level, np.float32(0))
     copy = cv2.warpAffine(line, move, shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
     return np.asarray(copy, np.float32)
+
+
+def lamp_pattern(shown: Shown, told: Float) -> Pair:
+    """Return a frame in the light of lamps that shine unevenly, beside one in even light."""
+    return Pair(shown.again(lamp=_even), shown.twin.level, shown.wall, "scale")
+
+
+def dim_led(shown: Shown, told: Float) -> Pair:
+    """Return a frame whose LED at an azimuth sends less, beside even light; ``told``: loss, azimuth."""
+    even, scene = shown.again(lamp=_even), shown.scene
+    theta = np.linspace(_NEAREST_RAD, np.pi / 2, _THETAS)
+    share = dim_share(scene.probe.lighting, float(told[1]), scene.ring.radius_mm, theta).mean(0)
+    wrapped = np.concatenate([share[:, -1:], share, share[:, :1]], 1).astype(np.float32)
+    column = (scene.polar[1] / (2 * np.pi) + 0.5) * share.shape[1] + 0.5
+    row = (np.nan_to_num(scene.polar[0]) - theta[0]) / (theta[1] - theta[0])
+    at = column.astype(np.float32), row.astype(np.float32)
+    lost = cv2.remap(wrapped, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return Pair(even, even * (1 - np.float32(told[0]) * np.asarray(lost, np.float32)), shown.wall, "scale")
+
+
+def _even(lamp: LampLight) -> LampLight:
+    return replace(lamp, pattern=np.zeros_like(lamp.pattern))
 
 
 def wide_line(shown: Shown, told: Float) -> Pair:

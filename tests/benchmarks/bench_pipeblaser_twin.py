@@ -1,9 +1,10 @@
 """A real probe's ring pictures beside the same pictures, re-rendered. usage: bench_pipeblaser_twin OUT
 
 Sixteen single frames of one smooth pipe, without texture, motion or photo: what can be modelled is the line's
-profile, the background and the noise. Profile and noise of every other frame are tried on those
-between; brightness and background of each frame's line are its own, in blocks of 1.5°. Writes recorded |
-re-rendered | z of the worst frame into OUT.
+profile, the background and the noise. The profile of every other frame is tried on those between, by a noise
+that neighbours along the line tell: neither frames nor profile that are judged have a part in it. Brightness
+and background of each frame's line are its own, in blocks of 1.5°. Writes recorded | re-rendered | z of the
+worst frame into OUT.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ from tests.shared_data import shared
 RED, RED_NM, WHITE = 2, 650.0, 250.0
 BLOCKS, HALF_PX, BROAD_PX, BINS = 240, 12.0, 8.0, 24
 CENTRE = (0.445, 0.524)
+SAME_COLOUR, ASIDE, FEWEST = 2, 0.1, 30
+"""Pixels of one colour are so far apart; tangent of how far the line may turn from a row or column: its
+profile then bends a second difference by less than one grey level. Fewest pixels of a bin."""
 
 
 @dataclass(frozen=True)
@@ -89,19 +93,37 @@ def rendered(frame: RealFrame, light: BlockLight) -> tuple[Float, Float]:
     return ground[b.block] + line, line
 
 
-def noise_of(frames: list[RealFrame], light: BlockLight) -> Float:
+def noise_of(frames: list[RealFrame]) -> Float:
     """Return variances: of dark pixels, per grey level, and relative to the line's square (speckle).
 
-    Mean squares of what is left over in bins of brightness: errors of the profile count as noise, too.
+    From second differences along the line, where it runs along rows or columns of the picture: its profile,
+    and light that changes slowly, have no part in them. Every second pixel is taken, which the camera's
+    mosaic gave the same colour.
     """
-    each = [(*rendered(f, light), f) for f in frames]
-    level, line = (np.concatenate([e[k][~e[2].blocks.clipped] for e in each]) for k in (0, 1))
-    rest = np.concatenate([(e[2].blocks.grey - e[0])[~e[2].blocks.clipped] for e in each])
+    level, line, square = (np.concatenate(p) for p in zip(*map(_along_line, frames), strict=True))
     cell = np.searchsorted(np.quantile(level, np.linspace(0, 1, BINS + 1)[1:-1]), level)
     count = np.bincount(cell, minlength=BINS)
-    parts = [np.ones_like(level), np.maximum(level, 0.0), line**2, rest**2]
-    mean = np.stack([np.bincount(cell, p, BINS) / count for p in parts], 1)
-    return np.asarray(nnls(mean[:, :3] / mean[:, 3:], np.ones(BINS))[0])
+    parts = [np.ones_like(level), np.maximum(level, 0.0), line**2, square]
+    mean = np.stack([np.bincount(cell, p, BINS) for p in parts], 1)[count > FEWEST]
+    mean /= count[count > FEWEST, None]
+    return np.asarray(nnls(mean[:, :3] / np.maximum(mean[:, 3:], 1 / 12), np.ones(len(mean)))[0])
+
+
+def _along_line(frame: RealFrame) -> tuple[Float, Float, Float]:
+    """Return level, line's part and squared noise (N,) of pixels about the line next to the axes."""
+    u, v = frame.column - frame.blocks.centre_px[0], frame.row - frame.blocks.centre_px[1]
+    found = []
+    for across, along, step in ((u, v, (SAME_COLOUR, 0)), (v, u, (0, SAME_COLOUR))):
+        use = np.abs(along) < ASIDE * np.abs(across)
+        row, column = frame.row[use], frame.column[use]
+        three = np.stack([frame.grey[row + k * step[0], column + k * step[1]] for k in (-1, 0, 1)]).astype(
+            float
+        )
+        three = three[:, three.max(0) < WHITE]
+        found.append((three, np.sqrt(1 / 6) * (three[0] - 2 * three[1] + three[2])))
+    level = np.concatenate([t.mean(0) for t, _ in found])
+    dark = float(np.median(frame.ground[frame.row, frame.column]))
+    return level, np.maximum(level - dark, 0.0), np.concatenate([d for _, d in found]) ** 2
 
 
 def variance_of(noise: Float, level: Float, line: Float) -> Float:
@@ -120,7 +142,7 @@ def main(out: Path) -> None:
         lights = [light_of(f.blocks) for f in learned]
         profile = np.median([light.profile for light in lights], 0)
         light = BlockLight(lights[0].x, profile, np.zeros(0))
-        noise = noise_of(learned, light)
+        noise = noise_of(learned)
         step, wide = light.x[1] - light.x[0], np.abs(light.x) > 3
         print(
             f"learned from {len(learned)} frames: variance {noise[0]:.2f} + {noise[1]:.3f} · level + "

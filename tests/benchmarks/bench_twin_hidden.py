@@ -33,12 +33,15 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin import PhotometryParameters, TwinParameters, compared_with, photometry_of
 from stages.twin.causes import causes
+from stages.twin.glints import SpotsOfFrames
 from stages.twin.locate import places_in_image
+from stages.twin.on_wall import unnamed
 from stages.twin.picture import WholePictures
-from stages.twin.reference import BlocksOfFrames, in_image, unnamed
+from stages.twin.reference import BlocksOfFrames, in_image
 from stages.twin.scene import Scene, scene_of
 from stages.twin.sums import Sums
 from tests.hidden_effects import Change, Hidden, effects
+from tests.hidden_shine import shining
 
 Few = tuple[int, int]
 """Measured frames of each light that are sampled, and withheld frames that are compared."""
@@ -125,8 +128,10 @@ def _context() -> Context:
 
 def hidden(run: Opened, few: Few, seed: int, only: str) -> None:
     """Print what is found of each effect, and counts with the right answers and with those of others."""
-    cases = effects(run.scene, run.frames.frame, np.random.default_rng(seed))
-    cases = [c for c in cases if only in c.name]
+    made = (
+        of(run.scene, run.scene.trajectory.frame, np.random.default_rng(seed)) for of in (effects, shining)
+    )
+    cases = [c for some in made for c in some if any(o in c.name for o in only.split("+"))]
     clean = _found(run, few, lambda number, light, image: image)
     print(f"nothing hidden: {len(clean)} found", *(f"\n  {m.statement}" for m in clean), flush=True)
     right, spoiled = np.zeros(5, int), np.zeros(5, int)
@@ -184,7 +189,7 @@ def _is_there(case: Hidden, found: Mismatch) -> bool:
         if not away <= max(tolerance, 2 * sd.get(name, 0.0)):
             return False
     # What is everywhere has no place: only its name tells that it was seen.
-    named = any(n in found.name for n in case.names)
+    named = any(n in found.name.split(" or ") for n in case.names if n or case.fixed_to == found.fixed_to)
     return named or (bool(case.place) and case.fixed_to in found.fixed_to)
 
 
@@ -199,6 +204,15 @@ def part_of(whole: WholePictures, random: np.random.Generator) -> WholePictures:
         for name in kept_of:
             setattr(part, name, [getattr(whole, name)[k] for k in use])
     return part
+
+
+def few_spots(whole: SpotsOfFrames, random: np.random.Generator) -> SpotsOfFrames:
+    """Return two thirds of the frames in which bright spots were looked for."""
+    use = np.sort(random.permutation(len(whole.frame))[: 2 * len(whole.frame) // 3])
+    frames = {whole.frame[k] for k in use}
+    spots = [s for s in whole.spots if s.frame in frames]
+    parts = ([of[k] for k in use] for of in (whole.excess, whole.variance, whole.wall))
+    return SpotsOfFrames(whole.light, whole.ring, sorted(frames), spots, *parts)
 
 
 def nulls(run: Opened, count: int, seed: int) -> tuple[int, int]:
@@ -221,7 +235,7 @@ def nulls(run: Opened, count: int, seed: int) -> tuple[int, int]:
         )
         chosen = () if lit_use is None else lit_use
         blocks = BlocksOfFrames(
-            sums.blocks.mean_radius_mm,
+            sums.blocks.ring,
             *([of[k] for k in chosen] for of in (sums.blocks.parts, sums.blocks.number)),
         )
         few = [
@@ -233,7 +247,8 @@ def nulls(run: Opened, count: int, seed: int) -> tuple[int, int]:
         on_window = [p for p, to in zip(places, in_image(samples, places), strict=True) if "image" in to]
         sums.whole = part_of(whole, random)
         pictures, withdrawn = sums.named(samples, recording)
-        found = (*causes(*few, scene.probe.lighting, scene.ring), *unnamed(samples), *pictures)
+        shine = [m for spots in sums.spots for m in few_spots(spots, random).found()]
+        found = (*causes(*few, scene.probe.lighting, scene.ring), *unnamed(samples), *pictures, *shine)
         taken_back += len(withdrawn)
         false += bool(on_window or found)
         for m in found:
@@ -248,7 +263,7 @@ if __name__ == "__main__":
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("what", choices=["hidden", "nulls"])
     words.add_argument("runs", type=Path, nargs="+")
-    words.add_argument("--only", default="", help="cases whose name holds this")
+    words.add_argument("--only", default="", help="cases whose name holds one of these words, joined by +")
     words.add_argument("--sampled", type=int, default=6, help="measured frames of each light")
     words.add_argument("--compared", type=int, default=36, help="withheld frames")
     words.add_argument("--seed", type=int, default=1)

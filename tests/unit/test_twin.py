@@ -21,7 +21,8 @@ from stages.twin.line_light import LineSamples
 from stages.twin.locate import ImagePlace
 from stages.twin.name import _not_sharp, clipped, left_over
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
-from stages.twin.reference import BlockSamples, in_image, unnamed
+from stages.twin.on_wall import unnamed
+from stages.twin.reference import BlockSamples, in_image
 from stages.twin.reflectance import wall_seen
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import LineSight
@@ -70,9 +71,15 @@ def _noisy_frames(read, electrons, frames=4):
     random = np.random.default_rng(5)
     level = np.tile(np.linspace(10, 180, 480, dtype=np.float32), (360, 1))
     whole = np.ones(level.shape, bool)
+    of_wall = 5 * np.sin(np.arange(480) / 5.0) * (np.arange(360) % 90 < 40)[:, None]
     for _ in range(frames):
-        noise = random.standard_normal(level.shape) * np.sqrt(read**2 + level / electrons)
-        yield windows_of(noise.astype(np.float32), level, whole)
+        first, second = (
+            (of_wall + random.standard_normal(level.shape) * np.sqrt(read**2 + level / electrons)).astype(
+                np.float32
+            )
+            for _ in range(2)
+        )
+        yield windows_of(first, second, level, whole)
 
 
 def test_photon_transfer_finds_the_noise_that_was_put_in():
@@ -90,7 +97,7 @@ def test_other_noise_gives_another_answer():
 
 def test_pictures_whose_dark_shows_no_noise_have_that_of_rounding():
     black = np.zeros((120, 240), np.float32)
-    noise = photon_transfer([windows_of(black, black, black == 0)] * 2, BLACK, 255.0)
+    noise = photon_transfer([windows_of(black, black, black, black == 0)] * 2, BLACK, 255.0)
     assert noise.read_variance.value == pytest.approx(1 / 12)
 
 
@@ -112,8 +119,9 @@ def _samples(change, frames=8, still=False):
     along = row + (0 if still else 2 * frame)
     value = 0.01 * random.standard_normal(len(frame)) + change(frame, row, column, along)
     return BlockSamples(
-        value, 4 + 0 * value, 32 + 0 * value, frame, row, column, along, column, 100.0, 2.5, np.arange(frames)
-    )
+        value, 4 + 0 * value, 32 + 0 * value, frame, row, column, along, column, 100.0, 2.5,
+        np.arange(frames), row / 40,
+    )  # fmt: skip
 
 
 def _near(a, b, c, d):

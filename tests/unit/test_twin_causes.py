@@ -6,7 +6,7 @@ import pytest
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import causes
 from stages.twin.cells import SECTORS, Cells, CellsOfFrames, sector_azimuth_rad, sectors_of
-from stages.twin.render import TwinFrame
+from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
 
 RING, FRAMES = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 18
@@ -96,9 +96,10 @@ def test_a_displaced_line_is_no_darker():
     sector = np.tile(np.arange(360) // 10, (25, 1))
     level = (100 * np.exp(-0.5 * across**2)).astype(np.float32)
     unknown = np.full(level.shape, np.nan, np.float32)
-    twin = TwinFrame(level, np.full_like(level, 2.0), np.zeros(level.shape, np.uint8), unknown, unknown)
+    region = np.where(np.abs(across) < 8, Region.LINE_CORE, Region.DARK).astype(np.uint8)
+    twin = TwinFrame(level, np.full_like(level, 2.0), region, unknown, unknown)
     taken = CellsOfFrames()
     for shift in (0.0, 2.0):
         recorded = (80 * np.exp(-0.5 * (across - shift) ** 2)).astype(np.float32)
-        taken.add_line(0, recorded, twin, np.abs(across) < 8, sector)
+        taken.add_line(0, recorded, twin, np.inf, sector)
     np.testing.assert_allclose(taken.cells().log_ratio, np.log(0.8), atol=1e-3)

@@ -19,8 +19,15 @@ def _dirty(tmp_path, fixed_to="image", name="droplet", **parameters):
     place = {key: {"value": value, "sd": 4.0, "unit": "px"} for key, value in figures.items()}
     sizes = {key: {"value": value, "sd": 0.01} for key, value in parameters.items()}
     response = {"fixed_to": "image", "place": {}, "name": "response", "parameters": {}}
-    spot = {"fixed_to": fixed_to, "place": place, "name": name, "parameters": sizes}
-    (tmp_path / "twin.json").write_text(json.dumps({"found": [response, spot]}), "utf-8")
+    led = {
+        "fixed_to": "image",
+        "place": {"azimuth_deg": {"value": 90.0}},
+        "name": "led_dead",
+        "parameters": {},
+    }
+    channel = "line" if name == "glint" else "intensity"
+    spot = {"fixed_to": fixed_to, "place": place, "name": name, "parameters": sizes, "channel": channel}
+    (tmp_path / "twin.json").write_text(json.dumps({"found": [response, led, spot]}), "utf-8")
     return configuration(settings=dirt_of(tmp_path)).tree()
 
 
@@ -39,6 +46,7 @@ def test_dirt_of_a_twin_is_left_out_of_the_photo_and_what_is_on_the_wall_is_not(
         ("window_dirt", {"share": 0.6}, True),
         ("window_dirt", {"share": 0.1}, False),
         (None, {"share": -1.2}, False),
+        ("glint", {"excess": 80.0}, True),
     ],
 )
 def test_rings_leave_out_what_moves_the_line(tmp_path, name, parameters, left_out):

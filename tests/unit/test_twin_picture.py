@@ -53,7 +53,7 @@ def _noisy(picture, random):
 
 def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0, judge=None):
     """Names that stand and names that are withdrawn; ``judge`` changes the frames that are rendered again."""
-    random, whole, blocks = np.random.default_rng(2), WholePictures(SCENE), BlocksOfFrames(50.0)
+    random, whole, blocks = np.random.default_rng(2), WholePictures(SCENE), BlocksOfFrames(RING)
     shown = {}
     for frame in range(FRAMES):
         twin, line = _lit(random), _line()

@@ -1,0 +1,80 @@
+"""Lamps that shine unevenly in all frames: one LED that sends less, or something else.
+
+The lamps' pattern around the picture is described by two harmonics. A single LED that is dim gives both, in a
+ratio and at angles that its place and the bore foretell; what gives others has no name.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.cells import SECTORS, sector_azimuth_rad
+from stages.twin.gate import Suspected
+from stages.twin.lamp_light import LampLight
+from stages.twin.laws import LED_AZIMUTHS, dim_share
+from stages.twin.scene import Scene
+from stages.twin.switched import dim_led, lamp_pattern
+
+_LEAST, _LEFT, _SURE = 0.012, 0.003, 5.0
+"""Least amplitude of the first harmonic, relative; what a sound photo leaves of any; least in σ. Recordings
+with even lamps leave 0.002."""
+_LOSSES = np.linspace(0.1, 1.0, 19)
+"""Losses at which the pattern is worked out; between them it is nearly straight."""
+_OF_SECOND = 2.0
+"""Relative σ of the first harmonic, for want of the lobe, by which the second may be another: order two."""
+
+
+def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Suspected, ...]:
+    """Return what makes the lamps' pattern in lit frames (F,) uneven; nothing where it is even."""
+    if lamp is None:
+        return ()
+    first, second = (complex(*lamp.pattern[k : k + 2]) for k in (0, 2))
+    sd = float(np.hypot(*lamp.pattern_sd[:2]))
+    if abs(first) < max(_LEAST, _SURE * sd):
+        return ()
+    dim, spread = _harmonics(lamp, scene)
+    azimuth = float(np.angle(-first))
+    lost = float(np.interp(abs(first), -dim[:, 0], _LOSSES))
+    foretold = float(np.interp(lost, _LOSSES, dim[:, 1])) * np.exp(2j * azimuth)
+    allowed = _LEFT + _OF_SECOND * spread * abs(foretold)
+    one = abs(first) < -(1 + 2 * spread) * dim[-1, 0] and abs(second - foretold) < allowed
+    look, nan = scene.ring.at(int(frame[0]), azimuth), float("nan")
+    at = NamedFigure("azimuth_deg", float(np.degrees(azimuth)), 180 / LED_AZIMUTHS, "deg")
+    told = np.tile([lost if one else 0.0, azimuth], (len(frame), 1))
+    if one:
+        size = NamedFigure(
+            "lost", lost, float(np.hypot(spread, sd / abs(first))) * lost, "share of the light"
+        )
+        said = f"In all frames the LED at image azimuth {at.value:.0f}° sends {100 * lost:.0f} % less light"
+        name, said = "led_dead", said + "."
+        if abs(foretold) < allowed:  # lamps that lean give the first harmonic alone
+            name, said = "led_dead or uneven_lamps", said + ", or the lamps lean or shine unevenly."
+        found = Mismatch(name, "intensity", "image", (at,), (size,), nan, nan, nan, said, look)
+        return (Suspected(found, dim_led, frame, told),)
+    size = NamedFigure("amplitude", abs(first), sd, "relative")
+    said = (
+        f"In all frames the side at image azimuth {np.degrees(np.angle(first)):.0f}° is "
+        f"{100 * abs(first):.0f} % brighter than the mean, which no single dim LED explains: the lamps stand "
+        "or shine unevenly."
+    )
+    found = Mismatch("", "intensity", "image", (at,), (size,), nan, nan, nan, said, look)
+    return (Suspected(found, lamp_pattern, frame, told),)
+
+
+def _harmonics(lamp: LampLight, scene: Scene) -> tuple[Float, float]:
+    """Return both harmonics (L, 2) of the logarithm of light around the picture for an LED that loses L.
+
+    They are the mean over the picture, as the lamps' pattern is. No probe states the LEDs' lobe: they are
+    the mean of LEDs that shine evenly and as the cosine, too; half of by what these differ is the relative
+    1 σ, returned beside them.
+    """
+    theta = np.linspace(lamp.theta_rad[0], min(float(lamp.theta_rad[-1]), np.pi / 2), len(lamp.theta_rad))
+    share, around = dim_share(scene.probe.lighting, 0.0, scene.ring.radius_mm, theta), sector_azimuth_rad()
+    waves = np.cos(np.arange(1, 3) * around[:, None]) * 2 / SECTORS
+    each = np.array([np.log1p(-0.999 * lost * share) @ waves for lost in _LOSSES])
+    # An equidistant lens shows as many pixels at a polar angle as the angle is wide.
+    each = np.average(each, axis=2, weights=theta)
+    first = each[-1, :, 0]
+    return each.mean(1), float(np.ptp(first) / 2 / abs(first.mean()))

@@ -1,0 +1,157 @@
+"""Differences that are fixed to the wall, or to rows of single frames.
+
+A region of the wall is darker or brighter than its photo, or it shines: it is the brighter, the more it is
+seen from the side, as wet or polished wall is, whose mirrored light falls off fast with the angle.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from scipy.stats import norm, t
+
+from pipeline.adjustment.robust import spread_about_median
+from pipeline.arrays import Bool, Float, Int
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.cells import centred, sigmas
+from stages.twin.locate import FALSE_ALARM
+from stages.twin.reference import FEWEST_FRAMES, SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
+
+_SURE, _FEWEST_CELLS = 3.0, 2
+"""σ from frame to frame by which other frames must bear a region out, and its fewest cells."""
+_LEAST_ON_WALL, _LEAST_OF_ROWS = 0.05, 0.01
+"""Relative changes that count: at steps of the wall the photo itself errs by a few per cent."""
+_LEAST_SHINE, _LEAST_LEAN = 0.25, 0.03
+"""Least relative brightening over a line's radius that counts as gloss, and least spread of the places, in
+radii of the line, from which it is told. Chosen."""
+
+
+def unnamed(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
+    """Return what is fixed to the wall or to rows."""
+    return () if samples is None else (*_regions_of_wall(samples), *_banding(samples))
+
+
+def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
+    """Return regions of the wall that differ from their photo, if frames bear it out."""
+    shape = (int(samples.along.max()) + 1, WALL_COLUMNS)
+    mean, sd = map_of(samples, "wall", shape)
+    shine, shine_sd = _shine(samples, shape)
+    cells = max(int(np.isfinite(mean).sum()), 1)
+    tail = float(norm.isf(FALSE_ALARM / (4 * cells)))
+    with np.errstate(invalid="ignore"):
+        beyond = (np.abs(mean) > np.maximum(tail * sd, _LEAST_ON_WALL)) | (
+            shine > np.maximum(tail * shine_sd, _LEAST_SHINE)
+        )
+    # Cells that touch but for a few belong together: noise cuts a faint region in parts.
+    count, label = cv2.connectedComponents(cv2.dilate(beyond.astype(np.uint8), np.ones((5, 5), np.uint8)))
+    label, found = label * beyond, []
+    for k in range(1, count):
+        region = np.argwhere(label == k)
+        if len(region) < _FEWEST_CELLS:
+            continue
+        use = label[samples.along, samples.around] == k
+        size, told = _gloss_of(samples, use)
+        if told > _SURE and size > _LEAST_SHINE:
+            found.append(_on_wall(region, shine, shine_sd, cells, samples, use, size / max(told, 1e-9)))
+        elif samples.fixed_to(use) == "wall":
+            found.append(_on_wall(region, mean, sd, cells, samples, use))
+    return tuple(found)
+
+
+def _shine(samples: BlockSamples, shape: tuple[int, int]) -> tuple[Float, Float]:
+    """Return by how much cells (a shape) brighten over a line's radius toward the image's border, and 1 σ."""
+    cell, cells = samples.orders["wall"], shape[0] * shape[1]
+    lean, change = centred(samples.away, cell), centred(samples.change, cell)
+    count, square, cross = (
+        np.bincount(cell, v, cells)[:cells] for v in (None, lean**2, lean * change)
+    )  # fmt: skip
+    known = (count >= FEWEST_FRAMES) & (square > _LEAST_LEAN**2 * count)
+    slope = np.where(known, cross / np.maximum(square, 1e-12), np.nan)
+    scale = np.sqrt(np.maximum(square, 1e-12))
+    spread = spread_about_median((slope * scale)[known]) if known.any() else np.nan
+    return slope.reshape(shape), (spread / scale).reshape(shape)
+
+
+def _gloss_of(samples: BlockSamples, use: Bool) -> tuple[float, float]:
+    """Return by how much blocks in ``use`` (N,) brighten toward the border, and by how many σ of frames.
+
+    A brightness of each cell that stays is granted. σ is 0 where halves of the frames contradict each other,
+    or frames are too few.
+    """
+    cell, frame = samples.orders["wall"][use], samples.frame[use]
+    lean, change = centred(samples.away[use], cell), centred(samples.change[use], cell)
+    cross, own = (np.bincount(frame, lean * v) for v in (change, lean))
+    frames = np.flatnonzero(own > 0)
+    if len(frames) < FEWEST_FRAMES:
+        return 0.0, 0.0
+    cross, own = cross[frames], own[frames]
+    slope = float(cross.sum() / own.sum())
+    sd = float(np.sqrt(((cross - slope * own) ** 2).sum() * len(frames) / (len(frames) - 1)) / own.sum())
+    halves = [cross[k::2].sum() / own[k::2].sum() for k in (0, 1)]
+    told = slope / max(sd, 1e-12)
+    sure = min(halves) > slope / 2 and t.sf(told, len(frames) - 1) < FALSE_ALARM
+    return slope, told if sure else 0.0
+
+
+def _on_wall(
+    cells: Int, mean: Float, sd: Float, known: int, samples: BlockSamples, use: Bool, gloss_sd: float = 0.0
+) -> Mismatch:
+    """Return a region of the wall; with ``gloss_sd`` one that shines, ``mean`` being its shine."""
+    cell_mm = samples.cell_mm
+    value, spread = (a[tuple(cells.T)] for a in (mean, sd))
+    most = int(np.nanargmax(np.abs(value)))
+    chance = min(1.0, 4 * known * float(norm.sf(abs(value[most]) / max(float(spread[most]), 1e-9))))
+    distance = samples.first_mm + (cells[:, 0].mean() + 0.5) * cell_mm
+    azimuth = float(np.degrees(_middle_angle(2 * np.pi * (cells[:, 1] + 0.5) / WALL_COLUMNS)))
+    extent = cell_mm * float(np.sqrt(len(cells)))
+    place = (
+        NamedFigure("distance_mm", distance, cell_mm / 2, "mm"),
+        NamedFigure("azimuth_deg", azimuth, 180 / WALL_COLUMNS, "deg"),
+        NamedFigure("extent_mm", extent, cell_mm, "mm"),
+    )
+    at, nan = f"At {distance:.0f} mm, azimuth {azimuth:.0f}°,", float("nan")
+    look = samples.look(use, SHOWN_PX)
+    if gloss_sd:
+        size = NamedFigure("shine", float(np.nanmean(value)), gloss_sd, "relative")
+        return Mismatch(
+            "wet_patch", "intensity", "wall", place, (size,), chance, nan, nan,
+            f"{at} the wall is the brighter, the more it is seen from the side: it is wet or polished there.",
+            look,
+        )  # fmt: skip
+    way = "brighter" if value[most] > 0 else "darker"
+    size = NamedFigure("change", float(value[most]), float(spread[most]), "relative")
+    return Mismatch(
+        "", "intensity", "wall", place, (size,), chance, nan, nan,
+        f"{at} the wall is {100 * abs(value[most]):.0f} % {way} "
+        "than its photo: it shines differently from each side, or lies elsewhere than the radius map says.",
+        look,
+    )  # fmt: skip
+
+
+def _middle_angle(angle_rad: Float) -> float:
+    """Return the mean direction of angles."""
+    return float(np.arctan2(np.sin(angle_rad).mean(), np.cos(angle_rad).mean()))
+
+
+def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
+    """Return bands along rows that change from frame to frame."""
+    everywhere = np.ones(len(samples.change), bool)
+    if samples.frame.max() + 1 < FEWEST_FRAMES or samples.fixed_to(everywhere) != "rows":
+        return ()
+    mean, _ = map_of(samples, "rows", (int(samples.frame.max()) + 1, int(samples.row.max()) + 1))
+    size = float(np.nanstd(mean))
+    frames = np.unique(samples.frame)
+    chance = float(t.sf(sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
+    sd = float(np.nanstd(np.nanstd(mean, axis=1))) / np.sqrt(len(frames))
+    if size < _LEAST_OF_ROWS:
+        return ()
+    nan = float("nan")
+    return (
+        Mismatch(
+            "banding", "intensity", "rows", (), (NamedFigure("change", size, sd, "relative"),), chance,
+            nan, nan,
+            f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as of lamps "
+            "that flicker within a frame of a rolling shutter.",
+            samples.look(everywhere, 2 * SHOWN_PX),
+        ),
+    )  # fmt: skip

@@ -1,0 +1,118 @@
+"""Glints, wet wall and uneven lamps, on made pictures: told where they are, and nowhere else."""
+
+from types import SimpleNamespace
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.instrument.probe import Lighting
+from pipeline.recording.base import Illumination
+from stages.twin.glints import SpotsOfFrames
+from stages.twin.lamp_light import Course, LampLight
+from stages.twin.lamps import uneven_lamps
+from stages.twin.laws import dim_share
+from stages.twin.on_wall import unnamed
+from stages.twin.reference import BlocksOfFrames
+from stages.twin.render import Region, TwinFrame
+from stages.twin.scene import Ring
+
+SHAPE, FRAMES, STEP_PX = (240, 320), 10, 8
+V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
+RING = Ring((160.0, 120.0), 90.0, 50.0, 25.0)
+
+
+def _twin(number, region=Region.WALL):
+    """A wall unrolled in the picture's columns, which moves down by blocks from frame to frame."""
+    level = np.full(SHAPE, 80.0, np.float32)
+    along = ((V + STEP_PX * number) * np.float32(50 / 90)).astype(np.float32)
+    around = (U / np.float32(90.0)).astype(np.float32)
+    return TwinFrame(level, np.full(SHAPE, 4.0, np.float32), np.full(SHAPE, region, np.uint8), along, around)
+
+
+def _spot(u, v, grey=120.0):
+    made = np.zeros(SHAPE, np.float32)
+    cv2.circle(made, (round(u), round(v)), 6, grey, -1)
+    return made
+
+
+def _spots(spot_of, light=Illumination.LED):
+    random, spots = np.random.default_rng(4), SpotsOfFrames(light, RING)
+    for number in range(FRAMES):
+        twin = _twin(number, Region.DARK if light == Illumination.LASER else Region.WALL)
+        noise = 2 * random.standard_normal(SHAPE).astype(np.float32)
+        spots.add(number, twin.level + noise + spot_of(number, random), twin)
+    return spots.found()
+
+
+def test_a_lamp_that_is_mirrored_at_one_place_of_the_image_is_a_glint():
+    (found,) = _spots(lambda n, r: _spot(100 + r.normal(0, 3), 60 + r.normal(0, 3)))
+    assert (found.name, found.fixed_to) == ("glint", "image")
+    u, v, _ = (p.value for p in found.place)
+    assert np.hypot(u - 100, v - 60) < 4
+    assert found.chi2_after < found.chi2_before / 2
+
+
+def test_a_glint_that_moves_with_the_wall_is_fixed_to_it():
+    (found,) = _spots(lambda n, r: _spot(200, 200 - STEP_PX * n))
+    assert (found.name, found.fixed_to) == ("glint", "wall")
+    assert found.place[0].value == pytest.approx(200 * 50 / 90, abs=2)
+
+
+def test_spots_that_come_back_nowhere_are_counted_without_a_name():
+    (found,) = _spots(lambda n, r: _spot(r.uniform(20, 300), r.uniform(20, 220)), Illumination.LASER)
+    assert (found.name, found.fixed_to, found.channel) == ("", "time", "line")
+    assert found.parameters[0].value == pytest.approx(1.0)
+
+
+def test_noise_and_one_spot_are_no_glints():
+    assert not _spots(lambda n, r: 0)
+    assert not _spots(lambda n, r: _spot(100, 100) * (n == 4))
+    assert not _spots(lambda n, r: np.float32(90.0))  # all of it too bright: no spot
+
+
+def _wall(change, seed=3):
+    random, blocks = np.random.default_rng(seed), BlocksOfFrames(RING)
+    for number in range(12):
+        twin = _twin(number)
+        patch = np.hypot(twin.distance_mm - 100, 50 * (twin.azimuth_rad - 0.8)) < 14
+        aside = np.hypot(U - 160, V - 120) / 90
+        noise = 2 * random.standard_normal(SHAPE).astype(np.float32)
+        blocks.add(number, twin.level * (1 + change(patch, aside)).astype(np.float32) + noise, twin, 255.0)
+    return unnamed(blocks.samples())
+
+
+def test_wall_that_shines_is_wet_and_wall_that_is_dark_has_no_name():
+    (wet,) = _wall(lambda patch, aside: 0.7 * patch * (aside - 0.8))
+    assert (wet.name, wet.fixed_to) == ("wet_patch", "wall")
+    assert abs(wet.place[0].value - 100) < 5
+    assert abs(wet.place[1].value - np.degrees(0.8)) < 5
+    (dark,) = _wall(lambda patch, aside: -0.2 * patch)
+    assert dark.name == ""
+    assert not _wall(lambda patch, aside: 0 * aside)
+    assert not [m for m in _wall(lambda patch, aside: -0.7 * patch * (aside - 0.8)) if m.name]
+
+
+LIGHTING = Lighting(leds=8, radius_mm=11.0)
+SCENE = SimpleNamespace(probe=SimpleNamespace(lighting=LIGHTING), ring=RING)
+
+
+def _lamp(change):
+    """A lamp whose pattern is that of a change (S,) of the logarithm of light around the picture."""
+    azimuth = -np.pi + 2 * np.pi * (np.arange(36) + 0.5) / 36
+    pattern = np.array([f(m * azimuth) @ change / 18 for m in (1, 2) for f in (np.cos, np.sin)])
+    course = Course(np.array([0]), np.zeros(1), np.zeros(1))
+    return LampLight(1.0, np.array([0.88, 0.92]), np.zeros(2), np.zeros(2), pattern, np.full(4, 1e-3), course)
+
+
+def test_a_dim_led_is_told_from_lamps_that_shine_unevenly():
+    frames, azimuth = np.arange(8), -np.pi + 2 * np.pi * (np.arange(36) + 0.5) / 36
+    for lost in (0.5, 1.0):
+        share = dim_share(LIGHTING, 2.0, 50.0, np.array([0.9])).mean((0, 1))
+        (dim,) = uneven_lamps(_lamp(np.log1p(-0.999 * lost * share)), SCENE, frames)
+        assert dim.mismatch.name.startswith("led_dead")
+        assert dim.mismatch.place[0].value == pytest.approx(np.degrees(2.0), abs=2)
+        assert dim.mismatch.parameters[0].value == pytest.approx(lost, abs=0.03)
+    (other,) = uneven_lamps(_lamp(0.2 * np.cos(2 * azimuth) + 0.05 * np.cos(azimuth)), SCENE, frames)
+    assert other.mismatch.name == ""
+    assert not uneven_lamps(_lamp(0 * azimuth), SCENE, frames)
