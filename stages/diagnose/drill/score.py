@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.drill.answer import Answer, Concealed, NamedEffect
+from stages.diagnose.drill.matching import matched
 
 _95 = 1.959964
 _STANDS_OUT = 5.0
@@ -19,10 +19,6 @@ SNR = 8.0
 _FOUND = ("named", "partly", "class", "unexplained")
 _WITH_NAMES = ("named", "partly")
 NOTHING = "nothing"
-# More than the numbers of one law can differ: each by its whole range.
-_STRANGERS = 1e3
-# The quantity that is a whole number.
-_WHOLE = "order"
 _PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 1.0001)
 
 
@@ -257,29 +253,6 @@ def owned(trial: Trial) -> bool:
 def size_errors(trial: Trial) -> list[float]:
     """Return (estimate − truth) / σ of the first quantity of every effect that is rightly named."""
     return [error for e, c in trial.right if (error := _size_error(e, c)) is not None]
-
-
-def matched(
-    given: Sequence[NamedEffect], concealed: Sequence[Concealed]
-) -> list[tuple[NamedEffect, Concealed]]:
-    """Return names with what they name, one to one; laws that come twice so that their numbers differ least.
-
-    Numbers differ by shares of what the catalogue allows them. Waves of another order are another effect.
-    """
-    apart = np.array([[_apart(e, c) for c in concealed] for e in given]).reshape(len(given), len(concealed))
-    pairs = np.stack(linear_sum_assignment(np.minimum(apart, _STRANGERS)), -1).tolist()
-    return [(given[e], concealed[c]) for e, c in pairs if apart[e, c] < _STRANGERS]
-
-
-def _apart(named: NamedEffect, truth: Concealed) -> float:
-    if named.name != truth.name:
-        return np.inf
-    # What is on pictures alone is not in the catalogue.
-    each = zip(EFFECTS[truth.name].quantities, truth.values, strict=False) if truth.name in EFFECTS else ()
-    known = [(q, named.parameters[q.name].value - v) for q, v in each if q.name in named.parameters]
-    if any(q.name == _WHOLE and abs(d) > 0.5 for q, d in known):
-        return np.inf
-    return float(sum(min(abs(d) / (q.high - q.low), 1.0) for q, d in known if np.isfinite(d)))
 
 
 def heldout_removed(answer: Answer) -> float | None:
