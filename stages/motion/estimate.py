@@ -92,7 +92,7 @@ def estimate_motion(
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
-    report_motion(context, estimate, run.texture, trajectory)
+    report_motion(context, estimate, run.texture, trajectory, recording.pipe.nominal_diameter_mm)
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)

@@ -103,9 +103,16 @@ def _mirrored(probe: Probe, moved: int, by: float) -> str:
 
 
 def report_motion(
-    context: Context, estimate: RunEstimate, texture: TrackedTexture, trajectory: Trajectory
+    context: Context,
+    estimate: RunEstimate,
+    texture: TrackedTexture,
+    trajectory: Trajectory,
+    nominal_mm: float,
 ) -> None:
-    """Report the figures of a motion, and warn where it may be off by more than its σ."""
+    """Report the figures of a motion, and warn where it may be off by more than its σ.
+
+    ``nominal_mm`` is the pipe's stated diameter.
+    """
     report_steps(context, estimate.trials, estimate.unsettled)
     context.report("landmarks", texture.store.landmarks, "")
     context.report("texture observations", texture.store.spool.count, "")
@@ -117,7 +124,7 @@ def report_motion(
     _warn_of_trembling(trembling(trajectory.T_pc, texture.poses.frames), context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
-    estimate.encoder.warn(context)
+    estimate.encoder.warn(context, 2 * trajectory.radius_mm / nominal_mm - 1)
     estimate.steady.warn(context)
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     context.report("distance travelled", travelled, "mm")

@@ -1,11 +1,12 @@
 """An encoder is believed only where it covers the frames and the wall's texture does not contradict it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from pipeline.recording.base import Encoder, FrameTable
+from stages.motion.bundle_adjustment.encoder_scale import EncoderScale
 from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames
 from stages.motion.tracking.landmarks import TrackedPoses
 from tests.quiet import quiet_context
@@ -115,3 +116,12 @@ def test_texture_lost_in_most_frames_contradicts_nothing() -> None:
     tracks = tracked(0 * z)
     tracks.lost[2:] = True
     assert not contradicted(EncoderReadings(z, 0.015, np.ones(FRAMES, bool)), tracks, quiet_context())
+
+
+@pytest.mark.parametrize(("wider", "words"), [(0.026, "speaks against the probe"), (0.0, "cannot tell")])
+def test_a_diameter_that_errs_as_the_way_does_speaks_against_the_probe(wider: float, words: str) -> None:
+    """Pictures zoomed by 1 %: the radius was 1.3 mm too large, and only the encoder was blamed."""
+    told: list[str] = []
+    EncoderScale(1.02, 0.001, 0.002).warn(replace(quiet_context(), warn=told.append), wider)
+    assert len(told) == 1
+    assert words in told[0]

@@ -16,6 +16,9 @@ from stages.motion.bundle_adjustment.unknowns import ENCODER_SCALE
 _TOO_FAR = 4.0
 """Differences, in σ, from which the encoder's scale was not as stated: by chance once in 16 000 recordings.
 A smaller one draws distances by 4 σ_pictures² / σ_encoder at most: .15 % at .09 and .2 %."""
+_ALIKE = 2.0
+"""Factor within which diameter and way err alike. A zoomed picture changes radii by θ / sin θ cos θ times as
+much, 3.0 at 65°, and ways by about as much as radii: 2.6 and 2.0 % for 1 % of zoom (open-1-field)."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +47,8 @@ class EncoderScale:
         """Whether pictures and encoder cannot both be as stated."""
         return self.in_sigma > _TOO_FAR
 
-    def warn(self, context: Context) -> None:
-        """Tell of an encoder that the pictures contradict."""
+    def warn(self, context: Context, wider: float) -> None:
+        """Tell of an encoder that the pictures contradict, in a pipe ``wider`` than nominal by that share."""
         if not self.contradicted:
             return
         more = "more" if self.scale < 1 else "less"
@@ -53,8 +56,18 @@ class EncoderScale:
             f"the encoder shows {100 * abs(1 / self.scale - 1):.2f} % {more} than laser and texture do "
             f"({self.in_sigma:.0f} σ): its wheel, unit or clock is not as stated, and distances rest on "
             "baseline and camera instead. If the probe is wrong and the encoder right, distances and "
-            "radii would be wrong by as much; this recording cannot tell. What to do: measure the wheel and "
+            f"radii would be wrong by as much{self._witness(wider)}. What to do: measure the wheel and "
             "compare the clocks of encoder.csv and frames.csv; compare the diameter with one that is known"
+        )
+
+    def _witness(self, wider: float) -> str:
+        """Return what the stated diameter says: a wrong probe makes pipe and way larger or smaller alike."""
+        if not 1 / _ALIKE < wider / (self.scale - 1) < _ALIKE:
+            return "; this recording cannot tell"
+        larger = "wider" if wider > 0 else "narrower"
+        return (
+            f". The pipe comes out {100 * abs(wider):.1f} % {larger} than its stated diameter as well, which "
+            "speaks against the probe: another camera or laser, or pictures that were scaled or cropped"
         )
 
 

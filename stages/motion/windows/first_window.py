@@ -35,11 +35,12 @@ class EncoderCheck:
     delay: EncoderDelay | None
     scale: EncoderScale | None
 
-    def warn(self, context: Context) -> None:
-        """Tell of what was wrong with the encoder."""
-        for fault in (self.delay, self.scale):
-            if fault is not None:
-                fault.warn(context)
+    def warn(self, context: Context, wider: float) -> None:
+        """Tell of what was wrong with the encoder, in a pipe ``wider`` than nominal by that share."""
+        if self.delay is not None:
+            self.delay.warn(context)
+        if self.scale is not None:
+            self.scale.warn(context, wider)
 
 
 @dataclass(frozen=True)
