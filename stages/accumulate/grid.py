@@ -126,8 +126,10 @@ def gridded(
     halves = [
         _map_of(columns.every_other(first), grid, 2 * width, 2 * largest_gap_mm)[:2] for first in (0, 1)
     ]
-    sigma = sigma * (_excess(halves, grid) * _shared(columns, held, width / max(spacing, 1e-9)))
-    return radius, sigma * _roughness(radius, sigma, grid), count, misalignment
+    sigma = sigma * _excess(halves, grid)
+    rough = sigma * _roughness(radius, sigma, grid)
+    shared = _shared(columns, held, width / max(spacing, 1e-9))
+    return radius, _with_shared(rough, sigma, shared), count, misalignment
 
 
 def _map_of(
@@ -156,24 +158,28 @@ def _excess(halves: list[tuple[Float32, Float32]], grid: MapGrid) -> Float32:
     return _spread_by_place(np.abs(a - b) / np.hypot(sigma_a, sigma_b), grid)
 
 
-def _shared(columns: RingColumns, held: HeldOver, width: float) -> np.float32:
+def _with_shared(rough: Float32, sigma: Float32, shared: float) -> Float32:
+    """Return σ (S, A) with what rings share added alike everywhere: flanks of defects scatter anyway."""
+    if shared <= 1.0 or not (known := np.isfinite(sigma)).any():
+        return rough
+    lacking = (shared * float(np.median(sigma[known]))) ** 2 - float(np.median(rough[known])) ** 2
+    return np.asarray(np.sqrt(rough**2 + max(lacking, 0.0)), np.float32)
+
+
+def _shared(columns: RingColumns, held: HeldOver, width: float) -> float:
     """Return how many times σ is that of neighbouring rings, in a mean over ``width`` rings; at least 1.
 
-    What a codec holds over for many rings is no scatter of neighbours. Rings are compared as far apart as
-    nothing is held over; the wall's own shape over that length then counts as error, too: nothing tells it
-    from what is held over.
+    Rings are compared as far apart as nothing is held over. The wall's own shape over that length counts as
+    error, too: nothing tells it from what is held over.
     """
     if held.rings <= 1 or columns.distance_mm.shape[1] < 2 * held.rings + 1:
-        return np.float32(1.0)
+        return 1.0
     near, far = (max(_scatter(columns, apart), 1.0) for apart in (1, held.rings))
-    return np.float32(max(far / near, 1.0) * held.gain_in_mean(width))
+    return max(far / near, 1.0) * held.gain_in_mean(width)
 
 
 def _scatter(columns: RingColumns, apart: int) -> float:
-    """Return the robust spread of rings about the line through those ``apart`` on either side, over their σ.
-
-    The line follows what slopes along the pipe.
-    """
+    """Return the robust spread of rings about the line through those ``apart`` on both sides, over its σ."""
     some = slice(None, None, _SOME_COLUMNS)
     at, radius, variance = (v[some] for v in (columns.distance_mm, columns.radius_mm, columns.variance))
     before, middle, after = slice(None, -2 * apart), slice(apart, -apart), slice(2 * apart, None)
@@ -181,8 +187,7 @@ def _scatter(columns: RingColumns, apart: int) -> float:
     error = radius[:, middle] - (1 - share) * radius[:, before] - share * radius[:, after]
     usual = variance[:, middle] + (1 - share) ** 2 * variance[:, before] + share**2 * variance[:, after]
     ratio = error / np.sqrt(usual)
-    known = ratio[np.isfinite(ratio)]
-    return robust_spread(known) if known.size else 1.0
+    return robust_spread(ratio[np.isfinite(ratio)]) if np.isfinite(ratio).any() else 1.0
 
 
 def _roughness(radius: Float32, sigma: Float32, grid: MapGrid) -> Float32:
