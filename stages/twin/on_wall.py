@@ -18,7 +18,7 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.reference import FEWEST_FRAMES, SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
 
 _SURE, _FEWEST_CELLS = 3.0, 2
-"""σ from frame to frame by which other frames must bear a region out, and its fewest cells."""
+"""σ from frame to frame by which other frames must bear a region out, and how many of its cells touch."""
 _LEAST_ON_WALL, _LEAST_OF_ROWS = 0.05, 0.01
 """Relative changes that count: at steps of the wall the photo itself errs by a few per cent."""
 _LEAST_SHINE, _LEAST_LEAN = 0.25, 0.03
@@ -44,10 +44,10 @@ def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
         )
     # Cells that touch but for a few belong together: noise cuts a faint region in parts.
     count, label = cv2.connectedComponents(cv2.dilate(beyond.astype(np.uint8), np.ones((5, 5), np.uint8)))
-    label, found = label * beyond, []
+    label, together, found = label * beyond, touching(beyond), []
     for k in range(1, count):
         region = np.argwhere(label == k)
-        if len(region) < _FEWEST_CELLS:
+        if together[label == k].max() < _FEWEST_CELLS:
             continue
         use = label[samples.along, samples.around] == k
         size, told = _gloss_of(samples, use)
@@ -56,6 +56,15 @@ def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
         elif samples.fixed_to(use) == "wall":
             found.append(_on_wall(region, mean, sd, cells, samples, use))
     return tuple(found)
+
+
+def touching(beyond: Bool) -> Int:
+    """Return for each cell of a map (H, W) how many cells touch it or each other in a row, itself included.
+
+    Single cells of noise that merely lie near each other are no region.
+    """
+    _, label = cv2.connectedComponents(beyond.astype(np.uint8))
+    return np.asarray(np.bincount(label.ravel())[label] * beyond)
 
 
 def _shine(samples: BlockSamples, shape: tuple[int, int]) -> tuple[Float, Float]:
@@ -114,8 +123,10 @@ def _on_wall(
     if gloss_sd:
         size = NamedFigure("shine", float(np.nanmean(value)), gloss_sd, "relative")
         return Mismatch(
-            "wet_patch", "intensity", "wall", place, (size,), chance, nan, nan,
-            f"{at} the wall is the brighter, the more it is seen from the side: it is wet or polished there.",
+            "", "intensity", "wall", place, (size,), chance, nan, nan,
+            f"{at} the wall is the brighter, the more it is seen from the side, as wet or polished wall is. "
+            "It has no name, since noise of a dim picture can look the same. Record next: the same place with "
+            "more light, or dried.",
             look,
         )  # fmt: skip
     way = "brighter" if value[most] > 0 else "darker"

@@ -12,7 +12,7 @@ from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_light import Course, LampLight
 from stages.twin.lamps import uneven_lamps
 from stages.twin.laws import dim_share
-from stages.twin.on_wall import unnamed
+from stages.twin.on_wall import touching, unnamed
 from stages.twin.reference import BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
@@ -82,15 +82,25 @@ def _wall(change, seed=3):
     return unnamed(blocks.samples())
 
 
-def test_wall_that_shines_is_wet_and_wall_that_is_dark_has_no_name():
+def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
     (wet,) = _wall(lambda patch, aside: 0.7 * patch * (aside - 0.8))
-    assert (wet.name, wet.fixed_to) == ("wet_patch", "wall")
+    assert (wet.name, wet.fixed_to, wet.parameters[0].name) == ("", "wall", "shine")
+    assert "wet or polished" in wet.statement
     assert abs(wet.place[0].value - 100) < 5
     assert abs(wet.place[1].value - np.degrees(0.8)) < 5
     (dark,) = _wall(lambda patch, aside: -0.2 * patch)
-    assert dark.name == ""
+    assert (dark.name, dark.parameters[0].name) == ("", "change")
     assert not _wall(lambda patch, aside: 0 * aside)
-    assert not [m for m in _wall(lambda patch, aside: -0.7 * patch * (aside - 0.8)) if m.name]
+    duller = _wall(lambda patch, aside: -0.7 * patch * (aside - 0.8))
+    assert not [m for m in duller if m.parameters[0].name == "shine"]
+
+
+def test_cells_of_noise_that_lie_near_each_other_are_no_region():
+    beyond = np.zeros((12, 12), bool)
+    beyond[2, 2] = beyond[2, 4] = beyond[4, 3] = True  # within the reach of the dilation, none touching
+    assert touching(beyond).max() == 1
+    beyond[3, 3] = True
+    assert touching(beyond).max() == 4
 
 
 LIGHTING = Lighting(leds=8, radius_mm=11.0)
