@@ -125,8 +125,8 @@ def _on_wall(
         return Mismatch(
             "", "intensity", "wall", place, (size,), chance, nan, nan,
             f"{at} the wall is the brighter, the more it is seen from the side, as wet or polished wall is. "
-            "It has no name, since noise of a dim picture can look the same. Record next: the same place with "
-            "more light, or dried.",
+            "It has no name, since noise of a dim picture can look the same. Record next: the same place "
+            "with more light, or dried.",
             look,
         )  # fmt: skip
     way = "brighter" if value[most] > 0 else "darker"
