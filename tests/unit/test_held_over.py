@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
+
 import numpy as np
 import pytest
 
 from pipeline.adjustment.held_over import HeldOver, held_over
 from pipeline.arrays import Float
+from stages.accumulate import warn_of_held
 from stages.accumulate.grid import MapGrid, RingColumns, gridded
+
+if TYPE_CHECKING:
+    from pipeline.machine.stage import Context
 
 HELD, SAMPLE_MM = 0.7, 0.2
 
@@ -57,6 +64,15 @@ def test_a_mean_of_rings_that_share_their_error_is_less_sure() -> None:
     drawn = rings_of(HELD, (17, 20000))
     gain = HeldOver(HELD ** np.arange(17.0)).gain_in_mean(width)
     assert np.std(weight @ drawn) / np.linalg.norm(weight) == pytest.approx(gain, rel=0.03)
+
+
+@pytest.mark.parametrize("held", [0.15, 0.45])
+def test_findings_are_warned_of_where_rings_are_alike(held: float) -> None:
+    told: list[str] = []
+    context = SimpleNamespace(report=lambda *_: None, warn=told.append)
+    warn_of_held(HeldOver(held ** np.arange(17.0)), cast("Context", context))
+    assert [w for w in told if "45 % of the line's finest structure" in w] == told
+    assert len(told) == (held > 0.3)
 
 
 def columns_with(held: float, sigma_mm: float) -> RingColumns:
