@@ -76,7 +76,7 @@ class LandmarkRows:
     surface_by_point : (L, 3)
     surface_by_border : (L, B)
     surface_residual, surface_sigma : (L,)
-    loss, surface_loss : Loss
+    loss : Loss
         Of texture and surface.
     """
 
@@ -92,7 +92,6 @@ class LandmarkRows:
     surface_residual: Float
     surface_sigma: Float
     loss: Loss = field(default_factory=Squares)
-    surface_loss: Loss = field(default_factory=Squares)
 
     @property
     def weight(self) -> Float:
@@ -102,14 +101,13 @@ class LandmarkRows:
     @property
     def surface_weight(self) -> Float:
         """Return the weights (L,) of the surface equations."""
-        return self.surface_loss.weight(self.surface_residual, self.surface_sigma)
+        return self.loss.weight(self.surface_residual, self.surface_sigma)
 
     @property
     def cost(self) -> float:
         """Return the total cost."""
         texture = self.loss.cost(np.linalg.norm(self.residual, axis=1), self.sigma)
-        relief = self.surface_loss.cost(self.surface_residual, self.surface_sigma)
-        return float(np.sum(texture) + np.sum(relief))
+        return float(np.sum(texture) + np.sum(self.loss.cost(self.surface_residual, self.surface_sigma)))
 
     @property
     def reach(self) -> int:

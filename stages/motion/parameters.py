@@ -22,11 +22,8 @@ class MotionParameters(Parameters):
     near_angle_deg: float = Field(
         78.0, gt=45, le=110, description="largest polar angle, deg, at which wall texture is tracked"
     )
-    # Farther ahead the wall is dim and matches lag, probably because a codec carries dim texture on from the
-    # picture before. Against true poses, templates cut at 38° to 44° lag by 0.08 px in open-1-field and by
-    # 0.3 px in its copy at crf 30, those cut nearer by a third of that at most.
     far_angle_deg: float = Field(
-        44.0, ge=10, lt=45, description="smallest polar angle, deg, at which wall texture is tracked"
+        38.0, ge=10, lt=45, description="smallest polar angle, deg, at which wall texture is tracked"
     )
     patch_half_px: int = Field(10, ge=4, le=30, description="half size, strip samples, of a tracked patch")
     # A little more than a patch, so that neighbouring patches share few samples.

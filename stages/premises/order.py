@@ -77,7 +77,10 @@ def _mends(light: Int, breaks: Bool, first: int) -> bool:
 
 
 def off_the_pipe(pictures: Pictures) -> Bool:
-    """Return (F,) true for pictures before the first closed laser line and behind the last, if many."""
+    """Return (F,) true for pictures before the first closed laser line and behind the last, if many.
+
+    Pictures that cannot be decoded do not count: they may well have shown a line.
+    """
     out = np.zeros(len(pictures.closed), bool)
     closed = pictures.closed > CLOSED
     beside = np.abs(pictures.line_px - np.roll(pictures.line_px, 1, axis=1))
@@ -86,8 +89,6 @@ def off_the_pipe(pictures: Pictures) -> Bool:
         return out
     lines = np.flatnonzero(closed & (smooth > _LIKE_OTHERS * np.median(smooth[closed])))
     many = max(_LONG * float(np.median(np.diff(lines))), _A_WHILE)
-    if lines[0] > many:
-        out[: lines[0]] = True
-    if len(out) - 1 - lines[-1] > many:
-        out[lines[-1] + 1 :] = True
+    for end in (slice(0, lines[0]), slice(lines[-1] + 1, None)):
+        out[end] = pictures.seen[end].sum() > many
     return out

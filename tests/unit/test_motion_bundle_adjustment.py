@@ -169,7 +169,7 @@ def roots_of_costs(equations: Equations, step: Float) -> Float:
     root = np.sqrt(2 * texture.loss.cost(size, texture.sigma))
     out.append((texture.residual * (root / np.maximum(size, 1e-12))[:, None]).ravel())
     relief = texture.surface_residual
-    out.append(np.sign(relief) * np.sqrt(2 * texture.surface_loss.cost(relief, texture.surface_sigma)))
+    out.append(np.sign(relief) * np.sqrt(2 * texture.loss.cost(relief, texture.surface_sigma)))
     return np.concatenate(out)
 
 

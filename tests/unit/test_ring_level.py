@@ -11,7 +11,7 @@ from pipeline.simulator.effects.switch import parse_switch
 from pipeline.simulator.prior import read_prior
 from stages.calibrate.gauge.geometry import gauge_of
 from stages.diagnose.effects.library import without
-from tests.benchmarks.bench_diagnosis import of_positions
+from tests.benchmarks.bench_diagnosis import of_positions, trial_from
 from tests.benchmarks.ring_level import Eye, Noise, ring_level_run, seen_at, traced_ring
 from tests.benchmarks.ring_level_cases import PRIOR, Mode, drawn
 from tests.benchmarks.ring_level_figures import more_figures
@@ -103,12 +103,11 @@ def test_several_effects_are_scored_name_by_name_and_a_wrong_answer_scores_badly
         sets = [{"names": list(names), "probability": 1.0}]
         answer = {"verdict": "named", "effects": effects, "candidates": sets}
         concealed = [["laser_tilt", [0.3, 20.0]], ["baseline", [0.2]]]
-        return {"mode": "several", "concealed": concealed, "left_out": [], "snr": [20.0, 30.0], "cpu_s": 1.0,
-                "answer": answer}  # fmt: skip
+        return {"mode": "several", "seed": 1, "concealed": concealed, "left_out": [], "snr": [20.0, 30.0],
+                "cpu_s": 1.0, "answer": answer}  # fmt: skip
 
-    right, wrong = (
-        "\n".join(more_figures([line(*n)])) for n in (("laser_tilt", "baseline"), ("laser_cone",))
-    )
+    cases = [[line("laser_tilt", "baseline")], [line("laser_cone")]]
+    right, wrong = ("\n".join(more_figures(c, [trial_from(one) for one in c])) for c in cases)
     assert "names that are right 2 of 2" in right
     assert "hold the truth: 1 of 1" in right
     assert "Brier score a case: 0.0000" in right

@@ -44,8 +44,7 @@ _DAMPED = 1e-5
 LEAST_REACH = 4
 """Frames that are coupled at least: a third difference has four."""
 _FIRST_RAD, _KNOT_RAD = np.radians(38.0), np.radians(10.0)
-"""First knot and way to the next: five cover the polar angles at which texture is tracked by default, and
-those a little farther ahead."""
+"""First knot and way to the next: five cover the polar angles at which texture is tracked by default."""
 _AT_ONCE, _THREADS = 16384, 2
 
 
@@ -229,8 +228,7 @@ def scales_of(equations: Equations, tracks: Tracks, alike: float) -> Scales:
 def landmark_rows(state: State, measured: Measurements, parameters: MotionParameters) -> LandmarkRows:
     """Return the equations of texture, each match with its predicted σ.
 
-    A landmark that projects nowhere does not pull, but costs as much as one far from its match. The scale of
-    matches is widened since many err alike (`scales_of`); what is an outlier is judged without that.
+    A landmark that projects nowhere does not pull, but costs as much as one far from its match.
     """
     tracks, count = measured.tracks, len(measured.tracks.frame)
     unsure = measured.unsure.shape[1]
@@ -249,8 +247,7 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     relief, normal, by_border = residuals.surface(state, state.xyz_p)
     return LandmarkRows(
         start, tracks.frame, by_pose, by_point, by_instrument, residual, tracks.sigma_px,
-        normal, by_border, relief, np.full(len(relief), parameters.surface_sigma_mm),
-        Cauchy(Cauchy.scale / np.sqrt(parameters.alike)), Cauchy(),
+        normal, by_border, relief, np.full(len(relief), parameters.surface_sigma_mm), Cauchy(),
     )  # fmt: skip
 
 
