@@ -152,6 +152,7 @@ def photo_as_reflectance(photo: WallTexture) -> Float32:
     mean = colour[known > 0].mean(0)
     wide = cv2.GaussianBlur(colour * known[..., None], (0, 0), 15)
     share = cv2.GaussianBlur(known, (0, 0), 15)[..., None]
+    # Below a hundredth of the weight, 8-bit steps of the photo are magnified: the mean is better.
     about = np.where(share > 0.01, wide / np.maximum(share, 0.01), mean)
     return np.where(known[..., None] > 0, colour, about).astype(np.float32)
 

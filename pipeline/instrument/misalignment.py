@@ -17,6 +17,8 @@ from pipeline.errors import InputError
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 
+# Share of the ring below which neither a circle nor a first harmonic is told from a third of its arc.
+_LEAST_SEEN = 0.25
 # Half a degree apart: the largest of a first harmonic is met within 1e-5 of it.
 AZIMUTHS = 720
 
@@ -206,9 +208,10 @@ def misalignment_error(scan: MisalignedScan, camera: Camera | None = None) -> Mi
     """
     ring = misread_ring(scan, camera)
     seen = np.isfinite(ring.radial_mm)
-    if seen.mean() < 0.25:
+    if seen.mean() < _LEAST_SEEN:
         raise InputError(
-            "error model", f"the camera sees {seen.mean():.0%} of the ring", expected="at least 25 %",
+            "error model", f"the camera sees {seen.mean():.0%} of the ring",
+            expected=f"at least {_LEAST_SEEN:.0%}",
             hint="take a longer baseline or a camera with a wider field of view",
         )  # fmt: skip
     centre, radius = fit_circle(ring.xyz_assumed_c[seen, :2])

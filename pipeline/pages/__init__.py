@@ -39,6 +39,7 @@ def page_template(name: str) -> Template:
     environment.filters |= {
         "data_uri": data_uri,
         "um": lambda mm: f"{1000 * mm:.1f}",
+        # Below a tenth of a millimetre a reader counts in µm.
         "um_or_mm": lambda mm: f"{1000 * mm:.1f} µm" if abs(mm) < 0.1 else f"{mm:.3f} mm",
         "percent": lambda share: "not stated" if share is None else f"{100 * share:.1f} %",
         "number": lambda value: f"{value:.4g}",

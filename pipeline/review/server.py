@@ -278,7 +278,7 @@ def _number(request: Request, name: str) -> float:
         value = float(text)
     except ValueError as error:
         raise InputError("request", f"{name} is {text[:40]!r}", expected="a number") from error
-    if not abs(value) < 1e9:
+    if not abs(value) < 1e9:  # mm: a thousand kilometres
         raise InputError("request", f"{name} is {text[:40]!r}", expected="a number within reason")
     return value
 

@@ -72,6 +72,7 @@ class LineProfile:
 
     def _own(self, height_mm: Float) -> Float:
         tau = self._exponential_mm()
+        # Skewness goes with the cube of tau / sigma: 1e-9 here, far below what a picture shows.
         if abs(tau) < 1e-3 * self.sigma_mm:
             bell = np.exp(-0.5 * (height_mm / self.sigma_mm) ** 2)
             return np.asarray(bell / (self.sigma_mm * np.sqrt(2 * np.pi)))

@@ -17,6 +17,9 @@ from pipeline.simulator.view import REFERENCE_MM, View, Work, to_wall
 
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
 _CLOSE_MM = 5e-4
+# How far from a hit wall is searched that could stand in the light, mm: farther off it would have to stand in
+# by more than 10 mm to hide an LED. And by how much it must stand in, tenfold the error of the map's cells.
+_SHADOW_MM, _STANDS_IN_MM = 40.0, 0.01
 # Spacing of the table of what the wall throws on itself: far below a bore's radius, its scale.
 GLOW_STEP_MM = 0.5
 
@@ -34,6 +37,8 @@ class Lamps(NamedTuple):
         See `LedRing`.
     ambient : float
         Light, full scales, of a white wall under stray light.
+    radius_mm : float
+        Of the LEDs' circle about the camera's axis.
     glow : (K, 3)
         Light, by colour, that the wall throws on itself, every `GLOW_STEP_MM` of distance; K may be 0.
     glow_from_mm : float
@@ -45,6 +50,7 @@ class Lamps(NamedTuple):
     lobe: float
     even: float
     ambient: float
+    radius_mm: float
     glow: Float
     glow_from_mm: float
 
@@ -55,12 +61,12 @@ def lamps_of(ring: LedRing) -> Lamps:
     across = ring.radius_mm * np.stack([np.cos(around), np.sin(around)])
     place = np.concatenate([across, np.full((1, ring.leds), ring.z_mm)])
     share = ring.level / ring.leds * np.array(ring.pattern or (1.0,) * ring.leds)
-    return Lamps(place, share, ring.lobe, ring.even, 0.0, np.zeros((0, 3)), 0.0)
+    return Lamps(place, share, ring.lobe, ring.even, 0.0, ring.radius_mm, np.zeros((0, 3)), 0.0)
 
 
 def stray_light(level: float) -> Lamps:
     """Return no lamps but even stray light."""
-    return Lamps(np.zeros((3, 0)), np.zeros(0), 1.0, 0.0, level, np.zeros((0, 3)), 0.0)
+    return Lamps(np.zeros((3, 0)), np.zeros(0), 1.0, 0.0, level, 0.0, np.zeros((0, 3)), 0.0)
 
 
 @kernel
@@ -126,7 +132,7 @@ def _lamp_light(view: View, lamps: Lamps, T: Float, facing: float, work: Work, l
     for a in range(3):
         at[a] = work.c_ray[a] + work.hit[0] * work.c_ray[3 + a]
     _face_lamps(place, at, work.c_ray, normal, T, facing, lit)
-    hidden = _may_hide(view.surface, work.hit, T, work.o, work.R)
+    hidden = _may_hide(view.surface, lamps.radius_mm, work.hit, T, work.o, work.R)
     light = 0.0
     for n in range(place.shape[1]):
         if lit[0, n] <= 0.0 or lit[1, n] <= 0.0:
@@ -170,15 +176,15 @@ def _face_lamps(
 
 
 @kernel
-def _may_hide(surface: Surface, hit: Float, T: Float, o: Float, R: Float) -> bool:
-    """Tell whether the wall between a hit and the camera stands in far enough to hide the LEDs."""
+def _may_hide(surface: Surface, lamps_mm: float, hit: Float, T: Float, o: Float, R: Float) -> bool:
+    """Tell whether the wall between a hit and the camera stands in far enough to hide LEDs on a circle."""
     along = R[0, 2] * (o[0] - T[0, 3]) + R[1, 2] * (o[1] - T[1, 3]) + R[2, 2] * (o[2] - T[2, 3])
     if along <= 1.0:
         return False
     back = 0.5
-    while back < min(along, 64.0):
+    while back < min(along, _SHADOW_MM):
         k = min(max(int(hit[1] - back - surface.from_mm), 0), surface.floor_mm.shape[1] - 1)
-        if surface.floor_mm[0, k] < hit[3] * (1.0 - back / along) + 11.0 * back / along:
+        if surface.floor_mm[0, k] < hit[3] * (1.0 - back / along) + lamps_mm * back / along:
             return True
         back *= 2.0
     return False
@@ -198,12 +204,12 @@ def _shaded(surface: Surface, hit: Float, T: Float, way: Float, distance: float,
         dz += R[a, 2] * turned
     step = 0.3
     back = step
-    while back < min(distance, 40.0):
+    while back < min(distance, _SHADOW_MM):
         x, y = hit[3] * c + back * dx, hit[3] * s + back * dy
         rho = np.sqrt(x * x + y * y)
         if rho < surface.least_mm:
             return False
-        if radius_at(surface, hit[1] + back * dz, azimuth_of(y, x)) < rho - 0.01:
+        if radius_at(surface, hit[1] + back * dz, azimuth_of(y, x)) < rho - _STANDS_IN_MM:
             return True
         step *= 1.25
         back += step

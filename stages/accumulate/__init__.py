@@ -62,6 +62,7 @@ def calibration_spread(
     The first harmonic of each change is taken out, because the pipe's axis follows the rings' centres.
     """
     azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
+    # Rings seen over less than 0.3 of their round hardly fix the first harmonic that is taken out (chosen).
     usable = np.flatnonzero(survey.seen > min(0.3, 0.99 * survey.seen.max()))
     count = min(len(usable), max(_RINGS, len(usable) // _EVERY))
     some = usable[np.unique(np.linspace(0, len(usable) - 1, count).astype(int))]

@@ -170,6 +170,7 @@ def _check_grid(file: Path, distance: Float, azimuth: Float, radius: Float) -> N
                          expected=f"{len(distance)} × {len(azimuth)}, at least 4 × 4")  # fmt: skip
     for name, axis in (("distance_mm", distance), ("azimuth_rad", azimuth)):
         step = np.diff(axis)
+        # A thousandth of a step: coordinates kept in single precision vary by that much.
         if not (np.isfinite(axis).all() and step.min() > 0 and np.ptp(step) < 1e-3 * step.mean()):
             raise InputError(file, "is not uniform and increasing", place=name)
     if not np.isfinite(radius).any():

@@ -44,6 +44,7 @@ class CleanWall:
             clean = self.clean[at]
             if clean.mean() > share:
                 best, share = np.where(clean, self.local_mm[at], 0.0), float(clean.mean())
+            # Clean enough: further tries gain little (chosen).
             if share > 0.98:
                 break
         return np.asarray(best * self.scale * (1 if random.random() < 0.5 else -1))

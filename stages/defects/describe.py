@@ -279,6 +279,7 @@ def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth
     )
     if len(kinds) > 1 and likely[kinds[1]] >= _WORTH_TELLING:
         words += f" It may also be {_a(kinds[1])}: probability {100 * likely[kinds[1]]:.0f} %."
+    # A tenth (chosen): a smaller difference is not worth a sentence.
     if abs(darkness) > 0.1:
         words += (
             f" The photo is {100 * abs(darkness):.0f} % {'darker' if darkness > 0 else 'brighter'} there."

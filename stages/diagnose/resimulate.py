@@ -128,6 +128,7 @@ def _compared(recording: Recording, run: GaugeRun, frames: Int, without: Fit, fo
     switches = tuple(_switch(t) for t in found.terms)
     plain = scene_of(recording, without)
     made = switch_on(scene_of(recording, found), switches)
+    # Samples that the gauge's fit weighed down to a tenth lie off the bore (chosen).
     weight = run.ring_weight > 0.1 * np.median(run.ring_weight)
     use = np.isin(run.rings.frame, frames) & weight
     frame, uv, outward = run.rings.frame[use], run.rings.uv[use], run.rings.outward[use]

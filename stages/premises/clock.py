@@ -16,6 +16,8 @@ _GAP = 4.0
 # A step of the wall over the gap is a usual one within this factor. With the gap as stated the encoder must
 # differ from the wall by more than it, and by less without: steps err by a tenth.
 _LIKE = 2.0
+# Frame rates that differ by more are told: recorders round 29.97 to 30 (chosen).
+_OTHER_RATE = 1.2
 _FEWEST = 8
 
 
@@ -84,7 +86,7 @@ def warn_of_clock(jumps: list[ClockJump], time_s: Float, recording: Recording, c
     if len(time_s) < 2:
         return
     rate = 1 / float(np.median(np.diff(time_s)))
-    if max(rate / recording.frame_rate, recording.frame_rate / rate) > 1.2:
+    if max(rate / recording.frame_rate, recording.frame_rate / rate) > _OTHER_RATE:
         context.warn(
             f"by frames.csv {rate:.3g} frames were taken a second, recording.yaml states "
             f"{recording.frame_rate:g}. What to do: check the unit (s) of time_s; speeds and the encoder's "

@@ -256,6 +256,7 @@ def rhythm_of(light: Int) -> int:
     if not np.any(light != Light.UNKNOWN):
         return 1
     agree = [float((light[p:] == light[:-p]).mean()) for p in range(1, min(13, len(light)))]
+    # A rhythm of twice the length agrees as well: the shortest within 0.05 (chosen) of the best is taken.
     return 1 + next((k for k, a in enumerate(agree) if a >= max(agree) - 0.05), 0)
 
 

@@ -124,6 +124,7 @@ def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _
     known = (time_s >= encoder.time_s[0]) & (time_s <= encoder.time_s[-1])
     reading = np.interp(time_s, encoder.time_s, encoder.distance_mm)
     by_encoder, by_wall = reading[steps.end] - reading[steps.start], steps.size * radius_mm
+    # Half of the fastest tenth's step: a ratio of two short ways says little.
     moving = np.abs(by_wall) > 0.5 * np.nanquantile(np.abs(by_wall), 0.9) if len(by_wall) else by_wall > 0
     use = known[steps.end] & known[steps.start] & moving
     if not use.any():

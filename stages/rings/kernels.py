@@ -98,7 +98,7 @@ def bell(x):  # type: ignore[no-untyped-def]
     Its Taylor series at a 32nd of the exponent, squared five times; what is below 1e-8 stays there.
     """
     v = x * x * (0.5 / 32)
-    v = v if v < 0.6 else 0.6
+    v = v if v < 0.6 else 0.6  # exp(-32 * 0.6) is 5e-9
     p = 1 - v * (1 - v * (1 / 2 - v * (1 / 6 - v * (1 / 24 - v * (1 / 120 - v / 720)))))
     p *= p
     p *= p

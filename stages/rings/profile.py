@@ -194,7 +194,7 @@ def _normal_equations(y, t, count, p, response, trusted, n, v):  # type: ignore[
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
-    """Clipped pixels, and unclipped ones on the inner and the outer flank (0.5 to 3 widths)."""
+    """Clipped pixels, and unclipped ones on the inner and the outer flank."""
     clipped, inner, outer = 0, 0, 0
     iw = np.exp(-p[1])
     may_clip = p[2] + p[3] + abs(p[4]) / iw > trusted
@@ -202,9 +202,9 @@ def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
         x = (t[k] - p[0]) * iw
         if may_clip and p[2] * np.exp(-0.5 * x * x) + p[3] + p[4] * t[k] > trusted:
             clipped += 1
-        elif -3.0 < x < -0.5:
+        elif -_FLANK * WINDOW_WIDTHS < x < -0.5:
             inner += 1
-        elif 0.5 < x < 3.0:
+        elif 0.5 < x < _FLANK * WINDOW_WIDTHS:
             outer += 1
     return clipped, inner, outer
 

@@ -11,6 +11,9 @@ from scipy.ndimage import map_coordinates
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Lighting
 
+# Places with less than this share of the reference light tell nothing: a grey level or two (chosen).
+LEAST_LIGHT = 0.01
+
 
 def irradiance(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
     """Return the irradiance (...), 1/mm², of wall points (..., 3) with unit normals, lit by unit LEDs.

@@ -12,7 +12,7 @@ from pipeline.geometry.image_places import ImagePlaces, clear_of
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
 from stages.texture.grid import NODE_PX
-from stages.texture.light import LightField
+from stages.texture.light import LEAST_LIGHT, LightField
 from stages.texture.surface import SurfacePatch
 from stages.texture.views import sheet_distance_mm
 
@@ -63,7 +63,8 @@ def project_tile(
     inside = (uv > _BORDER_PX) & (uv < np.array([width, height]) - 1 - _BORDER_PX)
     brightness = gain * light.brightness(xyz_c, patch.normal_p @ T_cp[:3, :3].T)
     from_sheet = sheet_distance_mm(probe.laser, xyz_c)
-    usable = cv2.erode((valid & inside.all(-1) & (brightness > 0.01)).astype(np.uint8), np.ones((3, 3)))
+    lit = valid & inside.all(-1) & (brightness > LEAST_LIGHT)
+    usable = cv2.erode(lit.astype(np.uint8), np.ones((3, 3)))
     worth = np.clip(1 - (from_sheet / reach_mm) ** 2, 0, 1) ** 2 * _quality(uv, brightness)
     weight = _enlarge(worth * usable)
     if gap_mm > 0:
@@ -72,7 +73,7 @@ def project_tile(
     seen_at = _enlarge(node_uv)
     if left_out:
         weight = np.where(clear_of(left_out, seen_at), weight, np.float32(0))
-    inverse = _enlarge(1 / np.maximum(brightness, 0.01))
+    inverse = _enlarge(1 / np.maximum(brightness, LEAST_LIGHT))
     return TileProjection(seen_at, _enlarge(node_uv, NODE_PX // 2), inverse, weight)
 
 

@@ -11,7 +11,7 @@ from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.image_places import ImagePlaces, clear_of
 from pipeline.geometry.rigid import transform
 from pipeline.instrument.probe import Probe
-from stages.texture.light import irradiance
+from stages.texture.light import LEAST_LIGHT, irradiance
 from stages.texture.surface import WallSurface
 from stages.texture.views import LitViews, sheet_distance_mm
 
@@ -81,7 +81,7 @@ class LightSampler:
         uv = ((seen_at + 0.5) * scale - 0.5).astype(np.float32)
         grey = cv2.remap(small, uv[..., 0], uv[..., 1], cv2.INTER_LINEAR)
         light = irradiance(self._probe.lighting, xyz_c, normal_c) / self._reference
-        use = self._usable(view, xyz_c) & (grey > _DARK) & (grey < _BRIGHT) & (light > 0.01)
+        use = self._usable(view, xyz_c) & (grey > _DARK) & (grey < _BRIGHT) & (light > LEAST_LIGHT)
         use &= clear_of(self._left_out, seen_at)
         cell = np.arange(rows.start * _CELL_COLUMNS, rows.stop * _CELL_COLUMNS).reshape(grey.shape)
         theta = np.arctan2(np.hypot(xyz_c[..., 0], xyz_c[..., 1]), xyz_c[..., 2])

@@ -148,6 +148,7 @@ def smoothed(radius_mm: Float32, sigma_px: tuple[float, ...]) -> Float32:
     while np.isnan(out).any():
         total = _gaussian(weight, sigma)
         mean = _gaussian(value, sigma) / np.maximum(total, 1e-12)
+        # Below a thousandth of the weight neighbours lie beyond 3.7 σ: the next, wider round reaches them.
         out = np.where(np.isnan(out) & (total > 1e-3), mean, out)
         sigma = 2 * sigma
     return out.astype(np.float32)

@@ -237,6 +237,7 @@ def block_ratios(above_black: Float32, twin: TwinFrame, white_above_black: float
     level = np.where(use, twin.level, np.float32(0))
     above, below = of_blocks(level * above_black), of_blocks(level * level)
     with np.errstate(divide="ignore", invalid="ignore"):
+        # 0.99: whole blocks alone, up to rounding.
         return np.where(of_blocks(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)
 
 

@@ -82,6 +82,7 @@ class SpotsOfFrames:
         more = np.where(known, above - twin.level, np.float32(0))
         beyond = (more > _LEAST_GREY) & (more * more > np.float32(_LEAST_SIGMA**2) * twin.variance)
         self.frame.append(frame)
+        # 0.99: whole blocks alone, up to rounding.
         self.excess.append(np.where(of_blocks(known) > 0.99, of_blocks(more), np.float32(np.nan)))
         self.variance.append(of_blocks(twin.variance))
         shape, middle = self.excess[-1].shape, (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2

@@ -19,6 +19,8 @@ from pipeline.arrays import Float, Float32, Int
 from stages.twin.lamp_light import DARK, Course, Figure
 from stages.twin.scene import LineSight, Scene
 
+# Within so many widths lies the line's own bell (99.7 % of a Gaussian); what is beyond is its halo.
+_BELL_WIDTHS = 3.0
 _SECTORS = 36
 PROFILE_WIDTHS = 6.0
 """The line's profile is described so many widths to each side; the halo beyond is left to the residual."""
@@ -191,6 +193,7 @@ class LineSamples:
         _, width = light.peak(sight)
         core = (np.abs(sight.offset_px) < _CORE_WIDTHS * width) & np.isfinite(predicted)
         clipped = core & (grey + self._black >= self._white)
+        # A sector's brightness is fitted to its core: one clipped pixel in twenty spoils it (chosen).
         spoiled = np.bincount(sector[clipped], minlength=_SECTORS) > 0.05 * np.bincount(
             sector[core], minlength=_SECTORS
         )
@@ -214,16 +217,16 @@ class LineSamples:
             rows.append(above / np.maximum(below, 1e-9))
         profile = np.median(rows, 0)
         sd = 1.25 * np.std(rows, 0) / np.sqrt(max(len(rows), 1))
-        wide = np.abs(middle) > 3.0
+        bell = np.abs(middle) < _BELL_WIDTHS
         halo = Figure(
-            float(profile[wide].sum() / profile.sum()),
-            float(np.linalg.norm(sd[wide]) / profile.sum()),
+            float(profile[~bell].sum() / profile.sum()),
+            float(np.linalg.norm(sd[~bell]) / profile.sum()),
         )
-        weight = np.where(np.abs(middle) < 3.0, profile, 0.0) / profile[np.abs(middle) < 3.0].sum()
+        weight = np.where(bell, profile, 0.0) / profile[bell].sum()
         first = float(weight @ middle)
         second = float(weight @ (middle - first) ** 2)
         skewness = float(weight @ (middle - first) ** 3) / second**1.5
-        noise = float(np.linalg.norm(sd * np.abs(middle) ** 3 * (np.abs(middle) < 3.0)) / profile.sum())
+        noise = float(np.linalg.norm(sd * np.abs(middle) ** 3 * bell) / profile.sum())
         skew = Figure(skewness, noise / second**1.5)
         spread = np.zeros_like(middle)
         return replace(light, profile_x=middle, profile=profile, halo=halo, skewness=skew, spread=spread)

@@ -113,10 +113,12 @@ def _broad(values: Float32, known: Bool) -> Float32:
     scaled = np.clip((filled - 0.5) * 255, 0, 255).astype(np.uint8)
     coarse = cv2.medianBlur(scaled, _BROAD_BLOCKS).astype(np.float32) / 255 + 0.5
     weight = cv2.GaussianBlur(known.astype(np.float32), (0, 0), _BROAD_BLOCKS / 4)
+    # Blocks off their surroundings by 5 % (chosen) may be dirt, and have no part in the level about them.
     near = np.abs(filled - coarse) < 0.05
     use = (known & near).astype(np.float32)
     total = cv2.GaussianBlur(filled * use, (0, 0), _BROAD_BLOCKS / 4)
     share = cv2.GaussianBlur(use, (0, 0), _BROAD_BLOCKS / 4)
+    # Where less than a twentieth (chosen) was left in, the median stands for the level.
     return np.where((share > 0.05 * weight) & (share > 1e-6), total / np.maximum(share, 1e-6), coarse)
 
 

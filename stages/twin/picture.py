@@ -125,6 +125,7 @@ class WholePictures:
         known = away & (lit.region == Region.WALL) & free
         glow = bounced(self.scene, twin, lit)
         small = [of_blocks(np.where(known, a, 0)) for a in (np.ones_like(above), above, lit.level, glow)]
+        # Whole blocks alone, up to rounding.
         whole = small[0] > 0.99
         if whole.sum() < TILE**2:
             return

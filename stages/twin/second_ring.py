@@ -50,6 +50,7 @@ def second_ring(ring: Ring, profiles: Sequence[Float], frame: Int) -> Suspected 
         return None
     stack = np.stack(profiles)
     at = (np.arange(_RATIOS) + 0.5) / _RATIOS * 2 * _REACH - _REACH
+    # The line itself stands within 2 % of its radius.
     line = float(np.where(np.abs(at) < 0.02, np.nan_to_num(stack), 0).max((1, 2)).mean())
     ground = median_filter(np.apply_along_axis(_without_gaps, -1, stack), (1, 1, _AROUND), mode="nearest")
     far = np.abs(at) * ring.radius_px > _FAR_WIDTHS

@@ -13,6 +13,8 @@ NO_DECISIONS = {
     "_SIDES", "_STEP_MM", "_TIME", "_UNITS_MM", "_WAVES", "_WIDTH", "_ZERO", "DIRECTION", "HALF_TURN_ABOUT_X",
     "WIDTH",
 }  # fmt: skip
+# Values that need no reason where something is compared with them.
+PLAIN = (0.5, 1.0, 2.0, 1.4826)
 NAME = re.compile(r"_?[A-Z][A-Z0-9_]*")
 
 
@@ -25,6 +27,21 @@ def unexplained(text: str, listed: set[str]) -> Iterator[str]:
         names = {n.id for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)}
         if all(NAME.fullmatch(n) for n in names) and not names & listed and not is_explained(node, lines):
             yield f"{node.lineno}: {', '.join(sorted(names))}"
+
+
+def unexplained_limits(text: str) -> Iterator[str]:
+    """Yield decimals that a function compares with, without a comment on their line or on the one above.
+
+    Halves, ones and twos, what guards a division (below 1e-5) and 1.4826 (MAD to σ) need none.
+    """
+    lines = text.splitlines()
+    functions = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.FunctionDef)]
+    compared = {c for f in functions for c in ast.walk(f) if isinstance(c, ast.Compare)}
+    for part in {p for c in compared for p in ast.walk(c) if is_decimal(p)}:
+        value = abs(ast.literal_eval(part))
+        explained = any("#" in line for line in lines[part.lineno - 2 : part.lineno])
+        if value >= 1e-5 and value not in PLAIN and not explained:
+            yield f"{part.lineno}: {value}"
 
 
 def is_decimal(node: ast.AST) -> bool:
@@ -52,6 +69,20 @@ def test_every_decimal_constant_has_its_reason() -> None:
         f"{f.relative_to(PROJECT_ROOT)}:{c}" for f in files for c in unexplained(f.read_text("utf-8"), listed)
     ]
     assert found == [], "write its source beside it, or list it in data/debts.md"
+
+
+def test_every_limit_inside_a_function_has_its_reason() -> None:
+    files = [f for package in ("pipeline", "stages") for f in (PROJECT_ROOT / package).rglob("*.py")]
+    found = [
+        f"{f.relative_to(PROJECT_ROOT)}:{c}" for f in files for c in unexplained_limits(f.read_text("utf-8"))
+    ]
+    assert found == [], "write above it where the number comes from, or give it a name"
+
+
+def test_a_planted_limit_is_found() -> None:
+    assert list(unexplained_limits("def f(x):\n    return x > 0.3 * 7\n")) == ["2: 0.3"]
+    for line in ("x > 0.3  # chosen", "x > 0.5", "x < 1e-9", "0.3 * x"):
+        assert list(unexplained_limits(f"def f(x):\n    return {line}\n")) == []
 
 
 def test_every_debt_is_of_a_constant_that_is_there() -> None:

@@ -87,3 +87,20 @@ def test_a_coarse_axis_is_made_fine_without_moving():
     origin, turn = frames_at(coarse, surface.axis_s)
     np.testing.assert_allclose(surface.axis_o, origin, atol=1e-9)
     np.testing.assert_allclose(surface.axis_turn, turn, atol=1e-9)
+
+
+def test_shadows_are_looked_for_wherever_an_led_of_a_wide_ring_is_hidden():
+    truth = rough_truth()
+    renderer = renderer_of(truth)
+    shot = renderer.shot(1)
+    view = view_of(renderer.scenery, shot)
+    lamps = lamps_of(replace(shot.instrument.light, radius_mm=38.0))
+    images = []
+    # at 1000 mm the wall is searched from every hit, at 11 mm as if the ring were a narrow one
+    for radius_mm in (lamps.radius_mm, 1000.0, 11.0):
+        image = np.zeros((300, 400, 3), np.float32)
+        add_wall(view, lamps._replace(radius_mm=radius_mm), np.ones(3), 1, image)
+        images.append(image)
+    own, searched, narrow = images
+    assert np.abs(own - searched).max() < 1e-6
+    assert np.abs(narrow - searched).max() > 1e-2

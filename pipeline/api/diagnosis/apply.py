@@ -28,6 +28,8 @@ from stages.diagnose.result import EffectFound
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
 _EVEN = 0.2
 # What shows the geometry; the model is made of the corrected run alone.
+# Depth changes and radius changes below these, mm, are not told: no inspection decides on less (chosen).
+_LEAST_DEPTH_CHANGE_MM, _LEAST_RADIUS_CHANGE_MM = 0.01, 0.005
 _GEOMETRY = frozenset({"rings", "triangulate", "motion", "accumulate", "texture", "defects"})
 _FILES = frozenset({"trajectory.csv", "radius_map.npz", "defects.json"})
 
@@ -140,7 +142,8 @@ def geometry_change(before: Path, after: Path) -> GeometryChange:
 
 def consequence(change: GeometryChange) -> str:
     """Return what the correction means for the inspection, in a sentence."""
-    told = [d for d in change.defects if abs(d.after_mm - d.before_mm) > max(2 * d.sigma_mm, 0.01)]
+    least_mm = _LEAST_DEPTH_CHANGE_MM
+    told = [d for d in change.defects if abs(d.after_mm - d.before_mm) > max(2 * d.sigma_mm, least_mm)]
     if told:
         worst = max(told, key=lambda d: abs(d.after_mm - d.before_mm))
         return _of_defect(worst)
@@ -148,7 +151,7 @@ def consequence(change: GeometryChange) -> str:
         return ""
     k = int(np.nanargmax(np.abs(change.mean_mm)))
     size = float(change.mean_mm[k])
-    if abs(size) < 0.005:
+    if abs(size) < _LEAST_RADIUS_CHANGE_MM:
         return f"The geometry changes by {change.rms_mm:.3f} mm (r.m.s.): of no consequence for depths."
     seemed = "understated" if size > 0 else "overstated"
     most = int(np.nanargmax(np.abs(change.max_mm)))

@@ -102,6 +102,7 @@ def round_ticks(low: float, high: float, about: int) -> Float:
     """Return round values within [low, high], roughly ``about`` of them."""
     raw = (high - low) / about
     power = 10.0 ** np.floor(np.log10(raw))
+    # 0.999: a step that is round already stays so in spite of rounding errors.
     step = power * next(f for f in (1, 2, 2.5, 5, 10) if f * power >= raw * 0.999)
     return np.asarray(np.round(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step, 10) + 0.0)
 

@@ -12,6 +12,8 @@ from stages.calibrate.gauge.adjust import Finding, Measurements, instrument_cova
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import ENCODER, SheetModel
 
+# A parameter is named in a direction that moves it by this share of its own σ or more (chosen, for reading).
+_NAMED_SHARE = 0.3
 _AZIMUTHS = 72
 
 
@@ -154,7 +156,7 @@ def weak_directions(probe: Probe, unsure: Float, radius_mm: float) -> tuple[Weak
     sigma = np.sqrt(np.diag(probe.covariance))
     out = []
     for k in np.argsort(moved)[::-1]:
-        large = np.flatnonzero(np.abs(direction[:, k]) > 0.3 * np.where(sigma > 0, sigma, np.inf))
+        large = np.flatnonzero(np.abs(direction[:, k]) > _NAMED_SHARE * np.where(sigma > 0, sigma, np.inf))
         change = {probe.parameter_names[i]: float(direction[i, k]) for i in large}
         share = float(np.linalg.norm(np.linalg.lstsq(unsure, direction[:, k], rcond=None)[0]))
         out.append(WeakDirection(change, float(moved[k]), min(share, 1.0)))

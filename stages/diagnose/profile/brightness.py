@@ -85,6 +85,7 @@ def _grey_by_theta(recording: Recording, probe: Probe, frames: Int, theta: Float
         grey = image[::_EVERY_PX, ::_EVERY_PX].ravel().astype(float)
         value = np.bincount(ring[inside], grey[inside] - black, len(theta)) / count
         clipped = np.bincount(ring[inside], grey[inside] > _BRIGHT, len(theta)) / count
+        # Where over 2 % of the pixels clip, or hardly any light is left, a mean misstates it (chosen).
         rows.append(np.where((clipped < 0.02) & (value > 2), value, np.nan))
     return np.array(rows).reshape(-1, len(theta))
 
@@ -201,6 +202,7 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
     design = np.stack([np.ones_like(share), along, share, -share * along], axis=1)
     fit = regress(design, foot, cells.block)
     clipped = float(np.mean(profiles.clipped[geometry.steady])) if geometry.steady.any() else 0.0
+    # One cell in twenty (chosen): with less, the spill's slope rests on few frames.
     if clipped < 0.05 or not np.isfinite(fit.sigma[3]):
         return untestable("saturation", f"{100 * clipped:.1f} % of the line clips: too little to test bloom.")
     test = tested(float(fit.coefficient[3]), float(fit.sigma[3]), 2 * STRAY_FLOOR, fit.groups)
@@ -216,8 +218,9 @@ def _course(rings: RingSamples, rows: Int) -> Float:
     height = np.where(rings.valid[rows], rings.amplitude[rows], np.nan).astype(float)
     log = np.log(np.maximum(height, 1e-3))
     seen = np.isfinite(log)
-    median = np.nanmedian(np.where(seen.mean(0) > 0.3, log, 0.0), axis=0)
+    # Azimuths seen in less than 0.3 of the frames have no sound median (chosen).
     good = seen.mean(0) > 0.3
+    median = np.nanmedian(np.where(good, log, 0.0), axis=0)
     waves = np.outer(rings.azimuth_rad, np.arange(1, _SMOOTH_ORDER + 1))
     basis = np.concatenate([np.ones((len(waves), 1)), np.cos(waves), np.sin(waves)], axis=1)
     weight = good.astype(float)

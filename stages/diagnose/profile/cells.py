@@ -107,6 +107,7 @@ def _speed(radius: Float, time_s: Float, azimuth_rad: Float, steady: Bool) -> Fl
     waves = np.outer(azimuth_rad, orders)
     basis = np.concatenate([np.ones((len(azimuth_rad), 1)), np.cos(waves), np.sin(waves)], axis=1)
     out = np.full(radius.shape, np.nan)
+    # With 0.3 of a ring missing, its low harmonics are hardly told apart (chosen).
     for run in _runs(steady & (np.isfinite(radius).mean(1) > 0.7)):
         if len(run) < 4:
             continue
@@ -217,6 +218,7 @@ def fit_gaussians(profile: Float, offset_px: Float, start_px: float = 1.2) -> tu
         peak = peak + step[:, 0]
         centre = np.clip(centre + np.clip(step[:, 1], -0.5, 0.5), -4, 4)
         log_width = np.clip(log_width + np.clip(step[:, 2], -0.3, 0.3), np.log(0.4), np.log(4.0))
+    # No line: a height of 1 keeps what is divided by it finite.
     return centre, np.exp(log_width), np.where(np.abs(peak) > 1e-3, peak, 1.0)
 
 

@@ -156,6 +156,7 @@ def _rate(score, information, design, parameters, block, clear):  # type: ignore
             i[block[n]] += (1 - f) * information[n, low] + f * information[n, low + 1]
         most = np.argmax(s)
         left = np.sum(i) - i[most]
+        # A ghost apart from its line in less than a fifth of the cells (chosen) passes for the line's foot.
         out[k] = (np.sum(s) - s[most]) / np.sqrt(left) if left > 0 and apart > 0.2 * cells else -1.0
     return out
 

@@ -12,6 +12,8 @@ from pipeline.arrays import Float
 from stages.diagnose.profile.cells import Cells
 
 REACH_PX, STEP_PX = 45.0, 0.5
+# Beyond so many widths a Gaussian is below 0.3 %, and is left out.
+_REACH_WIDTHS = 3.5
 # Least noise of a bin, as a part of the line's height; chosen, not measured (data/debts.md).
 NOISE_FLOOR = 3e-4
 
@@ -64,7 +66,7 @@ def _match(rest, offset, centre, width, weight, distance, score, information):  
     for n in range(rest.shape[0]):
         for b in range(bins):
             x = (offset[b] - centre[n]) / width[n]
-            e = np.exp(-0.5 * x * x) if abs(x) < 3.5 else 0.0
+            e = np.exp(-0.5 * x * x) if abs(x) < _REACH_WIDTHS else 0.0
             basis[0, b], basis[1, b], basis[2, b] = e, x * e, x * x * e
         for i in range(3):
             for j in range(3):
@@ -72,7 +74,7 @@ def _match(rest, offset, centre, width, weight, distance, score, information):  
         inverse = np.linalg.inv(gram)
         for d in range(distance.size):
             ghost = np.exp(-0.5 * ((offset - centre[n] - distance[d]) / width[n]) ** 2)
-            inside = np.abs(offset - centre[n]) < 3.5 * width[n]
+            inside = np.abs(offset - centre[n]) < _REACH_WIDTHS * width[n]
             for i in range(3):
                 cross[i] = np.sum(basis[i] * ghost * inside)
             taken = inverse @ cross

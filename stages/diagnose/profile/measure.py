@@ -93,6 +93,7 @@ def stack_frame(  # type: ignore[no-untyped-def]
                 light[s, b] += y - dark
                 height[s, b] += fit[0]
                 x = t / width[a]
+                # Beyond 1.5 widths the line is below a third of its height, and no bell (chosen).
                 if abs(x) < 1.5 and not clipped:
                     m = fit[0] * np.exp(-0.5 * x * x)
                     gain[0, pixel[k]] += (y - dark - m) * m

@@ -147,6 +147,7 @@ class _Tail:
         rate = float(self.covariance[0, 1]) / variance
         left = self.blur_px2 + rate * (scale - self.scale)
         spread = np.sqrt(max(float(self.covariance[1, 1]) - rate**2 * variance, 0.0))
+        # 0.05 px² at least (chosen): a pixel's own variance, 1/12 px², is known no better.
         return bool(off < _CLEARLY and left > _SMALLEST_BLUR_PX2 - _CLEARLY * max(spread, 0.05))
 
 

@@ -47,6 +47,7 @@ def amplitudes(
     t = time_s - (time_s[0] if start_s is None else start_s)
     line = [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)]
     design = np.concatenate([np.stack(line, 1), wander(time_s)], 1)
+    # Chosen: with fewer pictures too few degrees of freedom are left for a σ.
     if len(t) < 1.3 * design.shape[1]:
         return np.full((2, 2), np.nan), float("nan")
     solution = np.linalg.lstsq(design, xy_mm, rcond=1e-6)[0]
@@ -133,9 +134,11 @@ class Line:
         """Effects that show so: a camera that swings shows in all pictures, a sheet only in its own."""
         if not np.isfinite(self.lit_mm + self.laser_mm):
             return ("probe_vibration", "laser_rocking")
-        if abs(self.lit_mm - self.laser_mm) < max(3 * self.share_sigma_mm, 0.2 * self.laser_mm):
+        # Swings that differ by less than 3 σ or a fifth (chosen) pass for equal.
+        equal_mm = max(3 * self.share_sigma_mm, 0.2 * self.laser_mm)
+        if abs(self.lit_mm - self.laser_mm) < equal_mm:
             return ("probe_vibration",)
-        if self.lit_mm < max(3 * self.share_sigma_mm, 0.2 * self.laser_mm):
+        if self.lit_mm < equal_mm:
             return ("laser_rocking",)
         return ("probe_vibration", "laser_rocking")
 

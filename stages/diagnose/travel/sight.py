@@ -50,6 +50,7 @@ class Sight:
     def direction(self) -> Float:
         """(N,) +1 or −1: which way the probe moves, or moved before it stopped."""
         step = np.gradient(self.distance_mm)
+        # The probe stands where a step is below a twentieth of the usual one (chosen).
         still = np.abs(step) < 0.05 * np.percentile(np.abs(step), 90)
         last = np.maximum.accumulate(np.where(still, -1, np.arange(len(step))))
         first = int(np.argmax(~still))
