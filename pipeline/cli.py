@@ -150,8 +150,9 @@ def run(
     typer.echo(f"Opening {recording}", err=True)  # at once: what is imported next takes seconds
     from rich.console import Console
 
+    from pipeline.api.dirt import dirt_of
     from pipeline.api.job import run_job
-    from pipeline.api.run import configuration, dirt_of, prepare
+    from pipeline.api.run import configuration, prepare
     from pipeline.machine.display import ProgressDisplay
     from pipeline.machine.plan import Selection
     from pipeline.system.kernels import compiled_ahead

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
+from pipeline.api.dirt import dirt_of
 from pipeline.api.job import Job, open_job, run_job
 from pipeline.artefacts.findings import Defects, Sections
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.errors import BoresightError, InputError
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.files.installed import PARAMETERS, file_or_shipped
-from pipeline.files.json_yaml import read_json
 from pipeline.instrument.probe import Probe
 from pipeline.machine.configuration import Configuration, resolve
 from pipeline.machine.display import Display, SilentDisplay
@@ -25,14 +24,6 @@ from pipeline.review.decisions.replay import Finding
 from pipeline.review.review import Review
 from pipeline.review.run_files import RunFiles, measured_findings
 from stages.catalogue import PIPELINE
-
-_PLACE = ("u_px", "v_px", "radius_px")
-_WIDER = 1.5
-_LINE_PX, _MOVED_PX = 1.2, 0.03
-"""1 σ of a sharp line, and how far a rim may move it: light that changes by a share g per px across a line of
-width w moves it by g w². A ring's sample is measured to about as much."""
-"""A spot's edge reaches beyond the place where it was found. Derived for Gaussian spots that take 10 to 50 %:
-their change falls to 3 %, where they are found, at 1.5 to 2.4 of their σ, and to 1 % at 2.1 to 2.8."""
 
 
 def run(
@@ -101,42 +92,6 @@ def prepare(
     """Open the inputs of a run without starting it; raises as `run`."""
     file = None if probe is None else Path(probe)
     return open_job(Path(recording), Path(folder), file, PIPELINE, EXPORTERS, configuration)
-
-
-def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
-    """Return the settings that keep out of photo and rings what a twin found on window or lens.
-
-    A speck that dims the line alike on both its flanks leaves it where it is, and stays in the rings.
-
-    Raises
-    ------
-    InputError
-        When the folder holds no twin.json, or a broken one.
-    """
-    if twin is None:
-        return ()
-    file = Path(twin) / "twin.json"
-    try:
-        on_image = [m for m in read_json(file)["found"] if m["fixed_to"] == "image" and "u_px" in m["place"]]
-        places = [[float(m["place"][k]["value"]) for k in _PLACE] for m in on_image]
-        moved = [_moves_line(m, p[2]) for m, p in zip(on_image, places, strict=True)]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(
-            file, "is not what a twin found", expected="twin.json of boresight twin", hint="name its folder"
-        ) from error
-    wider = [[u, v, _WIDER * r] for u, v, r in places]
-    of_line = [p for p, m in zip(wider, moved, strict=True) if m]
-    return f"texture.left_out={json.dumps(wider)}", f"rings.left_out={json.dumps(of_line)}"
-
-
-def _moves_line(found: dict[str, Any], radius_px: float) -> bool:
-    """Return whether what is on the window moves the line: a drop, or a rim that is steep for its width."""
-    if found["name"] in (None, "glint"):
-        return bool(found["channel"] == "line")  # the LEDs mirrored somewhere do not show in laser frames
-    share = found["parameters"].get("share")
-    if share is None:
-        return True
-    return abs(float(share["value"])) / radius_px * _LINE_PX**2 > _MOVED_PX
 
 
 def configuration(config: Path | str | None = None, settings: Sequence[str] = ()) -> Configuration:

@@ -25,6 +25,9 @@ from stages.texture.surface import wall_surface
 from stages.texture.views import LitViews, lit_views, plan_tiles
 
 _WHITE = 250.0
+# What is brighter than the median wall by more is no matt wall: glints, noise where light is scarce.
+# Derived: dirty steel and concrete reflect .2, white lime and paint .8 of the light.
+_MATT_RATIO = 4.0
 Read = TypeVar("Read")
 _Reader = Callable[[Recording, Int], Iterator[tuple[int, Read | None]]]
 
@@ -60,7 +63,10 @@ class TextureParameters(Parameters):
         "boresight run --twin takes them from a twin",
     )
     white_quantile: float = Field(
-        0.9995, ge=0.5, le=1.0, description="quantile of the brightest colour that stays below 250 of 255"
+        0.9995,
+        ge=0.5,
+        le=1.0,
+        description="quantile of the wall's brightest colour that stays below 250 of 255",
     )
 
 
@@ -137,7 +143,7 @@ def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, conte
         count = picture.count[part]
         brightness += np.bincount(picture.colour[part].max(2)[count > 0], minlength=len(brightness))
         views += np.bincount(count.ravel(), minlength=len(views))
-    white = quantile_of_counts(brightness, white_quantile) if brightness.any() else 1.0
+    white = brightest_wall(brightness, white_quantile)
     gain = np.float32(min(1 / REFLECTANCE_SCALE, _WHITE / white))
     context.report("brightness of the photo against the recorded frames", float(gain * REFLECTANCE_SCALE), "")
     bgra = context.scratch.zeros((grid.rows, grid.columns, 4), np.uint8)
@@ -147,6 +153,22 @@ def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, conte
     context.report("wall textured", float(1 - views[0] / views.sum()), "fraction")
     context.report("views behind a pixel, median", quantile_of_counts(views, 0.5), "views")
     return WallTexture(bgra, grid.distance_from_mm, grid.mm_per_px, grid.azimuth_from_rad, grid.rad_per_px)
+
+
+def brightest_wall(counts: Int, quantile: float) -> float:
+    """Return the brightness below which the wall's ``quantile`` lies, glints left out; 1 where none is seen.
+
+    Parameters
+    ----------
+    counts
+        Pixels (N,) of each brightness 0 to N - 1.
+    quantile
+        Share of the wall that is to be no brighter.
+    """
+    if not counts.any():
+        return 1.0
+    matt = _MATT_RATIO * max(quantile_of_counts(counts, 0.5), 1.0)
+    return min(quantile_of_counts(counts, quantile), matt)
 
 
 def quantile_of_counts(counts: Int, quantile: float) -> float:
@@ -175,7 +197,7 @@ def _texture_of_run(
 
 TEXTURE = Stage(
     "texture",
-    "8",
+    "9",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",

@@ -8,6 +8,7 @@ from pipeline.geometry.axis import straight_axis
 from pipeline.instrument.probe import Lighting
 from pipeline.recording.images import SplitImage
 from stages.rings.kernels import median
+from stages.texture import brightest_wall
 from stages.texture.blend import REFLECTANCE_SCALE, TileStack, blend_samples
 from stages.texture.grid import NODE_PX, FlatGrid, flat_grid, footprint_mm
 from stages.texture.light import irradiance
@@ -262,3 +263,14 @@ def test_only_lit_frames_with_a_pose_become_views():
     assert views.frame.tolist() == [0, 2, 3]
     assert views.laser_on.all()
     assert np.allclose(views.T_cp[1] @ T[2], np.eye(4))
+
+
+def test_a_few_glints_do_not_darken_the_photo_and_white_wall_does():
+    """A photo came out nearly black: noise beside a hole in it was twelve times as bright as the wall."""
+    counts = np.zeros(1 << 16, np.int64)
+    counts[500:700] = 50  # the wall
+    counts[8000] = 60  # .6 % of the picture
+    assert brightest_wall(counts, 0.9995) == pytest.approx(4 * 600, rel=0.01)
+    counts[8000], counts[2000] = 0, 60  # white spots
+    assert brightest_wall(counts, 0.9995) == 2000
+    assert brightest_wall(0 * counts, 0.9995) == 1.0

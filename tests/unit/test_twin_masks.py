@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.api.run import configuration, dirt_of
+from pipeline.api.dirt import dirt_of
+from pipeline.api.run import configuration
 from pipeline.artefacts.measured import RingValidity
 from pipeline.errors import InputError
 from pipeline.geometry.image_places import clear_of

@@ -1,0 +1,88 @@
+"""Units, signs and diameters that the pictures contradict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.errors import UnusableError
+from pipeline.recording.base import Encoder, PipeFacts
+from tests.drawn_run import BASELINE, RADIUS
+from tests.premises_run import checked, good_recording, steady_run
+from tests.ring_images import MemorySource
+
+
+@pytest.fixture(scope="module")
+def run():
+    return steady_run()
+
+
+@pytest.fixture(scope="module")
+def good():
+    return good_recording()
+
+
+@pytest.mark.parametrize(
+    ("factor", "message"),
+    [
+        (1 / 25.4, "in inch"),
+        (1 / 1000, "in m "),
+        (-1.0, "its sign reversed"),
+        (-0.1, "in cm in place of mm and"),
+    ],
+)
+def test_the_encoder_is_brought_to_mm_and_to_the_sense_of_the_motion(factor, message, good, run):
+    encoder = Encoder(good.encoder.time_s, good.encoder.distance_mm * factor)
+    found, told = checked(replace(good, encoder=encoder), run.probe)
+    assert found.encoder_factor == pytest.approx(1 / factor)
+    assert message in told[0]
+    repaired = found.applied_to(replace(good, encoder=encoder)).encoder
+    np.testing.assert_allclose(repaired.distance_mm, good.encoder.distance_mm)
+
+
+@pytest.mark.parametrize(
+    ("diameter_mm", "message"), [(2 * RADIUS / 25.4, "stated in inch"), (RADIUS, "the radius were stated")]
+)
+def test_a_diameter_that_the_ring_contradicts_ends_the_run(diameter_mm, message, good, run):
+    with pytest.raises(UnusableError, match=message):
+        checked(replace(good, pipe=PipeFacts(diameter_mm)), run.probe)
+
+
+def test_a_baseline_in_metres_ends_the_run(good, run):
+    laser = replace(run.probe.laser, baseline_mm=BASELINE / 1000)
+    with pytest.raises(UnusableError, match="baseline were stated in m"):
+        checked(good, replace(run.probe, laser=laser))
+
+
+def test_another_diameter_and_another_clock_are_told(good, run):
+    table = replace(good.frames, time_s=good.frames.time_s * 1000)
+    _, told = checked(replace(good, frames=table, pipe=PipeFacts(2.3 * RADIUS)), run.probe)
+    assert any("diameter is 100" in t for t in told)
+    assert any("check the unit (s) of time_s" in t for t in told)
+
+
+def scratches(size):
+    """Nine thin bright strokes on the window, as bright as the lamps make them."""
+    drawn, random = np.zeros(size[::-1], np.uint8), np.random.default_rng(2)
+    for _ in range(9):
+        at, way = random.uniform(0.2, 0.8, 2) * size, random.uniform(-60, 60, 2)
+        cv2.line(drawn, at.astype(int).tolist(), (at + way).astype(int).tolist(), 240, 3, cv2.LINE_AA)
+    return drawn
+
+
+def test_scratches_on_the_window_are_not_taken_for_the_wall(good, run, monkeypatch):
+    """A wrong unit of the encoder is seen by how the wall moves; scratches stand still."""
+    size, light = run.probe.camera.image_size, good.frames.illumination
+    by_light = {"led": scratches(size), "laser": scratches(size) // 20}
+    images = {n: cv2.add(image, by_light[light[n]]) for n, image in good.source.images.items()}
+    encoder = Encoder(good.encoder.time_s, good.encoder.distance_mm / 25.4)
+    scratched = replace(good, source=MemorySource(images, size), encoder=encoder)
+    found, told = checked(scratched, run.probe)
+    assert "scratches" in told[0]
+    assert found.encoder_factor == 25.4
+    assert found.applied_to(scratched).stays is not None
+    monkeypatch.setattr("stages.premises.places_that_stay", lambda *parts: None)
+    assert checked(scratched, run.probe)[0].encoder_factor == 1, "the control: scratches are followed"
