@@ -12,7 +12,7 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.channels import Seen
-from stages.diagnose.inference import UNKNOWN
+from stages.diagnose.inference import SURE, UNKNOWN
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
@@ -24,6 +24,7 @@ from stages.diagnose.travel.steps import StepFound
 # effects each, a hundredth of one would.
 TRAVEL_FOUND = 1e-5
 # Drawn cases of each channel that were named, all of them rightly: gauge runs at ring level, drawn lines.
+# After n of them the next is right with a chance of (n + 1) / (n + 2): no more is told.
 _DRILLED = {Channel.MOTION: 44, Channel.PROFILE: 9}
 # What the fitted pattern goes with: distance along the pipe, turning back, or speed.
 _GOES_WITH = {
@@ -38,22 +39,21 @@ _ROCKING_P = 0.01
 _TURNED = 0.01
 
 
-def chance_of_name(p_value: float, rivals: int, agreements: Sequence[Agreement], drilled: int) -> float:
+def chance_of_name(p_value: float, doubts: int, agreements: Sequence[Agreement]) -> float:
     """Return the probability that the named cause made it, and not chance, a rival, or something unknown.
 
     Chance weighs −e p ln p, the most that a p-value can say for it (T. Sellke, M. J. Bayarri and J. O.
     Berger, "Calibration of p values for testing precise null hypotheses", Am. Stat., 2001). Rivals that were
-    not told apart weigh as much as the name. What is unknown loses by the likelihood ratio of the best second
-    prediction, or wins by that of one that fails; those of one recording share its pictures and count once.
-    No more is claimed than ``drilled`` cases bear, all of which were right: (n + 1) / (n + 2).
+    not told apart, and all else that speaks against the name, weigh as much as it. What is unknown loses by
+    the likelihood ratio of the best second prediction, or wins by that of one that fails; those of one
+    recording share its pictures and count once.
     """
     p = float(np.clip(p_value, 1e-300, 1 / np.e))
     nothing = -np.e * p * np.log(p)
     ratios = [a.ratio for a in agreements]
     failed = [a.ratio for a in agreements if not a.confirmation.agrees]
     ratio = min(failed) if failed else max(ratios, default=1.0)
-    weight = 1 / (1 + nothing + rivals + UNKNOWN / ratio)
-    return min(float(weight), (drilled + 1) / (drilled + 2))
+    return float(1 / (1 + nothing + doubts + UNKNOWN / ratio))
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,21 @@ class Claim:
     unknown: frozenset[str] = frozenset()
 
     @property
-    def like_it(self) -> tuple[str, ...]:
-        """Effects that the catalogue calls like it, those not known left out."""
-        return tuple(n for n in effect(self.name).alike if n not in self.unknown)
+    def rivals(self) -> tuple[str, ...]:
+        """What else may have made it; where its parts disagree, all that the catalogue calls like it too."""
+        disagree = any(not a.confirmation.agrees for a in self.agreements)
+        like_it = effect(self.name).alike if disagree else ()
+        return (*self.alike, *(n for n in like_it if n not in self.unknown))
+
+    @property
+    def sure(self) -> bool:
+        """Whether the name is sure."""
+        return self._chance > SURE
+
+    @property
+    def _chance(self) -> float:
+        doubts = len(self.rivals) + (not self.counted)
+        return chance_of_name(self.p_value, doubts, self.agreements)
 
     def not_knowing(self, names: Collection[str]) -> Claim:
         """Return the claim of one who does not know some effects."""
@@ -108,9 +120,9 @@ class Claim:
     @property
     def found(self) -> EffectFound:
         """The effect with the chance that it is the right name."""
-        drilled = _DRILLED[Channel(self.location.channel)] if self.counted else 0
+        drilled = _DRILLED[Channel(self.location.channel)]
         return EffectFound(
-            self.name, chance_of_name(self.p_value, len(self.alike), self.agreements, drilled),
+            self.name, min(self._chance, (drilled + 1) / (drilled + 2)),
             self.parameters, self.statement, effect(self.name).law,
             tuple(a.confirmation for a in self.agreements),
             course=CourseFound("constant", {}), recording="gauge" if self.of_gauge_alone else "",

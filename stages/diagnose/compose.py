@@ -95,8 +95,8 @@ def _said(examined: Examined | None, known: Sequence[Claim], unnamed: bool, unex
     rings = verdict_of_rings(examined, bool(known))
     of_rings = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(known, of_rings)
-    certain = (*_sure_of_rings(examined, rings, unexplained), *(c.found for c in claims if _is_sure(c)))
-    doubted = [n for c in claims if not _is_sure(c) for n in (*_rivals(c), c.name)]
+    certain = (*_sure_of_rings(examined, rings, unexplained), *(c.found for c in claims if c.sure))
+    doubted = [n for c in claims if not c.sure for n in (*c.rivals, c.name)]
     if rings in (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED):
         unsure = [e.name for e in of_rings if e not in certain]
         doubted += [*(of_gauge.members(examined) if unsure and examined is not None else ()), *unsure]
@@ -147,17 +147,6 @@ def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
     return Verdict.CONSISTENT if claimed and patternless and verdict is Verdict.UNEXPLAINED else verdict
 
 
-def _rivals(claim: Claim) -> tuple[str, ...]:
-    """Return what else may have made a claim; where its parts disagree, all that is known to be like it."""
-    disagree = any(not a.confirmation.agrees for a in claim.agreements)
-    return (*claim.alike, *(claim.like_it if disagree else ()))
-
-
-def _is_sure(claim: Claim) -> bool:
-    """Return whether nothing else may have made a claim, and a second prediction of its physics agrees."""
-    return claim.counted and not _rivals(claim) and any(a.confirmation.agrees for a in claim.agreements)
-
-
 def _next(said: _Said, asked: Sequence[str]) -> str:
     """Return what to record so that the answer becomes a name."""
     if said.verdict is Verdict.UNEXPLAINED or (said.verdict is Verdict.PARTLY and not said.members):
@@ -168,10 +157,15 @@ def _next(said: _Said, asked: Sequence[str]) -> str:
 def _identifiable(said: _Said, examined: Examined | None) -> str:
     """Return what is determined all the same: the size each cause would have, or an empirical formula."""
     if said.verdict is Verdict.CLASS:
-        unknown = of_gauge.unknown_rivals(examined)[:1] if examined is not None else ()
+        unknown = _unknown(examined) if examined is not None else ()
         return "; or ".join([*(e.statement for e in said.effects), *(_UNKNOWN.format(f) for f in unknown)])
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
     return of_gauge.formula(examined) if nameless and examined is not None else ""
+
+
+def _unknown(examined: Examined) -> tuple[str, ...]:
+    """Return the likeliest of what the library lacks and would show so, in words."""
+    return (*of_gauge.unknown_rivals(examined), *of_gauge.growing_otherwise(examined))[:1]
 
 
 def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Claim]:

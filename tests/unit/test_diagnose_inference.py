@@ -22,6 +22,9 @@ from stages.diagnose.gauge.elimination import (
 )
 from stages.diagnose.gauge.feasible import expected_gain
 from stages.diagnose.gauge.formula import APART, joint_p
+from stages.diagnose.gauge.other_growth import odds_in
+from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.sets import NAMELESS
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
 from stages.diagnose.result import Confirmation, FitQuality, Verdict
 
@@ -205,7 +208,7 @@ def examined(
     shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
     left: float = 0.5, pattern_order: int = 2, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),), heldout: float = 0.11,
-    unknown: float = 0.0, other_order: int = 3, rival_heldout: float = 1.0,
+    unknown: float = 0.0, other_order: int = 3, rival_heldout: float = 1.0, grown: float = 0.0,
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
@@ -230,7 +233,14 @@ def examined(
     quality = FitQuality("px", 1.0, 0.1, 1.0, heldout, 0.1)
     return cast(
         Any,
-        SimpleNamespace(best=best, verdicts=verdicts, confirmed=confirmed, unsplit=each, quality=quality),
+        SimpleNamespace(
+            best=best,
+            verdicts=verdicts,
+            confirmed=confirmed,
+            unsplit=each,
+            quality=quality,
+            other_growth=(grown,) * len(library),
+        ),
     )
 
 
@@ -256,6 +266,8 @@ def examined(
         (examined((1.0, 1.0), confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.PARTLY),
         (examined(confirmed=((),)), Verdict.CLASS),
         (examined(chance=0.98), Verdict.CLASS),
+        (examined(grown=0.005), Verdict.NAMED),
+        (examined(grown=0.015), Verdict.CLASS),
         (examined(unsplit=("principal_point",)), Verdict.CLASS),
     ],
 )
@@ -263,6 +275,22 @@ def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(se
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     monkeypatch.setattr(answer, "pattern_of", lambda term: ("laser", "static", term.order))
     assert answer.verdict_of(seen) is verdict
+
+
+@pytest.mark.parametrize(
+    ("noise", "growing", "low", "high"),
+    [(0.01, 0.0, 0.0, NAMELESS / 20), (10.0, 0.0, NAMELESS / 2, NAMELESS), (0.1, 0.5, 1.0, np.inf)],
+)
+def test_a_name_is_as_unsure_as_its_growth_with_the_radius(noise, growing, low, high):
+    """A cone of size 1 that grows as it should, one too faint to tell how, and one that grows otherwise."""
+    random = np.random.default_rng(10)
+    off = random.uniform(-0.5, 0.5, 200)
+    one = Term(CONE, (), np.ones(1))
+    columns = (Column("laser_cone", CONE.amplitudes[0].name), Column("other", "1"), Column("other", "2"))
+    design = np.stack([off**n for n in range(3)], 1) / noise
+    measured = design @ [1.0, growing, 0.0] + random.normal(size=200)
+    (odds,) = odds_in(evidence_of(design, measured, columns), [one], ["other"], Stated((), np.zeros((0, 0))))
+    assert low <= odds <= high
 
 
 @pytest.mark.parametrize(

@@ -45,10 +45,11 @@ def chances(examined: Examined) -> tuple[float, ...]:
     """Return for each effect of the likeliest hypothesis the chance that its name is right.
 
     To the hypotheses without it come, as odds against it: causes that this run is not expected to tell from
-    it, each as likely as it; one that nobody knows, `UNKNOWN`, where no second prediction agrees; and an even
-    chance for everything that shows that the hypothesis does not hold: a prediction that fails, a remainder
-    that is no noise, or that moves rings or fiducials by more than the effect, what was held out, and other
-    names, as many or fewer, that predict what was held out better.
+    it, each as likely as it; one that nobody knows, `UNKNOWN`, where no second prediction agrees, and the one
+    like it that grows otherwise with the radius; and an even chance for everything that shows that the
+    hypothesis does not hold: a prediction that fails, a remainder that is no noise, or that moves rings or
+    fiducials by more than the effect, what was held out, and other names, as many or fewer, that predict what
+    was held out better.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
@@ -57,12 +58,12 @@ def chances(examined: Examined) -> tuple[float, ...]:
     patterns = best.fit.terms[len(best.library_terms) :]
     left = max((shift_px(best.fit, t) for t in patterns), default=0.0)
     others = better_held_out(verdicts)
-    each = zip(best.library_terms, examined.unsplit, examined.confirmed, strict=False)
+    each = zip(best.library_terms, examined.unsplit, examined.confirmed, examined.other_growth, strict=False)
     out = []
-    for term, alike, confirmed in each:
+    for term, alike, confirmed, grown in each:
         doubt = everywhere + len(alike) + sum(not c.agrees for c in confirmed)
         doubt += (left > shift_px(best.fit, term)) + sum(term.model.law not in j.laws for j in others)
-        unknown = UNKNOWN * (not _is_confirmed(term, confirmed, best.library_terms, patterns))
+        unknown = grown + UNKNOWN * (not _is_confirmed(term, confirmed, best.library_terms, patterns))
         out.append(verdicts.chance_of(term) / (1 + doubt + unknown))
     return tuple(out)
 
@@ -111,6 +112,14 @@ def unknown_rivals(examined: Examined) -> tuple[str, ...]:
     each = chain(*(verdicts.patterns_beside(t).items() for t in best.library_terms))
     doubted = sorted((pair for pair in each if pair[1] > 1 - SURE), key=lambda pair: -pair[1])
     return tuple(dict.fromkeys(formula for formula, _ in doubted))
+
+
+def growing_otherwise(examined: Examined) -> tuple[str, ...]:
+    """Return for each name that a law which nobody knows leaves unsure what that law would be like."""
+    best = examined.best
+    each = zip(best.library_terms, examined.other_growth, strict=True) if best is not None else ()
+    unsure = dict.fromkeys(t.model.law for t, odds in each if odds > 1 - SURE)
+    return tuple(f"one like {law} that grows otherwise with the radius" for law in unsure)
 
 
 def beyond_line(examined: Examined) -> tuple[bool, ...]:

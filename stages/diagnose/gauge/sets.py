@@ -44,7 +44,7 @@ _TEMPERED = 1.5
 # Prior: all effects of the library are equally likely, and what has a pattern without a cause is 50 times
 # less likely, because such a pattern can imitate any law. Whether a law suffices is tested separately.
 # Debt: data/debts.md.
-_NAMELESS = 1 / 50
+NAMELESS = 1 / 50
 _PEAK = 2
 # Relative error of laws: a pattern that differs less from an effect describes it. Debt: data/debts.md.
 SAME = 0.02
@@ -94,7 +94,7 @@ def beforehand(run: GaugeRun, terms: Sequence[tuple[EffectModel, Shape]], laws: 
     """Return −2 ln of a set's chance beforehand: how many others there are like it, shapes included."""
     unknown = any(isinstance(model, Nameless) for model, _ in terms)
     each = sum(_one_beforehand(run, model, shape, laws) for model, shape in terms)
-    return float(each - 2 * np.log(_NAMELESS) * unknown)
+    return float(each - 2 * np.log(NAMELESS) * unknown)
 
 
 def _one_beforehand(run: GaugeRun, model: EffectModel, shape: Shape, laws: int) -> float:
@@ -194,7 +194,7 @@ class Sets:
     def surprise(self, chosen: Set) -> float:
         """Return −2 ln of a set's chance, up to a constant."""
         before = sum(self.members[k].beforehand for k in chosen)
-        before -= 2 * np.log(_NAMELESS) * any(self.members[k].nameless for k in chosen)
+        before -= 2 * np.log(NAMELESS) * any(self.members[k].nameless for k in chosen)
         if not chosen:
             return 0.0
         at = np.concatenate([self.place[k] for k in sorted(chosen)])
