@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.artefacts.findings import Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
 from pipeline.artefacts.wall_map import WallMap
@@ -122,8 +123,19 @@ def _of_rings(rings: RingSamples) -> Iterator[Number]:
 def _of_trajectory(trajectory: Trajectory) -> Iterator[Number]:
     distance_mm = distance_along(trajectory.axis, trajectory.T_pc)
     yield Number("distance travelled", round(float(np.sum(np.abs(np.diff(distance_mm)))), 2), "mm")
-    yield Number("relative 1 sigma of the distance scale", round(trajectory.scale_sigma, 6))
+    yield Number("relative 1 sigma of the distance scale", round(_scale_sigma(trajectory, distance_mm), 6))
     yield Number("motion events", len(trajectory.events))
+
+
+def _scale_sigma(trajectory: Trajectory, distance_mm: Float) -> float:
+    """Return the relative 1 σ of distances: of the way to the farthest frame, at least calibration's own.
+
+    After a way there and back the end is better known than the scale; the calibration's part does not cancel.
+    """
+    farthest_mm = float(np.abs(distance_mm - distance_mm[0]).max())
+    if not np.isfinite(trajectory.distance_sigma_mm) or farthest_mm == 0:
+        return trajectory.scale_sigma
+    return max(trajectory.scale_sigma, trajectory.distance_sigma_mm / farthest_mm)
 
 
 def _of_wall(wall: Wall) -> Iterator[Number]:
