@@ -259,8 +259,12 @@ class Factor:
 
     def border_rows(self, rows: Rows) -> Float:
         """Return how residuals (M, B) of equations of one frame each follow the border when frames do."""
-        frames = self.solved_border.reshape(-1, BLOCK, self.border.shape[1])[rows.frame[:, 0]]
-        return np.asarray(rows.by_border - np.einsum("mi,mib->mb", rows.by_frame[:, 0], frames))
+        of_frame = self.solved_border.reshape(-1, BLOCK, self.border.shape[1])
+        out = rows.by_border.copy()
+        for frame in np.unique(rows.frame[:, 0]):
+            own = rows.frame[:, 0] == frame
+            out[own] -= rows.by_frame[own, 0] @ of_frame[frame]
+        return out
 
     def frames_after(self, border: Float) -> Float:
         """Return the step (N, 7) of the frames to their best place when the border steps by (B,)."""

@@ -36,6 +36,9 @@ _CONVERGED_SIGMA = 0.02
 # Frames that third differences of the motion tie together.
 _REACH = 3
 _CAUCHY = 2.5
+# A model whose first step brings less than this part of the needed drop of χ² is not followed further: from
+# the plain optimum the first Gauss-Newton step brings nearly all of it (13.5 of 13.8 of a rendered gauge).
+_FIRST_STEP = 0.5
 
 
 @dataclass(frozen=True)
@@ -80,16 +83,22 @@ class Solution:
 
 
 def adjust(
-    state: Unknowns, measured: Measurements, parameters: GaugeParameters, watch: Watch = unwatched
+    state: Unknowns,
+    measured: Measurements,
+    parameters: GaugeParameters,
+    watch: Watch = unwatched,
+    most_steps: int | None = None,
 ) -> Solution:
     """Minimise all residuals together by Gauss-Newton with Cauchy weights; ``watch`` before every step.
+
+    ``most_steps`` in place of the parameters' number ends earlier.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         When something is not determined.
     """
-    for _ in range(parameters.iterations):
+    for _ in range(most_steps or parameters.iterations):
         watch()
         solution = _linearised(state, measured, parameters)
         frames, border = solution.factor.step()
@@ -247,11 +256,15 @@ def chosen(
     asked, evidence, solutions = [], {}, {SheetModel.PLAIN: plain}
     count = len(np.unique(plain.rings.cluster))
     for model in (SheetModel.DECENTRED, SheetModel.WAVY):
-        solutions[model] = adjust(_extended(plain.state, model, parameters), measured, parameters, watch)
-        drop = (cost - solutions[model].cost(edge_spread, ring_spread)) / alike
-        evidence[model] = drop
-        more = len(solutions[model].state.instrument) - len(plain.state.instrument)
-        if drop > parameters.evidence + more * np.log(count):
+        state = _extended(plain.state, model, parameters)
+        needed = parameters.evidence + (len(state.instrument) - len(plain.state.instrument)) * np.log(count)
+        for most_steps in (1, parameters.iterations):
+            solutions[model] = adjust(state, measured, parameters, watch, most_steps)
+            evidence[model] = (cost - solutions[model].cost(edge_spread, ring_spread)) / alike
+            if evidence[model] < _FIRST_STEP * needed:
+                break
+            state = solutions[model].state
+        if evidence[model] > needed:
             asked.append(model)
     if len(asked) == 2:
         start = _extended(plain.state, SheetModel.DECENTRED_WAVY, parameters)

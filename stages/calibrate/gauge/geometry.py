@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
@@ -81,15 +82,24 @@ class Gauge:
 
         Inside a fiducial its pattern is as near as its border.
         """
-        half = self.fiducials.size_mm / 2
-        nearest = np.full(len(distance_mm), np.inf)
+        at = np.array([[m.distance_mm, np.radians(m.azimuth_deg)] for m in self.fiducials.markers])
         radius = self.radius_mm[self.section(distance_mm)]
-        for marker in self.fiducials.markers:
-            dz = np.abs(distance_mm - marker.distance_mm) - half
-            turn = np.mod(azimuth_rad - np.radians(marker.azimuth_deg) + np.pi, 2 * np.pi) - np.pi
-            da = np.abs(turn) * radius - half
-            nearest = np.minimum(nearest, np.hypot(np.maximum(dz, 0), np.maximum(da, 0)))
-        return nearest
+        return np.asarray(_from_squares(distance_mm, azimuth_rad, radius, at, self.fiducials.size_mm / 2))
+
+
+@numba.njit(cache=True, nogil=True)
+def _from_squares(distance_mm, azimuth_rad, radius_mm, at, half_mm):  # type: ignore[no-untyped-def]
+    """Return how far points (N,) are from the nearest of squares about (distance, azimuth) ``at`` (K, 2)."""
+    out = np.full(len(distance_mm), np.inf)
+    for n in range(len(distance_mm)):
+        for k in range(len(at)):
+            along = max(abs(distance_mm[n] - at[k, 0]) - half_mm, 0.0)
+            if along >= out[n]:
+                continue
+            turn = (azimuth_rad[n] - at[k, 1] + np.pi) % (2 * np.pi) - np.pi
+            around = max(abs(turn) * radius_mm[n] - half_mm, 0.0)
+            out[n] = min(out[n], np.hypot(along, around))
+    return out
 
 
 def gauge_of(facts: PipeFacts, fiducials: Fiducials) -> Gauge:
