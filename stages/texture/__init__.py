@@ -19,10 +19,11 @@ from pipeline.recording.decoded_once import read_luma, read_split
 from stages.texture.blend import REFLECTANCE_SCALE
 from stages.texture.grid import FlatGrid, flat_grid
 from stages.texture.mosaic import Blended, Mosaic
+from stages.texture.noise import NoiseGauge, views_against
 from stages.texture.photometry import LightChain, cut_plan
 from stages.texture.sampling import LightSampler
 from stages.texture.surface import wall_surface
-from stages.texture.views import LitViews, lit_views, plan_tiles
+from stages.texture.views import LitViews, TileViews, lit_views, seen_by, thinned
 
 _WHITE = 250.0
 # What is brighter than the median wall by more is no matt wall: glints, noise where light is scarce.
@@ -44,7 +45,9 @@ class TextureParameters(Parameters):
     reach_radii: float = Field(
         0.5, ge=0.02, le=1.0, description="wall used on either side of the laser sheet, in pipe radii"
     )
-    most_views: int = Field(48, ge=3, le=64, description="most frames blended into one place")
+    most_views: int = Field(
+        48, ge=3, le=64, description="most frames blended into one place; as many as their noise asks for"
+    )
     tile_mm: float = Field(10.0, ge=1.0, le=200.0, description="length of the tiles worked on, mm")
     smoothing_mm: float = Field(0.2, ge=0.0, le=10.0, description="1 σ of the radius map's smoothing, mm")
     shading_mm: float = Field(0.4, ge=0.1, le=20.0, description="1 σ of the wall slopes' smoothing, mm")
@@ -83,12 +86,15 @@ def photograph_wall(
     grid = flat_grid(surface, probe, parameters.oversampling, parameters.tile_mm)
     views = lit_views(recording, trajectory)
     reach = parameters.reach_radii * surface.mean_radius_mm
-    plan = plan_tiles(grid, surface, views, probe.laser, reach, parameters.most_views)
-    stretches = cut_plan(plan, parameters.views_at_once)
-    images = _Images(recording, views, sum(len(s.wanted) for s in stretches), context)
-
     ring = float(np.arctan2(surface.mean_radius_mm, probe.laser.baseline_mm))
     sampler = LightSampler(surface, probe, views, reach, parameters.laser_band_mm, parameters.left_out)
+    gauge = NoiseGauge(
+        recording, probe, grid, surface, views, sampler.reference, parameters.laser_band_mm,
+        parameters.left_out,
+    )  # fmt: skip
+    plan = _plan(gauge, seen_by(grid, surface, views, probe.laser, reach), parameters.most_views, context)
+    stretches = cut_plan(plan, parameters.views_at_once)
+    images = _Images(recording, views, sum(len(s.wanted) for s in stretches), context)
     picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe, ring)
     for stretch in stretches:
         for view, luma in images.read(stretch.wanted, read_luma):
@@ -103,6 +109,14 @@ def photograph_wall(
                 mosaic.add(view, image, pool)
     _report_light(lights, context)
     return _flat_picture(picture, grid, parameters.white_quantile, context)
+
+
+def _plan(gauge: NoiseGauge, seen: list[TileViews], most: int, context: Context) -> list[TileViews]:
+    """Return the views to blend into each tile: as many as the pictures' noise asks for."""
+    noise = gauge.noise(seen)
+    if np.isfinite(noise):
+        context.report("noise of lit pictures, one against another", noise, "grey levels")
+    return thinned(seen, views_against(noise, most))
 
 
 class _Images:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.recording.base import Illumination, Recording
 from stages.texture.grid import FlatGrid
 from stages.texture.surface import WallSurface
+
+# Shares that add up to a whole number must not stay below it for their last bits.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -66,10 +70,10 @@ def sheet_distance_mm(laser: LaserSheet, xyz_c: Float) -> Float:
     return np.asarray(xyz_c[..., 2] - laser.height(psi) - rho * laser.slope(psi))
 
 
-def plan_tiles(
-    grid: FlatGrid, surface: WallSurface, views: LitViews, laser: LaserSheet, reach_mm: float, most: int
+def seen_by(
+    grid: FlatGrid, surface: WallSurface, views: LitViews, laser: LaserSheet, reach_mm: float
 ) -> list[TileViews]:
-    """Choose the views of each tile: those in which it lies nearest to the laser sheet.
+    """Return the views of each tile: those in which it lies near the laser sheet.
 
     There a picture point and the wall point measured by the ring coincide whatever the errors of camera and
     motion. Where views are rare the reach is widened until three of them show every row. Of several passes
@@ -78,9 +82,21 @@ def plan_tiles(
     half_tile, lean_mm = grid.tile_rows * grid.mm_per_px / 2, views.lean * surface.mean_radius_mm
     row = _InOrder(views.distance_mm)
     return [
-        _tile_views(row, grid.centre_mm(tile) - laser.baseline_mm, half_tile, lean_mm, reach_mm, most)
+        _tile_views(row, grid.centre_mm(tile) - laser.baseline_mm, half_tile, lean_mm, reach_mm)
         for tile in grid.tiles()
     ]
+
+
+def thinned(plan: Sequence[TileViews], most: int) -> list[TileViews]:
+    """Return the plan with about ``most`` views a tile where it has more, spread evenly.
+
+    Tiles keep the same ones, so that frames which no tile keeps need not be read.
+    """
+    rate = np.zeros(1 + max((int(t.views[-1]) for t in plan if len(t.views)), default=0))
+    for tile in plan:
+        rate[tile.views] = np.maximum(rate[tile.views], min(most / max(len(tile.views), 1), 1.0))
+    kept = np.diff(np.floor(np.cumsum(rate) + _ROUNDING), prepend=0.0) > 0
+    return [replace(t, views=_evenly(t.views[kept[t.views]], most)) for t in plan]
 
 
 class _InOrder:
@@ -104,16 +120,19 @@ class _InOrder:
 
 
 def _tile_views(
-    row: _InOrder, place_mm: float, half_tile: float, lean_mm: Float, reach_mm: float, most: int
+    row: _InOrder, place_mm: float, half_tile: float, lean_mm: Float, reach_mm: float
 ) -> TileViews:
     nearest = row.third_nearest_mm(place_mm)
     reach = max(reach_mm, nearest + half_tile) if nearest is not None else reach_mm
     near = row.within(place_mm, reach + half_tile + float(lean_mm.max(initial=0.0)))
     candidates = near[np.abs(place_mm - row.distance_mm[near]) < reach + half_tile + lean_mm[near]]
-    chosen = _longest_pass(candidates)
-    spread = chosen[np.argsort(place_mm - row.distance_mm[chosen], kind="stable")]
-    pick = np.unique(np.round(np.linspace(0, len(spread) - 1, min(most, len(spread)))).astype(int))
-    return TileViews(np.sort(spread[pick]), reach)
+    return TileViews(_longest_pass(candidates), reach)
+
+
+def _evenly(views: Int, most: int) -> Int:
+    """Return at most so many views (n,), spread evenly."""
+    places = np.round(np.linspace(0, len(views) - 1, min(most, len(views)))).astype(int)
+    return np.asarray(views[np.unique(places)])
 
 
 def _longest_pass(candidates: Int) -> Int:

@@ -16,7 +16,7 @@ from stages.texture.photometry import solve_light
 from stages.texture.project import TileProjection, _enlarge
 from stages.texture.sampling import LightSamples
 from stages.texture.surface import smoothed, wall_surface
-from stages.texture.views import LitViews, lit_views, plan_tiles, sheet_distance_mm
+from stages.texture.views import LitViews, lit_views, seen_by, sheet_distance_mm, thinned
 from tests.synthetic_wall import wall_of
 from tests.unit.drawn_pipe import BASELINE, RADIUS, poses, recording_of, small_probe, trajectory_of
 
@@ -214,7 +214,7 @@ def views_at(distance):
 def plan_of(distance, reach_mm=10.0, most=40):
     surface = wall_surface(straight_wall(), 0.0, 0.5)
     grid = FlatGrid(0.0, 0.5, 120, 640, 24)
-    return grid, plan_tiles(grid, surface, views_at(distance), small_probe().laser, reach_mm, most)
+    return grid, thinned(seen_by(grid, surface, views_at(distance), small_probe().laser, reach_mm), most)
 
 
 def test_views_near_the_sheet_are_chosen():

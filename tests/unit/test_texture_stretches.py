@@ -12,7 +12,8 @@ from stages.texture.grid import FlatGrid
 from stages.texture.photometry import LightChain, cut_plan
 from stages.texture.sampling import LightSamples
 from stages.texture.surface import wall_surface
-from stages.texture.views import TileViews, plan_tiles
+from stages.texture.noise import views_against
+from stages.texture.views import TileViews, seen_by, thinned
 from tests.quiet import quiet_context
 from tests.unit.drawn_pipe import draw, poses, recording_of, seen_wall, small_probe, trajectory_of
 from tests.unit.test_texture_parts import straight_wall, views_at
@@ -80,7 +81,7 @@ def test_light_goes_on_as_bright_as_it_was() -> None:
     np.testing.assert_array_equal(chain.wanted, np.arange(80))
 
 
-def plainly_planned(grid: FlatGrid, distance: Float, baseline: float, reach_mm: float, most: int):
+def plainly_planned(grid: FlatGrid, distance: Float, baseline: float, reach_mm: float):
     """Choose views by looking at all of them for every tile."""
     half = grid.tile_rows * grid.mm_per_px / 2
     for tile in grid.tiles():
@@ -88,10 +89,7 @@ def plainly_planned(grid: FlatGrid, distance: Float, baseline: float, reach_mm: 
         reach = max(reach_mm, np.sort(np.abs(offset))[:3][-1] + half)
         near = np.flatnonzero(np.abs(offset) < reach + half)
         passes = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
-        chosen = max(passes, key=len)
-        spread = chosen[np.argsort(offset[chosen], kind="stable")]
-        pick = np.unique(np.round(np.linspace(0, len(spread) - 1, min(most, len(spread)))).astype(int))
-        yield np.sort(spread[pick]), reach
+        yield max(passes, key=len), reach
 
 
 @pytest.mark.parametrize("count", [2, 40, 300])
@@ -100,11 +98,31 @@ def test_views_are_those_found_by_looking_at_all(count: int) -> None:
     distance = np.cumsum(random.normal(0.3, 0.6, count)) - 20  # there and back a little
     grid = FlatGrid(0.0, 0.5, 240, 640, 24)
     surface, probe = wall_surface(straight_wall(), 0.0, 0.5), small_probe()
-    got = plan_tiles(grid, surface, views_at(distance), probe.laser, 8.0, 20)
-    wanted = plainly_planned(grid, distance, probe.laser.baseline_mm, 8.0, 20)
+    got = seen_by(grid, surface, views_at(distance), probe.laser, 8.0)
+    wanted = plainly_planned(grid, distance, probe.laser.baseline_mm, 8.0)
     for chosen, (views, reach) in zip(got, wanted, strict=True):
         np.testing.assert_array_equal(chosen.views, views)
         assert chosen.reach_mm == pytest.approx(reach)
+
+
+@pytest.mark.parametrize("most", [1, 7, 16, 100])
+def test_thinned_tiles_keep_about_as_many_views_and_share_them(most: int) -> None:
+    ends = np.sort(np.random.default_rng(most).integers(0, 400, (40, 2)), axis=1)
+    plan = [TileViews(np.arange(a, b), 5.0) for a, b in ends]
+    found = thinned(plan, most)
+    for all_of_tile, kept in zip(plan, found, strict=True):
+        assert min(most, len(all_of_tile.views)) - 1 <= len(kept.views) <= most
+        assert set(kept.views) <= set(all_of_tile.views)
+    alike = thinned([TileViews(np.arange(k, k + 60), 5.0) for k in range(0, 140, 20)], 15)
+    assert len(np.unique(np.concatenate([t.views for t in alike]))) == 180 // 4
+    assert all(14 <= len(t.views) <= 15 for t in alike)
+
+
+def test_views_average_noise_to_that_of_rounding() -> None:
+    assert views_against(1.4, 48) == 24
+    assert views_against(0.0, 48) == 16
+    assert views_against(9.0, 48) == views_against(float("nan"), 48) == 48
+    assert views_against(1.4, 10) == 10
 
 
 def test_surface_in_blocks_is_the_surface_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
