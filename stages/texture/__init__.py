@@ -211,7 +211,7 @@ def _texture_of_run(
 
 TEXTURE = Stage(
     "texture",
-    "9",
+    "10",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",

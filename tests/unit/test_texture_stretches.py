@@ -9,10 +9,10 @@ from pipeline.arrays import Float
 from pipeline.artefacts.measured import WallTexture
 from stages.texture import TextureParameters, photograph_wall, quantile_of_counts
 from stages.texture.grid import FlatGrid
+from stages.texture.noise import views_against
 from stages.texture.photometry import LightChain, cut_plan
 from stages.texture.sampling import LightSamples
 from stages.texture.surface import wall_surface
-from stages.texture.noise import views_against
 from stages.texture.views import TileViews, seen_by, thinned
 from tests.quiet import quiet_context
 from tests.unit.drawn_pipe import draw, poses, recording_of, seen_wall, small_probe, trajectory_of
