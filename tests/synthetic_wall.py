@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 
 from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall, WallTexture
-from pipeline.geometry.axis import PipeAxis
+from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.recording.base import FrameTable, PipeFacts, Recording
+from stages.texture.surface import WallSurface
 
 
 class NoFrames:
@@ -108,3 +109,11 @@ def draw_defect(kind, distance_mm, azimuth_rad, rng):
         "weld": lambda: (u(4, 9), 0.0, -u(0.35, 1.5)),
     }[kind]()
     return DrawnDefect(kind, distance_mm, azimuth_rad, length, width, depth)
+
+
+def plain_bore(radius_mm=50.0, bump_mm=0.0):
+    distance = np.arange(0.0, 300.0, 0.5)
+    radius = np.full((len(distance), 360), radius_mm, np.float32)
+    radius[:, 100:140] += bump_mm
+    flat = np.zeros_like(radius)
+    return WallSurface(straight_axis(-100, 500), distance, radius, flat, flat, (0.0, 299.5))

@@ -171,7 +171,7 @@ def compared_with(
     on_window, glints = told_apart(on_window, sums.glints())
     found: tuple[Mismatch, ...] = (
         *over_time, *on_window,
-        *unnamed(samples and samples.clear_of((*on_window, *glints))), *whole, *glints,
+        *unnamed(samples and samples.clear_of((*on_window, *glints)), scene.surface), *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
@@ -238,7 +238,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "13",
+    "14",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from scipy.ndimage import gaussian_filter
 from scipy.stats import norm, t
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.texture.surface import WallSurface
 from stages.twin.cells import centred, sigmas
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.reference import FEWEST_FRAMES, SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
+from stages.twin.scene import SHADING_MM
 
 _SURE, _FEWEST_CELLS = 3.0, 2
 """σ from frame to frame by which other frames must bear a region out, and how many of its cells touch."""
@@ -25,14 +28,20 @@ _LEAST_SHINE, _LEAST_LEAN = 0.25, 0.03
 """Least relative brightening over a line's radius that counts as gloss, and least spread of the places, in
 radii of the line, from which it is told. Chosen."""
 
-
-def unnamed(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
-    """Return what is fixed to the wall or to rows."""
-    return () if samples is None else (*_regions_of_wall(samples), *_banding(samples))
+_NOISY = 3.0
+"""Medians of the size of two normal errors that the largest of some hundred reaches: 2.8, rounded up."""
 
 
-def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
-    """Return regions of the wall that differ from their photo, if frames bear it out."""
+def unnamed(samples: BlockSamples | None, surface: WallSurface) -> tuple[Mismatch, ...]:
+    """Return what is fixed to the wall, whose shape is ``surface``, or to rows."""
+    return () if samples is None else (*_regions_of_wall(samples, surface), *_banding(samples))
+
+
+def _regions_of_wall(samples: BlockSamples, surface: WallSurface) -> tuple[Mismatch, ...]:
+    """Return regions of the wall that differ from their photo, if frames bear it out.
+
+    Steep wall errs in brightness as its smoothed slope does: that counts to the σ of a region.
+    """
     shape = (int(samples.along.max()) + 1, WALL_COLUMNS)
     mean, sd = map_of(samples, "wall", shape)
     shine, shine_sd = _shine(samples, shape)
@@ -51,11 +60,45 @@ def _regions_of_wall(samples: BlockSamples) -> tuple[Mismatch, ...]:
             continue
         use = label[samples.along, samples.around] == k
         size, told = _gloss_of(samples, use)
-        if told > _SURE and size > _LEAST_SHINE:
-            found.append(_on_wall(region, shine, shine_sd, cells, samples, use, size / max(told, 1e-9)))
-        elif samples.fixed_to(use) == "wall":
-            found.append(_on_wall(region, mean, sd, cells, samples, use))
+        shines = told > _SURE and size > _LEAST_SHINE
+        value, spread = (shine, shine_sd) if shines else (mean, sd)
+        if _most(value, region) < tail * slope_error(surface, samples, region):
+            continue
+        if shines or samples.fixed_to(use) == "wall":
+            gloss_sd = size / max(told, 1e-9) if shines else 0.0
+            found.append(_on_wall(region, value, spread, cells, samples, use, gloss_sd))
     return tuple(found)
+
+
+def _most(values: Float, cells: Int) -> float:
+    """Return the largest size of a map's values in cells (N, 2)."""
+    return float(np.nanmax(np.abs(values[tuple(cells.T)])))
+
+
+def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int) -> float:
+    """Return the 1 σ of the relative brightness of cells (N, 2) of the wall for want of its exact slope.
+
+    What smoothing the slopes once more takes off is what the first smoothing took (J. W. Tukey's twicing,
+    1977); light at 45°, as lamps give about the ring, changes by as much as the slope. Noise of the radius
+    map is taken off: it does not keep one sign over a cell.
+    """
+    step = float(surface.distance_mm[1] - surface.distance_mm[0])
+    around_mm = 2 * np.pi * surface.mean_radius_mm / surface.radius_mm.shape[1]
+    first, last = (samples.first_mm + (f(cells[:, 0]) + 0.5) * samples.cell_mm for f in (np.min, np.max))
+    more = samples.cell_mm + 4 * SHADING_MM
+    rows = np.flatnonzero((surface.distance_mm > first - more) & (surface.distance_mm < last + more))
+    if not len(rows):
+        return 0.0
+    part, sigma = slice(rows[0], rows[-1] + 1), (SHADING_MM / step, SHADING_MM / around_mm)
+    lost = np.hypot(*(
+        a[part] - gaussian_filter(a[part], sigma, mode=("nearest", "wrap"))
+        for a in (surface.along, surface.around)
+    ))  # fmt: skip
+    column = np.arange(lost.shape[1]) * WALL_COLUMNS // lost.shape[1] + WALL_COLUMNS // 2
+    away = np.abs(column[:, None] % WALL_COLUMNS - cells[:, 1][None])
+    near = (np.minimum(away, WALL_COLUMNS - away) <= 1).any(1)
+    noise = _NOISY * float(np.median(lost))
+    return float(np.sqrt(max(float(lost[:, near].max()) ** 2 - noise**2, 0.0)))
 
 
 def touching(beyond: Bool) -> Int:

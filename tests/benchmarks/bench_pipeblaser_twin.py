@@ -2,9 +2,13 @@
 
 Sixteen single frames of one smooth pipe, without texture, motion or photo: what can be modelled is the line's
 profile, the background and the noise. The profile of every other frame is tried on those between, by a noise
-that neighbours along the line tell: neither frames nor profile that are judged have a part in it. Brightness
+that pixels along the line tell: neither frames nor profile that are judged have a part in it. Brightness
 and background of each frame's line are its own, in blocks of 1.5°. Writes recorded | re-rendered | z of the
 worst frame into OUT.
+
+Noise is told by pixels two apart, which see no more than what is white, and ten apart, beyond a block of the
+coder (these pictures were JPEGs: steps of the luma's coefficients 8 6 6 7 7 8, quality 75) and beyond grains
+of speckle. The difference is noise that neighbours share.
 """
 
 from __future__ import annotations
@@ -28,9 +32,9 @@ from tests.shared_data import shared
 RED, RED_NM, WHITE = 2, 650.0, 250.0
 BLOCKS, HALF_PX, BROAD_PX, BINS = 240, 12.0, 8.0, 24
 CENTRE = (0.445, 0.524)
-SAME_COLOUR, ASIDE, FEWEST = 2, 0.1, 30
-"""Pixels of one colour are so far apart; tangent of how far the line may turn from a row or column: its
-profile then bends a second difference by less than one grey level. Fewest pixels of a bin."""
+WHITE_PX, APART_PX, ASIDE, FEWEST = 2, 10, 0.04, 30
+"""How far apart pixels are that tell the noise, both even, for the camera's mosaic; tangent of how far the
+line may turn from a row or column, and fewest pixels of a bin."""
 
 
 @dataclass(frozen=True)
@@ -93,14 +97,14 @@ def rendered(frame: RealFrame, light: BlockLight) -> tuple[Float, Float]:
     return ground[b.block] + line, line
 
 
-def noise_of(frames: list[RealFrame]) -> Float:
+def noise_of(frames: list[RealFrame], apart_px: int) -> Float:
     """Return variances: of dark pixels, per grey level, and relative to the line's square (speckle).
 
     From second differences along the line, where it runs along rows or columns of the picture: its profile,
-    and light that changes slowly, have no part in them. Every second pixel is taken, which the camera's
-    mosaic gave the same colour.
+    and light that changes slowly, have no part in them.
     """
-    level, line, square = (np.concatenate(p) for p in zip(*map(_along_line, frames), strict=True))
+    each = [_along_line(f, apart_px) for f in frames]
+    level, line, square = (np.concatenate(p) for p in zip(*each, strict=True))
     cell = np.searchsorted(np.quantile(level, np.linspace(0, 1, BINS + 1)[1:-1]), level)
     count = np.bincount(cell, minlength=BINS)
     parts = [np.ones_like(level), np.maximum(level, 0.0), line**2, square]
@@ -109,11 +113,11 @@ def noise_of(frames: list[RealFrame]) -> Float:
     return np.asarray(nnls(mean[:, :3] / np.maximum(mean[:, 3:], 1 / 12), np.ones(len(mean)))[0])
 
 
-def _along_line(frame: RealFrame) -> tuple[Float, Float, Float]:
+def _along_line(frame: RealFrame, apart_px: int) -> tuple[Float, Float, Float]:
     """Return level, line's part and squared noise (N,) of pixels about the line next to the axes."""
     u, v = frame.column - frame.blocks.centre_px[0], frame.row - frame.blocks.centre_px[1]
     found = []
-    for across, along, step in ((u, v, (SAME_COLOUR, 0)), (v, u, (0, SAME_COLOUR))):
+    for across, along, step in ((u, v, (apart_px, 0)), (v, u, (0, apart_px))):
         use = np.abs(along) < ASIDE * np.abs(across)
         row, column = frame.row[use], frame.column[use]
         three = np.stack([frame.grey[row + k * step[0], column + k * step[1]] for k in (-1, 0, 1)]).astype(
@@ -136,13 +140,13 @@ def main(out: Path) -> None:
     files = sorted((shared() / "real" / "pipeblaser_cmu" / "rings_v1").glob("*.png"))
     frames = [real_frame(f) for f in files]
     worst: tuple[float, int, Float] = (0.0, 0, np.zeros(0))
-    chi2 = np.zeros((3, len(frames)))
+    chi2 = np.zeros((4, len(frames)))
     for half in (0, 1):
         learned = frames[half::2]
         lights = [light_of(f.blocks) for f in learned]
         profile = np.median([light.profile for light in lights], 0)
         light = BlockLight(lights[0].x, profile, np.zeros(0))
-        noise = noise_of(learned)
+        white, noise = (noise_of(learned, apart) for apart in (WHITE_PX, APART_PX))
         step, wide = light.x[1] - light.x[0], np.abs(light.x) > 3
         print(
             f"learned from {len(learned)} frames: variance {noise[0]:.2f} + {noise[1]:.3f} · level + "
@@ -152,20 +156,19 @@ def main(out: Path) -> None:
         )
         gauss = replace(light, profile=np.exp(-0.5 * light.x**2))
         for k in range(1 - half, len(frames), 2):
-            z = [_z(frames[k], shape, noise) for shape in (gauss, light)]
+            z = [_z(frames[k], *by) for by in ((gauss, noise), (light, noise), (light, white))]
             use = ~frames[k].blocks.clipped
-            dark = _z_dark(frames[k], noise)
-            chi2[:, k] = [np.mean(z[0][use] ** 2), np.mean(z[1][use] ** 2), np.mean(dark**2)]
+            chi2[:, k] = *(np.mean(a[use] ** 2) for a in z), np.mean(_z_dark(frames[k], noise) ** 2)
             if chi2[1, k] > worst[0]:
                 worst = chi2[1, k], k, z[1]
             print(
                 f"{files[k].name}: line, normal profile {chi2[0, k]:.2f}, learned {chi2[1, k]:.2f}, "
-                f"background {chi2[2, k]:.2f}"
+                f"by white noise alone {chi2[2, k]:.2f}, background {chi2[3, k]:.2f}"
             )
     better = int((chi2[1] < chi2[0]).sum())
     print(f"learned profile fits better in {better} of {len(frames)} withheld frames")
-    print(f"median χ²: normal {np.median(chi2[0]):.2f}, learned {np.median(chi2[1]):.2f}, "
-          f"background {np.median(chi2[2]):.2f}")  # fmt: skip
+    names = ("normal", "learned", "by white noise alone", "background")
+    print("median χ²:", ", ".join(f"{n} {x:.2f}" for n, x in zip(names, np.median(chi2, 1), strict=True)))
     _write(frames[worst[1]], worst[2], light, out / f"worst-{files[worst[1]].stem}.png")
 
 

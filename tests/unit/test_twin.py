@@ -12,9 +12,7 @@ from pipeline.api.twin import TwinOf, twin_document, write_twin
 from pipeline.artefacts.measured import RingValidity
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, RegionFit, Twin, TwinView
 from pipeline.files.provenance import MadeBy
-from pipeline.geometry.axis import straight_axis
 from pipeline.recording.base import Illumination
-from stages.texture.surface import WallSurface
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import LineSamples
@@ -27,17 +25,10 @@ from stages.twin.reflectance import wall_seen
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import LineSight
 from stages.twin.state import clipped_line
+from tests.synthetic_wall import plain_bore
 
 BLACK = Figure(16.0, 0.1)
 NOISE = CameraNoise(BLACK, 255.0, Figure(4.0, 0.1), Figure(0.0, 0.0), Figure(0.0, 0.0), Figure(1.0, 0.1))
-
-
-def _bore(radius_mm=50.0, bump_mm=0.0):
-    distance = np.arange(0.0, 300.0, 0.5)
-    radius = np.full((len(distance), 360), radius_mm, np.float32)
-    radius[:, 100:140] += bump_mm
-    flat = np.zeros_like(radius)
-    return WallSurface(straight_axis(-100, 500), distance, radius, flat, flat, (0.0, 299.5))
 
 
 def _rays(count=200):
@@ -50,7 +41,7 @@ def _rays(count=200):
 def test_rays_meet_the_wall_where_it_is(bump_mm):
     T_pc = np.eye(4)
     T_pc[:3, 3] = 2.0, -1.0, 80.0
-    surface, rays = _bore(bump_mm=bump_mm), _rays()
+    surface, rays = plain_bore(bump_mm=bump_mm), _rays()
     seen = wall_seen(surface, T_pc, rays)
     assert seen.seen.all()
     at = T_pc[:3, 3] + seen.xyz_c
@@ -64,7 +55,7 @@ def test_rays_meet_the_wall_where_it_is(bump_mm):
 def test_a_ray_that_is_not_there_meets_nothing():
     rays = _rays(3)
     rays[1] = np.nan
-    np.testing.assert_array_equal(wall_seen(_bore(), np.eye(4), rays).seen, [True, False, True])
+    np.testing.assert_array_equal(wall_seen(plain_bore(), np.eye(4), rays).seen, [True, False, True])
 
 
 def _noisy_frames(read, electrons, frames=4):
@@ -132,14 +123,14 @@ def test_what_stays_in_the_image_on_the_wall_and_in_rows_is_told_apart():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     on_window = _samples(lambda f, r, c, s: _near(r, 20, c, 20))
     assert in_image(on_window, place) == ("image",)
-    assert unnamed(on_window) == ()
+    assert unnamed(on_window, plain_bore()) == ()
     on_wall = _samples(lambda f, r, c, s: _near(s, 24, c, 20))
     assert in_image(on_wall, place) != ("image",)
-    (region,) = unnamed(on_wall)
+    (region,) = unnamed(on_wall, plain_bore())
     assert region.fixed_to == "wall"
     assert region.place[0].value == pytest.approx(100 + 24.5 * 2.5, abs=1.5)
     assert region.parameters[0].value == pytest.approx(0.2, abs=0.03)
-    (bands,) = unnamed(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 3 + 2.1 * f)))
+    (bands,) = unnamed(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 3 + 2.1 * f)), plain_bore())
     assert (bands.name, bands.fixed_to) == ("banding", "rows")
 
 
@@ -152,7 +143,7 @@ def test_what_stands_still_cannot_be_told_apart():
 def test_noise_is_fixed_to_nothing():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     noise = _samples(lambda f, r, c, s: 0.0)
-    assert unnamed(noise) == ()
+    assert unnamed(noise, plain_bore()) == ()
     assert in_image(noise, place) == ("",)
 
 

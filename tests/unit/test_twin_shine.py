@@ -1,5 +1,6 @@
 """Glints, wet wall and uneven lamps, on made pictures: told where they are, and nowhere else."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import cv2
@@ -16,6 +17,7 @@ from stages.twin.on_wall import touching, unnamed
 from stages.twin.reference import BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
+from tests.synthetic_wall import plain_bore
 
 SHAPE, FRAMES, STEP_PX = (240, 320), 10, 8
 V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
@@ -71,7 +73,7 @@ def test_noise_and_one_spot_are_no_glints():
     assert not _spots(lambda n, r: np.float32(90.0))  # all of it too bright: no spot
 
 
-def _wall(change, seed=3):
+def _wall(change, surface=None, seed=3):
     random, blocks = np.random.default_rng(seed), BlocksOfFrames(RING)
     for number in range(12):
         twin = _twin(number)
@@ -79,7 +81,7 @@ def _wall(change, seed=3):
         aside = np.hypot(U - 160, V - 120) / 90
         noise = 2 * random.standard_normal(SHAPE).astype(np.float32)
         blocks.add(number, twin.level * (1 + change(patch, aside)).astype(np.float32) + noise, twin, 255.0)
-    return unnamed(blocks.samples())
+    return unnamed(blocks.samples(), surface or plain_bore())
 
 
 def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
@@ -93,6 +95,16 @@ def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
     assert not _wall(lambda patch, aside: 0 * aside)
     duller = _wall(lambda patch, aside: -0.7 * patch * (aside - 0.8))
     assert not [m for m in duller if m.parameters[0].name == "shine"]
+
+
+def test_steep_wall_is_as_bright_as_its_slope_is_known():
+    plain = plain_bore()
+    s, psi = np.meshgrid(plain.distance_mm - 100, np.radians(np.arange(360) - 180) - 0.8, indexing="ij")
+    pit = 1.4 * np.exp(-(s**2 + (50 * psi) ** 2) / 2 / 1.3**2)
+    steep = replace(plain, along=(-s / 1.3**2 * pit).astype(np.float32))
+    assert _wall(lambda patch, aside: -0.15 * patch, plain)
+    assert not _wall(lambda patch, aside: -0.15 * patch, steep)
+    assert _wall(lambda patch, aside: -0.9 * patch, steep)
 
 
 def test_cells_of_noise_that_lie_near_each_other_are_no_region():
