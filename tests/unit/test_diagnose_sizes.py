@@ -14,6 +14,7 @@ from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge.confirm import Sized, partial_of, quantities
 from stages.diagnose.gauge.elimination import Reduced, score_inflation
 from stages.diagnose.gauge.fit import Fit
+from stages.diagnose.gauge.other_growth import OtherGrowth
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import freed
 from stages.diagnose.inference import Column, Evidence, Stated
@@ -37,6 +38,16 @@ def test_a_free_shape_is_the_effect_at_that_shape():
     assert DRIFT.quantities(shape, amplitude) == {"relative": 0.002, "time_s": 3.6}
     assert free.at(np.array([0.002, -10.0]))[0] == (0.5,)
     assert replace(free, amplitude=np.array([0.002]), bounds=None).at(np.array([0.002]))[0] == (3.0,)
+
+
+def test_a_law_that_grows_otherwise_has_another_exponent_at_the_reference_and_the_same_pattern():
+    reference, size = 50.0, np.array([0.2, 0.1])
+    other = OtherGrowth("other", TILT, (), size, of_line=True, reference=reference)
+    near, far = (ring_points(plain_probe(), Bore(r), 90, 1.3) for r in (reference, 1.01 * reference))
+    law, more = (m.sheet_shift_mm(far, (), a) for m, a in ((TILT, size), (other, np.array([0.3, 0.0]))))
+    assert more == pytest.approx(0.3 * (far.radius_mm / reference - 1) * law)
+    assert np.log1p(more / law).mean() / np.log(1.01) == pytest.approx(0.3, abs=0.01)
+    assert other.sheet_shift_mm(near, (), np.array([0.3, 0.1])) == pytest.approx(0 * law, abs=1e-9)
 
 
 def test_a_time_constant_carries_the_uncertainty_of_its_shape():

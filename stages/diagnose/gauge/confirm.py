@@ -42,7 +42,7 @@ def confirmations(
     run: GaugeRun, judged: Judged, regimes: Sequence[Regime], terms: Sequence[Term], stated: Stated
 ) -> tuple[tuple[Confirmation, ...], ...]:
     """Return for each term what disjoint parts of the run say of it, each against all the others."""
-    shared = [*by_bore(regimes), *_by_direction(run, judged)]
+    shared = [*_by_bore(regimes), *_by_direction(run, judged)]
     parts = [[*shared, *_by_half(run, term)] for term in terms]
     everything = np.ones(len(run.time_s), bool)
     distinct = {(where, p.frames.tobytes()): p for each in parts for where, p in each}
@@ -97,7 +97,7 @@ def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: S
     return Partial(where, result.value[at], covariance)
 
 
-def by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
+def _by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
     """Return the parts of the run within one bore each."""
     out = []
     for section in sorted({r.section for r in regimes}):

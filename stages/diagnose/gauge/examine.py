@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from pipeline.arrays import Bool
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Progress, unheard
@@ -19,14 +18,14 @@ from stages.calibrate.gauge import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, with_courses
 from stages.diagnose.effects.nameless import GenericTerm, Moves
-from stages.diagnose.gauge.confirm import Sized, by_bore, confirmations, partial_of, sizes_of
+from stages.diagnose.gauge.confirm import Sized, confirmations, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
-from stages.diagnose.gauge.fit import evidence, fit
+from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.formula import ADEQUATE, pattern_of, patterns_by_chance, swings
 from stages.diagnose.gauge.heldout import fit_quality
-from stages.diagnose.gauge.hypotheses import Judged, Regime, judged_of, regimes_of
+from stages.diagnose.gauge.hypotheses import Judged, judged_of, regimes_of
 from stages.diagnose.gauge.judge import Verdicts, judge
-from stages.diagnose.gauge.other_growth import odds_of_other_growth
+from stages.diagnose.gauge.other_growth import excess_exponent, odds_of_other_growth
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
 from stages.diagnose.gauge.sets import believed
@@ -44,8 +43,8 @@ _PARTS = 3
 _APART = 0.265
 
 
-def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated: Stated) -> Location | None:
-    """Return where the first term shows; its growth with the radius is measured from bore to bore."""
+def location_of(run: GaugeRun, judged: Judged, stated: Stated, ratio: float) -> Location | None:
+    """Return where the first term shows; its growth with the radius is measured, χ² divided by ``ratio``."""
     if not judged.fit.terms:
         return None
     term = judged.fit.terms[0]
@@ -53,53 +52,29 @@ def location_of(run: GaugeRun, judged: Judged, regimes: Sequence[Regime], stated
     rings = judged.fit.linearised.rings
     distance = rings.distance_mm if rings.distance_mm is not None else np.zeros(1)
     return Location(
-        "ring", fixed_to, time, harmonic, _exponent(run, judged, regimes, term, stated),
+        "ring", fixed_to, time, harmonic, _exponent(run, judged, term, stated, ratio),
         frames=(int(run.rings.frame.min()), int(run.rings.frame.max())),
         distance_mm=(float(np.nanmin(distance)), float(np.nanmax(distance))), azimuth_deg=(-180.0, 180.0),
     )  # fmt: skip
 
 
 def _exponent(
-    run: GaugeRun, judged: Judged, regimes: Sequence[Regime], term: Term, stated: Stated
+    run: GaugeRun, judged: Judged, term: Term, stated: Stated, ratio: float
 ) -> tuple[float, float] | None:
-    """Return d ln |δr| / d ln r of the residual with 1 σ: the law's own, and how its size drifts with r."""
-    bores = by_bore(regimes)
-    if len(bores) < 2:
+    """Return d ln |δr| / d ln r with 1 σ: the law's own, and what rings show beyond that."""
+    own = _own_exponent(term)
+    if own is None:
         return None
-    _, *each = evidence(run, judged.fit, (), [part for _, part in bores])
-    found = [partial_of(w, e, judged, term, stated) for (w, _), e in zip(bores, each, strict=True)]
-    radius = [_radius(run, judged, part.frames) for _, part in bores]
-    size = float(np.linalg.norm(term.amplitude))
-    way = term.amplitude / size
-    rows = [
-        (np.log(r), float(way @ f.amplitude) / size, float(np.sqrt(way @ f.covariance @ way)) / size)
-        for r, f in zip(radius, found, strict=True)
-        if f is not None and np.isfinite(f.covariance).all()
-    ]
-    rows = [row for row in rows if row[1] > 0 and np.isfinite(row[0])]
-    own = _own_exponent(judged, term)
-    if len(rows) < 2 or own is None:
-        return None
-    log_r, share, sigma = np.array(rows).T
-    weight = (share / sigma) ** 2
-    off = log_r - np.average(log_r, weights=weight)
-    spread = float(weight @ off**2)
-    if spread <= 0:
-        return None
-    return own + float(weight @ (off * np.log(share))) / spread, float(spread**-0.5)
+    excess, sigma = excess_exponent(run, judged, term, stated, ratio)
+    return own + excess, sigma
 
 
-def _own_exponent(judged: Judged, term: Term) -> float | None:
-    """Return the law's own exponent over these bores."""
+def _own_exponent(term: Term) -> float | None:
+    """Return the law's own exponent."""
     if isinstance(term.model, GenericTerm):
         return float(term.model.exponent) if term.model.moves is Moves.LINE else None
     known = EFFECTS.get(term.model.law)
     return known.radial_exponent if known is not None else None
-
-
-def _radius(run: GaugeRun, judged: Judged, frames: Bool) -> float:
-    inside = frames[run.rings.frame]
-    return float(np.median(judged.fit.linearised.rings.radius_mm[inside])) if inside.any() else np.nan
 
 
 @dataclass(frozen=True)
@@ -210,6 +185,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
     run, regimes = searched.run, verdicts.regimes
     nothing = next(j for j in verdicts.judged if not j.fit.terms)
     terms, alike = best.library_terms, searched.alike
+    ratio = believed(best.evidence, alike)
     unsplit = not_told_apart(run, searched.nothing, terms, library, stated, alike) if terms else ()
     shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula
     return replace(
@@ -217,7 +193,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
         confirmed=confirmations(run, best, regimes, terms, stated) if terms else (),
         unsplit=unsplit,
         sizes=sizes_of(run, best, stated, alike) if terms else (),
-        other_growth=odds_of_other_growth(run, best, terms, stated, believed(best.evidence, alike)),
-        location=location_of(run, shown, regimes, stated),
+        other_growth=odds_of_other_growth(run, best, terms, stated, ratio),
+        location=location_of(run, shown, stated, ratio),
         quality=fit_quality(run, nothing, shown, regimes, stated),
     )

@@ -22,7 +22,7 @@ from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.sets import NAMELESS, prior_sigma
-from stages.diagnose.inference import Evidence, Stated, estimate
+from stages.diagnose.inference import Evidence, Stated, estimate, places_of
 
 _POWERS = (1, 2)
 # How far such a law may be off the named one, as a part of its size: in even steps of the logarithm, from
@@ -85,13 +85,24 @@ class OtherGrowth(EffectModel):
         return np.asarray(sum(a * off**n for a, n in zip(amplitude, _POWERS, strict=True)))
 
 
-def other_growth(term: Term, at: Linearised) -> OtherGrowth:
+def other_growth(term: Term, at: Linearised, of_line: bool) -> OtherGrowth:
     """Return the law like a term's that grows otherwise, its reference in the middle of the rings."""
-    of_line = effect(term.model.law).fixed_to is FixedTo.LASER
     middle = float(np.median(_radius(at.rings, of_line)))
     shape, amplitude = term.at(term.amplitude)
     name = f"{term.model.name} {term.shape}, growing otherwise"
     return OtherGrowth(name, term.model, shape, amplitude, of_line, middle)
+
+
+def excess_exponent(
+    run: GaugeRun, best: Judged, term: Term, stated: Stated, believed: float
+) -> tuple[float, float]:
+    """Return by how much d ln |δr| / d ln r exceeds the law's own in the middle of the rings, with 1 σ."""
+    other = other_growth(term, best.fit.linearised, of_line=True)
+    about = evidence(run, best.fit, [(other, ())], with_spread=False)[0].deflated(believed)
+    both = (*best.fit.terms, Term(other, (), np.zeros(len(_POWERS))))
+    found = estimate(about, stated, prior_sigma(about, both))
+    at = places_of(about, other, ())[0]
+    return float(found.value[at]), float(np.sqrt(found.covariance[at, at]))
 
 
 def odds_of_other_growth(
@@ -101,7 +112,8 @@ def odds_of_other_growth(
 
     χ² is divided by ``believed``.
     """
-    others = [other_growth(t, best.fit.linearised) for t in terms]
+    at = best.fit.linearised
+    others = [other_growth(t, at, effect(t.model.law).fixed_to is FixedTo.LASER) for t in terms]
     about = evidence(run, best.fit, [(o, ()) for o in others], with_spread=False)[0].deflated(believed)
     return odds_in(about, best.fit.terms, [o.name for o in others], stated)
 
