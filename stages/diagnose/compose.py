@@ -68,7 +68,6 @@ def composed(
         inseparable=examined.inseparable if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
-        ring_picture=of_gauge.ring_picture(examined) if examined is not None else None,
         remainder=Remainder(_of_rest(said), None, said.members, identifiable) if partly else None,
     )
     return found.not_knowing(without)

@@ -72,6 +72,16 @@ def _shape(effect: EffectFound) -> Shape:
     return tuple(effect.parameters[n].value for n in ("time_s", "duration_s") if n in effect.parameters)
 
 
+def _adds(*names: str, unit: float = 1.0) -> Change:
+    """Return that each amplitude, times ``unit``, is added to a parameter."""
+
+    def change(p: dict[str, float], a: Float, shape: Shape) -> None:
+        for name, value in zip(names, a, strict=True):
+            p[name] += unit * float(value)
+
+    return change
+
+
 def _tilt(p: dict[str, float], a: Float, shape: Shape) -> None:
     tilt = np.radians(a)
     stretch = np.tan(np.hypot(*tilt)) / max(float(np.hypot(*tilt)), 1e-300)
@@ -79,28 +89,10 @@ def _tilt(p: dict[str, float], a: Float, shape: Shape) -> None:
     p["tilt_y"] += float(tilt[1] * stretch)
 
 
-def _cone(p: dict[str, float], a: Float, shape: Shape) -> None:
-    p["cone_rad"] += float(np.radians(a[0]))
-
-
-def _baseline(p: dict[str, float], a: Float, shape: Shape) -> None:
-    p["baseline_mm"] += float(a[0])
-
-
-def _decentre(p: dict[str, float], a: Float, shape: Shape) -> None:
-    p["decentre_x_mm"] += float(a[0])
-    p["decentre_y_mm"] += float(a[1])
-
-
 def _waves(p: dict[str, float], a: Float, shape: Shape) -> None:
     for name, value in zip((f"wave{shape[0]:.0f}_cos", f"wave{shape[0]:.0f}_sin"), a, strict=True):
         if name in p:
             p[name] += 1e-3 * float(value)
-
-
-def _centre(p: dict[str, float], a: Float, shape: Shape) -> None:
-    p["cx"] += float(a[0])
-    p["cy"] += float(a[1])
 
 
 def _focal(p: dict[str, float], a: Float, shape: Shape) -> None:
@@ -113,15 +105,12 @@ def _aspect(p: dict[str, float], a: Float, shape: Shape) -> None:
     p["fy"] /= float(np.sqrt(1 + a[0]))
 
 
-def _radial(p: dict[str, float], a: Float, shape: Shape) -> None:
-    p["k1"] += float(a[0])
-
-
 # Effects that a probe file can express, and how.
 CHANGES: Mapping[str, Change] = MappingProxyType({
-    "laser_tilt": _tilt, "laser_cone": _cone, "baseline": _baseline, "beam_decentre": _decentre,
-    "sheet_waviness": _waves, "principal_point": _centre, "focal_scale": _focal, "pixel_aspect": _aspect,
-    "radial_distortion": _radial,
+    "laser_tilt": _tilt, "laser_cone": _adds("cone_rad", unit=float(np.radians(1.0))),
+    "baseline": _adds("baseline_mm"), "beam_decentre": _adds("decentre_x_mm", "decentre_y_mm"),
+    "sheet_waviness": _waves, "principal_point": _adds("cx", "cy"), "focal_scale": _focal,
+    "pixel_aspect": _aspect, "radial_distortion": _adds("k1"),
 })  # fmt: skip
 
 

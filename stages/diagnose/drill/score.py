@@ -129,10 +129,6 @@ class Rate:
         return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
 
 
-def _number(value: float | np.floating) -> float | None:
-    return None if np.isnan(value) else float(value)
-
-
 def rate(hits: Iterable[bool]) -> Rate:
     """Return the share of true among ``hits``."""
     listed = list(hits)
@@ -220,11 +216,12 @@ def figures(trials: Iterable[Trial]) -> tuple[Figure, ...]:
     rates.append(("size_in_95", "Sizes within their 95 % interval", "93–97 %", rate(abs(x) < _95 for x in z)))
     removed = [r for t in given["known"] if (r := heldout_removed(t.answer)) is not None]
     return (
-        *(Figure(name, words, goal, _number(r.share), r.of, r.interval) for name, words, goal, r in rates),
-        Figure("size_bias_sigma", "Mean error of sizes in σ", "within ±0.2", _number(np.mean(z or [np.nan])),
-               len(z), None),
+        *(Figure(name, words, goal, r.share if r.of else None, r.of, r.interval)
+          for name, words, goal, r in rates),
+        Figure("size_bias_sigma", "Mean error of sizes in σ", "within ±0.2",
+               float(np.mean(z)) if z else None, len(z), None),
         Figure("heldout_removed", "Held-out discrepancy above the noise floor removed, median", "≥ 0.97",
-               _number(np.median(removed or [np.nan])), len(removed), None),
+               float(np.median(removed)) if removed else None, len(removed), None),
     )  # fmt: skip
 
 
@@ -260,8 +257,8 @@ def heldout_removed(answer: Answer) -> float | None:
     fit = answer.fit
     if fit is None or not fit.heldout_before > 1.05 * fit.noise_floor:  # also where a number is not known
         return None
-    above = fit.heldout_before**2 - fit.noise_floor**2
-    return float((fit.heldout_before**2 - fit.heldout_after**2) / above)
+    before, after, floor = (rms**2 for rms in (fit.heldout_before, fit.heldout_after, fit.noise_floor))
+    return (before - after) / (before - floor)
 
 
 def confusion(trials: Iterable[Trial]) -> Counter[tuple[str, str]]:
@@ -278,15 +275,12 @@ def calibration(trials: Iterable[Trial]) -> list[tuple[float, Rate]]:
 
 
 def _feasible_snr(concealed: Concealed, answer: Answer) -> float | None:
-    for one in answer.feasibility:
-        if one.name == concealed.name and one.detectable and concealed.values:
-            return _STANDS_OUT * abs(concealed.values[0]) / one.detectable
-    return None
+    least = next((f.detectable for f in answer.feasibility if f.name == concealed.name), None)
+    return _STANDS_OUT * abs(concealed.values[0]) / least if least and concealed.values else None
 
 
 def _left_of(name: str, answer: Answer) -> float:
-    found = [one.left for one in answer.feasibility if one.name == name and one.left is not None]
-    return found[0] if found else 1.0
+    return next((f.left for f in answer.feasibility if f.name == name and f.left is not None), 1.0)
 
 
 def _located(trial: Trial, what: str) -> bool:
@@ -298,10 +292,8 @@ def _located(trial: Trial, what: str) -> bool:
 def _size_error(named: NamedEffect, truth: Concealed) -> float | None:
     if truth.name not in EFFECTS:
         return None
-    first = EFFECTS[truth.name].quantities[0].name
-    if first not in named.parameters or not truth.values or not named.parameters[first].sd > 0:
-        return None
-    return (named.parameters[first].value - truth.values[0]) / named.parameters[first].sd
+    size = named.parameters.get(EFFECTS[truth.name].quantities[0].name)
+    return (size.value - truth.values[0]) / size.sd if size and truth.values and size.sd > 0 else None
 
 
 def _joined(names: frozenset[str]) -> str:

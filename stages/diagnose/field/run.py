@@ -9,11 +9,12 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
-from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
+from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.diagnose.effects.base import ImagePoints
+from stages.diagnose.gauge.points import passing_mm_s, widths_at
 from stages.motion import (
     MATCH_BIASES,
     EncoderReadings,
@@ -134,9 +135,10 @@ def ring_points(run: FieldRun) -> ImagePoints:
     normal_c, along_c, azimuth, distance = _wall_at(run, frame, xyz_c)
     passing = _passing(run, frame, xyz_c)
     rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
+    width_px = widths_at(run.rings, run.ring_frames, frame, uv - run.rings.centre_px)
     return ImagePoints(
         run.probe, frame, run.measured.time_s[frame], uv, xyz_c, normal_c, along_c, rate[:, None] * outward,
-        speed_mm_s(run)[frame], True, _widths(run.rings, run.ring_frames, frame, uv), azimuth, distance,
+        speed_mm_s(run)[frame], True, width_px, azimuth, distance,
     )  # fmt: skip
 
 
@@ -177,25 +179,5 @@ def _wall_at(run: FieldRun, frame: Int, xyz_c: Float) -> tuple[Float, Float, Flo
 
 
 def _passing(run: FieldRun, frame: Int, xyz_c: Float) -> Float:
-    """Return how points (M, 3) of the wall pass in C, mm/s."""
-    T, time_s = run.state.T_pc, run.measured.time_s
-    before = np.maximum(np.arange(len(time_s)) - 1, 0)
-    after = np.minimum(np.arange(len(time_s)) + 1, len(time_s) - 1)
-    span = np.maximum(time_s[after] - time_s[before], 1e-9)[:, None]
-    velocity_p = (T[after, :3, 3] - T[before, :3, 3]) / span
-    turning_c = vector_from_rotation(np.swapaxes(T[before, :3, :3], -1, -2) @ T[after, :3, :3]) / span
-    velocity_c = np.einsum("nij,ni->nj", T[:, :3, :3], velocity_p)
-    return np.asarray(-velocity_c[frame] - np.cross(turning_c[frame], xyz_c))
-
-
-def _widths(rings: RingSamples, ring_frames: Int, frame: Int, uv: Float) -> Float:
-    """Return the line's width (M,) of the sample nearest in azimuth."""
-    away = uv - rings.centre_px
-    count = len(rings.azimuth_rad)
-    step = 2 * np.pi / count
-    column = (
-        np.round((np.arctan2(away[:, 1], away[:, 0]) - rings.azimuth_rad[0]) / step).astype(np.int64) % count
-    )
-    width = rings.width_px[np.searchsorted(ring_frames, frame), column].astype(float)
-    seen = np.isfinite(width)
-    return np.where(seen, width, np.median(width[seen]) if seen.any() else 1.0)
+    """Return how points (M, 3) of the wall pass in C, mm/s; the adjustment has smoothed the poses."""
+    return passing_mm_s(run.state.T_pc, run.measured.time_s, frame, xyz_c, smoothed=np.asarray)

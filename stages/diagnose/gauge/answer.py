@@ -9,7 +9,6 @@ from itertools import chain
 import numpy as np
 
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities, tells_law
-from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE, pattern_of
 from stages.diagnose.gauge.hypotheses import Judged
@@ -17,7 +16,7 @@ from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.search import shift_px
 from stages.diagnose.inference import SURE, UNKNOWN
-from stages.diagnose.result import Candidate, Confirmation, EffectFound, Picture, Verdict
+from stages.diagnose.result import Candidate, Confirmation, EffectFound, Verdict
 
 # What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Under right
 # names, and where nothing is hidden, 25 runs at ring level come to 1.03–1.16 (mean 1.11, s.d. 0.04: samples
@@ -183,26 +182,6 @@ def formula(examined: Examined) -> str:
     patterns = best.fit.terms[len(best.library_terms) :] if best is not None and best.library_terms else ()
     terms = patterns or examined.verdicts.formula.fit.terms
     return "; ".join(t.model.equation(t.shape, t.amplitude) for t in terms)
-
-
-def ring_picture(examined: Examined, azimuths: int = 180) -> Picture:
-    """Return the rings' residuals over azimuth and frame, mm, before and after."""
-    searched, best = examined.searched, examined.best
-    after = best.fit if best is not None else searched.found
-    rings = searched.run.rings
-    azimuth = np.arctan2(rings.outward[:, 1], rings.outward[:, 0])
-    column = np.floor((azimuth + np.pi) / (2 * np.pi) * azimuths).astype(int) % azimuths
-    frame, row = np.unique(rings.frame, return_inverse=True)
-    pictures = []
-    for found in (searched.nothing, after):
-        equations = found.linearised.equations
-        residual = equations.residual[equations.kind == RING]
-        total, count = (np.zeros((len(frame), azimuths)) for _ in range(2))
-        np.add.at(total, (row, column), residual)
-        np.add.at(count, (row, column), 1)
-        pictures.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
-    middle = (np.arange(azimuths) + 0.5) / azimuths * 2 * np.pi - np.pi
-    return Picture(frame, middle, *pictures)
 
 
 def verdict_of(examined: Examined) -> Verdict:

@@ -7,6 +7,8 @@ on the recordings). They are unknowns of the recording, so that no effect is see
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.signal import savgol_filter
 
@@ -57,7 +59,7 @@ def ring_points(state: Unknowns, rings: BoreRings, time_s: Float, width_px: Floa
     xyz_p = transform(T, xyz_c)
     normal_c, along_c = _wall_directions(xyz_p, T)
     along_ray = way_per_px(state.probe, rings.uv, rings.outward)
-    passing = _passing(state, time_s, rings.frame, xyz_c)
+    passing = passing_mm_s(state.T_pc, time_s, rings.frame, xyz_c, _smoothed)
     rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
     return ImagePoints(
         state.probe, rings.frame, time_s[rings.frame] - time_s[0], rings.uv, xyz_c, normal_c, along_c,
@@ -77,7 +79,7 @@ def edge_points(state: Unknowns, edges: Edges, time_s: Float) -> ImagePoints:
     T = state.T_pc[edges.frame]
     xyz_c = transform(inverse(T), edges.xyz_p)
     normal_c, along_c = _wall_directions(edges.xyz_p, T)
-    passing = _passing(state, time_s, edges.frame, xyz_c)
+    passing = passing_mm_s(state.T_pc, time_s, edges.frame, xyz_c, _smoothed)
     by_c = state.probe.camera.project_jacobian(xyz_c).by_point
     return ImagePoints(
         state.probe, edges.frame, time_s[edges.frame] - time_s[0], edges.uv, xyz_c, normal_c, along_c,
@@ -86,20 +88,22 @@ def edge_points(state: Unknowns, edges: Edges, time_s: Float) -> ImagePoints:
     )  # fmt: skip
 
 
-def bin_widths(source: RingSamples, index: Int, rings: BoreRings) -> Float:
-    """Return the line's width (M,) at the ring bins, from the sample nearest in azimuth.
+def widths_at(source: RingSamples, index: Int, frame: Int, outward: Float) -> Float:
+    """Return the line's width (M,) in image directions ``outward`` (M, 2), from the sample nearest to each.
 
     Parameters
     ----------
     index : (F,) int
         Places in the recording of the sampled frames.
+    frame : (M,) int
+        Place of each point's frame.
     """
-    row = np.searchsorted(index, rings.frame)
-    azimuth = np.arctan2(rings.outward[:, 1], rings.outward[:, 0])
     step = 2 * np.pi / len(source.azimuth_rad)
-    column = np.round((azimuth - source.azimuth_rad[0]) / step).astype(np.int64) % len(source.azimuth_rad)
-    width = source.width_px[row, column].astype(float)
-    return np.where(np.isfinite(width), width, np.nanmedian(width) if np.isfinite(width).any() else 1.0)
+    turn = (np.arctan2(outward[:, 1], outward[:, 0]) - source.azimuth_rad[0]) / step
+    column = np.round(turn).astype(np.int64) % len(source.azimuth_rad)
+    width = source.width_px[np.searchsorted(index, frame), column].astype(float)
+    seen = np.isfinite(width)
+    return np.where(seen, width, np.median(width[seen]) if seen.any() else 1.0)
 
 
 def speed_along(state: Unknowns, time_s: Float) -> Float:
@@ -114,20 +118,24 @@ def _wall_directions(xyz_p: Float, T_pc: Float) -> tuple[Float, Float]:
     return np.einsum("mij,mi->mj", T_pc[:, :3, :3], normal_p), T_pc[:, 2, :3]
 
 
-def _passing(state: Unknowns, time_s: Float, frame: Int, xyz_c: Float) -> Float:
-    """Return how points (M, 3) of the wall pass in C, mm/s."""
+def passing_mm_s(
+    T_pc: Float, time_s: Float, frame: Int, xyz_c: Float, smoothed: Callable[[Float], Float]
+) -> Float:
+    """Return how points (M, 3) of the wall pass in C, mm/s, by poses (N, 4, 4) at times (N,).
+
+    ``smoothed`` is what is done to the poses' rates (N, 3), noise of which would be taken for motion.
+    """
     before = np.maximum(np.arange(len(time_s)) - 1, 0)
     after = np.minimum(np.arange(len(time_s)) + 1, len(time_s) - 1)
     span = np.maximum(time_s[after] - time_s[before], 1e-9)[:, None]
-    T = state.T_pc
-    velocity_p = (T[after, :3, 3] - T[before, :3, 3]) / span
-    turned = np.swapaxes(T[before, :3, :3], -1, -2) @ T[after, :3, :3]
-    turning_c = _smoothed(vector_from_rotation(turned) / span)
-    velocity_c = np.einsum("nij,ni->nj", T[:, :3, :3], _smoothed(velocity_p))
+    velocity_p = smoothed((T_pc[after, :3, 3] - T_pc[before, :3, 3]) / span)
+    turned = np.swapaxes(T_pc[before, :3, :3], -1, -2) @ T_pc[after, :3, :3]
+    turning_c = smoothed(vector_from_rotation(turned) / span)
+    velocity_c = np.einsum("nij,ni->nj", T_pc[:, :3, :3], velocity_p)
     return np.asarray(-velocity_c[frame] - np.cross(turning_c[frame], xyz_c))
 
 
 def _smoothed(rate: Float) -> Float:
-    """Return rates (N, 3) smoothed in time: noise of the poses would be taken for motion."""
+    """Return rates (N, 3) smoothed in time."""
     window = min(_SMOOTHING, len(rate) - 1 + len(rate) % 2)
     return np.asarray(savgol_filter(rate, window, 2, axis=0)) if window > 2 else rate

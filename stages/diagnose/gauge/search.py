@@ -19,7 +19,7 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
 from stages.diagnose.gauge.fit import Fit, evidence, fit, fit_beside, own_parameters
 from stages.diagnose.gauge.linearise import linearise
-from stages.diagnose.gauge.points import bin_widths
+from stages.diagnose.gauge.points import widths_at
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.scan import Scored, refined, scan
 from stages.diagnose.gauge.sets import Sets, believed, members_of, surprise_of, terms_of
@@ -74,7 +74,7 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
     smooth = adjust(loose, replace(measured, rings=rings, smooth_sigma=sigma), _FREE, watch).state
     rings = _between(source.on_bore(smooth.T_pc, smooth.probe, _FREE), posed)
     run = GaugeRun(
-        measured.edges, rings, bin_widths(source.rings, source.index, rings),
+        measured.edges, rings, widths_at(source.rings, source.index, rings.frame, rings.outward),
         measured.time_s, measured.encoder,
         max(measured.bore_sigma_mm, _LEAST_BORE_SIGMA_MM), _LOOSER * sigma,
         measured.edges.sigma_px**-2, np.ones(len(rings.frame)), watch,
