@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,12 +15,14 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Complex64, Float, Float32
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
+from pipeline.system.parallel import in_threads
 from stages.defects.along import stretches, widened
 from stages.defects.relief import Relief, WallRelief
 
 _ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
+_THREADS = 2
 _SMALL = 1  # the template for a bump of 3 mm × 3 mm
 
 
@@ -158,13 +161,17 @@ def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: 
     parts = stretches(relief.shape[0], overlap)
     for done, part in enumerate(parts, 1):
         near = weighed(relief.rows(part.wide), overlap)
-        for used in filters:
-            score = used.standardised(near)[part.inner]
+        for score in (s[part.inner] for s in scores(filters, near)):
             into[part.own] |= score > threshold
             inward[part.own] |= score < -threshold
             best[part.own] = np.maximum(best[part.own], np.abs(score))
         progress(done, 2 * len(parts))
     return Detection(into, inward, threshold, filters[_SMALL].height_sigma_mm, best, tuple(filters))
+
+
+def scores(filters: Sequence[Filter], wall: Weighed) -> Iterator[Float]:
+    """Yield the response (S, A) of every filter, in σ."""
+    return in_threads(lambda used: used.standardised(wall), filters, _THREADS)
 
 
 def seen_mm2(relief: WallRelief) -> float:
@@ -205,16 +212,17 @@ def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
     walls = [weighed(relief.rows(part.wide), overlap) for part in parts]
     seen = np.concatenate([w.seen[part.inner] for w, part in zip(walls, parts, strict=True)])
-    filters = []
-    for kernel in kernels:
+
+    def fitted(kernel: Float) -> Filter:
         found = [[f[part.inner] for f in _response(w, kernel)] for w, part in zip(walls, parts, strict=True)]
         response, power = (np.concatenate(f) for f in zip(*found, strict=True))
         least = 0.4 * float(np.median(power[seen]))
         enough = power > least
         size = np.abs(response[enough])
         scale = max(robust_spread(size), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
-        filters.append(Filter(kernel, scale, least, scale / float(np.sqrt(np.median(power[enough])))))
-    return filters
+        return Filter(kernel, scale, least, scale / float(np.sqrt(np.median(power[enough]))))
+
+    return list(in_threads(fitted, kernels, _THREADS))
 
 
 def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float]:

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from pipeline.arrays import Bool, Float
 from stages.defects.along import widened
-from stages.defects.detect import Detection, seen_mm2, weighed
+from stages.defects.detect import Detection, scores, seen_mm2, weighed
 from stages.defects.relief import WallRelief
 
 # Cells beside a peak within which another is the same one: 2 mm, the reach of the smaller templates.
@@ -80,7 +80,7 @@ def noise_tail(relief: WallRelief, seeds: Detection, known: Bool) -> NoiseTail:
         wide = relief.rows(part.wide)
         free = np.where(known[part.wide], np.nan, wide.sigma_mm)
         wall = weighed(replace(wide, sigma_mm=free), overlap)
-        score = np.max([np.abs(f.standardised(wall)) for f in seeds.filters], axis=0)[part.inner]
+        score = np.max([np.abs(s) for s in scores(seeds.filters, wall)], axis=0)[part.inner]
         heights.append(_peaks(np.where(known[rows], 0.0, score)))
         seen += int(wall.seen[part.inner].sum())
     whole = seen_mm2(relief) / (seen * relief.cell_mm[0] * relief.cell_mm[1])

@@ -13,6 +13,7 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.cloud_along import CloudAlong
 from pipeline.artefacts.measured import PointCloud
+from pipeline.system.parallel import in_threads
 from stages.defects.along import Stretch, widened
 from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief, WallRelief
@@ -23,7 +24,7 @@ _MARGIN_MM, _MARGIN_IN_RINGS = 10.0, 3.0
 # tells it, and below it moves a depth by no more than its noise.
 _UNSURE = 3.0
 _AROUND_MM = 0.45  # 1 σ of the kernel around the pipe: within a ring, samples lie close
-_LEAST = 12
+_LEAST, _THREADS = 12, 2
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,13 @@ def fine_surface(relief: Relief, points: DeviationPoints, wanted: Bool, coarse_m
     """
     out = np.full(relief.local_mm.shape, np.nan)
     place = (points.first, points.row, points.column, points.deviation_mm)
-    _regress(*place, *relief.cell_mm, *points.kernel_mm, _LEAST, np.argwhere(wanted & relief.seen), out)
+
+    def fill(cells: Int) -> None:
+        _regress(*place, *relief.cell_mm, *points.kernel_mm, _LEAST, cells, out)
+
+    cells = np.argwhere(wanted & relief.seen)
+    for _ in in_threads(fill, (cells[: len(cells) // 2], cells[len(cells) // 2 :]), _THREADS):
+        pass
     return np.where(np.isfinite(out), out, coarse_mm)
 
 
@@ -167,7 +174,7 @@ def cells_of(points: PointCloud, relief: Relief, region: Region) -> tuple[Float,
     return row, column, inside
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wanted, out):  # type: ignore[no-untyped-def]
     rows, columns = out.shape
     reach_s = int(np.ceil(2.5 * along / cell_s))
@@ -224,7 +231,7 @@ def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wante
         out[row, column] = right[0] + (right[3] + right[5]) / 12.0
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _solve(matrix, right):  # type: ignore[no-untyped-def]
     """Solve equations in place by Cholesky's way; of the matrix, positive definite, the upper half counts."""
     n = len(right)

@@ -16,12 +16,13 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
 from pipeline.recording.decoded_once import read_luma, read_split
+from pipeline.system.parallel import in_threads
 from stages.texture.blend import REFLECTANCE_SCALE
 from stages.texture.grid import FlatGrid, flat_grid
 from stages.texture.mosaic import Blended, Mosaic
 from stages.texture.noise import NoiseGauge, views_against
 from stages.texture.photometry import LightChain, cut_plan
-from stages.texture.sampling import LightSampler
+from stages.texture.sampling import LightSampler, joined
 from stages.texture.surface import wall_surface
 from stages.texture.views import LitViews, TileViews, lit_views, seen_by, thinned
 
@@ -97,9 +98,9 @@ def photograph_wall(
     images = _Images(recording, views, sum(len(s.wanted) for s in stretches), context)
     picture, lights = Blended.empty(grid, context.scratch), LightChain(len(views.frame), probe, ring)
     for stretch in stretches:
-        for view, luma in images.read(stretch.wanted, read_luma):
-            sampler.add(view, luma)
-        light = lights.add(sampler.take(stretch.wanted), stretch.wanted, sampler.reference)
+        lumas = images.read(stretch.wanted, read_luma)
+        samples = joined(list(in_threads(sampler.of, lumas, context.workers)), stretch.wanted)
+        light = lights.add(samples, stretch.wanted, sampler.reference)
         mosaic = Mosaic(
             grid, surface, probe, views, plan, stretch.tiles, light, parameters.laser_band_mm,
             parameters.left_out, picture,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import cv2
 import numpy as np
@@ -41,9 +42,15 @@ class LightSamples:
     cell: Int
     view: Int
 
+    @staticmethod
+    def none() -> LightSamples:
+        """Return no samples."""
+        number, whole = np.zeros(0), np.zeros(0, np.int64)
+        return LightSamples(number, number, number, whole, whole)
+
 
 class LightSampler:
-    """Takes samples of the wall cells from one frame after another."""
+    """Takes samples of the wall cells from frames."""
 
     def __init__(
         self,
@@ -64,12 +71,12 @@ class LightSampler:
         azimuth = np.linspace(-np.pi, np.pi, _CELL_COLUMNS, endpoint=False)
         self._patch = surface.patch(self._distance, azimuth)
         self._reference = float(self._at_sheet(radius))
-        self._parts: list[LightSamples] = []
 
-    def add(self, view: int, image: Image | None) -> None:
-        """Take the samples of one frame, its luma ``image`` (H, W); none where there is no image."""
+    def of(self, seen: tuple[int, Image | None]) -> LightSamples:
+        """Return the samples of a view by its luma (H, W); none where there is no image."""
+        view, image = seen
         if image is None:
-            return
+            return LightSamples.none()
         rows = self._rows_near(view)
         T_cp = self._views.T_cp[view]
         xyz_c = transform(T_cp, self._patch.xyz_p[rows])
@@ -87,19 +94,7 @@ class LightSampler:
         theta = np.arctan2(np.hypot(xyz_c[..., 0], xyz_c[..., 1]), xyz_c[..., 2])
         azimuth = np.arctan2(xyz_c[..., 1], xyz_c[..., 0])
         ratio = np.log(grey[use] / light[use])
-        self._parts.append(
-            LightSamples(ratio, theta[use], azimuth[use], cell[use], np.full(ratio.shape, view))
-        )
-
-    def take(self, views: Int) -> LightSamples:
-        """Return the samples taken since the last time, their views counted in a list (W,) of them."""
-        parts, self._parts = self._parts, []
-        fields = ("log_ratio", "theta_rad", "azimuth_rad", "cell", "view")
-        if not parts:
-            none, whole = np.zeros(0), np.zeros(0, np.int64)
-            return LightSamples(none, none, none, whole, whole)
-        samples = LightSamples(*(np.concatenate([getattr(p, f) for p in parts]) for f in fields))
-        return replace(samples, view=np.searchsorted(views, samples.view))
+        return LightSamples(ratio, theta[use], azimuth[use], cell[use], np.full(ratio.shape, view))
 
     @property
     def reference(self) -> float:
@@ -120,3 +115,13 @@ class LightSampler:
     def _at_sheet(self, radius: float) -> Float:
         point = np.array([radius, 0.0, self._probe.laser.baseline_mm])
         return irradiance(self._probe.lighting, point, np.array([-1.0, 0.0, 0.0]))
+
+
+def joined(parts: Sequence[LightSamples], views: Int) -> LightSamples:
+    """Return the samples of several views, which are counted in an ascending list (W,) of them."""
+    if not parts:
+        return LightSamples.none()
+    samples = LightSamples(
+        *(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(LightSamples))
+    )
+    return replace(samples, view=np.searchsorted(views, samples.view))

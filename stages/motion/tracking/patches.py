@@ -13,8 +13,10 @@ import numba
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32, Int, Int32
+from pipeline.system.parallel import in_threads
 from stages.rings.kernels import FAST
 
+_THREADS = 2
 _MOST_STEPS = 30
 """Gauss-Newton steps of one match; those that need more do not converge. Not measured."""
 _SMALL_STEP = 0.003
@@ -60,10 +62,16 @@ class Patches:
         """
         index = np.arange(len(self.value)) if index is None else index
         covariance = self._covariance(index)
-        offset, correlation, residual = _match(
-            *_wrapped(contrast, usable, self.value.shape[1]), contrast.shape[1],
-            self.value, self.by_row, self.by_column, index, covariance, row, column, _MOST_STEPS,
-        )  # fmt: skip
+        wide, width = _wrapped(contrast, usable, self.value.shape[1]), contrast.shape[1]
+        templates = self.value, self.by_row, self.by_column
+
+        def found(some: slice) -> tuple[Float, Float, Float]:
+            wanted = index[some], covariance[some], row[some], column[some]
+            return _match(*wide, width, *templates, *wanted, _MOST_STEPS)  # type: ignore[no-any-return]
+
+        middle = len(index) // 2
+        halves = in_threads(found, (slice(middle), slice(middle, None)), _THREADS)
+        offset, correlation, residual = (np.concatenate(parts) for parts in zip(*halves, strict=True))
         return Matches(offset, correlation, residual * _sigma(covariance))
 
     @staticmethod

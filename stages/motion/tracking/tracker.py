@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -74,11 +75,12 @@ def track_texture(
 
     ``progress`` is told the number of frames done.
     """
-    for done, (frame, image) in enumerate(images):
-        if image is not None:
-            predictor.learn(frame, tracker.follow(frame, image, predictor.predict(frame)))
-        progress(done + 1)
-    return tracker.result()
+    with ThreadPoolExecutor(1) as aside:
+        for done, (frame, image) in enumerate(images):
+            if image is not None:
+                predictor.learn(frame, tracker.follow(frame, image, predictor.predict(frame), aside))
+            progress(done + 1)
+        return tracker.result()
 
 
 @dataclass(frozen=True)
@@ -123,21 +125,24 @@ class TextureTracker:
         self._store = ObservationStore.on(scratch or Scratch(), parameters.most_observations)
         self._poses: list[tuple[int, Float, bool]] = []
         self._last: Strip | None = None
+        self._renewal: Future[None] | None = None
 
-    def follow(self, frame: int, image: Image, T_pc: Float) -> Float:
-        """Track one frame's softened picture from its predicted pose and return the better pose (4, 4)."""
+    def follow(self, frame: int, image: Image, T_pc: Float, aside: Executor) -> Float:
+        """Track one frame's softened picture from its predicted pose and return the better pose (4, 4).
+
+        New landmarks are started ``aside``, while the next frame is unrolled.
+        """
         T_pc, strip, found = self._located(frame, image, T_pc)
         drift, lost = self._record(found, strip, frame)
         T_better = self._shifted(T_pc, drift)
-        self._start_landmarks(strip, frame, drift)
+        self._renewal = aside.submit(self._renew, strip, frame, drift)
         self._poses.append((frame, T_better, lost))
         self._last = strip
-        if self._map.has_many_retired:
-            self._store.write(self._map.drop_retired())
         return T_better
 
     def result(self) -> TrackedTexture:
         """Return what was tracked, all observations written."""
+        self._await_renewal()
         self._store.write()
         frames = np.array([p[0] for p in self._poses], np.int64)
         T_pc = np.array([p[1] for p in self._poses]).reshape(-1, 4, 4)
@@ -150,6 +155,7 @@ class TextureTracker:
         Where few are found at the predicted pose, the last strip as a whole tells where to look instead.
         """
         strip = unroll(image, self._probe, T_pc, self._grid, self._hidden)
+        self._await_renewal()
         found = self._matched(strip, frame)
         if found.agreeing < _FEWEST_AGREEING and self._last is not None:
             T_moved = self._shifted(T_pc, _displacement(self._last, strip))
@@ -203,6 +209,18 @@ class TextureTracker:
         drift = np.median(found.offset[good], 0)
         m.offset[index] += found.offset[good] - drift
         return drift, False
+
+    def _renew(self, strip: Strip, frame: int, drift: Float) -> None:
+        """Start landmarks in the free cells of a strip, and put those that are no longer seen away."""
+        self._start_landmarks(strip, frame, drift)
+        if self._map.has_many_retired:
+            self._store.write(self._map.drop_retired())
+
+    def _await_renewal(self) -> None:
+        """Wait until the landmarks of the last frame are there."""
+        if self._renewal is not None:
+            self._renewal.result()
+            self._renewal = None
 
     def _start_landmarks(self, strip: Strip, frame: int, drift: Float) -> None:
         """Start a landmark at the best corner of every free cell."""
