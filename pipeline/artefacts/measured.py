@@ -178,6 +178,8 @@ class Trajectory:
     image_scale, image_scale_sigma : (N,) or None
         By how many times pictures are larger than the probe's camera has them, and its 1 σ; None where the
         scale did not drift.
+    radius_doubt : float
+        Relative 1 σ of all radii where encoder and stated diameter contradict the probe, else 0.
     """
 
     frame: Int
@@ -196,6 +198,7 @@ class Trajectory:
     pieces: tuple[PipePiece, ...] = ()
     image_scale: Float | None = None
     image_scale_sigma: Float | None = None
+    radius_doubt: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -71,10 +71,10 @@ def calibration_spread(
     turn = np.swapaxes(section, 1, 2) @ trajectory.T_pc[index, :3, :3]
     roll = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
     profiles = [_around(probe, rings, k, azimuth, t) for k, t in zip(some, roll, strict=True)]
-    drift = np.zeros(len(some))
+    drift = np.full(len(some), trajectory.radius_doubt * trajectory.radius_mm)
     if trajectory.image_scale_sigma is not None:
         by_scale = [_by_scale(probe, rings, k) for k in some]
-        drift = np.array(by_scale) * trajectory.image_scale_sigma[index]
+        drift = np.hypot(drift, np.array(by_scale) * trajectory.image_scale_sigma[index])
     return CalibrationSpread(survey.middle_mm[some], np.hypot(np.stack(profiles), drift[:, None]))
 
 
@@ -269,7 +269,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "6",
+    "7",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

@@ -88,16 +88,21 @@ def estimate_motion(
 
     view = WallView(recording, probe, grid)
     joined, loops = close_loops(estimate.joined, passage, features, view, parameters, context.scratch)
-    has_encoder = run.encoder is not None
+    wider = 2 * joined.radius_mm / recording.pipe.nominal_diameter_mm - 1
+    doubt, has_encoder = estimate.encoder.doubt_of_probe(wider), run.encoder is not None
+    joined = joined.with_scale_sigma(doubt)
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
-    report_motion(context, estimate, run.texture, trajectory, recording.pipe.nominal_diameter_mm)
+    report_motion(context, estimate, run.texture, trajectory, wider)
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
     steady = estimate.steady
-    return replace(trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma)
+    return replace(
+        trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
+        radius_doubt=doubt,
+    )  # fmt: skip
 
 
 def measure_run(
@@ -256,7 +261,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "25",
+    "26",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

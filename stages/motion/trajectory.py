@@ -107,11 +107,11 @@ def report_motion(
     estimate: RunEstimate,
     texture: TrackedTexture,
     trajectory: Trajectory,
-    nominal_mm: float,
+    wider: float,
 ) -> None:
     """Report the figures of a motion, and warn where it may be off by more than its σ.
 
-    ``nominal_mm`` is the pipe's stated diameter.
+    The pipe comes out ``wider`` than nominal by that share.
     """
     report_steps(context, estimate.trials, estimate.unsettled)
     context.report("landmarks", texture.store.landmarks, "")
@@ -124,7 +124,7 @@ def report_motion(
     _warn_of_trembling(trembling(trajectory.T_pc, texture.poses.frames), context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
-    estimate.encoder.warn(context, 2 * trajectory.radius_mm / nominal_mm - 1)
+    estimate.encoder.warn(context, wider)
     estimate.steady.warn(context)
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     context.report("distance travelled", travelled, "mm")

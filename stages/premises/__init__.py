@@ -17,18 +17,16 @@ from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
 from stages.premises.light import (
     Light,
     alike,
-    copies,
     light_seen,
     pattern_breaks,
-    repeated,
     rhythm_of,
     row_times,
     rows_by_motion,
-    rows_of_repeats,
     steps_of_wall,
 )
 from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
+from stages.premises.repeats import copies, repeated, rows_of_repeats
 from stages.premises.rows import Lights, Story, cheapest_story
 from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm
 from stages.premises.stays import places_that_stay
@@ -87,12 +85,13 @@ def check_premises(
         pictures = look_at_pictures(recording, probe, context, stays)
     story = _story(recording.frames, table, pictures, light)
     label = _labels(table, story, light, pictures)
-    copy = copies(pictures, light, _lights_of(_stated(table, story.row)), story.row)
+    stated, encoder = _lights_of(_stated(table, story.row)), recording.encoder
+    copy = copies(pictures, light, stated, story.row, row_times(table, story.row), encoder)
     label = np.where(copy, _stated(table, story.row), label)
     steps = steps_of_wall(pictures, light, copy)
-    row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder)
+    row = rows_by_motion(story.row, steps, rhythm_of(light), table, encoder)
     stated_s = row_times(table, row)
-    jumps = clock_jumps(stated_s, steps, recording.encoder)
+    jumps = clock_jumps(stated_s, steps, encoder)
     time_s = without_jumps(stated_s, jumps)
     changes = Changes(recording.frames, label, row, time_s)
     _refuse_unmended(changes, parameters)
@@ -224,7 +223,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "5",
+    "6",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from scipy.ndimage import label, maximum_filter1d, median_filter, minimum_filter1d
+from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Int
@@ -38,9 +38,6 @@ _NINE_IN_TEN = 1.645
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
 _LEAST_STEPS = 12
-# A picture repeats the one before where it changes by so small a part of what is usual; half as much again
-# as a usual step tells one step from two.
-_STANDS, _ONE_STEP = 0.25, 1.5
 # A step that took so many times as long as is usual counts no lost pictures: over 32 frames, 30 of them left
 # out, phase correlation erred by the way of 6 (open-1-field at half its size).
 _LONGEST_STEP = 4.0
@@ -207,26 +204,6 @@ def rows_by_motion(row: Int, steps: Steps, rhythm: int, table: FrameTable, encod
     return out
 
 
-def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
-    """Return ``row`` (F,) of a recording in one light with repeated pictures on the row before them.
-
-    A picture is repeated where the wall stands for that one picture and moves before and after. Where it
-    then goes on by a usual step, the table counted the repetition, and all rows behind move up; where it goes
-    on by two, the repetition stands in for a lost picture, and the rows behind are right.
-    """
-    size = np.abs(np.nan_to_num(pictures.step))
-    usual = median_filter(size, _AROUND_STEP, mode="nearest")
-    stands = (pictures.partner == np.arange(len(row)) - 1) & (size < _STANDS * usual)
-    stands &= pictures.change < _STANDS * np.nanmedian(pictures.change)
-    moves = size > 2 * _STANDS * usual
-    again = stands[1:-1] & moves[:-2] & moves[2:]
-    out = row.copy()
-    for k in np.flatnonzero(again) + 1:
-        counted = size[k + 1] < _ONE_STEP * usual[k + 1]
-        out[k : None if counted else k + 1] -= 1
-    return out
-
-
 def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tuple[int, int, int]]:
     """Return (start, end, pictures lost in whole rhythms) of the steps that stand out, the clearest first."""
     period_s = float(np.median(np.diff(time_s)))
@@ -258,43 +235,3 @@ def rhythm_of(light: Int) -> int:
     agree = [float((light[p:] == light[:-p]).mean()) for p in range(1, min(13, len(light)))]
     # A rhythm of twice the length agrees as well: the shortest within 0.05 (chosen) of the best is taken.
     return 1 + next((k for k, a in enumerate(agree) if a >= max(agree) - 0.05), 0)
-
-
-def repeated(pictures: Pictures, light: Int) -> Bool:
-    """Return (F,) true for pictures that differ from the one before by a quarter of what is usual at most."""
-    follows = pictures.partner == np.arange(len(light)) - 1
-    out = np.zeros(len(light), bool)
-    for kind in (Light.LINE, Light.WALL):
-        like = light == kind
-        compared = like & (pictures.partner >= 0)
-        if compared.any():
-            out |= like & follows & (pictures.change < _STANDS * np.median(pictures.change[compared]))
-    return out
-
-
-def copies(pictures: Pictures, light: Int, stated: Int, row: Int) -> Bool:
-    """Return (F,) true for pictures that are one before once more, in place of their own.
-
-    A recorder that hangs stores one picture for some frames, and the table goes on. ``stated`` (F,) is the
-    light that the ``row`` (F,) of every picture states: where lights take turns, a run of copies contradicts
-    it. Where the probe merely stands, each light repeats its own picture and nothing is contradicted. One
-    that repeats the last picture of its light, while those about it change, is a copy too.
-    """
-    again = repeated(pictures, light) & (np.diff(row, prepend=-1) > 0)
-    runs, _ = label(again)
-    contradicted = np.unique(runs[again & (light != stated)])
-    return np.asarray((again & np.isin(runs, contradicted)) | _repeated_alone(pictures, light))
-
-
-def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
-    """Return (F,) true for pictures that repeat the last one of their light while those about them change."""
-    out = np.zeros(len(light), bool)
-    for kind in (Light.LINE, Light.WALL):
-        place = np.flatnonzero((light == kind) & (pictures.partner >= 0))
-        if len(place) < _AROUND_STEP:
-            continue
-        change = pictures.change[place]
-        usual = median_filter(change, _AROUND_STEP, mode="mirror")
-        changes = np.pad(change > 2 * _STANDS * usual, 1, constant_values=True)
-        out[place] = (change < _STANDS * usual) & changes[:-2] & changes[2:]
-    return out

@@ -125,3 +125,5 @@ def test_a_diameter_that_errs_as_the_way_does_speaks_against_the_probe(wider: fl
     EncoderScale(1.02, 0.001, 0.002).warn(replace(quiet_context(), warn=told.append), wider)
     assert len(told) == 1
     assert words in told[0]
+    doubt = EncoderScale(1.02, 0.001, 0.002).doubt_of_probe(wider)
+    assert doubt == pytest.approx(0.02 if wider else 0.0), "σ of radii must hold what is told"

@@ -136,3 +136,8 @@ def test_what_is_known_of_the_scale_goes_into_the_radii() -> None:
     gain = np.nanmedian(walls[1].sigma_mm ** 2 - walls[0].sigma_mm ** 2) ** 0.5
     theta = np.arctan2(RADIUS, 22.0)  # dr = b (1 + tan² θ) θ dε where radius in the picture is f θ
     assert gain == pytest.approx(22.0 / np.cos(theta) ** 2 * theta * 2e-3, rel=0.05)
+    doubted = accumulate_wall(
+        run.probe, run.rings, run.points, replace(plain, radius_doubt=0.02), chosen, quiet_context()
+    ).radius_map
+    gain = np.nanmedian(doubted.sigma_mm**2 - walls[0].sigma_mm ** 2) ** 0.5
+    assert gain == pytest.approx(0.02 * RADIUS, rel=0.01), "a probe that encoder and diameter contradict"

@@ -64,6 +64,22 @@ def test_pictures_that_repeat_the_last_one_of_their_light_are_left_out(repeats, 
     assert f"{again.sum()} pictures show" in told[0]
 
 
+@pytest.mark.parametrize("encoder", ["goes on", "none"])
+@pytest.mark.parametrize("count", [5, 15])
+def test_pictures_of_a_recorder_that_repeats_each_light_are_left_out(count, encoder, good, run):
+    """After a second of it "42 pictures were lost", and the run came out 12 % too long."""
+    frame = np.arange(COUNT)
+    hung = (frame >= 22) & (frame < 22 + count)
+    shown = {k: good.source.images[20 + k % 2 if hung[k] else k] for k in frame}
+    spoiled = replace(good, source=MemorySource(shown, run.probe.camera.image_size))
+    spoiled = spoiled if encoder == "goes on" else replace(spoiled, encoder=None)
+    found, told = checked(spoiled, run.probe)
+    assert found.frame.tolist() == frame[~hung].tolist()
+    np.testing.assert_allclose(found.time_s, good.frames.time_s[~hung])
+    assert len(told) == 1
+    assert f"{count} pictures show the picture before once more" in told[0]
+
+
 def test_pictures_of_a_probe_that_stops_are_no_repeats():
     z = np.concatenate([np.arange(20), np.full(20, 20), 20 + np.arange(20)])
     halting = drawn_run(STEP_MM * z, 0.0 * z)

@@ -60,14 +60,24 @@ class EncoderScale:
             "compare the clocks of encoder.csv and frames.csv; compare the diameter with one that is known"
         )
 
+    def doubt_of_probe(self, wider: float) -> float:
+        """Return the relative 1 σ that radii and distances have beside the probe's own; 0 without doubt.
+
+        A wrong probe makes pipe and way larger or smaller alike. Where they do, in a pipe ``wider`` than
+        nominal by that share, the encoder may be right and lengths wrong by all of the difference.
+        """
+        alike = self.contradicted and 1 / _ALIKE < wider / (self.scale - 1) < _ALIKE
+        return abs(self.scale - 1) if alike else 0.0
+
     def _witness(self, wider: float) -> str:
-        """Return what the stated diameter says: a wrong probe makes pipe and way larger or smaller alike."""
-        if not 1 / _ALIKE < wider / (self.scale - 1) < _ALIKE:
+        """Return what the stated diameter says."""
+        if not self.doubt_of_probe(wider):
             return "; this recording cannot tell"
         larger = "wider" if wider > 0 else "narrower"
         return (
             f". The pipe comes out {100 * abs(wider):.1f} % {larger} than its stated diameter as well, which "
-            "speaks against the probe: another camera or laser, or pictures that were scaled or cropped"
+            "speaks against the probe: another camera, laser, or pictures that were scaled or cropped. σ of "
+            "radii and distances holds this"
         )
 
 

@@ -35,6 +35,10 @@ class EncoderCheck:
     delay: EncoderDelay | None
     scale: EncoderScale | None
 
+    def doubt_of_probe(self, wider: float) -> float:
+        """Return the relative 1 σ of lengths by a probe that encoder and diameter contradict: see there."""
+        return 0.0 if self.scale is None else self.scale.doubt_of_probe(wider)
+
     def warn(self, context: Context, wider: float) -> None:
         """Tell of what was wrong with the encoder, in a pipe ``wider`` than nominal by that share."""
         if self.delay is not None:

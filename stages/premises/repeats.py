@@ -1,0 +1,132 @@
+"""Pictures that are shown once more in place of their own: by a recorder that hung, or by a converter."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import label, median_filter
+
+from pipeline.arrays import Bool, Float, Int
+from pipeline.recording.base import Encoder
+from stages.premises.light import Light
+from stages.premises.pictures import Pictures
+
+# A picture repeats the one before where it changes by so small a part of what is usual; half as much again
+# as a usual step tells one step from two.
+_STANDS, _ONE_STEP = 0.25, 1.5
+# Steps on either side from which the usual speed is taken.
+_AROUND_STEP = 9
+
+
+def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
+    """Return ``row`` (F,) of a recording in one light with repeated pictures on the row before them.
+
+    A picture is repeated where the wall stands for that one picture and moves before and after. Where it
+    then goes on by a usual step, the table counted the repetition, and all rows behind move up; where it goes
+    on by two, the repetition stands in for a lost picture, and the rows behind are right.
+    """
+    size = np.abs(np.nan_to_num(pictures.step))
+    usual = median_filter(size, _AROUND_STEP, mode="nearest")
+    stands = (pictures.partner == np.arange(len(row)) - 1) & (size < _STANDS * usual)
+    stands &= pictures.change < _STANDS * np.nanmedian(pictures.change)
+    moves = size > 2 * _STANDS * usual
+    again = stands[1:-1] & moves[:-2] & moves[2:]
+    out = row.copy()
+    for k in np.flatnonzero(again) + 1:
+        counted = size[k + 1] < _ONE_STEP * usual[k + 1]
+        out[k : None if counted else k + 1] -= 1
+    return out
+
+
+def repeated(pictures: Pictures, light: Int) -> Bool:
+    """Return (F,) true for pictures that differ from the one before by a quarter of what is usual at most."""
+    follows = pictures.partner == np.arange(len(light)) - 1
+    out = np.zeros(len(light), bool)
+    for kind in (Light.LINE, Light.WALL):
+        like = light == kind
+        compared = like & (pictures.partner >= 0)
+        if compared.any():
+            out |= like & follows & (pictures.change < _STANDS * np.median(pictures.change[compared]))
+    return out
+
+
+def copies(
+    pictures: Pictures, light: Int, stated: Int, row: Int, time_s: Float, encoder: Encoder | None
+) -> Bool:
+    """Return (F,) true for pictures that are one before once more, in place of their own.
+
+    A recorder that hangs stores one picture for some frames, and the table goes on. ``stated`` (F,) is the
+    light that the ``row`` (F,) of every picture states: where lights take turns, a run of copies contradicts
+    it. Where the probe merely stands, each light repeats its own picture and nothing is contradicted. One
+    that repeats the last picture of its light, while those about it change, is a copy too, and so is a run of
+    them (`_hung`). ``time_s`` (F,) is when the pictures were taken.
+    """
+    again = repeated(pictures, light) & (np.diff(row, prepend=-1) > 0)
+    runs, _ = label(again)
+    contradicted = np.unique(runs[again & (light != stated)])
+    alone = _repeated_alone(pictures, light) | _hung(pictures, light, time_s, encoder)
+    return np.asarray((again & np.isin(runs, contradicted)) | alone)
+
+
+def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
+    """Return (F,) true for pictures that repeat the last one of their light while those about them change."""
+    out = np.zeros(len(light), bool)
+    for kind in (Light.LINE, Light.WALL):
+        place = np.flatnonzero((light == kind) & (pictures.partner >= 0))
+        if len(place) < _AROUND_STEP:
+            continue
+        change = pictures.change[place]
+        usual = median_filter(change, _AROUND_STEP, mode="mirror")
+        changes = np.pad(change > 2 * _STANDS * usual, 1, constant_values=True)
+        out[place] = (change < _STANDS * usual) & changes[:-2] & changes[2:]
+    return out
+
+
+def _hung(pictures: Pictures, light: Int, time_s: Float, encoder: Encoder | None) -> Bool:
+    """Return (F,) true where each light repeats its own last picture for a while, and the wall then leaps.
+
+    A probe that stands shows the same, but goes on by a usual step, and the encoder stands with it.
+    """
+    out = np.zeros(len(light), bool)
+    wall = np.flatnonzero((light == Light.WALL) & (pictures.partner >= 0))
+    still = _unchanged(pictures, wall)
+    runs, count = label(still)
+    for run in range(1, count + 1):
+        inside = np.flatnonzero(runs == run)
+        behind = int(inside[-1]) + 1
+        if len(inside) < 2 or behind == len(wall) or not _leaps(pictures.step[wall], ~still, behind):
+            continue
+        first, last = int(pictures.partner[wall[inside[0]]]), int(wall[inside[-1]])
+        if encoder is None or _went_on(encoder, time_s, first, last):
+            out |= _still_between(pictures, light, first, int(wall[behind]))
+    return out
+
+
+def _unchanged(pictures: Pictures, place: Int) -> Bool:
+    """Return which pictures (K,) of one light change by a part of what is usual only."""
+    change = pictures.change[place]
+    return np.asarray(change < _STANDS * np.median(change)) if len(place) else np.zeros(0, bool)
+
+
+def _leaps(step: Float, moving: Bool, behind: int) -> bool:
+    """Return whether a step (of K) is none that a wall which goes on as before and after makes."""
+    near = np.abs(np.arange(len(step)) - behind) <= _AROUND_STEP
+    usual = step[near & moving & np.isfinite(step) & (np.arange(len(step)) != behind)]
+    if not usual.size or not np.isfinite(step[behind]):
+        return bool(usual.size)
+    return not 0 <= step[behind] / float(np.median(usual)) < _ONE_STEP
+
+
+def _went_on(encoder: Encoder, time_s: Float, first: int, last: int) -> bool:
+    """Return whether the encoder went on from one picture to another at half of its usual speed or more."""
+    read = np.abs(np.diff(np.interp(time_s, encoder.time_s, encoder.distance_mm)))
+    usual = float(np.median(read[read > 0])) if read.any() else 0.0
+    return bool(read[first:last].mean() > usual / 2 > 0)
+
+
+def _still_between(pictures: Pictures, light: Int, first: int, behind: int) -> Bool:
+    """Return (F,) true for the pictures of both lights between two that repeat the last of their light."""
+    out = np.zeros(len(light), bool)
+    for kind in (Light.LINE, Light.WALL):
+        place = np.flatnonzero((light == kind) & (pictures.partner >= 0))
+        out[place] = _unchanged(pictures, place) & (place > first) & (place < behind)
+    return out
