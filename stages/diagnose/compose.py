@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
+from enum import StrEnum
+from typing import Any
 
 import numpy as np
 
@@ -225,67 +227,41 @@ def _global_p(field: Seen | None, gauge: Seen | None) -> float:
 
 
 def to_json(found: Diagnosis) -> dict[str, object]:
-    """Return what diagnosis.json holds."""
-    out: dict[str, object] = {
-        "format": _FORMAT, "recording": found.recording, "gauge": found.gauge, "verdict": str(found.verdict),
-        "global_p": _number(found.global_p),
-        "location": None if found.location is None else _place(found.location),
+    """Return what diagnosis.json holds: all but the pictures."""
+    told = {k: v for k, v in _fields(found).items() if not k.endswith("_picture")}
+    return {
+        "format": _FORMAT,
+        **told,
+        "discrepancy": None,
         "effects": [_effect(e, found) for e in found.effects],
-        "class": list(found.members), "identifiable": found.identifiable, "discrepancy": None,
-        "remainder": None if found.remainder is None else _remainder(found.remainder),
-        "fit": None if found.fit is None else _plain(found.fit),
-        "record_next": found.record_next,
-        "feasibility": [_plain(f) for f in found.feasibility],
-        "inseparable": [list(names) for names in found.inseparable],
-        "candidates": [_plain(c) for c in found.candidates],
-        "shortcomings": list(found.shortcomings), "notes": list(found.notes),
-    }  # fmt: skip
-    return out
+    }
 
 
 def _effect(found: EffectFound, answer: Diagnosis) -> dict[str, object]:
     alone = answer.location if len(answer.effects) == 1 else None
-    place = found.location or alone
     undecided = answer.verdict is Verdict.CLASS and found.name in answer.members
     return {
-        "name": found.name, "probability": _number(found.probability),
-        "parameters": {k: _plain(v) for k, v in found.parameters.items()},
-        "statement": found.statement, "equation": found.equation,
-        "confirmed_by": [_plain(c) for c in found.confirmed_by],
-        "course": None if found.course is None else _course(found.course), "recording": found.recording,
-        "location": None if place is None else _place(place),
+        **_fields(replace(found, location=found.location or alone)),
         "credible_set": list(answer.members) if undecided else [found.name],
-    }  # fmt: skip
+    }
 
 
-def _remainder(left: Remainder) -> dict[str, object]:
-    return {
-        "verdict": str(left.verdict), "location": None if left.location is None else _place(left.location),
-        "class": list(left.members), "formula": left.formula,
-    }  # fmt: skip
+def _fields(record: object) -> dict[str, object]:
+    """Return a record's fields: of a place those that are known, of a course its numbers beside its kind."""
+    if isinstance(record, CourseFound):
+        return {"kind": record.kind, **_plain(record.parameters), "probability": _plain(record.probability)}
+    each = {"class" if k == "members" else k: _plain(v) for k, v in vars(record).items()}
+    return {k: v for k, v in each.items() if v is not None} if isinstance(record, Location) else each
 
 
-def _course(found: CourseFound) -> dict[str, object]:
-    numbers = {k: _plain(v) for k, v in found.parameters.items()}
-    return {"kind": found.kind, **numbers, "probability": _number(found.probability)}
-
-
-def _place(found: Location) -> dict[str, object]:
-    return {k: v for k, v in _plain(found).items() if v is not None}
-
-
-def _plain(record: object) -> dict[str, object]:
-    return {k: _value(v) for k, v in vars(record).items()}
-
-
-def _value(value: object) -> object:
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it: numbers in six figures, None for what is no number."""
+    if isinstance(value, StrEnum):
+        return str(value)
     if isinstance(value, float):
-        return _number(value)
+        return float(f"{value:.6g}") if np.isfinite(value) else None
     if isinstance(value, tuple):
-        return [_value(v) for v in value]
-    return value
-
-
-def _number(value: float) -> float | None:
-    """Return the number in six figures; None for what is no number, which JSON does not have."""
-    return float(f"{value:.6g}") if np.isfinite(value) else None
+        return [_plain(v) for v in value]
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    return _fields(value) if is_dataclass(value) else value
