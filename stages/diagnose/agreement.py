@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy import stats
@@ -10,7 +12,7 @@ from scipy import stats
 from pipeline.arrays import Float
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.inference import DEGREES
-from stages.diagnose.result import Confirmation
+from stages.diagnose.result import Confirmation, Value
 
 # They agree when their difference is no rarer than this.
 AGREE = 1e-3
@@ -18,6 +20,7 @@ AGREE = 1e-3
 _LAW = 0.05
 # A measurement tells something only when it is known to this part of the effect.
 TELLING = 0.25
+_DRAWS = 400
 
 
 @dataclass(frozen=True)
@@ -91,21 +94,25 @@ def _spread(gap: Float, size: float) -> Float:
 
 
 def sized(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:
-    """Return an effect's quantities, each with its own 1 σ, by the slopes of its amplitudes (Q,)."""
-    step = 0.1 * np.sqrt(np.diag(covariance))
-    slopes: dict[str, list[float]] = {}
-    for way in np.diag(step):
-        higher, lower = (model.quantities(shape, amplitude + s * way) for s in (1, -1))
-        for name in higher:
+    """Return an effect's quantities, each with its own 1 σ, of amplitudes (Q,)."""
+    told = drawn(partial(model.quantities, shape), amplitude, covariance)
+    words = {name: f" ± {v.sd:.2g}" if v.sd > 0 else "" for name, v in told.items()}
+    return ", ".join(f"{name} {v.value:.4g}{words[name]}" for name, v in told.items() if np.isfinite(v.value))
+
+
+def drawn(
+    numbers: Callable[[Float], dict[str, float]], amplitude: Float, covariance: Float
+) -> dict[str, Value]:
+    """Return numbers of amplitudes (Q,) with 1 σ, by draws; NaN where a covariance is not known."""
+    middle, random = numbers(amplitude), np.random.default_rng(0)
+    if not np.isfinite(covariance).all():
+        return {name: Value(value, float("nan")) for name, value in middle.items()}
+    draws = random.multivariate_normal(amplitude, covariance, _DRAWS, check_valid="ignore")
+    each, out = [numbers(a) for a in draws], {}
+    for name, value in middle.items():
+        apart = np.array([d[name] for d in each]) - value
+        if name in ("direction_deg", "phase_deg"):
             # A direction may pass from 180 to -180 degrees in between.
-            change = higher[name] - lower[name]
-            turned = (change + 180) % 360 - 180 if name.endswith("_deg") else change
-            slopes.setdefault(name, []).append(turned / 0.2)
-    unit = covariance / np.maximum(np.outer(step, step) * 100, np.finfo(float).tiny)
-    told = []
-    for name, value in model.quantities(shape, amplitude).items():
-        sigma = float(np.sqrt(np.array(slopes[name]) @ unit @ np.array(slopes[name])))
-        told += (
-            [f"{name} {value:.4g}" + (f" ± {sigma:.2g}" if sigma > 0 else "")] if np.isfinite(value) else []
-        )
-    return ", ".join(told)
+            apart = (apart + 180) % 360 - 180
+        out[name] = Value(value, float(np.sqrt(np.mean(apart**2))))
+    return out

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
-from stages.diagnose.agreement import TELLING, same, sized
+from stages.diagnose.agreement import TELLING, drawn, same, sized
 from stages.diagnose.effects.base import Shape
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
 from stages.diagnose.gauge.fit import evidence
@@ -26,7 +26,6 @@ from stages.diagnose.result import Confirmation, CourseFound, Value
 _AGREE = 2e-4
 _LEAST_FRAMES = 8
 _BORE = "bore"
-_DRAWS = 400
 
 
 @dataclass(frozen=True)
@@ -201,27 +200,17 @@ def _sized(judged: Judged, term: Term, stated: Stated) -> Sized:
 
 def quantities(sized: Sized) -> dict[str, Value]:
     """Return the catalogue's quantities with 1 σ."""
-    return _drawn(sized, sized.term.model.quantities)
+    return _numbers(sized, sized.term.model.quantities)
 
 
 def course_of(sized: Sized) -> CourseFound:
     """Return the term's course with 1 σ."""
-    numbers = _drawn(sized, sized.term.model.course)
+    numbers = _numbers(sized, sized.term.model.course)
     if sized.time_s is not None:
         numbers["time_s"] = sized.time_s
     return CourseFound(str(sized.term.model.kind), numbers)
 
 
-def _drawn(sized: Sized, numbers: Callable[[Shape, Float], dict[str, float]]) -> dict[str, Value]:
-    """Return numbers of a term with 1 σ, by draws of the amplitudes."""
-    term, random = sized.term, np.random.default_rng(0)
-    draws = random.multivariate_normal(term.amplitude, sized.covariance, _DRAWS, check_valid="ignore")
-    middle = numbers(*term.at(term.amplitude))
-    drawn = [numbers(*term.at(a)) for a in draws]
-    out = {}
-    for name, value in middle.items():
-        apart = np.array([d[name] for d in drawn]) - value
-        if name in ("direction_deg", "phase_deg"):
-            apart = (apart + 180) % 360 - 180
-        out[name] = Value(value, float(np.sqrt(np.mean(apart**2))))
-    return out
+def _numbers(sized: Sized, numbers: Callable[[Shape, Float], dict[str, float]]) -> dict[str, Value]:
+    term = sized.term
+    return drawn(lambda a: numbers(*term.at(a)), term.amplitude, sized.covariance)
