@@ -17,12 +17,11 @@ from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, 
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
-from stages.diagnose.gauge.fit import Fit, evidence, fit, fit_beside, own_parameters
+from stages.diagnose.gauge.fit import Fit, fit, fit_beside, own_parameters
 from stages.diagnose.gauge.linearise import linearise
 from stages.diagnose.gauge.points import widths_at
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.scan import Scored, refined, scan
-from stages.diagnose.gauge.sets import Sets, believed, members_of, surprise_of, terms_of
 from stages.diagnose.inference import Stated
 
 # Something was left out when its probability by chance, corrected for all tried, is below this.
@@ -31,8 +30,6 @@ DETECTED = 1e-4
 _REFITTED = 4
 _OTHER_COURSES = 2
 MOST_EFFECTS = 6
-# So many of the likeliest sets about a fit are fitted.
-_PROPOSED = 3
 _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
 _RIVAL_ITERATIONS = 5
@@ -163,8 +160,7 @@ class Search:
 
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
-    """Add effects while the data ask for them; after each, see whether another set of them does better."""
-    laws = len({model.law for model in library.values()})
+    """Add effects while the data ask for them; whether another set of them does better, the judge weighs."""
     found, steps = start, []
     tried: list[Fit] = []
     while True:
@@ -173,10 +169,7 @@ def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated
         if better is None or len(better.terms) > MOST_EFFECTS or len(steps) > 2 * MOST_EFFECTS:
             break
         better = refined(run, better)
-        others: tuple[Fit, ...] = ()
-        if len(better.terms) > 1:
-            better, others = _exchanged(run, better, step.scores, stated, laws)
-        tried += [*step.tried, *others, found]
+        tried += [*step.tried, found]
         run, found = _weighed_anew(run, better)
     ratio = alike(steps[-1].scores)
     nothing, rivals = fit(run, start.state, ()), _rivals(run, found, tried, ratio)
@@ -269,30 +262,3 @@ def _counts(found: Fit) -> bool:
     """Return whether the last effect is large enough beside the others to count."""
     sizes = [shift_px(found, t) for t in found.terms]
     return len(sizes) < 2 or sizes[-1] > LEAST_SHARE * max(sizes[:-1])
-
-
-def _exchanged(
-    run: GaugeRun, found: Fit, scores: Sequence[Scored], stated: Stated, laws: int
-) -> tuple[Fit, tuple[Fit, ...]]:
-    """Return the likeliest of a fit and of the sets of effects that are likely about it, and the others.
-
-    The fit's first effects were found with all others still there. Sets are compared by the equations of this
-    fit; the best few are then fitted.
-    """
-    members = members_of(run, found, scores, laws)
-    own = [(t.model, t.shape) for t in found.terms]
-    asked = [(m.model, m.shape) for m in members if (m.model, m.shape) not in own]
-    ratio = believed(evidence(run, found, ())[0], alike(scores))
-    sets = Sets.of(evidence(run, found, asked, with_spread=False)[0], members, stated, ratio)
-    here = sets.set_of(found)
-    met = sets.likely([here], MOST_EFFECTS)
-    # What comes on top of the fit is for the next step.
-    named = [s for s in met if s and not s >= here and not any(sets.members[k].nameless for k in s)]
-    near = sorted((s for s in named if met[s] < met[here] + _LEAST_GAIN), key=met.__getitem__)
-    fits = [found]
-    for chosen in near[:_PROPOSED]:
-        terms = terms_of(sets.in_order(chosen), found)
-        fits.append(refined(run, fit(run, found.state, terms, _RIVAL_ITERATIONS)))
-    surprise = [surprise_of(f, laws, stated, ratio) for f in fits]
-    best = int(np.argmin(surprise))
-    return fits[best], tuple(f for k, f in enumerate(fits) if k != best)

@@ -22,7 +22,7 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.free_profile import FREE_PROFILES
 from stages.diagnose.effects.nameless import VOCABULARY, Nameless
-from stages.diagnose.gauge.fit import Fit, evidence
+from stages.diagnose.gauge.fit import Fit
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import Scored, span
 from stages.diagnose.inference import (
@@ -30,7 +30,6 @@ from stages.diagnose.inference import (
     PRIOR_PLAUSIBLE,
     Evidence,
     Stated,
-    estimate,
     instrument_places,
     places_of,
 )
@@ -114,13 +113,6 @@ def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
             for c in of.columns
         ]
     )
-
-
-def surprise_of(found: Fit, laws: int, stated: Stated, believed: float) -> float:
-    """Return −2 ln of the chance of a fit's effects, up to a constant."""
-    of = evidence(found.run, found, (), with_spread=False)[0].deflated(believed)
-    chance = beforehand(found.run, [(t.model, t.shape) for t in found.terms], laws)
-    return estimate(of, stated, prior_sigma(of, found.terms)).surprise + chance
 
 
 def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -> tuple[Member, ...]:
