@@ -13,10 +13,11 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
+from pipeline.system.parallel import in_threads
 from stages.premises.stays import in_full
 
 # Rays of the polar picture: a line that closes is told from chance by tens of them already.
-_RAYS = 128
+_RAYS, _THREADS = 128, 2
 # A line is closed when it goes round more than half of the circle.
 CLOSED = 0.5
 # Part of the way from the centre to the nearer edge of the picture that is looked at.
@@ -82,14 +83,21 @@ def look_at_pictures(
     motion = _AxialMotion(probe.camera, polar.line_width_px, stays)
     count = len(recording.frames.frame)
     seen = _empty(count, polar.azimuth_rad)
-    for place, (_, image) in enumerate(recording.read(recording.frames.frame, "grey")):
-        if image is not None:
-            wall, line = polar.wall_and_line(image)
-            seen.brightness[place] = np.sqrt(float(wall.mean()))
-            seen.closed[place], seen.line_px[place] = polar.closed_line(line)
-            ring = seen.line_px[place] if seen.closed[place] > CLOSED else None
-            compared = motion.since(place, seen.brightness[place], image, ring)
-            seen.partner[place], seen.change[place], seen.step[place] = compared
+
+    def look(place: int, image: Image | None) -> _Strip | None:
+        if image is None:
+            return None
+        wall, line = polar.wall_and_line(image)
+        seen.brightness[place] = np.sqrt(float(wall.mean()))
+        seen.closed[place], seen.line_px[place] = polar.closed_line(line)
+        ring = seen.line_px[place] if seen.closed[place] > CLOSED else None
+        return motion.strip(place, seen.brightness[place], image, ring)
+
+    images = recording.read(recording.frames.frame, "grey")
+    strips = in_threads(lambda given: look(given[0], given[1][1]), enumerate(images), _THREADS)
+    for place, strip in enumerate(strips):
+        if strip is not None:
+            seen.partner[place], seen.change[place], seen.step[place] = motion.since(strip)
         context.progress(place + 1, count)
     return seen
 
@@ -160,20 +168,21 @@ class _AxialMotion:
         self._radii_per_row = float(z[1] - z[0])
         self._kept: deque[_Strip] = deque(maxlen=_KEPT)
 
-    def since(
-        self, place: int, brightness: float, image: Image, line_px: Float32 | None
-    ) -> tuple[int, float, float]:
-        """Return the latest picture in like light, the difference to it, and the motion in pipe radii.
+    def strip(self, place: int, brightness: float, image: Image, line_px: Float32 | None) -> _Strip:
+        """Return the wall unrolled.
 
         Rows with a laser line, at ``line_px`` on each ray, are left out: it does not move with the wall.
         """
         grey = cv2.remap(image, self._u, self._v, cv2.INTER_LINEAR).astype(np.float32)
-        strip = _Strip(place, brightness, grey, *self._free_rows(line_px))
+        return _Strip(place, brightness, grey, *self._free_rows(line_px))
+
+    def since(self, strip: _Strip) -> tuple[int, float, float]:
+        """Return the latest picture in like light, the difference to it, and the motion in pipe radii."""
         before = next((k for k in reversed(self._kept) if _in_like_light(k, strip)), None)
         self._kept.append(strip)
         if before is None:
             return -1, np.nan, np.nan
-        change = float(np.abs(grey - before.grey).mean())
+        change = float(np.abs(strip.grey - before.grey).mean())
         rows = slice(max(strip.first, before.first), min(strip.end, before.end))
         if rows.stop - rows.start < _LEAST_ROWS:
             return before.place, change, np.nan
