@@ -54,11 +54,13 @@ def scene(
     swing_mm: float = 0.0,
     widens: float = 0.0,
     picture_grows: float = 0.0,
+    joint_mm: tuple[float, float] = (0.0, 0.0),
 ) -> Scene:
     """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`.
 
     The way swings by ``swing_mm`` about one of even speed. The pipe's radius gains the share ``widens`` of
     the distance, and pictures are larger in the end than at the beginning by the share ``picture_grows``.
+    From a joint on (`joint_at`) the pipe is wider and lies farther along x by ``joint_mm``.
     """
     random = np.random.default_rng(seed)
     instrument = probe()
@@ -75,9 +77,10 @@ def scene(
         T_pc, np.zeros((landmarks, 3)), -20.0, 1.2 * frames + 60, RADIUS, 30.0, unsure.shape[1] + MATCH_BIASES
     )
     state = _bent(replace(start, globals=np.array([RADIUS, 0.2, -0.1, 1.0])))
-    truth = replace(state, xyz_p=_on_wall(state, random, landmarks, widens))
+    wall = Wall(state, widens, joint_at(frames), joint_mm)
+    truth = replace(state, xyz_p=_on_wall(wall, random, landmarks))
     tracks = _tracks(truth, instrument, noise, random)
-    rings = _rings(truth, noise, random, unsure.shape[1], widens=widens)
+    rings = _rings(wall, noise, random, unsure.shape[1])
     larger = picture_grows * (k / (frames - 1) - 0.5)
     tracks = tracks.reduced(1 - larger, instrument.camera.centre_px)
     grown = _RING_PX * larger[rings.frame, None] * rings.by_pixel
@@ -105,11 +108,32 @@ def _bent(state: State) -> State:
     return state.step(np.zeros((len(state.T_pc), 7)), border, np.zeros_like(state.xyz_p))
 
 
-def _on_wall(state: State, random: np.random.Generator, count: int, widens: float) -> Float:
-    s = random.uniform(12, 1.2 * len(state.T_pc) + 30, count)
-    psi = random.uniform(-np.pi, np.pi, count)
-    r, a, b, _ = state.globals
-    return from_pipe(state.axis, s, psi, r + widens * s + a * np.cos(2 * psi) + b * np.sin(2 * psi))
+@dataclass(frozen=True)
+class Wall:
+    """A pipe that may widen, and have a joint at ``joint_at_mm``."""
+
+    state: State
+    widens: float
+    joint_at_mm: float
+    joint_mm: tuple[float, float]
+
+    def at(self, s: Float, psi: Float) -> Float:
+        """Return its points (M, 3) at distances and azimuths (M,)."""
+        r, a, b, _ = self.state.globals
+        behind = s > self.joint_at_mm
+        radius = r + self.widens * s + self.joint_mm[0] * behind
+        xyz = from_pipe(self.state.axis, s, psi, radius + a * np.cos(2 * psi) + b * np.sin(2 * psi))
+        return np.asarray(xyz + (self.joint_mm[1] * behind)[:, None] * [1.0, 0.0, 0.0])
+
+
+def joint_at(frames: int) -> float:
+    """Return where the joint of a scene of so many frames is: at the ring of the middle frame."""
+    return 1.2 * (frames // 2 - 0.5) + 22.0
+
+
+def _on_wall(wall: Wall, random: np.random.Generator, count: int) -> Float:
+    s = random.uniform(12, 1.2 * len(wall.state.T_pc) + 30, count)
+    return wall.at(s, random.uniform(-np.pi, np.pi, count))
 
 
 def _tracks(state: State, instrument: Probe, noise: float, random: np.random.Generator) -> Tracks:
@@ -131,27 +155,18 @@ def _tracks(state: State, instrument: Probe, noise: float, random: np.random.Gen
     )  # fmt: skip
 
 
-def _rings(
-    state: State,
-    noise: float,
-    random: np.random.Generator,
-    unsure: int,
-    bins: int = 24,
-    widens: float = 0.0,
-) -> RingBins:
+def _rings(wall: Wall, noise: float, random: np.random.Generator, unsure: int, bins: int = 24) -> RingBins:
     psi = np.linspace(-np.pi, np.pi, bins, endpoint=False)
-    r, a, b, _ = state.globals
-    points = []
-    for T in state.T_pc:
+    points, poses = [], wall.state.T_pc
+    for T in poses:
         s = np.full(bins, T[2, 3] + 22.0)
         for _ in range(6):
-            wall = from_pipe(state.axis, s, psi, r + widens * s + a * np.cos(2 * psi) + b * np.sin(2 * psi))
-            s = s - (transform(inverse(T), wall)[:, 2] - 22.0)
-        points.append(transform(inverse(T), wall))
+            s = s - (transform(inverse(T), wall.at(s, psi))[:, 2] - 22.0)
+        points.append(transform(inverse(T), wall.at(s, psi)))
     xyz_c = np.concatenate(points)
     outward = xyz_c * [1, 1, 0] / np.linalg.norm(xyz_c[:, :2], axis=1)[:, None]
     xyz_c = xyz_c + noise * 0.05 * random.standard_normal(len(xyz_c))[:, None] * outward
     by_instrument = random.standard_normal((len(xyz_c), 3, unsure)) * 0.01
-    frame = np.repeat(np.arange(len(state.T_pc)), bins)
+    frame = np.repeat(np.arange(len(poses)), bins)
     by_pixel = _RING_MM_PER_PX * outward
     return RingBins(frame, xyz_c, by_instrument, by_pixel, 0 * by_instrument, np.full(len(xyz_c), 0.05))

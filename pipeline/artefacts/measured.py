@@ -144,6 +144,24 @@ class PipePiece:
 
 
 @dataclass(frozen=True)
+class LaserKnock:
+    """A laser that moved against the camera from one ring to the next, and stayed there.
+
+    Attributes
+    ----------
+    frame : int
+        First frame after it.
+    change : (3,)
+        Of the sheet's baseline, mm, and of its slopes along x and y of C.
+    covariance : (3, 3)
+    """
+
+    frame: int
+    change: Float
+    covariance: Float
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """Pose of the camera in P at every frame, the pipe's axis, and what the motion showed.
 
@@ -180,6 +198,8 @@ class Trajectory:
         scale did not drift.
     radius_doubt : float
         Relative 1 σ of all radii where encoder and stated diameter contradict the probe, else 0.
+    knock : LaserKnock or None
+        A laser knocked in the run; ``instrument`` is the probe before it.
     """
 
     frame: Int
@@ -199,6 +219,7 @@ class Trajectory:
     image_scale: Float | None = None
     image_scale_sigma: Float | None = None
     radius_doubt: float = 0.0
+    knock: LaserKnock | None = None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.measured import LaserKnock, Trajectory
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 
@@ -106,6 +106,14 @@ class Probe:
         if trajectory.instrument is None or trajectory.instrument_covariance is None:
             return self
         return self.with_parameters(trajectory.instrument, trajectory.instrument_covariance)
+
+    def after(self, knock: LaserKnock) -> Probe:
+        """Return the probe with its laser knocked, and no surer than that is known."""
+        first, count = len(self.camera.parameter_names), len(knock.change)
+        parameters, covariance = self.parameters, self.covariance.copy()
+        parameters[first : first + count] += knock.change
+        covariance[first : first + count, first : first + count] += knock.covariance
+        return self.with_parameters(parameters, covariance)
 
     def principal_uncertainties(self) -> Float:
         """Return (P, Q) the independent directions of the covariance, each 1 σ long, largest first.

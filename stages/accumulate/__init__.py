@@ -70,7 +70,11 @@ def calibration_spread(
     section = frames_at(trajectory.axis, survey.middle_mm[some])[1]
     turn = np.swapaxes(section, 1, 2) @ trajectory.T_pc[index, :3, :3]
     roll = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
-    profiles = [_around(probe, rings, k, azimuth, t) for k, t in zip(some, roll, strict=True)]
+    knock = trajectory.knock
+    after = probe if knock is None else probe.after(knock)
+    first = np.inf if knock is None else knock.frame
+    probes = [probe if rings.frame[k] < first else after for k in some]
+    profiles = [_around(p, rings, k, azimuth, t) for p, k, t in zip(probes, some, roll, strict=True)]
     drift = np.full(len(some), trajectory.radius_doubt * trajectory.radius_mm)
     if trajectory.image_scale_sigma is not None:
         by_scale = [_by_scale(probe, rings, k) for k in some]

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Int
-from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import LaserKnock, RingPoints, RingSamples, RingValidity, Trajectory
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.probe import Probe
 from pipeline.system.parallel import in_threads
@@ -111,7 +111,7 @@ def wall_samples(
     direction = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
     pixels = rings.centre_px + rings.radius_px[rows][..., None].astype(np.float64) * direction
     ray = probe.camera.unproject(pixels).ray
-    xyz_p = _placed(T_pc, probe.laser.intersect(ray))
+    xyz_p = _placed(T_pc, _on_sheet(probe, trajectory.knock, frame, ray))
     s, psi, radius = to_pipe(trajectory.axis, xyz_p)
     uncorrected = to_pipe(trajectory.axis, _placed(T_pc, probe.laser.untilted().intersect(ray)))[2]
     section = frames_at(trajectory.axis, np.where(np.isfinite(s), s, 0.0))[1]
@@ -122,6 +122,15 @@ def wall_samples(
     seen = rings.validity[rows] == RingValidity.VALID
     valid = seen & known[:, None] & np.isfinite(radius) & np.isfinite(sigma)
     return WallSamples(frame, valid, xyz_p, s, psi, radius, sigma, uncorrected - radius, section)
+
+
+def _on_sheet(probe: Probe, knock: LaserKnock | None, frame: Int, ray: Float) -> Float:
+    """Return where rays (F, A, 3) of frames (F,) meet the laser sheet, which may have been knocked."""
+    xyz_c = probe.laser.intersect(ray)
+    if knock is not None:
+        after = frame >= knock.frame
+        xyz_c[after] = probe.after(knock).laser.intersect(ray[after])
+    return xyz_c
 
 
 def _placed(T_pc: Float, xyz_c: Float) -> Float:

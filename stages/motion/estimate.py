@@ -22,6 +22,7 @@ from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import FrameTable, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
+from stages.motion.bundle_adjustment.laser_knock import find_jump
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
@@ -102,6 +103,7 @@ def estimate_motion(
     return replace(
         trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
         radius_doubt=doubt,
+        knock=steady.run.knock,
     )  # fmt: skip
 
 
@@ -142,7 +144,9 @@ def measure_run(
     at_mm = T_pc[places_of(recording, circles.frame), 2, 3] + probe.laser.baseline_mm
     bore = BoreSteps.of(circles.radius_mm, at_mm)
     context.report("steps of the bore", len(bore.at_mm), "")
-    return MeasuredRun(texture, rings, place, recording.frames.time_s, T_pc, encoder, probe, bore)
+    jump = find_jump(circles, at_mm, points, probe)
+    time_s = recording.frames.time_s
+    return MeasuredRun(texture, rings, place, time_s, T_pc, encoder, probe, bore, jump=jump)
 
 
 @dataclass(frozen=True)

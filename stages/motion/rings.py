@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.interpolate import interp1d
@@ -61,6 +62,11 @@ class RingBins:
     instrument_by_pixel: Float
     sigma_mm: Float
 
+    @staticmethod
+    def joined(parts: Sequence[RingBins]) -> RingBins:
+        """Return the bins of several parts of a run, one after the other."""
+        return RingBins(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(RingBins)))
+
     def instrument_where_expected(self, residual_mm: Float, normal_c: Float) -> Float:
         """Return ``by_instrument`` where the pipe puts the ring, which is off it by (M,) along (M, 3) in C.
 
@@ -77,11 +83,14 @@ class RingBins:
 class BoreSteps:
     """Where the bore steps (k,), and how much wider (k + 1,) than the longest the lengths between are, mm.
 
-    A pipe of one bore has no steps. Held to one radius, two bores 2 mm apart moved the probe by 20 σ.
+    A pipe of one bore has no steps. Held to one radius, two bores 2 mm apart moved the probe by 20 σ. From
+    ``aside_from_mm`` on the pipe lies farther across by ``aside_mm``, along x and y of its sections.
     """
 
     at_mm: Float
     wider_mm: Float
+    aside_from_mm: float = np.inf
+    aside_mm: tuple[float, float] = (0.0, 0.0)
 
     @staticmethod
     def of(radius_mm: Float, at_mm: Float) -> BoreSteps:
@@ -91,8 +100,7 @@ class BoreSteps:
         radius_mm, at_mm = radius_mm[order], at_mm[order]
         if len(radius_mm) < 2 * _FEWEST_RINGS_OF_LENGTH + 2:
             return NO_STEPS
-        apart_mm = max(float(np.ptp(at_mm)) / len(at_mm), 1e-9)
-        n = max(round(_LENGTH_RADII * float(np.median(radius_mm)) / apart_mm), _FEWEST_RINGS_OF_LENGTH)
+        n = rings_of_length(radius_mm, at_mm)
         if len(radius_mm) < 2 * n + 2:
             return NO_STEPS
         median = np.median(np.lib.stride_tricks.sliding_window_view(radius_mm, n), axis=1)
@@ -111,7 +119,19 @@ class BoreSteps:
 
     def behind(self, start_mm: float) -> BoreSteps:
         """Return the steps with distance counted from ``start_mm``."""
-        return BoreSteps(self.at_mm - start_mm, self.wider_mm)
+        return replace(self, at_mm=self.at_mm - start_mm, aside_from_mm=self.aside_from_mm - start_mm)
+
+    def with_joint(self, at_mm: float, aside_mm: tuple[float, float], wider_mm: float) -> BoreSteps:
+        """Return the steps with a joint behind which the pipe lies aside and is wider."""
+        place = int(np.searchsorted(self.at_mm, at_mm))
+        wider = np.insert(self.wider_mm, place, self.wider_mm[place])
+        wider[place + 1 :] += wider_mm
+        return BoreSteps(np.insert(self.at_mm, place, at_mm), wider, at_mm, aside_mm)
+
+    def off_at(self, distance_mm: Float, azimuth_rad: Float) -> Float:
+        """Return how much farther from the axis the wall is (M,) at distances and azimuths (M,), mm."""
+        (x, y), behind = self.aside_mm, distance_mm > self.aside_from_mm
+        return self.wider_at(distance_mm) + behind * (x * np.cos(azimuth_rad) + y * np.sin(azimuth_rad))
 
 
 NO_STEPS = BoreSteps(np.zeros(0), np.zeros(1))
@@ -167,6 +187,12 @@ def circles_in_rings(points: RingPoints) -> RingCircles:
             hint="check exposure and that the laser is on; see the rejected ring samples by reason",
         )
     return RingCircles(points.frame, centre, radius)
+
+
+def rings_of_length(radius_mm: Float, at_mm: Float) -> int:
+    """Return how many rings, with radii (F,) at distances (F,), the shortest length of a bore has."""
+    apart_mm = max(float(np.ptp(at_mm)) / len(at_mm), 1e-9)
+    return max(round(_LENGTH_RADII * float(np.median(radius_mm)) / apart_mm), _FEWEST_RINGS_OF_LENGTH)
 
 
 def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigma_mm: float) -> RingBins:

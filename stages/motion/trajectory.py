@@ -126,6 +126,8 @@ def report_motion(
     context.report("encoder scale", trajectory.encoder_scale, "")
     estimate.encoder.warn(context, wider)
     estimate.steady.warn(context)
+    if estimate.knock is not None:
+        estimate.knock.warn(context)
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     context.report("distance travelled", travelled, "mm")
     context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")

@@ -8,20 +8,16 @@ both, low polynomials of time and of distance, are added to the equations at the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import chdtrc
 
-from pipeline.adjustment.bordered import BorderedSystem, Rows
-from pipeline.adjustment.elimination import BLOCK
 from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
-from pipeline.geometry.rigid import transform
 from pipeline.machine.stage import Context
-from stages.motion.bundle_adjustment import residuals
-from stages.motion.bundle_adjustment.equations import LEAST_REACH, Measurements, factorised
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.extra_columns import ExtraColumns, RingsInPipe, chance
 from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.rings import BoreSteps
@@ -154,9 +150,7 @@ class ScaleDrift:
 def drift_of_scale(estimate: Estimate, measured: Measurements, before: Float | None = None) -> ScaleDrift:
     """Return the course of the image scale at an estimate; ``before`` (N,) was taken out of it already."""
     course = _polynomials(measured.time_s, _COURSE)
-    system, border = _widened(estimate, measured, course)
-    factor = factorised(system)
-    step, covariance = factor.step()[1][border:], factor.border_covariance()[border:, border:]
+    step, covariance = _widths_and_scales(estimate, measured, course).solved(estimate)
     widths = len(step) - _COURSE
     width, scale = np.arange(widths), np.arange(widths, len(step))
     found, own = step[scale], covariance[np.ix_(scale, scale)]
@@ -166,73 +160,38 @@ def drift_of_scale(estimate: Estimate, measured: Measurements, before: Float | N
     sigma = np.sqrt(np.einsum("ni,ij,nj->n", course, own, course))
     known = np.linalg.lstsq(course, before, rcond=None)[0]
     return ScaleDrift(
-        at_frames, sigma, _chance(found + known, own), _chance(step[width], covariance[np.ix_(width, width)]),
-        _chance(step, covariance), course @ (found - follow @ step[width]),
-        _ring_gain(estimate.state, measured)[1],
+        at_frames, sigma, chance(found + known, own), chance(step[width], covariance[np.ix_(width, width)]),
+        chance(step, covariance), course @ (found - follow @ step[width]),
+        _ring_gain(RingsInPipe.of(estimate.state, measured), estimate.state, measured)[1],
         float(np.sqrt(estimate.factor.border_covariance()[0, 0])),
     )  # fmt: skip
 
 
-def _widened(estimate: Estimate, measured: Measurements, course: Float) -> tuple[BorderedSystem, int]:
-    """Return the equations with columns for the pipe's width and the scale, and where these begin."""
-    equations, state = estimate.adjusted.equations, estimate.state
-    by_ring, _ = _ring_gain(state, measured)
-    in_rings = _points(state, measured)[1]
-    span = np.concatenate([in_rings, to_pipe(state.axis, state.xyz_p)[0]])
-    width = _widths(span, state.bore)
-    rings = np.concatenate([-width[: len(in_rings)], by_ring[:, None] * course[measured.rings.frame]], 1)
-    texture, border = equations.texture, equations.rings.by_border.shape[1]
+def _widths_and_scales(estimate: Estimate, measured: Measurements, course: Float) -> ExtraColumns:
+    """Return the columns of the pipe's widths, then of the scale's course."""
+    state, texture = estimate.state, estimate.adjusted.equations.texture
+    rings = RingsInPipe.of(state, measured)
+    by_ring, _ = _ring_gain(rings, state, measured)
+    span = np.concatenate([rings.span_mm, to_pipe(state.axis, state.xyz_p)[0]])
+    width, count = _widths(span, state.bore), len(rings.span_mm)
+    in_rings = np.concatenate([-width[:count], by_ring[:, None] * course[measured.rings.frame]], 1)
     away_px = measured.tracks.uv - measured.camera_at(state).centre_px
     away_px = away_px * np.asarray(texture.by_pose.any((1, 2)))[:, None]
     by_scale = away_px[:, :, None] * course[measured.tracks.frame][:, None, :]
-    widths = width.shape[1]
-    unmoved = np.zeros((*away_px.shape, widths))
-    landmarks = width[len(in_rings) :]
-    more = np.concatenate([-landmarks, np.zeros((len(landmarks), _COURSE))], 1)
-    texture = replace(
-        texture,
-        by_instrument=np.concatenate([texture.by_instrument, unmoved, by_scale], 2),
-        surface_by_border=np.concatenate([texture.surface_by_border, more], 1),
-    )
-    size = border + widths + _COURSE
-    system = BorderedSystem(equations.frames, size, max(texture.reach, LEAST_REACH))
-    for rows in equations.rows:
-        system.add(_with(rows, np.zeros((len(rows.residual), widths + _COURSE))))
-    system.add(_with(equations.rings, rings))
-    system.add(_beforehand(border, widths, state.nominal_radius_mm))
-    system.add_landmarks(texture)
-    return system, border
+    widths, landmarks = width.shape[1], width[count:]
+    pixels = np.concatenate([np.zeros((*away_px.shape, widths)), by_scale], 2)
+    surface = np.concatenate([-landmarks, np.zeros((len(landmarks), _COURSE))], 1)
+    sigma = _LARGEST * np.r_[np.full(widths, state.nominal_radius_mm), np.ones(_COURSE)]
+    return ExtraColumns(in_rings, pixels, surface, sigma)
 
 
-def _ring_gain(state: State, measured: Measurements) -> tuple[Float, float]:
+def _ring_gain(rings: RingsInPipe, state: State, measured: Measurements) -> tuple[Float, float]:
     """Return what rings' residuals (M,) change by per scale that was too large, and the mean radius' gain."""
-    normal_c = _points(state, measured)[2]
     camera = measured.camera_at(state)
-    radius_px = np.linalg.norm(camera.project(_points(state, measured)[0]).uv - camera.centre_px, axis=1)
-    gain = np.einsum("mi,mi->m", normal_c, measured.rings.by_pixel) * radius_px
+    radius_px = np.linalg.norm(camera.project(rings.xyz_c).uv - camera.centre_px, axis=1)
+    gain = np.einsum("mi,mi->m", rings.normal_c, measured.rings.by_pixel) * radius_px
     gain = np.where(np.isfinite(gain), gain, 0.0)
     return -gain, float(np.median(gain)) if gain.size else 0.0
-
-
-def _points(state: State, measured: Measurements) -> tuple[Float, Float, Float]:
-    """Return rings' points (M, 3) in C, their distances (M,), and the wall's normals (M, 3) there in C."""
-    rings, T = measured.rings, state.T_pc[measured.rings.frame]
-    xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument[: rings.by_instrument.shape[2]]
-    xyz_p = transform(T, xyz_c)
-    normal = residuals.surface(state, xyz_p)[1]
-    return xyz_c, to_pipe(state.axis, xyz_p)[0], np.einsum("mi,mij->mj", normal, T[:, :3, :3])
-
-
-def _with(rows: Rows, more: Float) -> Rows:
-    return replace(rows, by_border=np.concatenate([rows.by_border, more], 1))
-
-
-def _beforehand(border: int, widths: int, radius_mm: float) -> Rows:
-    count = widths + _COURSE
-    by_border = np.concatenate([np.zeros((count, border)), np.eye(count)], 1)
-    sigma = _LARGEST * np.r_[np.full(widths, radius_mm), np.ones(_COURSE)]
-    none = np.zeros((count, 0), np.int64)
-    return Rows(none, np.zeros((count, 0, BLOCK)), by_border, np.zeros(count), sigma)
 
 
 def _widths(at_mm: Float, bore: BoreSteps) -> Float:
@@ -245,8 +204,3 @@ def _polynomials(at: Float, degree: int) -> Float:
     """Return Legendre's polynomials (M, degree) from the first on, over the span of places (M,)."""
     x = 2 * (at - at.min()) / max(float(np.ptp(at)), 1e-9) - 1
     return np.asarray(legendre.legvander(x, degree)[:, 1:])
-
-
-def _chance(value: Float, covariance: Float) -> float:
-    """Return the chance by which values (K,) lie as far from 0 or farther."""
-    return float(chdtrc(len(value), value @ np.linalg.solve(covariance, value)))

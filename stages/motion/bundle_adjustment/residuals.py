@@ -37,7 +37,7 @@ def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
     s, psi, rho = to_pipe(state.axis, xyz_p)
     basis = state.axis_basis(s)
     a2, b2 = state.globals[1:3]
-    radius = state.globals[0] + state.bore.wider_at(s)
+    radius = state.globals[0] + state.bore.off_at(s, psi)
     residual = rho - radius - a2 * np.cos(2 * psi) - b2 * np.sin(2 * psi)
     frame = state.section_frames(s)
     c, sn = np.cos(psi)[:, None], np.sin(psi)[:, None]

@@ -11,9 +11,11 @@ from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of_encoder
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, noise_of_encoder, scale_of_encoder
 from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.laser_knock import KnockTest
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, scale_between_halves
 from stages.motion.parameters import MotionParameters
 from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.steady_laser import with_steady_laser
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 
@@ -64,6 +66,8 @@ class FirstWindow:
     encoder : EncoderCheck
     steady : SteadyRun
         Its image scale.
+    knock : KnockTest or None
+        Of its laser, where rings jump.
     """
 
     run: MeasuredRun
@@ -73,6 +77,7 @@ class FirstWindow:
     unsure: float
     encoder: EncoderCheck
     steady: SteadyRun
+    knock: KnockTest | None
 
     @property
     def distance_sigma(self) -> float:
@@ -88,6 +93,7 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     UnusableError
         When the motion is not determined.
     """
+    run, knock = with_steady_laser(run, parameters, watch)
     measured = run.measured(window, parameters)
     estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch)
     noisy, unsure = with_shared_error(parameters, estimate.adjusted.equations.reprojection_px), 0.0
@@ -116,7 +122,7 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
         estimate = estimate_state(estimate.state, measured, parameters, watch)
     steady = with_steady_scale(run, window, estimate, measured, parameters, watch)
     check = EncoderCheck(delay, scale)
-    return FirstWindow(steady.run, parameters, steady.estimate, steady.measured, unsure, check, steady)
+    return FirstWindow(steady.run, parameters, steady.estimate, steady.measured, unsure, check, steady, knock)
 
 
 def _without_encoder(

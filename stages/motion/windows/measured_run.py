@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import RingSamples
+from pipeline.artefacts.measured import LaserKnock, RingSamples
 from pipeline.instrument.probe import Probe
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
+from stages.motion.bundle_adjustment.laser_knock import RingJump
 from stages.motion.bundle_adjustment.unknowns import State, straight_start
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import BoreSteps, ring_bins
+from stages.motion.rings import BoreSteps, RingBins, ring_bins
 from stages.motion.tracking.landmarks import Tracks
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.submaps import Window
@@ -42,6 +43,10 @@ class MeasuredRun:
         Of the straightened pipe.
     image_scale : (N,) or None
         By how many times the pictures are larger than the probe's camera has them, where that drifts.
+    jump : RingJump or None
+        Where the rings jump.
+    knock : LaserKnock or None
+        What the laser did there.
     """
 
     texture: TrackedTexture
@@ -53,6 +58,8 @@ class MeasuredRun:
     probe: Probe
     bore: BoreSteps
     image_scale: Float | None = None
+    jump: RingJump | None = None
+    knock: LaserKnock | None = None
 
     @property
     def whole(self) -> Window:
@@ -65,26 +72,42 @@ class MeasuredRun:
         rows = slice(*np.searchsorted(self.ring_place, [window.first, window.last]))
         rings, place = _some_rings(self.rings, rows), self.ring_place[rows] - window.first
         rings = rings if self.image_scale is None else rings.reduced(self.image_scale[self.ring_place[rows]])
-        bins = ring_bins(rings, place, self.probe, parameters.ring_bins, parameters.surface_sigma_mm)
-        tracks = _behind(self.texture.between(window.first, window.last), self._start_mm(window))
+        bins = self._bins(rings, place, parameters)
+        tracks = _behind(self.texture.between(window.first, window.last), self.start_mm(window))
         if self.image_scale is not None:
             tracks = tracks.reduced(self.image_scale[part], self.probe.camera.centre_px)
         encoder = _since_first(self.encoder, part)
         return Measurements.of(tracks, bins, self.time_s[part], encoder, self.probe)
 
+    def knocked(self, knock: LaserKnock) -> MeasuredRun:
+        """Return the run with a laser that was knocked where the rings jump."""
+        return replace(self, knock=knock, bore=self.bore if self.jump is None else self.jump.bore)
+
+    def _bins(self, rings: RingSamples, place: Int, parameters: MotionParameters) -> RingBins:
+        bins, wall_mm = parameters.ring_bins, parameters.surface_sigma_mm
+        if self.knock is None:
+            return ring_bins(rings, place, self.probe, bins, wall_mm)
+        first = int(np.searchsorted(rings.frame, self.knock.frame))
+        after = replace(self.probe.after(self.knock), covariance=self.probe.covariance)
+        parts = (slice(0, first), self.probe), (slice(first, None), after)
+        return RingBins.joined(
+            [ring_bins(_some_rings(rings, rows), place[rows], probe, bins, wall_mm) for rows, probe in parts]
+        )
+
     def start(self, window: Window, measured: Measurements, parameters: MotionParameters) -> State:
         """Return the first guess in a window: a straight pipe, as long as its wall was seen."""
         T_pc = self.T_pc[window.first : window.last].copy()
-        T_pc[:, 2, 3] -= self._start_mm(window)
+        T_pc[:, 2, 3] -= self.start_mm(window)
         z, grid = T_pc[:, 2, 3], self.texture.grid
         span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
         corrections = measured.unsure.shape[1] + MATCH_BIASES
         straight = straight_start(
             T_pc, measured.tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, corrections
         )
-        return replace(straight, bore=self.bore.behind(self._start_mm(window)))
+        return replace(straight, bore=self.bore.behind(self.start_mm(window)))
 
-    def _start_mm(self, window: Window) -> float:
+    def start_mm(self, window: Window) -> float:
+        """Return the distance of a window's first frame, from which its own are counted."""
         return float(self.T_pc[window.first, 2, 3]) if window.first else 0.0
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float, Int
 from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.laser_knock import KnockTest
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, estimate_with_shared
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
@@ -57,6 +58,8 @@ class RunEstimate:
         Against what rings and texture of the first window show.
     steady : SteadyRun
         What the image scale did in the first window.
+    knock : KnockTest or None
+        Of the laser, where rings jump.
     """
 
     joined: JoinedRun
@@ -67,6 +70,7 @@ class RunEstimate:
     lasting: float
     encoder: EncoderCheck
     steady: SteadyRun
+    knock: KnockTest | None
 
 
 @dataclass(frozen=True)
@@ -170,7 +174,8 @@ def _run_estimate(joined: JoinedRun, ends: Sequence[_End], first: FirstWindow) -
     names = ("reprojection_px", "excess", "lasting")
     error, excess, lasting = (float(np.median([getattr(end, name) for end in ends])) for name in names)
     trials, unsettled = sum(e.trials for e in ends), sum(not e.settled for e in ends)
-    return RunEstimate(joined, trials, unsettled, error, excess, lasting, first.encoder, first.steady)
+    parts = first.encoder, first.steady, first.knock
+    return RunEstimate(joined, trials, unsettled, error, excess, lasting, *parts)
 
 
 def _adjusted(
