@@ -28,6 +28,9 @@ the sway of open-1's probe counts four times as much."""
 _SUSPECT, _LEAST_MM = 10.0, 0.1
 """Jump that is looked into, in spreads of such differences and in mm: sound recordings show 3 to 4 (open-1,
 a01, a10), a weld 168 (open-2), after which the radius is what it was. A choice."""
+_LARGEST_JUMP = 0.1
+"""Share of the radius beyond which a jump is another bore: in gauges and reducers they differ by a fifth (a01) or
+more, and no laser moves so far. A choice."""
 _SURE, _MAY_BE = 0.5 * 5.0**2, 0.5 * 3.0**2
 """How much likelier a knock must be than any other cause, and how much less likely it may be and still not be
 refused, as logarithms: 5 and 3 σ."""
@@ -97,7 +100,8 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
     usual = 1.4826 * np.median(np.abs(jump), axis=0)
     most = int(np.argmax(np.linalg.norm(jump / usual, axis=1)))
     size, times, first = jump[most], float(np.linalg.norm(jump[most] / usual)), most + _SIDE
-    if times < _SUSPECT or np.linalg.norm(size) < _LEAST_MM:
+    most_mm = _LARGEST_JUMP * circles.usual_radius_mm
+    if times < _SUSPECT or not _LEAST_MM < np.linalg.norm(size) < most_mm:
         return None
     if abs(_lasting(shape[:, 2], at_seen, first) - size[2]) > _ALIKE * np.linalg.norm(size):
         return None
