@@ -29,8 +29,8 @@ _SUSPECT, _LEAST_MM = 10.0, 0.1
 """Jump that is looked into, in spreads of such differences and in mm: sound recordings show 3 to 4 (open-1,
 a01, a10), a weld 168 (open-2), after which the radius is what it was. A choice."""
 _LARGEST_JUMP = 0.1
-"""Share of the radius beyond which a jump is another bore: in gauges and reducers they differ by a fifth (a01) or
-more, and no laser moves so far. A choice."""
+"""Share of the radius beyond which a jump is another bore: in gauges and reducers they differ by a fifth
+(a01) or more, and no laser moves so far. A choice."""
 _SURE, _MAY_BE = 0.5 * 5.0**2, 0.5 * 3.0**2
 """How much likelier a knock must be than any other cause, and how much less likely it may be and still not be
 refused, as logarithms: 5 and 3 σ."""
