@@ -41,6 +41,12 @@ def test_every_listed_kernel_is_there_and_takes_so_many_arguments() -> None:
             assert len(wanted) == len(inspect.signature(function).parameters), f"{module}.{name}"
 
 
+def test_every_listed_kernel_takes_the_types_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that does not would end the second process, and what is listed behind it be compiled by the run."""
+    monkeypatch.setattr("os.nice", lambda more: more)
+    compile_all(_kernels())
+
+
 def test_types_are_read() -> None:
     assert type_of("float32[2A]") == types.Array(types.float32, 2, "A")
     assert type_of("float64[3C kept]") == types.Array(types.float64, 3, "C", readonly=True)
