@@ -48,8 +48,8 @@ class Evidence:
     ----------
     rings : int
         How many show it.
-    photo : bool
-        Whether the photo does.
+    photo : bool, optional
+        Whether the photo does; None where it cannot tell.
     score : float
         How far the search for it stands out, σ.
     fixed : bool
@@ -65,7 +65,7 @@ class Evidence:
     """
 
     rings: int
-    photo: bool
+    photo: bool | None
     score: float
     fixed: bool = False
     edge: bool = False
@@ -81,7 +81,7 @@ class Evidence:
     @property
     def corroborated(self) -> bool:
         """Whether two rings, or one and the photo, show it on the wall."""
-        return self.on_wall and (self.rings >= LEAST_RINGS or (self.photo and self.rings > 0))
+        return self.on_wall and (self.rings >= LEAST_RINGS or (self.photo is True and self.rings > 0))
 
     @property
     def doubt(self) -> str:
@@ -138,7 +138,7 @@ def evidence_for(
     shifted = abs(depth.depth_mm) > size
     return Evidence(
         rings_behind(region, depth.depth_mm, surface),
-        not shifted and photo_stands_out(seen_by.texture, relief, region),
+        None if shifted else photo_stands_out(seen_by.texture, relief, region),
         score,
         _is_fixed(region, surface, fixed_mm),
         lies_at_edge(region, relief),
@@ -215,14 +215,17 @@ def rings_behind(region: Region, depth_mm: float, surface: Surface) -> int:
     return int(np.sum(showing >= np.maximum(_TOP_SHARE * count, _LEAST_SAMPLES)))
 
 
-def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bool:
-    """Whether the photo differs in the region more from what is around than at all places beside it."""
+def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bool | None:
+    """Whether the photo differs in the region more from what is around than at all places beside it.
+
+    It cannot tell, None, of what goes all round, and where it is not known.
+    """
     if region.all_round:
-        return False
+        return None
     turns = np.arange(1, _PLACES + 1) * len(relief.azimuth_rad) // (_PLACES + 1)
     here = abs(darkness(texture, relief, region))
     beside = [abs(darkness(texture, relief, region.turned(int(turn)))) for turn in turns]
-    return bool(np.isfinite(here) and here > np.nanmax(beside, initial=0.0))
+    return bool(here > np.nanmax(beside, initial=0.0)) if np.isfinite(here) else None
 
 
 def darkness(texture: WallTexture, relief: Relief, region: Region) -> float:

@@ -8,12 +8,13 @@ from scipy.ndimage import maximum_filter
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
-from stages.defects.corroborate import Evidence
+from stages.defects.corroborate import Evidence, photo_stands_out
 from stages.defects.credibility import chance_of_depth, credibility_of, is_depth_known
 from stages.defects.detect import detect
 from stages.defects.noise_tail import Law, NoiseTail, noise_tail
 from stages.defects.noise_tail import tail_of as tail_of_peaks
 from stages.defects.relief import smooth_shape_removed
+from stages.defects.segment import Region
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
@@ -174,6 +175,28 @@ def test_a_finding_no_higher_than_the_noise_of_its_recording_is_doubted():
     heavy = NoiseTail(200.0, (Law(2, 6.0),))
     assert probability(evidence(5, 5.6), several) > 0.9 > 0.3 > probability(evidence(5, 5.6), several, heavy)
     assert probability(evidence(5, 30.0), several, heavy) > 0.95
+
+
+def test_the_photo_counts_for_a_finding_and_a_little_against_it():
+    several, heavy = [evidence(5)] * 4, NoiseTail(200.0, (Law(2, 2.4),))
+
+    def told(score, photo):
+        return probability(replace(evidence(5, score), photo=photo), several, heavy)
+
+    unknown, doubted, borne_out = (told(6.8, photo) for photo in (None, False, True))
+    assert doubted < unknown - 0.1 < unknown + 0.2 < borne_out
+    # A dent on plain wall leaves no trace in the photo: one that stands out of the noise stays sure.
+    assert told(9.0, False) > 0.97
+
+
+def test_where_the_photo_is_unknown_it_counts_neither_way():
+    wall = wall_of(DISTANCE, AZIMUTH, np.full((len(DISTANCE), len(AZIMUTH)), RADIUS), SIGMA)
+    relief = smooth_shape_removed(wall.radius_map, DefectParameters()).rows(slice(0, len(DISTANCE)))
+    place, unseen = Region(30, 100, np.ones((4, 12), bool), 1.0), grey_texture(wall)
+    unseen.bgra[..., 3] = 0
+    assert photo_stands_out(grey_texture(wall), relief, place) is False
+    assert photo_stands_out(unseen, relief, place) is None
+    assert photo_stands_out(grey_texture(wall), relief, replace(place, all_round=True)) is None
 
 
 def test_one_ring_is_not_deeper_than_its_neighbours_allow():
