@@ -6,6 +6,8 @@ from base64 import b64encode
 from io import BytesIO
 from typing import TYPE_CHECKING, Literal
 
+from pipeline.pages.notation import measured
+
 if TYPE_CHECKING:  # who wants only this package's words need not wait for what fills templates and draws
     from jinja2 import Template
     from matplotlib.axes import Axes
@@ -25,7 +27,7 @@ def page_template(name: str) -> Template:
     """Return the template ``{name}.html`` of this package, which may extend ``base.html``.
 
     Numbers in millimetres go through the filters ``um`` and ``um_or_mm``, shares through ``percent``,
-    the bytes of pictures through ``data_uri``.
+    the bytes of pictures through ``data_uri``, values with their 1 σ and unit through ``figure``.
 
     Raises
     ------
@@ -43,6 +45,7 @@ def page_template(name: str) -> Template:
         "um_or_mm": lambda mm: f"{1000 * mm:.1f} µm" if abs(mm) < 0.1 else f"{mm:.3f} mm",
         "percent": lambda share: "not stated" if share is None else f"{100 * share:.1f} %",
         "number": lambda value: f"{value:.4g}",
+        "figure": lambda f: measured(f["value"], f["sd"], f["unit"]),
     }
     return environment.get_template(f"{name}.html")
 

@@ -1,4 +1,4 @@
-"""The wall that pixels see: rays met with its radius map, and its photo as each viewing angle blurs it."""
+"""The photo of the wall, as each viewing angle blurs it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ import cv2
 import numba
 import numpy as np
 
-from pipeline.arrays import Bool, Float, Float32
+from pipeline.arrays import Float, Float32
 from pipeline.artefacts.measured import WallTexture
-from pipeline.geometry.axis_kernels import section_frame
 from pipeline.instrument.probe import Probe
 from stages.texture.grid import footprint_mm
-from stages.texture.surface import WallSurface
 
 LUMA_BGR = np.array([0.114, 0.587, 0.299])
 """Shares of blue, green and red in the grey of a video (ITU-R BT.601)."""
@@ -46,29 +44,45 @@ class Reflectance:
     azimuth_from_rad: float
     rad_per_px: float
 
-    def grey(self, distance_mm: Float32, azimuth_rad: Float32, theta_rad: Float32) -> Float32:
-        """Return the grey (H, W) of wall places seen at polar angles, all (H, W)."""
+    def level_of(self, theta_rad: Float32) -> Float32:
+        """Return which of the levels, counted from 0 and between them, polar angles (H, W) are seen at."""
         first, step = float(self.theta_rad[0]), float(self.theta_rad[1] - self.theta_rad[0])
-        level = np.clip((theta_rad - first) / step, 0, len(self.theta_rad) - 1).astype(np.float32)
-        return self._sampled(self.levels, distance_mm, azimuth_rad, level)
+        return np.clip((theta_rad - first) / step, 0, len(self.theta_rad) - 1).astype(np.float32)
+
+    def seen(self, nodes: Float32, step_px: int, phi_rad: Float32, level: Float32) -> Float32:
+        """Return what pixels between nodes look at.
+
+        Parameters
+        ----------
+        nodes : (3, h, w)
+            Every ``step_px`` pixels: distance on the wall, mm, azimuth beyond the pixel's own, rad, and
+            irradiance; NaN where no wall is seen.
+        phi_rad, level : (H, W)
+            The pixels' own azimuth, and the photo's level.
+
+        Returns
+        -------
+        (4, H, W)
+            Grey of the photo, irradiance, distance and azimuth.
+        """
+        out = np.empty((4, *level.shape), np.float32)
+        _see(self.levels, nodes, step_px, phi_rad, level, self._place, out)
+        return out
 
     def coloured(self, distance_mm: Float32, azimuth_rad: Float32) -> Float32:
-        """Return blue, green and red (3, ...) of wall places (...)."""
-        of = [
-            self._sampled(c[None], distance_mm, azimuth_rad, np.zeros_like(distance_mm)) for c in self.colours
-        ]
-        return np.stack(of)
-
-    def _sampled(
-        self, levels: Float32, distance_mm: Float32, azimuth_rad: Float32, level: Float32
-    ) -> Float32:
-        out = np.full(distance_mm.shape, np.nan, np.float32)
-        _sample(
-            levels, distance_mm.ravel(), azimuth_rad.ravel(), level.ravel(),
-            np.float32(self.distance_from_mm), np.float32(1 / self.mm_per_px),
-            np.float32(self.azimuth_from_rad), np.float32(1 / self.rad_per_px), out.ravel(),
-        )  # fmt: skip
+        """Return blue, green and red (3, N) of wall places (N,)."""
+        out = np.empty((len(self.colours), len(distance_mm)), np.float32)
+        _sample(self.colours, distance_mm, azimuth_rad, self._place, out)
         return out
+
+    @property
+    def _place(self) -> Float32:
+        """From where, and by what, distance and azimuth go over into rows and columns."""
+        along, around = (
+            (self.distance_from_mm, 1 / self.mm_per_px),
+            (self.azimuth_from_rad, 1 / self.rad_per_px),
+        )
+        return np.array([*along, *around], np.float32)
 
 
 def reflectance_of(texture: WallTexture, probe: Probe, radius_mm: float, blur_px: float) -> Reflectance:
@@ -130,164 +144,74 @@ def _blurred(grey: Float32, known: Float32, along_px: float, around_px: float) -
     return np.where(weight > _KNOWN, total / np.maximum(weight, 1e-6), np.float32(np.nan)).astype(np.float32)
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _sample(  # type: ignore[no-untyped-def]
-    levels, distance, azimuth, level, s_from, s_scale, psi_from, psi_scale, out
-):
-    """Write what the levels show at places (N,); bilinear on the wall, linear between levels."""
-    count, rows, columns = levels.shape
-    for n in range(len(distance)):
-        row = (distance[n] - s_from) * s_scale
-        if not (0.0 <= row <= rows - 1):
-            continue
-        i = min(int(row), rows - 2)
-        column = (azimuth[n] - psi_from) * psi_scale
-        column -= np.floor(column / columns) * columns
-        j = min(int(column), columns - 1)
-        k = j + 1 if j + 1 < columns else 0
-        u, v = row - i, column - j
-        low = min(int(level[n]), max(count - 2, 0))
-        w = level[n] - low
-        a = levels[low]
-        value = (1 - u) * ((1 - v) * a[i, j] + v * a[i, k]) + u * ((1 - v) * a[i + 1, j] + v * a[i + 1, k])
-        if w > 0:
-            b = levels[low + 1]
-            far = (1 - u) * ((1 - v) * b[i, j] + v * b[i, k]) + u * ((1 - v) * b[i + 1, j] + v * b[i + 1, k])
-            value += w * (far - value)
-        out[n] = value
+_FAST = {"contract", "reassoc"}
 
 
-_STEPS, _CLOSE_MM = 12, 2e-3
-"""Newton steps of a ray toward the wall, and the gap at which they end: 2 µm is 0.01 px at the ring."""
-_MET = 20
-"""Gaps, in units of the above, up to which a ray that did not settle still counts as having met the wall."""
-_FAR_RADII = 12.0
-"""A ray that meets no wall within so many radii sees none: it leaves through the pipe's open end."""
-_LEAST_APPROACH = 1e-3
-"""Sine of the angle to the axis below which a ray is taken to run along the pipe."""
-
-
-@dataclass(frozen=True)
-class WallSight:
-    """Wall points that rays meet; NaN where a ray meets none.
-
-    Attributes
-    ----------
-    distance_mm, azimuth_rad : (N,) float32
-        In the pipe.
-    xyz_c, normal_c : (N, 3)
-        Point, mm, and inward unit normal in C.
-    """
-
-    distance_mm: Float32
-    azimuth_rad: Float32
-    xyz_c: Float
-    normal_c: Float
-
-    @property
-    def seen(self) -> Bool:
-        """(N,) whether the ray meets the wall."""
-        return np.isfinite(self.distance_mm)
-
-
-def wall_seen(surface: WallSurface, T_pc: Float, ray_c: Float) -> WallSight:
-    """Return what unit rays (N, 3) in C meet from a camera's pose (4, 4); NaN rays meet nothing."""
-    count = len(ray_c)
-    place, point, normal = np.full((count, 2), np.nan), np.full((count, 3), np.nan), np.zeros((count, 3))
-    axis, step = surface.axis, float(surface.distance_mm[1] - surface.distance_mm[0])
-    _meet(
-        axis.distance_mm, axis.origin_p, axis.R_pa, surface.radius_mm, surface.along, surface.around,
-        float(surface.distance_mm[0]), step, surface.mean_radius_mm, np.ascontiguousarray(T_pc, float),
-        np.ascontiguousarray(ray_c, float), place, point, normal,
-    )  # fmt: skip
-    return WallSight(place[:, 0].astype(np.float32), place[:, 1].astype(np.float32), point, normal)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _bilinear(values, row, column):  # type: ignore[no-untyped-def]
-    """Return a map's value at fractional row (held at the ends) and column (around the pipe)."""
-    rows, columns = values.shape
-    row = min(max(row, 0.0), rows - 1.0)
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST, inline="always")
+def _cell(place, distance, azimuth, rows, columns):  # type: ignore[no-untyped-def]
+    """Return row, column and next column of a place, and how far it is beyond them; row -1 off the photo."""
+    row = (distance - place[0]) * place[1]
+    if not (0.0 <= row <= rows - 1):
+        return -1, 0, 0, np.float32(0), np.float32(0)
     i = min(int(row), rows - 2)
-    j = int(np.floor(column))
-    u, v = row - i, column - j
-    j %= columns
-    k = j + 1 if j + 1 < columns else 0
-    return (1 - u) * ((1 - v) * values[i, j] + v * values[i, k]) + u * (
-        (1 - v) * values[i + 1, j] + v * values[i + 1, k]
-    )
+    column, all_round = (azimuth - place[2]) * place[3], np.float32(columns)
+    column -= np.floor(column / all_round) * all_round
+    j = min(int(column), columns - 1)
+    return i, j, j + 1 if j + 1 < columns else 0, np.float32(row - i), np.float32(column - j)
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST, inline="always")
+def _between(a, i, j, k, u, v):  # type: ignore[no-untyped-def]
+    """Return a map's value between rows i, i + 1 and columns j, k."""
+    one = np.float32(1)
+    return (one - u) * ((one - v) * a[i, j] + v * a[i, k]) + u * ((one - v) * a[i + 1, j] + v * a[i + 1, k])
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
+def _sample(maps, distance, azimuth, place, out):  # type: ignore[no-untyped-def]
+    """Write what maps (C, H, W) show at places (N,) to (C, N)."""
+    count, rows, columns = maps.shape
+    for n in range(len(distance)):
+        i, j, k, u, v = _cell(place, distance[n], azimuth[n], rows, columns)
+        for c in range(count):
+            out[c, n] = _between(maps[c], i, j, k, u, v) if i >= 0 else np.nan
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
+def _see(levels, nodes, step, phi, level, place, out):  # type: ignore[no-untyped-def]
+    """Write photo, irradiance, distance and azimuth (4, H, W) of pixels; see `Reflectance.seen`."""
+    count, rows, columns = levels.shape
+    far, turn, light = nodes[0], nodes[1], nodes[2]
+    grey, lit, distances, azimuths = out[0], out[1], out[2], out[3]
+    down, below = _nodes_beside(grey.shape[0], far.shape[0], step)
+    right, beyond = _nodes_beside(grey.shape[1], far.shape[1], step)
+    for y in range(grey.shape[0]):
+        i, u = down[y], below[y]
+        for x in range(grey.shape[1]):
+            j, v = right[x], beyond[x]
+            distance = _between(far, i, j, j + 1, u, v)
+            grey[y, x], lit[y, x], distances[y, x], azimuths[y, x] = np.nan, np.nan, distance, np.nan
+            if np.isnan(distance):
+                continue
+            azimuth = phi[y, x] + _between(turn, i, j, j + 1, u, v)
+            lit[y, x], azimuths[y, x] = _between(light, i, j, j + 1, u, v), azimuth
+            r, c, d, p, q = _cell(place, distance, azimuth, rows, columns)
+            if r < 0:
+                continue
+            low = min(int(level[y, x]), max(count - 2, 0))
+            w = np.float32(level[y, x] - low)
+            value = _between(levels[low], r, c, d, p, q)
+            if w > 0:
+                value += w * (_between(levels[low + 1], r, c, d, p, q) - value)
+            grey[y, x] = value
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _section_of(axis_at, axis_origin, axis_frame, p, s, o, m, at):  # type: ignore[no-untyped-def]
-    """Return the distance of a point (3,) from a guess; ``o``, ``m``: its section, ``at``: x and y there."""
-    section_frame(axis_at, axis_origin, axis_frame, s, o, m)
-    s += m[0, 2] * (p[0] - o[0]) + m[1, 2] * (p[1] - o[1]) + m[2, 2] * (p[2] - o[2])
-    for k in range(2):
-        at[k] = m[0, k] * (p[0] - o[0]) + m[1, k] * (p[1] - o[1]) + m[2, k] * (p[2] - o[2])
-    return s
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _step(at, r, d, m, slope, gap, way, mean):  # type: ignore[no-untyped-def]
-    """Return how far to go on along a ray ``d`` (3,) for its radius to become the wall's."""
-    ax = m[0, 0] * d[0] + m[1, 0] * d[1] + m[2, 0] * d[2]
-    ay = m[0, 1] * d[0] + m[1, 1] * d[1] + m[2, 1] * d[2]
-    az = m[0, 2] * d[0] + m[1, 2] * d[1] + m[2, 2] * d[2]
-    outward = (at[0] * ax + at[1] * ay) / r if r > 0 else np.sqrt(ax * ax + ay * ay)
-    if outward < _LEAST_APPROACH and gap > 0:
-        return mean  # inside and moving toward the axis: the far wall is met beyond it
-    rate = max(outward - slope * az, 0.3 * outward)
-    return min(max(gap / rate, -0.5 * way), 2.0 * mean)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _write_normal(at, r, m, along, around, normal):  # type: ignore[no-untyped-def]
-    """Write the inward unit normal (3,) in P of wall with slopes ``along`` and ``around``."""
-    c, s = at[0] / r, at[1] / r
-    size = 1.0 / np.sqrt(1.0 + along * along + around * around)
-    for i in range(3):
-        outward, turning = c * m[i, 0] + s * m[i, 1], c * m[i, 1] - s * m[i, 0]
-        normal[i] = (around * turning + along * m[i, 2] - outward) * size
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _meet(  # type: ignore[no-untyped-def]
-    axis_at, axis_origin, axis_frame, radius, along, around, s_from, s_step, mean, T_pc, rays, place, point,
-    normal,
-):  # fmt: skip
-    """Follow every ray by Newton steps to where its radius is the wall's; neighbours start from each other.
-
-    ``place`` (N, 2) gets distance and azimuth, ``point`` and ``normal`` (N, 3) are in C, as ``rays`` are.
-    """
-    o, m, at, p = np.empty(3), np.empty((3, 3)), np.empty(2), np.empty(3)
-    d, inward, start = np.empty(3), np.empty(3), T_pc[:3, 3].copy()
-    columns, far = radius.shape[1], _FAR_RADII * mean
-    home = _section_of(axis_at, axis_origin, axis_frame, start, start[2], o, m, at)
-    way, s = -1.0, home
-    for n in range(len(rays)):
-        if not np.isfinite(rays[n, 0]):
-            continue
-        if not 0.0 < way < far:
-            way, s = mean, home
-        for i in range(3):
-            d[i] = T_pc[i, 0] * rays[n, 0] + T_pc[i, 1] * rays[n, 1] + T_pc[i, 2] * rays[n, 2]
-        gap, r, psi, row, column = np.inf, 1.0, 0.0, 0.0, 0.0
-        for _ in range(_STEPS):
-            for i in range(3):
-                p[i] = start[i] + way * d[i]
-            s = _section_of(axis_at, axis_origin, axis_frame, p, s, o, m, at)
-            r, psi = np.sqrt(at[0] * at[0] + at[1] * at[1]), np.arctan2(at[1], at[0])
-            row, column = (s - s_from) / s_step, (psi + np.pi) / (2 * np.pi) * columns
-            gap = _bilinear(radius, row, column) - r
-            if abs(gap) < _CLOSE_MM or way > far:
-                break
-            way += _step(at, r, d, m, _bilinear(along, row, column), gap, way, mean)
-        if not abs(gap) < _MET * _CLOSE_MM or way > far:
-            way = -1.0
-            continue
-        place[n, 0], place[n, 1] = s, psi
-        _write_normal(at, r, m, _bilinear(along, row, column), _bilinear(around, row, column), inward)
-        for i in range(3):
-            point[n, i] = way * rays[n, i]
-            normal[n, i] = T_pc[0, i] * inward[0] + T_pc[1, i] * inward[1] + T_pc[2, i] * inward[2]
+def _nodes_beside(pixels, nodes, step):  # type: ignore[no-untyped-def]
+    """Return the node before each pixel along a side, and how far toward the next one the pixel lies."""
+    first, share = np.empty(pixels, np.int64), np.empty(pixels, np.float32)
+    for x in range(pixels):
+        at = min(max((x + 0.5) / step - 0.5, 0.0), nodes - 1.0)
+        first[x] = min(int(at), nodes - 2)
+        share[x] = at - first[x]
+    return first, share

@@ -16,10 +16,13 @@ from pipeline.instrument.probe import Probe
 from stages.texture.surface import WallSurface, wall_surface
 from stages.texture.views import sheet_distance_mm
 from stages.twin.leds import even_light
-from stages.twin.reflectance import Reflectance, reflectance_of, wall_seen
+from stages.twin.rays import wall_seen
+from stages.twin.reflectance import Reflectance, reflectance_of
 
 _STEP_PX = 4
 """Spacing of the pixels whose rays are met with the wall; between them places are interpolated."""
+_FEW = 17
+"""Of so many nodes one tells by how much, on the whole, the image is turned: some thousand do."""
 _BAND_PX = 14.0
 """Half width of the band about the line that is rendered exactly, pixel by pixel: four line widths and the
 wander of the ring within four pixels."""
@@ -168,18 +171,18 @@ class Scene:
 
     def lit(self, T_pc: Float) -> LitSight:
         """Return what a frame with the LEDs on looks at from a pose (4, 4)."""
-        shape = self._rays.shape[:2]
         seen = wall_seen(self.surface, T_pc, self._rays.reshape(-1, 3))
         light = even_light(self.probe.lighting, seen.xyz_c, seen.normal_c) / self._reference
         turn = seen.azimuth_rad - self._phi_nodes.ravel()
-        turn = np.mod(turn + np.pi, 2 * np.pi) - np.pi
-        middle = _circular_middle(turn)
-        turn = np.mod(turn - middle + np.pi, 2 * np.pi) - np.pi
-        theta, phi, _ = self.polar
-        distance = self._enlarged(seen.distance_mm.reshape(shape))
-        azimuth = phi + self._enlarged(turn.reshape(shape)) + np.float32(middle)
-        reflectance = self.reflectance.grey(distance, azimuth, theta)
-        return LitSight(reflectance, self._enlarged(light.reshape(shape)), distance, azimuth)
+        middle = _circular_middle(turn[::_FEW])
+        turn = np.mod(turn - middle + np.pi, 2 * np.pi) - np.pi + middle
+        nodes = np.stack([seen.distance_mm, turn, light]).astype(np.float32)
+        nodes = nodes.reshape(3, *self._rays.shape[:2])
+        return LitSight(*self.reflectance.seen(nodes, _STEP_PX, self.polar[1], self._level))
+
+    @cached_property
+    def _level(self) -> Float32:
+        return self.reflectance.level_of(self.polar[0])
 
     def seen_again(self, T_pc: Float, next_T_pc: Float) -> tuple[Float32, Float32]:
         """Return column and row (H, W) at which the next frame shows the wall that each pixel shows."""
@@ -196,9 +199,10 @@ class Scene:
         seen = wall_seen(self.surface, T_pc, rays)
         offset = sheet_distance_mm(self.probe.laser, seen.xyz_c)
         width, height = self.probe.camera.image_size
-        dense = np.full((height, width), np.nan, np.float32)
-        dense[row, column] = offset
-        slope = np.hypot(*(_central(dense, axis)[row, column] for axis in (0, 1)))
+        dense = np.full((height + 2, width + 2), np.nan, np.float32)
+        dense[row + 1, column + 1] = offset
+        down, right = dense[row + 2, column + 1] - dense[row, column + 1], dense[row + 1, column + 2]
+        slope = np.hypot(down, right - dense[row + 1, column]) / 2
         keep = np.isfinite(slope) & (slope > 0)
         row, column, offset, slope = row[keep], column[keep], offset[keep], slope[keep]
         distance, azimuth = seen.distance_mm[keep], seen.azimuth_rad[keep]
@@ -219,9 +223,12 @@ class Scene:
         slope = np.hypot(*np.gradient(offset)) / _STEP_PX
         near = np.abs(offset) < _BAND_PX * np.maximum(slope, 1e-6)
         width, height = self.probe.camera.image_size
-        big = np.kron(near.astype(np.uint8), np.ones((_STEP_PX, _STEP_PX), np.uint8))[:height, :width]
-        found = np.nonzero(big)
-        return found[0], found[1]
+        row, column = np.nonzero(near)
+        inner = np.arange(_STEP_PX)
+        rows = _STEP_PX * row[:, None, None] + inner[:, None] + 0 * inner
+        columns = _STEP_PX * column[:, None, None] + inner + 0 * inner[:, None]
+        inside = (rows < height) & (columns < width)
+        return rows[inside], columns[inside]
 
     def _rays_to_sheet(self, T_pc: Float) -> Float:
         """Return the rays (N, 3) of the nodes, NaN where they meet the sheet far from any wall."""
@@ -272,13 +279,3 @@ def _circular_middle(angle: Float) -> float:
     """Return the mean direction of angles, those that are NaN left out."""
     known = angle[np.isfinite(angle)]
     return float(np.arctan2(np.sin(known).mean(), np.cos(known).mean())) if len(known) else 0.0
-
-
-def _central(values: Float32, axis: int) -> Float32:
-    """Return central differences, NaN at the edges."""
-    out = np.full_like(values, np.nan)
-    if axis == 0:
-        out[1:-1] = (values[2:] - values[:-2]) / 2
-    else:
-        out[:, 1:-1] = (values[:, 2:] - values[:, :-2]) / 2
-    return out

@@ -20,8 +20,8 @@ from stages.twin.locate import ImagePlace
 from stages.twin.name import _not_sharp, clipped, left_over
 from stages.twin.noise import CameraNoise, photon_transfer, windows_of
 from stages.twin.on_wall import unnamed
+from stages.twin.rays import wall_seen
 from stages.twin.reference import BlockSamples, in_image
-from stages.twin.reflectance import wall_seen
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import LineSight
 from stages.twin.state import clipped_line

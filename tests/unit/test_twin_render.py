@@ -3,11 +3,14 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from pipeline.recording.base import Illumination
 from stages.twin.lamp_light import Course, Figure, LampLight
 from stages.twin.noise import CameraNoise
+from stages.twin.reflectance import Reflectance
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import LitSight
 from stages.twin.state import PhotometricState
@@ -45,3 +48,25 @@ def test_a_response_acts_on_the_contrast_of_the_wall():
     scene = SimpleNamespace(**vars(SCENE) | {"lit": lambda T_pc: sight})
     twin = Renderer(scene, replace(STATE, power=0.5)).frame(0, Illumination.LED)
     np.testing.assert_allclose(twin.level[:, 30:].mean() / twin.level[:, :30].mean(), np.sqrt(2), rtol=0.01)
+
+
+def test_pixels_between_nodes_see_the_photo_at_their_place_and_level():
+    random, step = np.random.default_rng(3), 4
+    levels = random.uniform(20, 200, (2, 50, 90)).astype(np.float32)
+    photo = Reflectance(levels, np.array([0.4, 0.9]), levels[:1], 100.0, 0.5, -np.pi, 2 * np.pi / 90)
+    nodes = random.uniform([[[101]], [[-0.3]], [[0.5]]], [[[123]], [[0.3]], [[1]]], (3, 10, 15))
+    nodes = nodes.astype(np.float32)
+    nodes[:, 4, 7] = np.nan
+    phi = random.uniform(-np.pi, np.pi, (40, 60)).astype(np.float32)
+    theta = random.uniform(0.3, 1.0, phi.shape).astype(np.float32)
+    distance, turn, light = (cv2.resize(n, None, fx=step, fy=step) for n in nodes)
+    at = (distance - 100.0) / 0.5, (phi + turn + np.pi) / (2 * np.pi / 90)
+    near, far = (map_coordinates(a, np.nan_to_num(at), order=1, mode="grid-wrap") for a in levels)
+    share = np.clip((theta - 0.4) / 0.5, 0, 1)
+    grey = np.where(np.isfinite(distance), near + share * (far - near), np.nan)
+    seen = photo.seen(nodes, step, phi, photo.level_of(theta))
+    assert np.isnan(seen[0]).any()
+    for got, expected in zip(seen[1:], (light, distance, phi + turn), strict=True):
+        np.testing.assert_allclose(got, expected, atol=1e-5)
+    # Rows are told to 1e-5 by single precision, and neighbours differ by up to 180 grey levels.
+    np.testing.assert_allclose(seen[0], grey, atol=0.01)
