@@ -47,7 +47,8 @@ class Reflectance:
     def level_of(self, theta_rad: Float32) -> Float32:
         """Return which of the levels, counted from 0 and between them, polar angles (H, W) are seen at."""
         first, step = float(self.theta_rad[0]), float(self.theta_rad[1] - self.theta_rad[0])
-        return np.clip((theta_rad - first) / step, 0, len(self.theta_rad) - 1).astype(np.float32)
+        level = np.clip((theta_rad - first) / step, 0, len(self.theta_rad) - 1)
+        return np.asarray(level, np.float32)
 
     def seen(self, nodes: Float32, step_px: int, phi_rad: Float32, level: Float32) -> Float32:
         """Return what pixels between nodes look at.
