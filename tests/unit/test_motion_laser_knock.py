@@ -126,6 +126,9 @@ def test_a_jump_of_which_texture_cannot_tell_is_said_to_be_one() -> None:
         KnockTest(jump.guess, over_joint, 100.0, jump, 1.0).warn(context)
     assert ["too weak to tell" in words for words in told] == [True, False]
     assert "knocked against each other, by" in told[1]
+    wider = replace(jump, jump_mm=np.array([0.1, 0, 0.9]))
+    KnockTest(wider.guess, 50.0, 100.0, wider, 1.0).warn(context)
+    assert ["or the picture's scale changed" in words for words in told] == [False, False, True]
 
 
 @cache

@@ -154,12 +154,13 @@ class KnockTest:
         if self.told:
             tilt_deg, baseline_mm = np.degrees(np.hypot(*self.knock.change[1:])), self.knock.change[0]
             sigma = np.sqrt(np.diagonal(self.knock.covariance))
+            zoomed = " (or the picture's scale changed)" if abs(radius) > np.hypot(x, y) else ""
             by = f"{tilt_deg:.2f} ± {np.degrees(sigma[1:].max()):.2f}°"
             context.warn(
                 f"{jump}, all round at once and for good, and the texture does not follow: laser and "
                 f"camera were knocked against each other, by {by} and "
-                f"{baseline_mm:+.3f} ± {sigma[0]:.3f} mm of the baseline. This is taken out from there on, "
-                "what is left of it is in the σ. What to do: fix laser and camera, calibrate the probe anew"
+                f"{baseline_mm:+.3f} ± {sigma[0]:.3f} mm of the baseline{zoomed}. This is taken out from "
+                "there on, what is left of it is in the σ. What to do: fix laser and camera, calibrate anew"
             )
         elif self.ambiguous:
             context.warn(
