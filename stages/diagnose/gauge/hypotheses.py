@@ -11,9 +11,7 @@ from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.elimination import Part
 from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.sets import (
-    prior_sigma,
-)
+from stages.diagnose.gauge.sets import prior_sigma
 from stages.diagnose.inference import Evidence, Stated, estimate, total
 
 _STRETCHES = 2
