@@ -23,6 +23,7 @@ IMU_COLUMNS = ("time_s", "gx", "gy", "gz", "ax", "ay", "az")
 _LARGEST_RATE_RAD_S, _LARGEST_FORCE_M_S2 = 70.0, 200.0
 # At rest an accelerometer shows 9.8 m/s²; one that shows less than 2 in the median was written in g.
 _LEAST_FORCE_M_S2 = 2.0
+_OTHER_SEPARATORS = {";": "semicolons", "\t": "tabs"}
 # About ten million lines: four days at 30 frames/s.
 LARGEST_BYTES = 256 << 20
 _KINDS = tuple(k.value for k in Illumination)
@@ -161,9 +162,14 @@ def _column(file: Path, header: list[str], name: str) -> int:
     if name in header:
         return header.index(name)
     near = difflib.get_close_matches(name, header, 1)
+    first = ",".join(header)
+    parted_by = next((word for mark, word in _OTHER_SEPARATORS.items() if mark in first), "")
+    hint = f"is {near[0]} meant?" if near else f"the first line is {first[:80]!r}"
+    if parted_by:
+        hint = f"columns are parted by {parted_by}: save the file with commas between, and points in decimals"
     raise InputError(
         file, f"has no column {name}", place="line 1", expected="a first line that names the columns",
-        hint=f"is {near[0]} meant?" if near else f"the first line is {','.join(header)[:80]!r}",
+        hint=hint,
     )  # fmt: skip
 
 

@@ -37,6 +37,7 @@ from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.tracking.strips import StripGrid, WallView
 from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track_texture
 from stages.motion.trajectory import (
+    doubting_texture,
     report_instrument,
     report_motion,
     report_steps,
@@ -99,7 +100,7 @@ def estimate_motion(
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
-    steady = estimate.steady
+    steady, trajectory = estimate.steady, doubting_texture(trajectory, probe, estimate.lasting)
     return replace(
         trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
         radius_doubt=doubt,

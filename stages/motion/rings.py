@@ -25,6 +25,9 @@ _ROUNDS = 5
 """Reweighted fits of a circle; on the open recordings the last changes nothing that matters. Not measured."""
 _OUTLYING = 3.0
 """Spreads at which a sample weighs half in the fit of a circle. Not measured."""
+_FARTHEST_SAMPLE = 2.0
+"""Median distances from the camera's axis up to which a sample may lie on a ring's circle: of a camera 0.6
+radii off the pipe's axis the farthest lies at 1.65. Mirrored lines lie a hundred times as far."""
 _AT_ONCE = 256
 _STEP_MM = 0.5
 """Change of radius that counts as a step of the bore: five times the relief about the smooth pipe
@@ -250,7 +253,9 @@ def _circles(xy_c: Float32) -> tuple[Float, Float]:
     x = np.where(seen[..., None], xy, 0.0)
     design = np.concatenate([x, np.ones_like(x[..., :1])], -1)
     target = np.sum(x * x, -1)
-    weight = seen.astype(float)
+    distance = np.where(seen, np.sqrt(target), np.nan)
+    usual = np.nanmedian(np.where(seen.any(1)[:, None], distance, 0.0), axis=1)
+    weight = (distance < _FARTHEST_SAMPLE * usual[:, None]).astype(float)
     usable = seen.mean(1) > _LEAST_COVERED
     out = np.full((len(xy), 3), np.nan)
     for _ in range(_ROUNDS):
@@ -261,6 +266,6 @@ def _circles(xy_c: Float32) -> tuple[Float, Float]:
         size = np.where(seen & usable[:, None], np.abs(error), np.nan)
         scale = np.ones(len(xy))
         scale[usable] = robust_spreads(size[usable], axis=1)
-        weight = seen / (1 + (error / (_OUTLYING * np.maximum(scale, 1e-6))[:, None]) ** 2)
+        weight = (weight > 0) / (1 + (error / (_OUTLYING * np.maximum(scale, 1e-6))[:, None]) ** 2)
     centre = out[:, :2] / 2
     return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1))

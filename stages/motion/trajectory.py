@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.adjustment.motion_priors import trembling
@@ -65,6 +67,19 @@ def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder:
         events=(),
         instrument=probe.parameters + unsure @ found,
         instrument_covariance=unsure @ covariance @ unsure.T,
+    )
+
+
+def doubting_texture(trajectory: Trajectory, probe: Probe, lasting: float) -> Trajectory:
+    """Return a trajectory whose instrument is as unsure as it was moved, where matches contradict the motion.
+
+    They moved it, and by what they share: a lamp mirrored in a polished wall made radii 0.3 mm too large.
+    """
+    if trajectory.instrument is None or trajectory.instrument_covariance is None or lasting <= _MOST_LASTING:
+        return trajectory
+    moved = trajectory.instrument - probe.parameters
+    return replace(
+        trajectory, instrument_covariance=trajectory.instrument_covariance + np.outer(moved, moved)
     )
 
 
@@ -156,8 +171,9 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, context: Context) ->
         context.warn(
             f"matches of texture contradict the motion by {lasting:.1f} times their σ, alike in neighbouring "
             "pictures, where sound recordings have 0.5 at most: reflections, compression or lights that move "
-            "with the probe are taken for the wall. Distance and roll may be off by more than their σ. What "
-            "to do: compare the distance with the encoder or a tape, record with less compression"
+            "with the probe are taken for the wall. Distance and roll may be off by more than their σ; that "
+            "of radii holds by how much the probe was moved. What to do: compare distance and diameter with "
+            "known ones, record with less compression"
         )
 
 

@@ -23,16 +23,35 @@ _NEAR_UNIT = 1.25
 # Unrolled walls show motion to about a tenth, bores of a gauge differ from their mean: twice is neither.
 _CONTRADICTS = 2.0
 _LEAST_STEPS, _ONE_SIGN = 8, 0.8
+# The line is on the laser sheet wherever a probe is as stated; half of it leaves room for chance lines.
+_MOST_LOST = 0.5
 
 
 def radius_seen_mm(pictures: Pictures, probe: Probe) -> float:
-    """Return the median distance of the laser line from the camera's axis; NaN where no line closes."""
+    """Return the median distance of the laser line from the camera's axis; NaN where no line closes.
+
+    Raises
+    ------
+    UnusableError
+        When the stated probe has no place on the laser sheet for most of the line.
+    """
     closed = pictures.line_px[pictures.closed > CLOSED].astype(float)
     if not closed.size:
         return float("nan")
     direction = np.stack([np.cos(pictures.azimuth_rad), np.sin(pictures.azimuth_rad)], -1)
     uv = np.asarray(probe.camera.centre_px) + closed[..., None] * direction
-    return float(np.nanmedian(np.linalg.norm(probe.triangulate(uv)[..., :2], axis=-1)))
+    radius_mm = np.linalg.norm(probe.triangulate(uv)[..., :2], axis=-1)
+    lost = 1 - float(np.isfinite(radius_mm).mean())
+    if lost > _MOST_LOST:
+        raise UnusableError(
+            "premises",
+            f"by the stated probe {100 * lost:.0f} % of the laser line's pixels look past the laser sheet or "
+            "nowhere at all",
+            limit=f"{100 * _MOST_LOST:.0f} %",
+            hint="check camera.focal_px, centre_px and distortion and the laser in probe.yaml; the "
+            "camera's lengths are px of these pictures",
+        )
+    return float(np.nanmedian(radius_mm))
 
 
 def check_diameter(radius_mm: float, pipe: PipeFacts, context: Context) -> None:

@@ -15,6 +15,7 @@ from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import estimate_state
 from stages.motion.rings import BoreSteps
+from stages.motion.trajectory import doubting_texture
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
 from tests.motion_scene import scene
@@ -141,3 +142,17 @@ def test_what_is_known_of_the_scale_goes_into_the_radii() -> None:
     ).radius_map
     gain = np.nanmedian(doubted.sigma_mm**2 - walls[0].sigma_mm ** 2) ** 0.5
     assert gain == pytest.approx(0.02 * RADIUS, rel=0.01), "a probe that encoder and diameter contradict"
+
+
+def test_a_probe_moved_by_matches_that_contradict_is_as_unsure_as_it_was_moved() -> None:
+    run = drawn_run(0.9 * np.arange(4), np.zeros(4))
+    moved = np.zeros_like(run.probe.parameters)
+    moved[0] = 0.3
+    got = Trajectory(
+        np.arange(4), np.arange(4) / 30, run.T_pc, np.zeros((4, 6, 6)), straight_axis(-50.0, 150.0), RADIUS,
+        1, 0, 0, (), run.probe.parameters + moved, 1e-4 * np.eye(len(moved)),
+    )  # fmt: skip
+    for lasting, sigma in ((0.5, 0.01), (0.7, np.hypot(0.01, 0.3))):
+        found = doubting_texture(got, run.probe, lasting).instrument_covariance
+        assert found is not None
+        assert np.sqrt(found[0, 0]) == pytest.approx(sigma)

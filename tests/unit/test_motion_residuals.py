@@ -12,13 +12,13 @@ from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.motion_priors import smooth_motion_rows, third_difference_coefficients
 from pipeline.adjustment.robust import GemanMcClure
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import RingSamples, RingValidity
+from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.geometry.axis import to_pipe
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.equations import landmark_rows
 from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import BoreSteps, ring_bins
+from stages.motion.rings import BoreSteps, circles_in_rings, ring_bins
 from tests.gauge_runs import stated_probe
 from tests.motion_scene import displaced, scene
 
@@ -212,3 +212,15 @@ def test_a_landmark_behind_the_lens_is_left_out(given) -> None:
     assert np.all(rows.by_point[astray] == 0)
     stayed = landmark_rows(state, measured, MotionParameters())
     assert rows.cost > stayed.cost, "or the adjustment would gain by losing landmarks"
+
+
+def test_lines_mirrored_far_away_do_not_draw_the_circle() -> None:
+    """Mirrored in standing water, a third of the line lay up to 9 m away: motion tracked a pipe 1 m wide."""
+    azimuth = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    radius = np.where(azimuth > np.pi / 3, np.random.default_rng(1).uniform(50, 9000, 360), 50.0)
+    xyz = np.stack([3 + radius * np.cos(azimuth), radius * np.sin(azimuth), 0 * azimuth], -1)
+    noise = np.zeros_like(xyz)
+    points = RingPoints(np.arange(3), azimuth, np.stack([xyz] * 3), np.stack([noise] * 3))
+    circles = circles_in_rings(points)
+    np.testing.assert_allclose(circles.radius_mm, 50, atol=0.1)
+    np.testing.assert_allclose(circles.centre_c, [[3, 0]] * 3, atol=0.1)

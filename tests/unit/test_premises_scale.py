@@ -57,6 +57,13 @@ def test_a_baseline_in_metres_ends_the_run(good, run):
         checked(good, replace(run.probe, laser=laser))
 
 
+def test_a_camera_that_looks_nowhere_ends_the_run(good, run):
+    """A focal length of 1e-9 px had no complaint: not one pixel of the line has a place by it."""
+    camera = replace(run.probe.camera, focal_px=(1e-9, 1e-9))
+    with pytest.raises(UnusableError, match=r"100 % of the laser line's pixels(.|\n)*focal_px"):
+        checked(good, replace(run.probe, camera=camera))
+
+
 def test_another_diameter_and_another_clock_are_told(good, run):
     table = replace(good.frames, time_s=good.frames.time_s * 1000)
     _, told = checked(replace(good, frames=table, pipe=PipeFacts(2.3 * RADIUS)), run.probe)
