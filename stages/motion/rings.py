@@ -232,10 +232,10 @@ def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigm
     sigma = np.sqrt(CORRELATED_FRAMES * wall_sigma_mm**2 + noise_mm**2)
     frame = np.broadcast_to(place[:, None], keep.shape)[keep]
     xyz_c = probe.triangulate(uv)
-    ok = np.isfinite(xyz_c).all(1)
     unsure = probe.principal_uncertainties()
     by_instrument = by_parameters @ unsure
     farther = probe.triangulate_jacobian(uv + outward)[1] @ unsure - by_instrument
+    ok = np.isfinite(np.column_stack([xyz_c, sigma])).all(1) & np.isfinite(farther).all((1, 2))
     return RingBins(frame[ok], xyz_c[ok], by_instrument[ok], by_pixel[ok], farther[ok], sigma[ok])
 
 

@@ -88,7 +88,7 @@ def check_premises(
     stated, encoder = _lights_of(_stated(table, story.row)), recording.encoder
     copy = copies(pictures, light, stated, story.row, row_times(table, story.row), encoder)
     label = np.where(copy, _stated(table, story.row), label)
-    steps = steps_of_wall(pictures, light, copy)
+    steps = steps_of_wall(pictures, shown, copy)
     row = rows_by_motion(story.row, steps, rhythm_of(light), table, encoder)
     stated_s = row_times(table, row)
     jumps = clock_jumps(stated_s, steps, encoder)
@@ -223,7 +223,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "6",
+    "7",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -160,18 +160,16 @@ class Steps:
     size: Float
 
 
-def steps_of_wall(pictures: Pictures, light: Int, copy: Bool) -> Steps:
-    """Return the steps between pictures that both show the lit wall; all there are where light is unknown.
+def steps_of_wall(pictures: Pictures, shown: Int, copy: Bool) -> Steps:
+    """Return the steps between pictures that are ``shown`` (F,) to be of the lit wall, or are stated to be.
 
     A picture that is a ``copy`` (F,) has the place of the one that it repeats.
     """
-    known = bool(np.any(light != Light.UNKNOWN))
     end = np.flatnonzero((pictures.partner >= 0) & ~copy)
     start = pictures.partner[end]
     while np.any(copy[start]):
         start = np.where(copy[start], pictures.partner[start], start)
-    use = ((light[end] == Light.WALL) & (light[start] == Light.WALL)) | np.full(len(end), not known)
-    use &= np.isfinite(pictures.step[end])
+    use = (shown[end] == Light.WALL) & (shown[start] == Light.WALL) & np.isfinite(pictures.step[end])
     return Steps(start[use], end[use], pictures.step[end[use]])
 
 

@@ -122,15 +122,16 @@ def encoder_factor(
     if found.steps < _LEAST_STEPS or found.one_sign < _ONE_SIGN:
         return 1.0
     unit, size = _nearest_unit(abs(found.value))
-    factor = size * float(np.sign(found.value))
-    wrong = [f"in {unit} in place of mm"] * (size != 1.0) + ["with its sign reversed"] * (factor < 0)
+    contradicts = max(abs(found.value) * size, 1 / max(abs(found.value) * size, 1e-9)) > _CONTRADICTS
+    factor = 1.0 if contradicts else size * float(np.sign(found.value))
+    wrong = [f"in {unit} in place of mm"] * (abs(factor) != 1.0) + ["with its sign reversed"] * (factor < 0)
     if wrong:
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
             f"{found.steps} steps: its readings are taken as {' and '.join(wrong)}, and multiplied by "
             f"{factor:g}. What to do: correct encoder.csv"
         )
-    elif max(abs(found.value), 1 / abs(found.value)) > _CONTRADICTS:
+    elif contradicts:
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
             f"{found.steps} steps: one of the encoder's scale, its clock and the probe's baseline is wrong. "
