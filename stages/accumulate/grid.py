@@ -260,8 +260,7 @@ def _regress(  # type: ignore[no-untyped-def]
                 d[first:last], kernel[first:last], radius[a, first:last], variance[a, first:last], width
             )
             for k in range(first, last):
-                # Rings beyond 3 widths weigh exp(-4.5), 1 %: not counted.
-                out_count[i, a] += count[a, k] if abs(d[k]) <= 3.0 * width else 0
+                out_count[i, a] += count[a, k] if abs(d[k]) <= 3.0 * width else 0  # beyond, a ring weighs 1 %
             out_misalignment[i, a] = carried / total
 
 
@@ -297,6 +296,5 @@ def _line_at(d, kernel, radius, variance, width):  # type: ignore[no-untyped-def
         misfit += w * (radius[k] - value - slope * d[k]) ** 2
         spread += share * share * variance[k]
     freedom = sum1 - 2.0 * sum2 / max(sum1, 1e-12)
-    # Below 0.2 degrees of freedom (chosen) a scatter says nothing; the stated variances count alone.
-    excess = misfit / freedom if freedom > 0.2 else 1.0
+    excess = misfit / freedom if freedom > 0.2 else 1.0  # a choice: scatter of fewer says nothing
     return value, np.sqrt(spread * max(1.0, excess))

@@ -1,8 +1,6 @@
 """Inference of the diagnosis against dense brute force, on small linear problems."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,8 +9,6 @@ from scipy import stats
 from pipeline.adjustment.bordered import Rows
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import VOCABULARY
-from stages.diagnose.gauge import answer
-from stages.diagnose.gauge.confirm import passes_again
 from stages.diagnose.gauge.elimination import (
     Equations,
     OwnUnknowns,
@@ -26,7 +22,6 @@ from stages.diagnose.gauge.other_growth import odds_in
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import NAMELESS
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
-from stages.diagnose.result import Confirmation, FitQuality, Verdict
 
 FRAMES, GLOBALS = 9, 5
 TILT, CONE = LIBRARY["laser_tilt"], LIBRARY["laser_cone"]
@@ -200,83 +195,6 @@ def test_what_is_left_is_noise_or_is_not(hidden, low, high):
     assert low <= joint_p(of, Stated((), np.zeros((0, 0))), np.zeros(0, np.int64)) <= high
 
 
-AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
-AT_OTHER_RADII = Confirmation("bore 1: 1", "bore 2: 1", True)
-
-
-def examined(
-    shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
-    left: float = 0.5, pattern_order: int = 2, unsplit: tuple[str, ...] = (),
-    confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),), heldout: float = 0.11,
-    unknown: float = 0.0, other_order: int = 3, rival_heldout: float = 1.0, grown: float = 0.0,
-) -> Any:  # fmt: skip
-    """Return a gauge run in which effects and patterns were found that move rings by so much."""
-    law = SimpleNamespace(law="laser_tilt")
-    orders = (*[1, other_order, other_order][: len(shifts_px)], *([pattern_order] * len(patterns_px)))
-    terms = tuple(
-        SimpleNamespace(model=law, shift_px=s, order=m)
-        for s, m in zip((*shifts_px, *patterns_px), orders, strict=True)
-    )
-    library = terms[: len(shifts_px)]
-    fit = SimpleNamespace(terms=terms)
-    best = SimpleNamespace(
-        named=bool(library) and not patterns_px, library_terms=library, fit=fit, heldout=0.0
-    )
-    rival = SimpleNamespace(named=True, library_terms=terms[:1], laws=("cone",), heldout=rival_heldout)
-    verdicts = SimpleNamespace(
-        adequacy=left,
-        judged=(best, rival),
-        chance_of=lambda term: chance / (1 + unknown),
-        patterns_beside=lambda term: {"image outward": unknown / (1 + unknown)},
-    )
-    each = (unsplit, *[()] * (len(library) - 1)) if library else ()
-    quality = FitQuality("px", 1.0, 0.1, 1.0, heldout, 0.1)
-    return cast(
-        Any,
-        SimpleNamespace(
-            best=best,
-            verdicts=verdicts,
-            confirmed=confirmed,
-            unsplit=each,
-            quality=quality,
-            other_growth=(grown,) * len(library),
-        ),
-    )
-
-
-@pytest.mark.parametrize(
-    ("seen", "verdict"),
-    [
-        (examined(), Verdict.NAMED),
-        (examined((), (0.5,), confirmed=()), Verdict.UNEXPLAINED),
-        (examined(patterns_px=(0.5,)), Verdict.PARTLY),
-        (examined(patterns_px=(2.0,)), Verdict.UNEXPLAINED),
-        (examined(patterns_px=(0.5,), pattern_order=1), Verdict.UNEXPLAINED),
-        (examined(patterns_px=(0.5,), chance=0.98), Verdict.UNEXPLAINED),
-        (examined((1.0, 1.0), unsplit=("principal_point",), confirmed=((AGREES,),) * 2), Verdict.PARTLY),
-        (examined((1.0, 1.0), other_order=1, confirmed=((AGREES,),) * 2), Verdict.CLASS),
-        (examined((1.0, 1.0), other_order=1, confirmed=((AT_OTHER_RADII,),) * 2), Verdict.NAMED),
-        (examined((1.0,) * 3, other_order=1, confirmed=((AT_OTHER_RADII,),) * 3), Verdict.CLASS),
-        (examined(left=1e-9), Verdict.UNEXPLAINED),
-        (examined(heldout=0.2), Verdict.UNEXPLAINED),
-        (examined(rival_heldout=-1.0), Verdict.CLASS),
-        (examined(unknown=0.5), Verdict.UNEXPLAINED),
-        (examined(unknown=0.5, unsplit=("focal_scale",)), Verdict.CLASS),
-        (examined(confirmed=((AGREES, DIFFERS),)), Verdict.UNEXPLAINED),
-        (examined((1.0, 1.0), confirmed=((AGREES,), (AGREES, DIFFERS))), Verdict.PARTLY),
-        (examined(confirmed=((),)), Verdict.CLASS),
-        (examined(chance=0.98), Verdict.CLASS),
-        (examined(grown=0.005), Verdict.NAMED),
-        (examined(grown=0.015), Verdict.CLASS),
-        (examined(unsplit=("principal_point",)), Verdict.CLASS),
-    ],
-)
-def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict, monkeypatch):
-    monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
-    monkeypatch.setattr(answer, "pattern_of", lambda term: ("laser", "static", term.order))
-    assert answer.verdict_of(seen) is verdict
-
-
 @pytest.mark.parametrize(
     ("noise", "growing", "low", "high"),
     [(0.01, 0.0, 0.0, NAMELESS / 20), (10.0, 0.0, NAMELESS / 2, NAMELESS), (0.1, 0.5, 1.0, np.inf)],
@@ -291,17 +209,6 @@ def test_a_name_is_as_unsure_as_its_growth_with_the_radius(noise, growing, low, 
     measured = design @ [1.0, growing, 0.0] + random.normal(size=200)
     (odds,) = odds_in(evidence_of(design, measured, columns), [one], ["other"], Stated((), np.zeros((0, 0))))
     assert low <= odds <= high
-
-
-@pytest.mark.parametrize(
-    ("step_s", "turns_s", "again"), [(3.0, 9.0, False), (3.0, 6.0, True), (0.0, 6.0, False)]
-)
-def test_a_step_is_borne_out_only_where_the_probe_comes_back_to_the_wall_before_it(step_s, turns_s, again):
-    time_s = np.arange(100) / 10
-    T_pc = np.tile(np.eye(4), (100, 1, 1))
-    T_pc[:, 2, 3] = 20 * (turns_s - np.abs(time_s - turns_s))
-    run = cast(Any, SimpleNamespace(time_s=time_s))
-    assert passes_again(run, T_pc, step_s) is again
 
 
 def test_a_score_that_few_cells_hold_is_less_surprising():

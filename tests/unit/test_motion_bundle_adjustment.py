@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -15,9 +13,9 @@ from pipeline.adjustment.motion_priors import trembling
 from pipeline.adjustment.normal_equations import BandedCholesky
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.arrays import Float, Int
-from pipeline.geometry.rigid import inverse, transform, vector_from_rotation
-from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Scales, linearised, scales_of
-from stages.motion.bundle_adjustment.solver import adjust, estimate_state, scale_between_halves, trembles
+from pipeline.geometry.rigid import vector_from_rotation
+from stages.motion.bundle_adjustment.equations import Equations, Scales, linearised, scales_of
+from stages.motion.bundle_adjustment.solver import adjust, estimate_state, trembles
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 from tests.motion_scene import SHAKE, displaced, scene
@@ -261,45 +259,3 @@ def test_trembling_loosens_the_motion_across_the_pipe_and_no_other() -> None:
     known = steady.measured.tracks.poses.frames
     assert not trembles(trembling(steady.truth.T_pc, known))
     assert trembles(trembling(shaken.truth.T_pc, known))
-
-
-def test_match_biases_come_last() -> None:
-    given = scene(8, 14, seed=2)
-    assert len(given.truth.instrument) == given.measured.unsure.shape[1] + MATCH_BIASES
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_bias_of_far_matches_is_not_taken_for_distance(seed: int) -> None:
-    """Compression drops texture far ahead: matches at less than 0.85 rad lag behind, by up to 0.25 px."""
-    given = scene(40, 90, encoder=False, seed=seed)
-    tracks, truth = given.measured.tracks, given.truth
-    xyz_c = transform(inverse(truth.T_pc[tracks.frame]), truth.xyz_p[tracks.landmark])
-    beside = np.hypot(xyz_c[:, 0], xyz_c[:, 1])
-    lag = -0.25 * np.clip((0.85 - np.arctan2(beside, xyz_c[:, 2])) / 0.15, 0, 1)
-    uv = tracks.uv + lag[:, None] * xyz_c[:, :2] / beside[:, None]
-    measured = replace(given.measured, tracks=replace(tracks, uv=uv))
-    found = adjust(truth, measured, MotionParameters(alike=1.0), 1e-5)
-    sigma = np.sqrt(frame_covariance(found.equations.factor(), np.array([39]))[0, 2, 2])
-    assert sigma < 0.1
-    assert abs(found.state.T_pc[-1, 2, 3] - truth.T_pc[-1, 2, 3]) < 2 * sigma
-
-
-def test_what_shifts_near_matches_alone_makes_distances_unsure() -> None:
-    given = scene(40, 90, encoder=False, seed=1)
-    tracks, truth = given.measured.tracks, given.truth
-    away = tracks.uv - given.measured.probe.camera.centre_px
-    distance = np.linalg.norm(away, axis=1)
-    near = distance > np.median(distance)
-    shifted = tracks.uv + np.where(near, 1.0, 0.0)[:, None] * away / distance[:, None]
-    unsure = []
-    for uv in (tracks.uv, shifted):
-        measured, parameters = (
-            replace(given.measured, tracks=replace(tracks, uv=uv)),
-            MotionParameters(alike=1.0),
-        )
-        found = estimate_state(truth, measured, parameters)
-        unsure.append(scale_between_halves(found, measured, parameters))
-    way = np.ptp(truth.T_pc[:, 2, 3])
-    sigma = np.sqrt(frame_covariance(found.factor, np.array([39]))[0, 2, 2]) / way
-    assert unsure[0] < 2 * sigma
-    assert unsure[1] > 3 * unsure[0], unsure

@@ -164,10 +164,10 @@ class KnockTest:
             )
         elif self.ambiguous:
             context.warn(
-                f"{jump}. Whether laser and camera were knocked against each other or the pipe steps there, "
-                "texture is too weak to tell: this is not corrected, and radii and distances may be off by "
-                "more than their σ on one side of it. What to do: pass the place once more; the pipe's step "
-                "stays where it is"
+                f"{jump}. This recording does not tell for sure whether laser and camera were knocked "
+                "against each other or the pipe steps there: nothing is corrected, and radii and distances "
+                "may be off by more than their σ on one side. What to do: pass the place once more: the "
+                "pipe's step stays where it is"
             )
 
 
