@@ -12,7 +12,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
 from pipeline.recording.checks import CheckedFrames, withheld_frames
-from stages.premises.changes import Changes, warn_of, warn_of_frames
+from stages.premises.changes import Changes, warn_of, warn_of_frames, warn_of_interlacing
 from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
 from stages.premises.light import (
     Light,
@@ -74,6 +74,7 @@ def check_premises(
         When what is stated cannot be right and cannot be mended, or is not to be.
     """
     pictures = look_at_pictures(recording, probe, context)
+    warn_of_interlacing(pictures, context)
     table = _table(recording)
     seen_light = _light(recording.frames, pictures)
     outside = off_the_pipe(pictures)
@@ -223,7 +224,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "7",
+    "8",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

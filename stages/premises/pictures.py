@@ -34,6 +34,8 @@ _LEAST_ROWS, _MOST_COVERED, _BROAD = 24, 0.1, 8.0
 _KEPT = 8
 # Brightness is told where this share of the surroundings is known. Not measured.
 _LEAST_KNOWN = 0.05
+# Every so many columns are looked at for rows that were taken at two times.
+_EVERY_COLUMN = 8
 # Two pictures are taken in the same light when their brightness differs by less than this part.
 _SAME_LIGHT = 0.3
 
@@ -53,6 +55,9 @@ class Pictures:
         Radius of the strongest thin line on each ray.
     azimuth_rad : (R,)
         Of the rays.
+    combing : (F,)
+        Power of the difference from one row to the next over that to the row after it: 1 at most in
+        pictures taken at one time, more where odd and even rows show different times; NaN in a black one.
     partner : (F,) int
         The latest picture before in like light, −1 without one.
     change : (F,)
@@ -65,6 +70,7 @@ class Pictures:
     closed: Float
     line_px: Float32
     azimuth_rad: Float
+    combing: Float
     partner: np.ndarray[tuple[int], np.dtype[np.int64]]
     change: Float
     step: Float
@@ -88,6 +94,7 @@ def look_at_pictures(
         if image is None:
             return None
         wall, line = polar.wall_and_line(image)
+        seen.combing[place] = combing(image)
         seen.brightness[place] = np.sqrt(float(wall.mean()))
         seen.closed[place], seen.line_px[place] = polar.closed_line(line)
         ring = seen.line_px[place] if seen.closed[place] > CLOSED else None
@@ -103,10 +110,17 @@ def look_at_pictures(
 
 
 def _empty(count: int, azimuth_rad: Float) -> Pictures:
-    nothing = (np.full(count, np.nan) for _ in range(4))
-    brightness, closed, change, step = nothing
+    nothing = (np.full(count, np.nan) for _ in range(5))
+    brightness, closed, combed, change, step = nothing
     line = np.full((count, len(azimuth_rad)), np.nan, np.float32)
-    return Pictures(brightness, closed, line, azimuth_rad, np.full(count, -1), change, step)
+    return Pictures(brightness, closed, line, azimuth_rad, combed, np.full(count, -1), change, step)
+
+
+def combing(image: Image) -> float:
+    """Return by how much neighbouring rows of a picture (H, W) differ more than every second ones."""
+    rows = image[:, ::_EVERY_COLUMN].astype(np.float32)
+    next_row, next_but_one = (float(np.mean((rows[n:] - rows[:-n]) ** 2)) for n in (1, 2))
+    return next_row / next_but_one if next_but_one > 0 else float("nan")
 
 
 class _PolarView:
