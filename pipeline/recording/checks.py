@@ -43,9 +43,9 @@ def encoder_warnings(encoder: Encoder | None, frames: FrameTable) -> tuple[str, 
     step_s, slack = np.diff(encoder.time_s), _slack_s(encoder, frames)
     found = []
     if encoder.time_s[0] > frames.time_s[0] + slack:
-        found.append(f"the encoder begins {encoder.time_s[0] - frames.time_s[0]:.6g} s after the first frame")
+        found.append(f"the encoder begins {encoder.time_s[0] - frames.time_s[0]:.2f} s after the first frame")
     if encoder.time_s[-1] < frames.time_s[-1] - slack:
-        found.append(f"the encoder ends {frames.time_s[-1] - encoder.time_s[-1]:.6g} s before the last frame")
+        found.append(f"the encoder ends {frames.time_s[-1] - encoder.time_s[-1]:.2f} s before the last frame")
     if np.any(step_s > 10 * slack):
         found.append(f"the encoder is silent for up to {step_s.max():.2f} s")
     return (*found, *_jumps(encoder))

@@ -24,7 +24,7 @@ from stages.texture.noise import NoiseGauge, views_against
 from stages.texture.photometry import LightChain, cut_plan
 from stages.texture.sampling import LightSampler, joined
 from stages.texture.surface import wall_surface
-from stages.texture.views import LitViews, TileViews, lit_views, seen_by, thinned
+from stages.texture.views import LitViews, TileViews, lit_views, seen_by, shared, thinned
 
 _WHITE = 250.0
 # What is brighter than the median wall by more is no matt wall: glints, noise where light is scarce.
@@ -117,7 +117,8 @@ def _plan(gauge: NoiseGauge, seen: list[TileViews], most: int, context: Context)
     noise = gauge.noise(seen)
     if np.isfinite(noise):
         context.report("noise of lit pictures, one against another", noise, "grey levels")
-    return thinned(seen, views_against(noise, most))
+    asked = views_against(noise, most)
+    return thinned(seen, most) if asked == most else shared(seen, asked)
 
 
 class _Images:
@@ -212,7 +213,7 @@ def _texture_of_run(
 
 TEXTURE = Stage(
     "texture",
-    "10",
+    "11",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",

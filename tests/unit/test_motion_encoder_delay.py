@@ -74,6 +74,7 @@ class Made:
     encoder: EncoderReadings | None
     probe: Probe
     time_s: Float
+    jump: None = None
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
         return replace(self.given.measured, encoder=self.encoder, probe=self.probe)

@@ -13,7 +13,7 @@ from stages.texture.noise import views_against
 from stages.texture.photometry import LightChain, cut_plan
 from stages.texture.sampling import LightSamples
 from stages.texture.surface import wall_surface
-from stages.texture.views import TileViews, seen_by, thinned
+from stages.texture.views import TileViews, seen_by, shared
 from tests.quiet import quiet_context
 from tests.unit.drawn_pipe import draw, poses, recording_of, seen_wall, small_probe, trajectory_of
 from tests.unit.test_texture_parts import straight_wall, views_at
@@ -106,14 +106,14 @@ def test_views_are_those_found_by_looking_at_all(count: int) -> None:
 
 
 @pytest.mark.parametrize("most", [1, 7, 16, 100])
-def test_thinned_tiles_keep_about_as_many_views_and_share_them(most: int) -> None:
+def test_tiles_keep_about_as_many_views_and_share_them(most: int) -> None:
     ends = np.sort(np.random.default_rng(most).integers(0, 400, (40, 2)), axis=1)
     plan = [TileViews(np.arange(a, b), 5.0) for a, b in ends]
-    found = thinned(plan, most)
+    found = shared(plan, most)
     for all_of_tile, kept in zip(plan, found, strict=True):
         assert min(most, len(all_of_tile.views)) - 1 <= len(kept.views) <= most
         assert set(kept.views) <= set(all_of_tile.views)
-    alike = thinned([TileViews(np.arange(k, k + 60), 5.0) for k in range(0, 140, 20)], 15)
+    alike = shared([TileViews(np.arange(k, k + 60), 5.0) for k in range(0, 140, 20)], 15)
     assert len(np.unique(np.concatenate([t.views for t in alike]))) == 180 // 4
     assert all(14 <= len(t.views) <= 15 for t in alike)
 
