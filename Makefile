@@ -10,9 +10,10 @@ COVERAGE := --cov --cov-report=term:skip-covered
 
 setup: $(READY)
 
+# The lock names everything: resolved again, an extra of a package would ask for its newest version.
 $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --require-hashes --no-deps -r requirements.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $(READY)
 

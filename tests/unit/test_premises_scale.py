@@ -10,8 +10,11 @@ import pytest
 
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
+from stages.premises.light import Steps
+from stages.premises.scale import encoder_factor
 from tests.drawn_run import BASELINE, RADIUS
 from tests.premises_run import COUNT, checked, good_recording, steady_run
+from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 
 
@@ -75,6 +78,17 @@ def test_an_encoder_is_not_reversed_by_pictures_that_show_no_wall(good, run):
         spoiled = replace(good, frames=table, listed=None, source=source, encoder=encoder)
         found, _ = checked(spoiled, run.probe)
         assert found.encoder_factor == 1
+
+
+def test_a_ratio_that_fits_no_unit_does_not_turn_the_encoder_round(good):
+    place = np.arange(1, 40)
+    # the encoder goes on by 1 mm a frame, what is taken for the wall back by a seventh
+    steps = Steps(place - 1, place, np.full(len(place), -1 / 7))
+    time_s = np.arange(40) / 30
+    told: list[str] = []
+    spoiled = replace(good, encoder=Encoder(time_s, np.arange(40.0)))
+    assert encoder_factor(spoiled, time_s, steps, 1.0, replace(quiet_context(), warn=told.append)) == 1.0
+    assert "one of the encoder's scale, its clock and the probe's baseline is wrong" in told[0]
 
 
 def test_another_diameter_and_another_clock_are_told(good, run):
