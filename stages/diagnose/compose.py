@@ -159,7 +159,8 @@ def _identifiable(said: _Said, examined: Examined | None) -> str:
     """Return what is determined all the same: the size each cause would have, or an empirical formula."""
     if said.verdict is Verdict.CLASS:
         unknown = _unknown(examined) if examined is not None else ()
-        return "; or ".join([*(e.statement for e in said.effects), *(_UNKNOWN.format(f) for f in unknown)])
+        told = [*(e.statement for e in said.effects), *(_UNKNOWN.format(f) for f in unknown)]
+        return "; or ".join(dict.fromkeys(words.rstrip(".") for words in told)) + "."
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
     return of_gauge.formula(examined) if nameless and examined is not None else ""
 

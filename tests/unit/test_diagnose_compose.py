@@ -26,8 +26,8 @@ from tests.shared_data import PROJECT_ROOT
 
 AGREES = Agreement(Confirmation("first half: 0.02", "second half: 0.02", True), 30.0)
 DIFFERS = Agreement(Confirmation("first half: 0.02", "second half: -0.01", False), 1e-12)
-SCALE = TravelEstimate("encoder_scale", "relative", "", 0.02, 0.0004, 0.002, 1e-12, 0.01, ())
-PLAY = TravelEstimate("encoder_backlash", "backlash_mm", "mm", 1.0, 0.02, 0.02, 1e-30, 0.1, ())
+SCALE = TravelEstimate("encoder_scale", "relative", 0.02, 0.0004, 0.002, 1e-12, 0.01, ())
+PLAY = TravelEstimate("encoder_backlash", "backlash_mm", 1.0, 0.02, 0.02, 1e-30, 0.1, ())
 SLIP = StepFound(40, 1.3, 0.02, 2.0, 0.05, 1e-20, (), 0.0)
 SWING = Line(5.0, 0.3, 0.002, 20.0, 1e-12, float("nan"), 0.3, float("nan"), 0.01, (AGREES,))
 

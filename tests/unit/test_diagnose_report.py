@@ -64,6 +64,20 @@ def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
     assert "below 10⁻⁹" in page
 
 
+def test_the_first_lines_give_the_size_with_its_sigma_and_what_it_means_for_the_pipe(tmp_path):
+    write_page(WHOLE, Shown(), tmp_path)
+    page = (tmp_path / "diagnosis.html").read_text()
+    assert "angle by which the sheet leans forward: 0.600 ± 0.010 deg" in page
+    assert "puts the wall up to 0.100 mm beside where it is" in page
+    assert "with what was found, 0.001 mm are left" in page
+
+
+def test_causes_of_a_class_that_say_the_same_are_said_once(tmp_path):
+    found = replace(WHOLE, verdict=Verdict.CLASS, effects=(TILT, TILT), identifiable=TILT.statement)
+    write_page(found, Shown(), tmp_path)
+    assert (tmp_path / "diagnosis.html").read_text().count(TILT.statement) == 1
+
+
 def test_the_frame_shown_is_the_one_that_departs_most_and_has_most_of_a_ring():
     frame = np.repeat([3, 5, 7, 9], [24, 22, 6, 24])
     residual = np.select([frame == 5, frame == 7], [0.2, 0.9], 0.01)

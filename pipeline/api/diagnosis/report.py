@@ -15,10 +15,20 @@ from pipeline.api.diagnosis.apply import GeometryChange, consequence
 from pipeline.arrays import Float
 from pipeline.files.disk import replace_text
 from pipeline.pages import page_template, rendered, tidy
+from pipeline.pages.notation import measured
+from pipeline.physics.catalogue import ALL_EFFECTS
 from stages.diagnose.compared import OnImage
 from stages.diagnose.compose import to_json
 from stages.diagnose.resimulate import Resimulated
-from stages.diagnose.result import Candidate, Diagnosis, Picture, ReadingPicture, Verdict, WallPicture
+from stages.diagnose.result import (
+    Candidate,
+    Diagnosis,
+    EffectFound,
+    Picture,
+    ReadingPicture,
+    Verdict,
+    WallPicture,
+)
 
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
@@ -48,7 +58,8 @@ def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
     change = shown.change
     text = page_template("diagnose").render(
         d=to_json(found), headline=headline(found), simulated=shown.simulated, change=change,
-        consequence=consequence(change) if change is not None else "",
+        sizes=[sizes(e) for e in found.effects],
+        consequence=consequence(change) if change is not None else size_of_mismatch(found),
         hours=_by_hour(change) if change is not None else (), pictures=_pictures(found, shown),
     )  # fmt: skip
     replace_text(folder / "diagnosis.html", text)
@@ -62,6 +73,39 @@ def headline(found: Diagnosis) -> str:
         names = " and ".join(e.name.replace("_", " ") for e in found.effects)
         return f"Left out: {names}, and something more that has no name yet"
     return _HEADLINES[found.verdict]
+
+
+def sizes(found: EffectFound) -> tuple[str, ...]:
+    """Return each estimated size of an effect in words, with its 1 σ; what is counted has none."""
+    law = ALL_EFFECTS.get(found.name)
+    known = {q.name: q for q in law.quantities} if law is not None else {}
+    out = []
+    for name, value in found.parameters.items():
+        meaning, unit = (known[name].meaning, known[name].unit) if name in known else (name, "")
+        share, unit = (100.0, "%") if name == "relative" else (1.0, unit)
+        if value.sd > 0:
+            out.append(f"{meaning}: {measured(share * value.value, share * value.sd, unit)}")
+    return tuple(out)
+
+
+def size_of_mismatch(found: Diagnosis) -> str:
+    """Return by how much measured and expected differ before and after, in a sentence; else empty."""
+    if found.reading_picture is not None:
+        seen = found.reading_picture
+        before, after = (float(np.nanmax(np.abs(mm))) for mm in (seen.before_mm, seen.after_mm))
+        return (
+            f"The encoder's reading is off by up to {before:.2f} mm; with what was found taken out, up to "
+            f"{after:.2f} mm are left."
+        )
+    if found.ring_picture is None or found.verdict is Verdict.CONSISTENT:
+        return ""
+    rings = found.ring_picture
+    before, after = (float(np.nanmax(np.abs(_quantiles(mm)[0]))) for mm in (rings.before_mm, rings.after_mm))
+    return (
+        f"The stated instrument puts the wall up to {before:.3f} mm beside where it is (median of frames, "
+        f"worst azimuth); with what was found, {after:.3f} mm are left. --apply measures the pipe anew and "
+        "says what changes for each defect."
+    )
 
 
 def _by_hour(change: GeometryChange) -> list[tuple[int, float | None, float | None]]:

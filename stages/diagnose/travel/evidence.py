@@ -9,7 +9,6 @@ import numpy as np
 from scipy.stats import norm
 
 from pipeline.arrays import Bool, Float
-from pipeline.pages import notation
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
@@ -43,7 +42,7 @@ class TravelEstimate:
 
     Attributes
     ----------
-    effect, quantity, unit : str
+    effect, quantity : str
         Names of the catalogue.
     value, sigma : float
         All effects fitted together; σ infinite where this motion tells nothing of it.
@@ -63,7 +62,6 @@ class TravelEstimate:
 
     effect: str
     quantity: str
-    unit: str
     value: float
     sigma: float
     stated_sigma: float
@@ -80,9 +78,8 @@ class TravelEstimate:
 
     @property
     def statement(self) -> str:
-        """Return the effect in a plain sentence with its size and uncertainty."""
-        words = LIBRARY[self.effect].statement((), np.array([self.value]))
-        return f"{words} {notation.plus_minus(self.size_sigma, self.unit)}"
+        """Return the effect in a plain sentence with its size."""
+        return LIBRARY[self.effect].statement((), np.array([self.value]))
 
 
 @dataclass(frozen=True)
@@ -213,7 +210,7 @@ def _estimates(
         again = second_predictions(fit, k, turning if k == PLAY else 0.0) if p < _REPORTED else ()
         out.append(
             TravelEstimate(
-                name, quantity.name, quantity.unit, value, sigma, allowed, p, _DETECTED * total, alike, again,
+                name, quantity.name, value, sigma, allowed, p, _DETECTED * total, alike, again,
                 _where(fit.columns[:, k]),
             )
         )  # fmt: skip
