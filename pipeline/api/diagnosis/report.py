@@ -102,9 +102,9 @@ def size_of_mismatch(found: Diagnosis) -> str:
     rings = found.ring_picture
     before, after = (float(np.nanmax(np.abs(_quantiles(mm)[0]))) for mm in (rings.before_mm, rings.after_mm))
     return (
-        f"The stated instrument puts the wall up to {before:.3f} mm beside where it is (median of frames, "
-        f"worst azimuth); with what was found, {after:.3f} mm are left. --apply measures the pipe anew and "
-        "says what changes for each defect."
+        f"With the stated instrument the ring shows the wall up to {before:.3f} mm beside where texture and "
+        f"motion place it (median of frames, worst azimuth); with what was found, {after:.3f} mm are left. "
+        "--apply measures the pipe anew and says what changes for each defect."
     )
 
 
