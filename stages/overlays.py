@@ -1,8 +1,4 @@
-"""Wall -> error-colour overlays: deviation, 1 σ uncertainty, misalignment error.
-
-Colour maps are safe for colour-blind readers and even in lightness: a blue-white-red map of ColorBrewer for
-signed values, `cividis` (Nuñez, Anderton, Renslow 2018) for values that only grow.
-"""
+"""Wall -> error-colour overlays: deviation, 1 σ uncertainty, misalignment error."""
 
 from __future__ import annotations
 
@@ -18,6 +14,7 @@ from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.pages.colour_maps import colours_bgr
 from pipeline.recording.base import Recording
 
 # Colour of what was not measured: middle grey, which no colour map has.
@@ -151,17 +148,12 @@ def _overlay(
 
 
 def _palette(colours: str) -> Byte:
-    # matplotlib is slow to import, so it is imported only when it is needed.
-    from matplotlib import colormaps
-
-    rgb = colormaps[colours](np.linspace(0, 1, 255))[:, :3]
-    bgr = np.rint(255 * rgb[:, ::-1]).astype(np.uint8)
-    return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), bgr])
+    return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), colours_bgr(colours, 255)])
 
 
 OVERLAYS = Stage(
     "overlays",
-    "1",
+    "2",
     OverlayParameters,
     draw_overlays,
     "wall -> deviation, uncertainty, misalignment as colours",
