@@ -10,11 +10,11 @@ from pydantic import Field
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Byte, Float
+from pipeline.artefacts.colour_maps import colours_bgr
 from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context, Parameters, Stage
-from pipeline.pages.colour_maps import colours_bgr
 from pipeline.recording.base import Recording
 
 # Colour of what was not measured: middle grey, which no colour map has.

@@ -25,7 +25,8 @@ _LEFT, _TOP, _HIGH, _RIGHT, _BELOW = 90, 48, 480, 150, 72
 _BAR_ASIDE, _BAR_WIDE, _BAR_END, _TICK, _LETTERS, _TITLE = 18, 24, 24, 5, 16, 20
 # px between the marks of an axis, at least.
 _ALONG_APART, _BAR_APART = 90, 70
-_FONT = "mpl-data/fonts/ttf/DejaVuSans.ttf"  # lies in matplotlib's folder, and has every letter that is needed
+# In the folder of matplotlib; has every letter that is needed.
+_FONT = "mpl-data/fonts/ttf/DejaVuSans.ttf"
 
 
 def overlay_figure(overlays: Overlays, overlay: Overlay) -> Image.Image:

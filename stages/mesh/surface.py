@@ -54,7 +54,7 @@ def weld(pieces: Sequence[Surface]) -> Surface:
 
 
 def vertex_normals(surface: Surface) -> Float:
-    """Return unit normals (V, 3) of the vertices, toward the inside of the pipe: triangles' by their areas."""
+    """Return unit normals (V, 3) of vertices, toward the inside of the pipe: of triangles, by their areas."""
     corner = surface.vertex_p[surface.face]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     number, count = surface.face.ravel(), len(surface.vertex_p)

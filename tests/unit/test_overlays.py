@@ -7,10 +7,10 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from pipeline.artefacts.colour_maps import colours_bgr
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import UnusableError
 from pipeline.export.overlay_figure import overlay_figure
-from pipeline.pages.colour_maps import colours_bgr
 from stages.overlays import OverlayParameters, draw_overlays, fitted_pipe, overlays_of
 from tests.quiet import quiet_context
 from tests.unit.small_wall import PIT, RADIUS, small_wall

@@ -230,7 +230,7 @@ def test_places_within_an_outline_are_those_of_an_independent_reader(wall: Wall)
     turn = np.linspace(-np.pi, np.pi, 40, endpoint=False)
     star = np.stack([15 + 5 * np.cos(turn), np.pi + np.sin(turn) * (1 + 0.4 * np.cos(3 * turn))], -1)
     at = np.random.default_rng(1).uniform((8, -np.pi), (22, np.pi), (5000, 2))
-    want = [Outline(star).contains_points(at + (0, k * 2 * np.pi)) for k in (0, 1)]
+    want = [Outline(star).contains_points(at + np.array((0, k * 2 * np.pi))) for k in (0, 1)]
     found = defect_at([replace(pit_defect(), outline=star)], at[:, 0], at[:, 1])
     np.testing.assert_array_equal(found == 0, want[0] | want[1])
     assert all(w.any() for w in want)

@@ -1,8 +1,8 @@
 """Colour maps as a few colours each, between which they run straight.
 
 Safe for colour-blind readers and even in lightness: blue-white-red and two others of ColorBrewer (C. Brewer,
-colorbrewer2.org) for signed values; `cividis` (Nuñez, Anderton, Renslow 2018) and `viridis` (van der Walt, Smith
-2015) for values that only grow, thinned out to at most 4 of 255 levels.
+colorbrewer2.org) for signed values; `cividis` (Nuñez, Anderton, Renslow 2018) and `viridis` (van der Walt,
+Smith 2015) for values that only grow, thinned out to at most 4 of 255 levels.
 """
 
 from __future__ import annotations
@@ -35,4 +35,4 @@ def colours_bgr(name: str, count: int) -> Byte:
     known = np.array([list(bytes.fromhex(c)) for c in _COLOURS[name].split()], float)
     place = np.linspace(0, len(known) - 1, count)
     rgb = [np.interp(place, np.arange(len(known)), channel) for channel in known.T]
-    return np.rint(np.stack(rgb[::-1], -1)).astype(np.uint8)
+    return np.asarray(np.rint(np.stack(rgb[::-1], -1)), np.uint8)
