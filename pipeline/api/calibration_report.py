@@ -14,6 +14,7 @@ from scipy.stats import binned_statistic_2d
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.files.provenance import MadeBy
+from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.pages import page_template, rendered
 from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
@@ -113,14 +114,31 @@ def _parameter(result: GaugeCalibration, k: int) -> dict[str, Any]:
     }
 
 
-def _laser(probe: Probe) -> dict[str, float]:
-    laser = probe.laser
+def _laser(probe: Probe) -> dict[str, dict[str, float | str | None]]:
+    """Return the sheet in an engineer's terms; no σ of the direction where the tilt is less than its own."""
+    values, step = _sheet_terms(probe.laser), 1e-7
+    moved = [probe.laser.with_parameters(probe.laser.parameters + d) for d in step * np.eye(len(_SHEET))]
+    jacobian = (np.array([_sheet_terms(sheet) for sheet in moved]) - values).T / step
+    jacobian[1] = (jacobian[1] + 180 / step) % (360 / step) - 180 / step
+    first = len(probe.camera.parameter_names)
+    covariance = probe.covariance[first : first + len(_SHEET), first : first + len(_SHEET)]
+    sigma = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
+    sigma[1] = sigma[1] if values[0] > sigma[0] else np.nan
     return {
-        "tilt_deg": float(np.degrees(np.arctan(np.hypot(laser.tilt_x, laser.tilt_y)))),
-        "tilt_direction_deg": float(np.degrees(np.arctan2(laser.tilt_y, laser.tilt_x))),
-        "opening_angle_deg": 180 - 2 * float(np.degrees(laser.cone_rad)),
-        "baseline_mm": laser.baseline_mm,
+        name: {"value": float(v), "sd": float(s) if np.isfinite(s) else None, "unit": unit}
+        for (name, unit), v, s in zip(_TERMS, values, sigma, strict=True)
     }
+
+
+_SHEET = LaserSheet.PARAMETER_NAMES
+_TERMS = (("tilt_deg", "°"), ("tilt_direction_deg", "°"), ("opening_angle_deg", "°"), ("baseline_mm", "mm"))
+
+
+def _sheet_terms(laser: LaserSheet) -> Float:
+    """Return the four numbers of `_TERMS`."""
+    tilt, direction = np.hypot(laser.tilt_x, laser.tilt_y), np.arctan2(laser.tilt_y, laser.tilt_x)
+    degrees = np.degrees([np.arctan(tilt), direction, np.pi - 2 * laser.cone_rad])
+    return np.array([*degrees, laser.baseline_mm])
 
 
 def _encoder(result: GaugeCalibration) -> dict[str, Any] | None:
