@@ -1,4 +1,8 @@
-"""Wall -> error-colour overlays: deviation, 1 σ uncertainty, misalignment error."""
+"""Wall -> error-colour overlays: deviation, 1 σ uncertainty, misalignment error.
+
+Colour maps are safe for colour-blind readers and even in lightness: a blue-white-red map of ColorBrewer for
+signed values, `cividis` (Nuñez, Anderton, Renslow 2018) for values that only grow.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,6 @@ from pydantic import Field
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Byte, Float
-from pipeline.artefacts.colour_maps import colours_bgr
 from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import UnusableError
@@ -148,12 +151,17 @@ def _overlay(
 
 
 def _palette(colours: str) -> Byte:
-    return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), colours_bgr(colours, 255)])
+    # matplotlib is slow to import, so it is imported only when it is needed.
+    from matplotlib import colormaps
+
+    rgb = colormaps[colours](np.linspace(0, 1, 255))[:, :3]
+    bgr = np.rint(255 * rgb[:, ::-1]).astype(np.uint8)
+    return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), bgr])
 
 
 OVERLAYS = Stage(
     "overlays",
-    "2",
+    "1",
     OverlayParameters,
     draw_overlays,
     "wall -> deviation, uncertainty, misalignment as colours",

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from pipeline.arrays import Byte
 from pipeline.artefacts.measured import WallTexture
-from pipeline.artefacts.model import Overlays
-from pipeline.export.overlay_figure import overlay_figure
+from pipeline.artefacts.model import Overlay, Overlays
+from pipeline.pages import notation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Common viewers and graphics cards refuse pictures with a side of more than 16384 px.
 _MOST_ROWS = 16384
@@ -19,7 +23,9 @@ _MOST_ROWS = 16384
 _COMPRESSION = 3
 # Of photos, which are noisy: looking for runs of one byte alone takes .6 of level 3's time and 5 % less room.
 _PHOTO = (cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
-_DPI = 120  # of figures
+# Of an overlay's figure: dots per inch, mm of pipe per inch, the longest figure (12000 px at 120 dpi, which
+# viewers still open).
+_DPI, _MM_PER_INCH, _LONGEST_INCH = 120, 30.0, 100.0
 
 
 def write_unrolled(texture: WallTexture, folder: Path) -> None:
@@ -90,4 +96,58 @@ def write_overlays(overlays: Overlays, folder: Path) -> None:
     """
     for overlay in overlays.pictures:
         figure = overlay_figure(overlays, overlay)
-        figure.save(folder / f"{overlay.name}.png", compress_level=_COMPRESSION, dpi=(_DPI, _DPI))
+        figure.savefig(
+            folder / f"{overlay.name}.png", dpi=_DPI, metadata={"Software": "boresight"},
+            pil_kwargs={"compress_level": _COMPRESSION},
+        )  # fmt: skip
+
+
+def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:
+    """Return the figure of one overlay, without any global state of matplotlib."""
+    # matplotlib is slow to import, so it is imported only when the first figure is drawn.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    distance = overlays.distance_mm
+    width = float(np.clip(np.ptp(distance) / _MM_PER_INCH, 6, _LONGEST_INCH))
+    figure = Figure(figsize=(width + 2, 5))
+    FigureCanvasAgg(figure)
+    # Places are fixed: a layout engine draws every figure three times to find them.
+    axes = figure.add_axes((0.75 / (width + 2), 0.6 / 5, width / (width + 2), 4.0 / 5))
+    half = (distance[-1] - distance[0]) / max(len(distance) - 1, 1) / 2
+    # No finer than the picture's own dots.
+    every = max(len(distance) // int(_LONGEST_INCH * _DPI), 1)
+    rgb = overlay.palette_bgr[_twelve_in_the_middle(overlays, overlay.level[::every]), ::-1]
+    axes.imshow(
+        rgb.transpose(1, 0, 2),
+        extent=(distance[0] - half, distance[-1] + half, -6, 6),
+        origin="lower",
+        aspect="auto",
+        interpolation="nearest",
+    )
+    hours = np.arange(-6, 7, 3)
+    axes.set_yticks(hours, [notation.clock(float(h) % 12) for h in hours])
+    axes.set_xlabel("distance (mm)")
+    axes.set_ylabel("clock position, looking forward")
+    axes.set_title(overlay.title)
+    _add_colour_bar(figure, overlay)
+    return figure
+
+
+def _twelve_in_the_middle(overlays: Overlays, level: Byte) -> Byte:
+    """Return levels (S, A) with columns from 6 o'clock over 12 (azimuth −90°) to 6 o'clock."""
+    clock = (overlays.azimuth_rad + np.pi / 2 + np.pi) % (2 * np.pi)
+    return np.asarray(level[:, np.argsort(clock, kind="stable")])
+
+
+def _add_colour_bar(figure: Figure, overlay: Overlay) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    colours = ListedColormap(overlay.palette_bgr[1:, ::-1] / 255.0)
+    scale = ScalarMappable(Normalize(overlay.low_mm, overlay.high_mm), colours)
+    left, bottom, wide, high = figure.axes[0].get_position().bounds
+    inch = 1 / figure.get_figwidth()
+    beside = figure.add_axes((left + wide + 0.15 * inch, bottom, 0.2 * inch, high))
+    bar = figure.colorbar(scale, cax=beside, extend="both" if overlay.low_mm < 0 else "max")
+    bar.set_label(f"mm  (grey: not measured; {100 * overlay.beyond:.1f} % beyond the ends)")

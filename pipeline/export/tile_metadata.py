@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.arrays import Bool, Float, Int
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import RadiusMap
 from pipeline.export.glb import GlbBuilder
@@ -96,25 +96,15 @@ def near(defects: Sequence[Defect], from_mm: float, to_mm: float) -> list[Defect
 
 def defect_at(defects: Sequence[Defect], distance_mm: Float, azimuth_rad: Float) -> Int:
     """Return (N,) which of the defects holds each place in its outline, their number where none does."""
+    # matplotlib is slow to import, so it is imported only when it is needed.
+    from matplotlib.path import Path as Outline
+
     out = np.full(len(distance_mm), len(defects))
     for number, defect in enumerate(defects):
+        outline = Outline(defect.outline)
         for turn in (-2 * np.pi, 0.0, 2 * np.pi):
-            out[_within(defect.outline, distance_mm, azimuth_rad + turn)] = number
+            out[outline.contains_points(np.stack([distance_mm, azimuth_rad + turn], -1))] = number
     return out
-
-
-def _within(outline: Float, x: Float, y: Float) -> Bool:
-    """Return (N,) which places lie in a polygon (K, 2): those from which a ray crosses it an odd time."""
-    inside = np.zeros(len(x), bool)
-    near = np.flatnonzero(
-        (x >= outline[:, 0].min()) & (x <= outline[:, 0].max())
-        & (y >= outline[:, 1].min()) & (y <= outline[:, 1].max())
-    )  # fmt: skip
-    x, y = x[near], y[near]
-    for (xa, ya), (xb, yb) in zip(outline, np.roll(outline, -1, axis=0), strict=True):
-        if ya != yb:
-            inside[near] ^= ((ya > y) != (yb > y)) & (x < xa + (y - ya) / (yb - ya) * (xb - xa))
-    return inside
 
 
 def facts_json(facts: StretchFacts) -> Json:

@@ -16,7 +16,6 @@ Face = NDArray[np.int32]
 Index = NDArray[np.int64]
 # Decimation that removes less than a tenth of the triangles is not worth its time.
 _WORTHWHILE = 0.9
-_NO_LENGTH = 1e-300  # what is divided by in place of nothing
 _AGGRESSIVENESS = 5.0  # growth of the allowed collapse error: 7 errs 7 % more, 3 does not reach its goal
 
 
@@ -54,12 +53,12 @@ def weld(pieces: Sequence[Surface]) -> Surface:
 
 
 def vertex_normals(surface: Surface) -> Float:
-    """Return unit normals (V, 3) of vertices, toward the inside of the pipe: of triangles, by their areas."""
-    corner = surface.vertex_p[surface.face]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    number, count = surface.face.ravel(), len(surface.vertex_p)
-    total = np.stack([np.bincount(number, np.repeat(n, 3), count) for n in normal.T], -1)
-    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), _NO_LENGTH))
+    """Return unit normals (V, 3) of the vertices, toward the inside of the pipe (by open3d)."""
+    o3d = open3d()
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(surface.vertex_p), o3d.utility.Vector3iVector(surface.face)
+    )
+    return np.asarray(mesh.compute_vertex_normals().vertex_normals)
 
 
 def with_normals(pieces: Iterable[Surface]) -> Iterator[tuple[Surface, Float]]:

@@ -7,10 +7,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from pipeline.artefacts.colour_maps import colours_bgr
-from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import UnusableError
-from pipeline.export.overlay_figure import overlay_figure
 from stages.overlays import OverlayParameters, draw_overlays, fitted_pipe, overlays_of
 from tests.quiet import quiet_context
 from tests.unit.small_wall import PIT, RADIUS, small_wall
@@ -79,26 +76,3 @@ def test_nothing_measured_is_refused() -> None:
         draw_overlays(
             recording, dataclasses.replace(wall, radius_map=none), OverlayParameters(), quiet_context()
         )
-
-
-@pytest.mark.parametrize("name", ["RdBu_r", "PuOr_r", "BrBG", "cividis", "viridis"])
-def test_colour_maps_are_the_published_ones(name: str) -> None:
-    from matplotlib import colormaps
-
-    want = 255 * colormaps[name](np.linspace(0, 1, 255))[:, 2::-1]
-    assert np.abs(colours_bgr(name, 255) - want).max() < 5
-
-
-@pytest.mark.parametrize(("row", "hour"), [(0, 3.0), (60, 12.0), (119, 8.0)])
-def test_the_figure_shows_a_cell_at_its_distance_and_hour(row: int, hour: float) -> None:
-    shape, azimuth = (120, 144), -np.pi + 2 * np.pi * np.arange(144) / 144
-    level = np.full(shape, 128, np.uint8)
-    level[row, round(((hour - 3) / 12 * 144 + 72) % 144)] = 255
-    shown = Overlay("x", "X", "RdBu_r", -1.0, 1.0, 0.0, np.full((256, 3), 90, np.uint8), level)
-    shown.palette_bgr[255] = (0, 0, 255)
-    overlays = Overlays(10 + np.arange(120.0), azimuth, np.full(144, 20.0), 20.0, *[shown] * 4)
-    picture = np.asarray(overlay_figure(overlays, shown))[:, :810]  # without the colour bar
-    y, x = np.nonzero((picture == (255, 0, 0)).all(-1))
-    assert 90 + (row + 0.5) / 120 * 720 == pytest.approx(x.mean() + 0.5, abs=1)
-    upward = 6 - (y.mean() + 0.5 - 48) / 480 * 12  # hours from 12
-    assert upward == pytest.approx((hour + 6) % 12 - 6, abs=12 / 144)

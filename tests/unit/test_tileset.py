@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import VARIANTS, TexturedMesh
-from pipeline.export.tile_metadata import defect_at
 from pipeline.export.tileset import write_tileset
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
@@ -222,15 +220,3 @@ def test_same_wall_same_bytes(written: Written, wall: Wall, mesh: TexturedMesh, 
     for file in written.folder.rglob("*.*"):
         again = tmp_path / "tileset" / file.relative_to(written.folder)
         assert again.read_bytes() == file.read_bytes(), file.name
-
-
-def test_places_within_an_outline_are_those_of_an_independent_reader(wall: Wall) -> None:
-    from matplotlib.path import Path as Outline
-
-    turn = np.linspace(-np.pi, np.pi, 40, endpoint=False)
-    star = np.stack([15 + 5 * np.cos(turn), np.pi + np.sin(turn) * (1 + 0.4 * np.cos(3 * turn))], -1)
-    at = np.random.default_rng(1).uniform((8, -np.pi), (22, np.pi), (5000, 2))
-    want = [Outline(star).contains_points(at + np.array((0, k * 2 * np.pi))) for k in (0, 1)]
-    found = defect_at([replace(pit_defect(), outline=star)], at[:, 0], at[:, 1])
-    np.testing.assert_array_equal(found == 0, want[0] | want[1])
-    assert all(w.any() for w in want)
