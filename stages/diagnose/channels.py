@@ -287,10 +287,10 @@ FIDUCIALS = Stage(
     "fiducials", "1", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
-    "free_motion", "1", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
+    "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "13", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "14", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
     "evidence", "9", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"

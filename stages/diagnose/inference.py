@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import stats
@@ -80,9 +81,14 @@ class Evidence:
     misfit: float
     degrees: Float
 
+    @cached_property
+    def place(self) -> dict[Column, int]:
+        """Place of each column."""
+        return {c: k for k, c in enumerate(self.columns)}
+
     def over(self, columns: Sequence[Column]) -> Evidence:
         """Return the evidence over other columns, in their order; it says nothing of those it lacks."""
-        place = {c: k for k, c in enumerate(self.columns)}
+        place = self.place
         here = [k for k, c in enumerate(columns) if c in place]
         own = [place[columns[k]] for k in here]
         size = len(columns)
@@ -172,29 +178,68 @@ class Score:
     gain: float
 
 
-def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = None) -> Score | None:
-    """Return the score of columns ``block``, the instrument and columns ``given`` being free.
+@dataclass(frozen=True)
+class Around:
+    """Evidence about every effect when the instrument, and effects that are there, are free.
 
-    None when the columns cannot be seen. What is seen of an effect only beside another, nearly the same one
-    that is free, rests on laws being exact, and does not count.
+    Attributes
+    ----------
+    evidence : Evidence
+    information, right : (K, K), (K,)
+        What is left of it without the free columns; zero there.
+    from_stated : (K, K)
+        What of the information comes from the stated instrument's uncertainty.
+    least : float
+        Least share of its own information that an effect must keep to be seen.
     """
-    a = evidence.information
-    free = instrument_places(evidence) if given is None else np.union1d(instrument_places(evidence), given)
-    own, right, from_stated = eliminated(evidence, stated, block, free)
-    size = np.sqrt(np.maximum(np.diag(a)[block], 1e-300))
-    value = np.linalg.eigvalsh(own / np.outer(size, size))
-    if not np.all(value > (_SEEN if given is None or not len(given) else _SEEN_BESIDE)):
-        return None
-    # Neighbours that err alike widen what the data say, not what was stated beforehand.
-    inflation = np.sqrt(np.diag(evidence.score_covariance)[block] / np.diag(a)[block])
-    spread = (own - from_stated) * np.outer(inflation, inflation) + from_stated
-    inverse = np.linalg.inv(own)
-    amplitude, covariance = inverse @ right, np.asarray(inverse @ spread @ inverse, np.float64)
-    statistic = float(right @ np.linalg.solve(spread, right))
-    # Columns whose spread is sure make up for those of which few cells tell: relative variances average.
-    degrees = 1 / max(1 / DEGREES, float(np.mean(1 / evidence.degrees[block])))
-    p_value = float(stats.f.sf(statistic / len(block), len(block), degrees))
-    return Score(np.asarray(amplitude, np.float64), covariance, statistic, p_value, float(right @ amplitude))
+
+    evidence: Evidence
+    information: Float
+    right: Float
+    from_stated: Float
+    least: float
+
+    @staticmethod
+    def of(evidence: Evidence, stated: Stated, given: Int | None = None) -> Around:
+        """Return what is left when the instrument and columns ``given`` are free."""
+        beside = given is not None and len(given) > 0
+        own = instrument_places(evidence)
+        free = np.union1d(own, given) if given is not None else own
+        kept = np.setdiff1d(np.arange(len(evidence.columns)), free)
+        size, at = len(evidence.columns), np.ix_(kept, kept)
+        information, right, from_stated = np.zeros((size, size)), np.zeros(size), np.zeros((size, size))
+        information[at], right[kept], from_stated[at] = eliminated(evidence, stated, kept, free)
+        return Around(evidence, information, right, from_stated, _SEEN_BESIDE if beside else _SEEN)
+
+    def score(self, block: Int) -> Score | None:
+        """Return the score of columns ``block``.
+
+        None when the columns cannot be seen. What is seen of an effect only beside another, nearly the same
+        one that is free, rests on laws being exact, and does not count.
+        """
+        at = np.ix_(block, block)
+        own, right, from_stated = self.information[at], self.right[block], self.from_stated[at]
+        before = np.diag(self.evidence.information)[block]
+        size = np.sqrt(np.maximum(before, 1e-300))
+        if not np.all(np.linalg.eigvalsh(own / np.outer(size, size)) > self.least):
+            return None
+        # Neighbours that err alike widen what the data say, not what was stated beforehand.
+        inflation = np.sqrt(np.diag(self.evidence.score_covariance)[block] / before)
+        spread = (own - from_stated) * np.outer(inflation, inflation) + from_stated
+        inverse = np.linalg.inv(own)
+        amplitude, covariance = inverse @ right, np.asarray(inverse @ spread @ inverse, np.float64)
+        statistic = float(right @ np.linalg.solve(spread, right))
+        # Columns whose spread is sure make up for those of which few cells tell: relative variances average.
+        degrees = 1 / max(1 / DEGREES, float(np.mean(1 / self.evidence.degrees[block])))
+        p_value = float(stats.f.sf(statistic / len(block), len(block), degrees))
+        return Score(
+            np.asarray(amplitude, np.float64), covariance, statistic, p_value, float(right @ amplitude)
+        )
+
+
+def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = None) -> Score | None:
+    """Return the score of columns ``block``, the instrument and columns ``given`` being free."""
+    return Around.of(evidence, stated, given).score(block)
 
 
 def eliminated(evidence: Evidence, stated: Stated, block: Int, free: Int) -> tuple[Float, Float, Float]:
@@ -204,7 +249,7 @@ def eliminated(evidence: Evidence, stated: Stated, block: Int, free: Int) -> tup
     """
     a, b = evidence.information, evidence.right
     free = free[np.diag(a)[free] > 0]
-    prior = stated.over(evidence.columns)[np.ix_(free, free)]
+    prior = stated.over([evidence.columns[k] for k in free])
     both, out = np.concatenate([free, block]), np.arange(len(free))
     information = a[np.ix_(both, both)]
     information[: len(free), : len(free)] += prior
@@ -220,13 +265,8 @@ def instrument_places(evidence: Evidence) -> Int:
 
 def places_of(evidence: Evidence, model: EffectModel, shape: Shape) -> Int:
     """Return the places of an effect's columns."""
-    wanted = {(model.name, a.name, shape): k for k, a in enumerate(model.amplitudes)}
-    here = [
-        (wanted[key], k)
-        for k, c in enumerate(evidence.columns)
-        if (key := (c.effect, c.amplitude, c.shape)) in wanted
-    ]
-    return np.array([k for _, k in sorted(here)], np.int64)
+    columns = (Column(model.name, a.name, shape) for a in model.amplitudes)
+    return np.array([evidence.place[c] for c in columns if c in evidence.place], np.int64)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ again. ``estimate`` is the stage. What others use of them is named here.
 
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, Measurements
+from stages.motion.bundle_adjustment.laser_knock import KnockTest
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings, encoder_at_frames
 from stages.motion.estimate import (
@@ -20,6 +21,7 @@ from stages.motion.estimate import (
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import RingBins, circles_in_rings, ring_bins
 from stages.motion.tracking.landmarks import Tracks
+from stages.motion.windows.steady_laser import with_steady_laser
 
 __all__ = [
     "MATCH_BIASES",
@@ -27,6 +29,7 @@ __all__ = [
     "EncoderReadings",
     "Equations",
     "JointEstimate",
+    "KnockTest",
     "Measurements",
     "MotionParameters",
     "RingBins",
@@ -40,4 +43,5 @@ __all__ = [
     "places_of",
     "residuals",
     "ring_bins",
+    "with_steady_laser",
 ]

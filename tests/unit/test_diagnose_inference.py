@@ -207,8 +207,32 @@ def test_a_name_is_as_unsure_as_its_growth_with_the_radius(noise, growing, low, 
     columns = (Column("laser_cone", CONE.amplitudes[0].name), Column("other", "1"), Column("other", "2"))
     design = np.stack([off**n for n in range(3)], 1) / noise
     measured = design @ [1.0, growing, 0.0] + random.normal(size=200)
-    (odds,) = odds_in(evidence_of(design, measured, columns), [one], ["other"], Stated((), np.zeros((0, 0))))
+    about, nobody = evidence_of(design, measured, columns), Stated((), np.zeros((0, 0)))
+    (odds,) = odds_in(about, [one], ["other"], ["same"], lambda terms: 0.0, nobody)
     assert low <= odds <= high
+
+
+@pytest.mark.parametrize(
+    ("power", "pattern", "noise", "low", "high"),
+    [(1, "same", 1.0, 0.1, np.inf), (6, "same", 0.01, 0.0, 0.01), (1, "another", 1.0, 0.0, 0.05)],
+)
+def test_two_names_that_one_unknown_law_may_make_up_for_are_unsure(power, pattern, noise, low, high):
+    """A cone, and a baseline that grows with the radius, or as no smooth law does, or of another harmonic."""
+    random = np.random.default_rng(11)
+    off = random.uniform(-0.5, 0.5, 400)
+    both = [Term(LIBRARY[name], (), np.ones(1)) for name in ("laser_cone", "baseline")]
+    grown = [np.ones(400), 2.0 * off**power]
+    design = np.stack([*grown, *(law * off**n for law in grown for n in (1, 2))], 1) / noise
+    columns = (
+        *(Column(t.model.name, t.amplitudes[0].name) for t in both),
+        *(Column(f"like {t.model.name}", n) for t in both for n in "12"),
+    )
+    about = evidence_of(design, design[:, :2].sum(1) + random.normal(size=400), columns)
+    others, rare = [f"like {t.model.name}" for t in both], 2 * np.log(30.0)
+    odds = odds_in(
+        about, both, others, ["same", pattern], lambda terms: rare * len(terms), Stated((), np.zeros((0, 0)))
+    )
+    assert all(low <= one <= high for one in odds)
 
 
 def test_a_score_that_few_cells_hold_is_less_surprising():

@@ -6,27 +6,26 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.field.run import warn_of_knock
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.confirm import passes_again
+from stages.diagnose.gauge.judge import Unfitted
+from stages.diagnose.gauge.sets import Member
 from stages.diagnose.result import Confirmation, FitQuality, Verdict
 
 AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
-AT_OTHER_RADII = Confirmation("bore 1: 1", "bore 2: 1", True)
 
 
 def examined(
     shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
-    left: float = 0.5, pattern_order: int = 2, unsplit: tuple[str, ...] = (),
+    left: float = 0.5, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),), heldout: float = 0.11,
-    unknown: float = 0.0, other_order: int = 3, rival_heldout: float = 1.0, grown: float = 0.0,
+    unknown: float = 0.0, rival_heldout: float = 1.0, grown: float = 0.0,
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
-    orders = (*[1, other_order, other_order][: len(shifts_px)], *([pattern_order] * len(patterns_px)))
-    terms = tuple(
-        SimpleNamespace(model=law, shift_px=s, order=m)
-        for s, m in zip((*shifts_px, *patterns_px), orders, strict=True)
-    )
+    terms = tuple(SimpleNamespace(model=law, shift_px=s) for s in (*shifts_px, *patterns_px))
     library = terms[: len(shifts_px)]
     fit = SimpleNamespace(terms=terms)
     best = SimpleNamespace(
@@ -61,12 +60,9 @@ def examined(
         (examined((), (0.5,), confirmed=()), Verdict.UNEXPLAINED),
         (examined(patterns_px=(0.5,)), Verdict.PARTLY),
         (examined(patterns_px=(2.0,)), Verdict.UNEXPLAINED),
-        (examined(patterns_px=(0.5,), pattern_order=1), Verdict.UNEXPLAINED),
         (examined(patterns_px=(0.5,), chance=0.98), Verdict.UNEXPLAINED),
         (examined((1.0, 1.0), unsplit=("principal_point",), confirmed=((AGREES,),) * 2), Verdict.PARTLY),
-        (examined((1.0, 1.0), other_order=1, confirmed=((AGREES,),) * 2), Verdict.CLASS),
-        (examined((1.0, 1.0), other_order=1, confirmed=((AT_OTHER_RADII,),) * 2), Verdict.NAMED),
-        (examined((1.0,) * 3, other_order=1, confirmed=((AT_OTHER_RADII,),) * 3), Verdict.CLASS),
+        (examined((1.0, 1.0), confirmed=((AGREES,),) * 2), Verdict.NAMED),
         (examined(left=1e-9), Verdict.UNEXPLAINED),
         (examined(heldout=0.2), Verdict.UNEXPLAINED),
         (examined(rival_heldout=-1.0), Verdict.CLASS),
@@ -83,7 +79,6 @@ def examined(
 )
 def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict, monkeypatch):
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
-    monkeypatch.setattr(answer, "pattern_of", lambda term: ("laser", "static", term.order))
     assert answer.verdict_of(seen) is verdict
 
 
@@ -96,3 +91,23 @@ def test_a_step_is_borne_out_only_where_the_probe_comes_back_to_the_wall_before_
     T_pc[:, 2, 3] = 20 * (turns_s - np.abs(time_s - turns_s))
     run = cast(Any, SimpleNamespace(time_s=time_s))
     assert passes_again(run, T_pc, step_s) is again
+
+
+@pytest.mark.parametrize(("exposure_s", "possible"), [(0.01, True), (-0.01, False)])
+def test_an_exposure_shorter_than_none_is_no_explanation(exposure_s, possible):
+    sizes = (np.array([exposure_s]), np.array([0.3, -0.2]))
+    members = tuple(Member(LIBRARY[name], (), 0.0) for name in ("motion_blur", "laser_tilt"))
+    assert Unfitted(members, sizes, 0.0, 0.0).possible is possible
+
+
+@pytest.mark.parametrize(
+    ("told", "ambiguous", "words"),
+    [(True, False, "each other."), (False, True, "or the pipe"), (False,) * 2 + ("",)],
+)
+def test_rings_that_jump_in_an_inspection_are_told_as_a_knock_where_they_may_be_one(told, ambiguous, words):
+    warned: list[str] = []
+    jump = SimpleNamespace(frame=140, jump_mm=np.array([0.2, -0.2, 0.01]))
+    knock = SimpleNamespace(told=told, ambiguous=ambiguous, jump=jump, time_s=4.67)
+    warn_of_knock(cast(Any, knock), cast(Any, SimpleNamespace(warn=warned.append)))
+    assert len(warned) == (told or ambiguous)
+    assert all("at 4.67 s (frame 140)" in w and "0.28 mm" in w and words in w for w in warned)

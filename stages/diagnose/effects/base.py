@@ -10,6 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -177,8 +178,11 @@ class EffectModel(ABC):
         """Return the shapes to be searched; one empty shape when there is nothing to search."""
         return ((),)
 
-    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape] | None:
-        """Return the part (M,) of the size that is there and the static law; None where it is no product."""
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored | None:
+        """Return the parts (M,) of the size that are there and the static law; None where it is no product.
+
+        The amplitudes are the static law's, once for each part.
+        """
         return None
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -219,3 +223,7 @@ class EffectModel(ABC):
         ranges = {q.name: (q.low, q.high) for q in effect(self.law).quantities}
         found = self.quantities(shape, amplitude)
         return all(low <= found[name] <= high for name, (low, high) in ranges.items() if name in found)
+
+
+# Parts (M,) of a size, a law, and its shape: what an effect is that is a product.
+Factored: TypeAlias = tuple[tuple[Float, ...], EffectModel, Shape]

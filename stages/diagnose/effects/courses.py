@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Course, CourseKind
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
 
 # Laws of parts that a knock, heat or play can move during a recording, each with its shapes.
 _MOVABLE: Mapping[str, tuple[Shape, ...]] = {
@@ -107,12 +107,10 @@ class Coursed(EffectModel):
         """Return a part of the time constant, the step of a frequency; None where nothing is continuous."""
         return {CourseKind.EXPONENTIAL: 0.3 * sum(shape), CourseKind.SINUSOID: 0.05}.get(self.kind)
 
-    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape] | None:
-        """Return the course's factor and the law; a swing is two products."""
-        if self.kind is CourseKind.SINUSOID:
-            return None
-        ((factor, _),) = self._parts(points, shape, np.zeros(len(self.amplitudes)))
-        return factor, self.static, self.own
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
+        """Return the course's factor, of a swing two, and the law."""
+        parts = self._parts(points, shape, np.zeros(len(self.amplitudes)))
+        return tuple(factor for factor, _ in parts), self.static, self.own
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the law's shift at each point's part of the size."""

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, Quantity
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ class Drifting(Worded):
         """Return (M,) the part of the final size that is reached."""
         return np.asarray(-np.expm1(-time_s / shape[0]))
 
-    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape]:
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
         """Return the share of its final size that is reached, and the static law."""
-        return self.reached(points.time_s, shape), self.static, ()
+        return (self.reached(points.time_s, shape),), self.static, ()
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the static shift times the share of its final size that is reached."""
@@ -123,8 +123,8 @@ class Periodic(Worded):
 
     def size_at(self, time_s: Float, shape: Shape, amplitude: Float) -> Float:
         """Return (M, 2) size along x and y at the times (M,)."""
-        phase = 2 * np.pi * shape[0] * time_s
-        return np.asarray(np.outer(np.sin(phase), amplitude[:2]) + np.outer(np.cos(phase), amplitude[2:]))
+        sine, cosine = sine_and_cosine_at(time_s, shape[0])
+        return np.asarray(np.outer(sine, amplitude[:2]) + np.outer(cosine, amplitude[2:]))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the shift at each point's time."""
@@ -162,6 +162,12 @@ def along_x_and_y(name: str, plausible: float) -> tuple[Amplitude, Amplitude]:
         Amplitude(f"{size.name} along x", size.unit, plausible),
         Amplitude(f"{size.name} along y", size.unit, plausible),
     )
+
+
+def sine_and_cosine_at(time_s: Float, frequency_hz: float) -> tuple[Float, Float]:
+    """Return (M,) both waves at the times (M,)."""
+    phase = 2 * np.pi * frequency_hz * time_s
+    return np.sin(phase), np.cos(phase)
 
 
 def sine_and_cosine(name: str, plausible: float) -> tuple[Amplitude, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
 from stages.diagnose.effects.kinds import (
     Directed,
     Periodic,
@@ -17,9 +17,11 @@ from stages.diagnose.effects.kinds import (
     cosine,
     one,
     sine_and_cosine,
+    sine_and_cosine_at,
 )
 
 _ORDERS = (2, 3, 4, 5, 6)
+_DEG_PER_MRAD = float(np.degrees(0.001))  # a unit
 
 
 class AlbedoBias(Worded):
@@ -205,6 +207,11 @@ class LaserRocking(Periodic):
         "The laser sheet rocks by ±{amplitude_mrad:.2f} mrad at {frequency_hz:.2f} Hz (or an alias of it) "
         "toward azimuth {direction_deg:.1f}°."
     )
+
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
+        """Return both waves, of a tilt in degrees."""
+        sine, cosine = sine_and_cosine_at(points.time_s, shape[0])
+        return (_DEG_PER_MRAD * sine, _DEG_PER_MRAD * cosine), LaserTilt(), ()
 
     def moved_px(self, points: ImagePoints, size: Float) -> Float:
         """Return none."""

@@ -78,12 +78,13 @@ def _by_course(
     factored = model.factored(points, shape)
     if factored is None and not model.linear:
         return made(model, points, shape)
-    static, own = (model, shape) if factored is None else factored[1:]
+    parts, static, own = factored or ((), model, shape)
     key = (static.name, own, made is _line_columns)
     if key not in points.patterns:
         points.patterns[key] = made(static, points, own)
     pattern = points.patterns[key]
-    return pattern if factored is None else factored[0].reshape(-1, *[1] * (pattern.ndim - 1)) * pattern
+    wide = [-1, *[1] * (pattern.ndim - 1)]
+    return np.concatenate([p.reshape(wide) * pattern for p in parts], -1) if parts else pattern
 
 
 def _line_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:

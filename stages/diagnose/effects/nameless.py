@@ -9,8 +9,8 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
-from stages.diagnose.effects.kinds import cosine
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
+from stages.diagnose.effects.kinds import cosine, sine_and_cosine_at
 
 _REFERENCE_MM = 50.0
 _HARMONICS = (0, 1, 2, 3, 4)
@@ -86,14 +86,16 @@ class SwingTerm(Nameless):
         """Return the step of the frequency: the resolution of the recording's duration."""
         return 0.05
 
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
+        """Return both waves and the steady pattern."""
+        steady = _term(Moves.LINE, self.harmonic, self.exponent)
+        return sine_and_cosine_at(points.time_s, shape[0]), steady, STEADY
+
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return (r/50)^p cos m(ψ − ψ₀) at each point's time, on the line."""
-        if not points.on_line:
-            return np.zeros(len(points.uv))
-        phase = 2 * np.pi * shape[0] * points.time_s
-        sine, cosines = np.split(np.asarray(amplitude), 2)
-        swing = np.sin(phase) * self._wave(points, sine) + np.cos(phase) * self._wave(points, cosines)
-        return np.asarray(growth(points, self.exponent) * swing)
+        waves, steady, at_rest = self.factored(points, shape)
+        each = zip(waves, np.split(np.asarray(amplitude), 2), strict=True)
+        return np.asarray(sum(wave * steady.wall_shift_mm(points, at_rest, part) for wave, part in each))
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the amplitude and the frequency."""
@@ -107,9 +109,6 @@ class SwingTerm(Nameless):
         """Return the pattern as a formula."""
         wave = f" cos {self.harmonic}(ψ − ψ₀)" if self.harmonic else ""
         return f"δr = a (r/50)^{self.exponent}{wave} sin(2πft + φ)"
-
-    def _wave(self, points: ImagePoints, parts: Float) -> Float:
-        return cosine(points.azimuth_rad, np.array([*parts, 0.0])[:2], self.harmonic)
 
 
 def _swing(harmonic: int, exponent: int) -> SwingTerm:
@@ -155,9 +154,9 @@ class GenericTerm(Nameless):
         """Return constant and linear in time."""
         return ((0.0,), (1.0,))
 
-    def factored(self, points: ImagePoints, shape: Shape) -> tuple[Float, EffectModel, Shape] | None:
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored | None:
         """Return the course and the steady pattern."""
-        return None if shape == STEADY else (self._course(points, shape), self, STEADY)
+        return None if shape == STEADY else ((self._course(points, shape),), self, STEADY)
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a cos m(ψ_P − ψ₀)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from stages.motion import (
     EncoderReadings,
     Equations,
     JointEstimate,
+    KnockTest,
     Measurements,
     MotionParameters,
     State,
@@ -27,6 +29,7 @@ from stages.motion import (
     encoder_at_frames,
     measure_run,
     ring_bins,
+    with_steady_laser,
 )
 
 
@@ -83,6 +86,7 @@ def field_run(
         When rings and texture alone do not determine the motion.
     """
     run = measure_run(recording, probe, rings, points, parameters, context, use_encoder=False)
+    warn_of_knock(with_steady_laser(run, parameters, partial(context.progress, 0, 1))[1], context)
     grid, frames = run.texture.grid, recording.frames
     measured = run.measured(run.whole, parameters)
     start = run.start(run.whole, measured, parameters)
@@ -92,6 +96,19 @@ def field_run(
         recording, probe, rings, found.measured, found.state, found.equations, found.trajectory,
         encoder, run.ring_place, parameters,
     )  # fmt: skip
+
+
+def warn_of_knock(knock: KnockTest | None, context: Context) -> None:
+    """Warn of a laser that was knocked in mid-run, or may have been: the run is examined as it is."""
+    if knock is None or not (knock.told or knock.ambiguous):
+        return
+    x, y, radius = knock.jump.jump_mm
+    context.warn(
+        f"at {knock.time_s:.2f} s (frame {knock.jump.frame}) the inspection's rings jump by "
+        f"{np.hypot(x, y):.2f} mm across and {radius:+.2f} mm of radius: laser and camera were knocked "
+        f"against each other{'' if knock.told else ', or the pipe steps there'}. The inspection is examined "
+        "as if nothing had moved. What to do: fix laser and camera, and record both runs anew"
+    )
 
 
 def with_probe(run: FieldRun, probe: Probe, context: Context) -> FieldRun:

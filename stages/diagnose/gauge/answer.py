@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
 import numpy as np
 
-from stages.diagnose.gauge.confirm import Sized, course_of, quantities, tells_law
+from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.gauge.formula import ADEQUATE, pattern_of
+from stages.diagnose.gauge.formula import ADEQUATE
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
@@ -23,9 +22,6 @@ from stages.diagnose.result import Candidate, Confirmation, EffectFound, Verdict
 # of one fiducial err alike, which the floor does not have), four rendered ones to 1.00–1.17; this is 5 s.d.
 # beyond. A wrong explanation of four effects came to 1.36 (`bench_diagnosis --mode several`, case 1).
 _MOST_OF_FLOOR = 1.3
-# Of effects with one harmonic and one course so many may be named: four were once found for one that the
-# library did not have (`bench_diagnosis --mode leftout`, case 1001). Debt: data/debts.md.
-_MOST_LIKE = 2
 # Explanations that were only weighed are listed when their chance is above this: all others together change
 # no answer.
 _LISTED = 1e-3
@@ -44,8 +40,8 @@ def chances(examined: Examined) -> tuple[float, ...]:
     """Return for each effect of the likeliest hypothesis the chance that its name is right.
 
     To the hypotheses without it come, as odds against it: causes that this run is not expected to tell from
-    it, each as likely as it; one that nobody knows, `UNKNOWN`, where no second prediction agrees, and the one
-    like it that grows otherwise with the radius; and an even chance for everything that shows that the
+    it, each as likely as it; laws that nobody knows in its place, and one more, `UNKNOWN`, where no second
+    prediction agrees; and an even chance for everything that shows that the
     hypothesis does not hold: a prediction that fails, a remainder that is no noise, or that moves rings or
     fiducials by more than the effect, what was held out, and other names, as many or fewer, that predict what
     was held out better.
@@ -62,24 +58,9 @@ def chances(examined: Examined) -> tuple[float, ...]:
     for term, alike, confirmed, grown in each:
         doubt = everywhere + len(alike) + sum(not c.agrees for c in confirmed)
         doubt += (left > shift_px(best.fit, term)) + sum(term.model.law not in j.laws for j in others)
-        unknown = grown + UNKNOWN * (not _is_confirmed(term, confirmed, best.library_terms, patterns))
+        unknown = grown + UNKNOWN * (not any(c.agrees for c in confirmed))
         out.append(verdicts.chance_of(term) / (1 + doubt + unknown))
     return tuple(out)
-
-
-def _is_confirmed(
-    term: Term, confirmed: Sequence[Confirmation], terms: Sequence[Term], patterns: Sequence[Term]
-) -> bool:
-    """Return whether a second prediction agrees, as strictly as what else was found asks for.
-
-    Two effects with one harmonic and one course may make up for one law that nobody knows, all through the
-    run: only other radii then tell. Three, or a pattern without a cause beside one, make up for almost any.
-    """
-    own = pattern_of(term)[1:]
-    if any(pattern_of(t)[1:] == own for t in patterns):
-        return False
-    like = sum(pattern_of(t)[1:] == own for t in terms)
-    return like <= _MOST_LIKE and any(c.agrees for c in confirmed if like == 1 or tells_law(c))
 
 
 def sure(examined: Examined) -> tuple[bool, ...]:

@@ -76,11 +76,6 @@ def passes_again(run: GaugeRun, T_pc: Float, step_s: float) -> bool:
     return bool(min((shared & after).sum(), (shared & ~after).sum()) >= _LEAST_FRAMES)
 
 
-def tells_law(confirmation: Confirmation) -> bool:
-    """Return whether a comparison tells how an effect grows with the radius."""
-    return confirmation.prediction.startswith(_BORE)
-
-
 def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: Stated) -> Partial | None:
     """Return the term's estimate from a part of the measurements, the other terms being free."""
     result = estimate(part, stated, 10 * prior_sigma(part, judged.fit.terms))

@@ -25,7 +25,7 @@ from stages.diagnose.gauge.formula import ADEQUATE, pattern_of, patterns_by_chan
 from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.hypotheses import Judged, judged_of, regimes_of
 from stages.diagnose.gauge.judge import Verdicts, judge
-from stages.diagnose.gauge.other_growth import excess_exponent, odds_of_other_growth
+from stages.diagnose.gauge.other_growth import excess_exponent, odds_of_unknown_laws
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
 from stages.diagnose.gauge.sets import believed
@@ -186,6 +186,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
     nothing = next(j for j in verdicts.judged if not j.fit.terms)
     terms, alike = best.library_terms, searched.alike
     ratio = believed(best.evidence, alike)
+    laws = len({model.law for model in library.values()})
     unsplit = not_told_apart(run, searched.nothing, terms, library, stated, alike) if terms else ()
     shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula
     return replace(
@@ -193,7 +194,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
         confirmed=confirmations(run, best, regimes, terms, stated) if terms else (),
         unsplit=unsplit,
         sizes=sizes_of(run, best, stated, alike) if terms else (),
-        other_growth=odds_of_other_growth(run, best, terms, stated, ratio),
+        other_growth=odds_of_unknown_laws(run, best, stated, ratio, laws),
         location=location_of(run, shown, stated, ratio),
         quality=fit_quality(run, nothing, shown, regimes, stated),
     )

@@ -33,7 +33,7 @@ def ability(
     shapes = {name: _middle(model.shapes(*span(run))) for name, model in library.items()}
     asked = [(library[name], shape) for name, shape in shapes.items() if shape is not None]
     known = {name: shape for name, shape in shapes.items() if shape is not None}
-    return evidence(run, nothing, asked)[0], known
+    return evidence(run, nothing, asked, with_spread=False)[0], known
 
 
 def feasibility(
@@ -83,7 +83,8 @@ def not_told_apart(
         if model.law not in laws
         for shape in _shapes_beside(model, terms, _middle(model.shapes(*span(run))))
     ]
-    about = evidence(run, nothing, [*((t.model, t.shape) for t in terms), *rivals])[0].deflated(alike)
+    asked = [*((t.model, t.shape) for t in terms), *rivals]
+    about = evidence(run, nothing, asked, with_spread=False)[0].deflated(alike)
     blocks = [(places_of(about, t.model, t.shape), t.amplitude) for t in terms]
     places = [(model.law, places_of(about, model, shape)) for model, shape in rivals]
     seen = [(law, rival) for law, rival in places if np.diag(about.information)[rival].min() > 0]

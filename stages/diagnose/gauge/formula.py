@@ -25,13 +25,13 @@ from stages.diagnose.gauge.scan import Scored, freed, refined, scan
 from stages.diagnose.gauge.sets import SAME
 from stages.diagnose.inference import (
     DEGREES,
+    Around,
     Evidence,
     Score,
     Stated,
     eliminated,
     instrument_places,
     places_of,
-    score,
 )
 
 _MOST_TERMS = 4
@@ -131,7 +131,7 @@ def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
 
 def _by_chance(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
     given = _places(about, [(t.model, t.shape) for t in terms])
-    each = [_score(about, stated, m, s, given) for m, s in VOCABULARY]
+    each = _scores(about, stated, given, VOCABULARY)
     single = min((s.p_value for s in each if s is not None), default=1.0) * len(VOCABULARY)
     return float(2 * min(single, joint_p(about, stated, given)))
 
@@ -158,19 +158,20 @@ def joint_p(about: Evidence, stated: Stated, given: Int) -> float:
 def _next(
     about: Evidence, stated: Stated, given: Int, words: Sequence[tuple[EffectModel, Shape]]
 ) -> tuple[EffectModel, Shape, Score] | None:
-    scored = [
-        (model, shape, result)
-        for model, shape in words
-        if (result := _score(about, stated, model, shape, given)) is not None
-    ]
+    each = zip(words, _scores(about, stated, given, words), strict=True)
+    scored = [(model, shape, result) for (model, shape), result in each if result is not None]
     best = max(scored, key=lambda s: s[2].statistic / len(s[2].amplitude), default=None)
     needed = best is not None and best[2].p_value * len(VOCABULARY) < _NEEDED
     return best if needed else None
 
 
-def _score(about: Evidence, stated: Stated, model: EffectModel, shape: Shape, given: Int) -> Score | None:
-    block = places_of(about, model, shape)
-    return score(about, stated, block, given) if not np.isin(block, given).any() else None
+def _scores(
+    about: Evidence, stated: Stated, given: Int, words: Sequence[tuple[EffectModel, Shape]]
+) -> list[Score | None]:
+    """Return the score of each pattern that is not among the columns ``given``."""
+    around = Around.of(about, stated, given)
+    places = [places_of(about, model, shape) for model, shape in words]
+    return [around.score(block) if not np.isin(block, given).any() else None for block in places]
 
 
 def _places(about: Evidence, asked: Sequence[tuple[EffectModel, Shape]]) -> Int:

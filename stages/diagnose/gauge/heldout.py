@@ -62,7 +62,8 @@ def fit_quality(
     by_part: Sequence[Evidence] = best.by_regime
     if any(isinstance(t.model, Coursed) and t.model.kind in OWN_CLOCK for t in best.fit.terms):
         parts = [Part(frames, _SEEN_KINDS) for frames in _by_turns(len(run.time_s))]
-        by_part = evidence(run, best.fit, (), [replace(p, kinds=Part(p.frames).kinds) for p in parts])[1:]
+        every = [Part(p.frames) for p in parts]
+        by_part = evidence(run, best.fit, (), every, with_spread=False)[1:]
     learned = [
         partial(_from_others, total([e for e in by_part if e is not left]), best.fit, stated)
         for left in by_part

@@ -35,7 +35,7 @@ class Judged:
     ----------
     fit : Fit
     evidence : Evidence
-        Of the whole run.
+        Of the whole run; how far its scores spread is known of the likeliest alone.
     by_regime : tuple of Evidence
         Of each regime on its own.
     surprise, heldout : float
@@ -68,6 +68,11 @@ class Judged:
         return tuple(t for t in self.fit.terms if not isinstance(t.model, Nameless))
 
     @property
+    def possible(self) -> bool:
+        """Whether the sizes of all its effects are."""
+        return all(t.model.possible(*t.at(t.amplitude)) for t in self.fit.terms)
+
+    @property
     def named(self) -> bool:
         """Whether all its effects are of the library, and there are some."""
         return bool(self.fit.terms) and not any(isinstance(t.model, Nameless) for t in self.fit.terms)
@@ -96,7 +101,7 @@ def judged_of(
     run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, alike: float, before: float = 0.0
 ) -> Judged:
     """Return the hypothesis' evidence and its surprise, held out and not."""
-    whole, *parts = evidence(run, found, (), [r.part for r in regimes])
+    whole, *parts = evidence(run, found, (), [r.part for r in regimes], with_spread=False)
     sigma = prior_sigma(whole, found.terms)
 
     def surprise(of: Evidence) -> float:

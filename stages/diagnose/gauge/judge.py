@@ -45,6 +45,12 @@ class Unfitted:
     probability: float
 
     @property
+    def possible(self) -> bool:
+        """Whether all sizes are: an exposure cannot be shorter than none."""
+        each = zip(self.members, self.amplitudes, strict=True)
+        return all(m.model.possible(m.shape, a) for m, a in each)
+
+    @property
     def statement(self) -> str:
         """What it would be."""
         each = zip(self.members, self.amplitudes, strict=True)
@@ -147,6 +153,7 @@ def judge(
     each = (replace(u, probability=float(p)) for u, p in zip(near, chance[count:], strict=True))
     unfitted = tuple(sorted(each, key=lambda u: -u.probability))
     of_formula = _of(judged, formula)
+    ranked = (replace(best, evidence=evidence(run, best.fit, ())[0]), *ranked[1:])
     return Verdicts(regimes, ranked, chance[:count], left, of_formula, searched.alike, unfitted)
 
 
@@ -159,10 +166,10 @@ def _of(judged: Sequence[Judged], formula: Fit) -> Judged:
 def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tuple[Judged, ...], Bool]:
     """Return the hypotheses, the likeliest first, and which (H,) are allowed at all.
 
-    One that predicts held-out regimes worse than the stated instrument is discarded.
+    One that predicts held-out regimes worse than the stated instrument is discarded, as are impossible sizes.
     """
     nothing = next(j for j in judged if not j.fit.terms)
-    allowed = np.array([j.heldout <= nothing.heldout for j in judged])
+    allowed = np.array([j.heldout <= nothing.heldout and j.possible for j in judged])
     surprise = np.array([j.surprise + j.beforehand for j in judged])
     allowed &= ~_redundant(run, judged, _of(judged, formula), surprise)
     order = np.lexsort((surprise, ~allowed))
@@ -200,9 +207,10 @@ def _unfitted(sets: Sets, ranked: Sequence[Judged]) -> list[Unfitted]:
     offset = best.surprise + best.beforehand - sets.surprise(here)
     out = []
     for chosen, surprise in sets.likely([here], MOST_EFFECTS).items():
-        members = sets.in_order(chosen)
-        if _key(members) not in fitted and surprise + offset - best.surprise - best.beforehand < _FAR:
-            out.append(Unfitted(members, sets.amplitudes(chosen), surprise + offset, 0.0))
+        members, far = sets.in_order(chosen), surprise + offset - best.surprise - best.beforehand
+        if far < _FAR and _key(members) not in fitted:
+            one = Unfitted(members, sets.amplitudes(chosen), surprise + offset, 0.0)
+            out += [one] if one.possible else []
     return out
 
 

@@ -12,7 +12,7 @@ from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.inference import Score, Stated, places_of, score, stated_belief
+from stages.diagnose.inference import Around, Score, Stated, places_of, stated_belief
 from stages.diagnose.result import Value
 
 # More shapes than this are first tried on a thinned run.
@@ -86,8 +86,9 @@ def _best(
         given = np.concatenate(
             [np.zeros(0, np.int64), *[places_of(here, t.model, t.shape) for t in found.terms]]
         ).astype(np.int64)
+        around = Around.of(here, stated, given)
         for model, shape in part:
-            result = score(here, stated, places_of(here, model, shape), given)
+            result = around.score(places_of(here, model, shape))
             if result is not None and (
                 model.name not in best or result.statistic > best[model.name].score.statistic
             ):
@@ -187,11 +188,12 @@ def _gains(run: GaugeRun, found: Fit, place: int) -> tuple[Float, Float]:
     time_s = _times_near(run, term)
     reduced = fit(run, found.state, others, _ITERATIONS)
     asked: list[tuple[EffectModel, tuple[float, ...]]] = [(term.model, (float(t),)) for t in time_s]
-    about = evidence(run, reduced, asked)[0]
+    about = evidence(run, reduced, asked, with_spread=False)[0]
     stated = stated_belief(found.state.stated)
     given = [places_of(about, t.model, t.shape) for t in others]
     free = np.concatenate([np.zeros(0, np.int64), *given]).astype(np.int64)
-    each = [score(about, stated, places_of(about, m, s), free) for m, s in asked]
+    around = Around.of(about, stated, free)
+    each = [around.score(places_of(about, m, s)) for m, s in asked]
     return time_s, np.array([0.0 if one is None else one.gain for one in each])
 
 
