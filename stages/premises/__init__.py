@@ -23,6 +23,7 @@ from stages.premises.light import (
     row_times,
     rows_by_motion,
     steps_of_wall,
+    sway_of_line,
 )
 from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
@@ -90,7 +91,8 @@ def check_premises(
     copy = copies(pictures, light, stated, story.row, row_times(table, story.row), encoder)
     label = np.where(copy, _stated(table, story.row), label)
     steps = steps_of_wall(pictures, shown, copy)
-    row = rows_by_motion(story.row, steps, rhythm_of(light), table, encoder)
+    sway = sway_of_line(pictures, light)
+    row = rows_by_motion(story.row, steps, rhythm_of(light), table, encoder, sway)
     stated_s = row_times(table, row)
     jumps = clock_jumps(stated_s, steps, encoder)
     time_s = without_jumps(stated_s, jumps)
@@ -224,7 +226,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "8",
+    "9",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -41,6 +41,10 @@ _LEAST_STEPS = 12
 # A step that took so many times as long as is usual counts no lost pictures: over 32 frames, 30 of them left
 # out, phase correlation erred by the way of 6 (open-1-field at half its size).
 _LONGEST_STEP = 4.0
+# The laser line leaps where it moves across so many times as far as it usually does, of at least half a
+# pixel, in the time that would have passed. In open-1 to open-3, a01 and a09 it moves up to 3
+# times as far, twice in a run more than 2.5; where all pictures of open-1 were moved by 4 px, 5.4 times.
+_LINE_LEAPS, _LEAST_SWAY_PX = 2.5, 0.5
 # The encoder is asked within so many frames whether the probe itself leapt.
 _NEARBY = 10
 
@@ -180,12 +184,29 @@ def row_times(table: FrameTable, row: Int) -> Float:
     return np.asarray(table.time_s[np.minimum(row, len(table.time_s) - 1)] + beyond * usual)
 
 
-def rows_by_motion(row: Int, steps: Steps, rhythm: int, table: FrameTable, encoder: Encoder | None) -> Int:
+def sway_of_line(pictures: Pictures, light: Int) -> Float:
+    """Return how far (F,) the laser line moves across to its next picture, over how far it usually does."""
+    out, line = np.zeros(len(light)), np.flatnonzero((light == Light.LINE) & (pictures.closed > CLOSED))
+    if len(line) < _LEAST_STEPS:
+        return out
+    moved, azimuth = np.diff(pictures.line_px[line], axis=0), pictures.azimuth_rad
+    ahead = [[np.cos(azimuth - turn) > np.sqrt(0.5) for turn in (a, a + np.pi)] for a in (0, np.pi / 2)]
+    across = [[np.median(moved[:, side], axis=1) for side in sides] for sides in ahead]
+    way = np.hypot(*((one - other) / 2 for one, other in across))
+    way /= max(float(np.median(way)), _LEAST_SWAY_PX)
+    out[line[0] + 1 : line[-1] + 1] = np.repeat(way, np.diff(line))
+    return out
+
+
+def rows_by_motion(
+    row: Int, steps: Steps, rhythm: int, table: FrameTable, encoder: Encoder | None, sway: Float
+) -> Int:
     """Return ``row`` (F,) with more or fewer rows skipped where the wall moves by more or less than usual.
 
     The lights fix the number of lost pictures but for whole rhythms of theirs; the motion of the wall, at the
     usual speed of the steps around, counts these. A leap that the encoder shows too is the probe's own.
-    Over pictures that were left out it tells nothing: the speed is not known so long.
+    Over pictures that were left out it tells nothing: the speed is not known so long. Nor where the line's
+    ``sway`` (F,) leaps: the camera was knocked there.
     """
     if len(steps.end) < _LEAST_STEPS:
         return row
@@ -195,6 +216,7 @@ def rows_by_motion(row: Int, steps: Steps, rhythm: int, table: FrameTable, encod
     for start, end, lost in _leaps(steps, time, rhythm, _SIGMAS_LOST if left > 0 else _SIGMAS):
         skips = np.diff(row[start : end + 1]) - 1
         believed = left >= lost or _encoder_was_steady(encoder, float(time[end]), period)
+        believed &= sway[start + 1 : end + 1].max() < _LINE_LEAPS * (1 + abs(lost) / rhythm)
         if (lost > 0 and believed) or (lost < 0 and skips.max() + lost >= 0):
             first = int(np.argmax(skips)) + start + 1 if skips.max() > 0 else (start + end + 1) // 2
             out[first:] += lost

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.recording.base import Encoder, FrameTable
-from stages.premises.light import Steps, rows_by_motion
+from stages.premises.light import Light, Steps, rows_by_motion, sway_of_line
+from stages.premises.pictures import Pictures
 from tests.drawn_run import drawn_run
 from tests.premises_run import COUNT, STEP_MM, checked, good_recording, steady_run, with_rings
 from tests.ring_images import MemorySource
@@ -112,8 +113,26 @@ def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():
     steps = Steps(seen[:-1], seen[1:], np.diff(way))
     table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
     encoder = Encoder(table.time_s, 10.0 * table.time_s)
-    row = rows_by_motion(np.arange(120), steps, 2, table, encoder)
+    row = rows_by_motion(np.arange(120), steps, 2, table, encoder, np.ones(120))
     np.testing.assert_array_equal(row, np.arange(120))
+
+
+@pytest.mark.parametrize("knocked", [False, True])
+def test_a_camera_knocked_in_mid_run_is_no_loss(knocked):
+    """Its pictures moved by 4 px, the wall seemed to leap, and times were taken from other rows."""
+    frame = np.arange(0, 120, 2)
+    size = np.where(frame[1:] == 60, 0.04, 0.02) + 0.0001 * np.sin(frame[1:])
+    table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
+    encoder = Encoder(table.time_s, 10.0 * table.time_s)
+    azimuth = np.linspace(-np.pi, np.pi, 128, endpoint=False)
+    moved = 0.4 * np.sin(frame / 5) + 4 * knocked * (frame + 1 >= 60)
+    line = np.full((120, 128), np.nan, np.float32)
+    line[1::2] = 100 + np.round(moved[:, None] * np.cos(azimuth))
+    nothing, light = np.full(120, np.nan), np.tile([Light.WALL, Light.LINE], 60)
+    pictures = Pictures(nothing, np.ones(120), line, azimuth, nothing, np.full(120, -1), nothing, nothing)
+    sway = sway_of_line(pictures, light)
+    row = rows_by_motion(np.arange(120), Steps(frame[:-1], frame[1:], size), 2, table, encoder, sway)
+    assert row[-1] - 119 == (0 if knocked else 2)
 
 
 @pytest.mark.parametrize("stood", [False, True])
