@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 
 from pipeline.adjustment.bordered import BorderedSystem, Rows
 from pipeline.adjustment.elimination import BLOCK
-from pipeline.arrays import Float
+from pipeline.arrays import Bool, Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import transform
 from stages.motion.bundle_adjustment import residuals
@@ -37,6 +37,11 @@ class ExtraColumns:
     pixels: Float
     landmarks: Float
     sigma: Float
+
+    def some(self, which: Bool) -> ExtraColumns:
+        """Return some (K,) of the unknowns."""
+        pixels = self.pixels[..., which]
+        return ExtraColumns(self.rings[:, which], pixels, self.landmarks[:, which], self.sigma[which])
 
     def solved(self, estimate: Estimate) -> tuple[Float, Float]:
         """Return the unknowns (K,) at the minimum of the linear equations, and their covariance (K, K)."""

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
-from pipeline.arrays import Float
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import LaserKnock
 from stages.motion.bundle_adjustment.equations import Measurements, Scales, linearised, scales_of
 from stages.motion.bundle_adjustment.extra_columns import ExtraColumns
-from stages.motion.bundle_adjustment.laser_knock import KnockTest, RingJump, by_joint, by_laser
+from stages.motion.bundle_adjustment.laser_knock import (
+    LASER_AND_JOINT,
+    KnockTest,
+    RingJump,
+    by_laser_and_joint,
+)
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.parameters import MotionParameters
 from stages.motion.windows.measured_run import MeasuredRun
@@ -27,18 +31,41 @@ never settle, and is refused all the same."""
 
 
 @dataclass(frozen=True)
-class _Cause:
-    """What may make rings jump: its size (3,) at first, a run without it, and what it changes."""
+class _Place:
+    """Where rings jump in a window of a run.
 
-    size: Float
-    taken_out: Callable[[Float], MeasuredRun]
-    columns: Callable[[Estimate, Measurements], ExtraColumns] | None = None
+    ``behind`` is the first frame behind the jump, counted from the run's first.
+    """
+
+    run: MeasuredRun
+    jump: RingJump
+    window: Window
+    behind: int
+
+    def taken_out(self, size: Float) -> MeasuredRun:
+        """Return the run without sizes (6,) of knock and joint (`LASER_AND_JOINT`)."""
+        run = self.run.knocked(LaserKnock(self.jump.frame, size[LASER_AND_JOINT], np.zeros((3, 3))))
+        x, y, wider = size[~LASER_AND_JOINT]
+        return replace(run, bore=run.bore.with_joint(self.jump.at_mm, (x, y), wider))
+
+    def columns(self, estimate: Estimate, measured: Measurements) -> ExtraColumns:
+        """Return what these sizes change."""
+        first, at_mm = self.behind - self.window.first, self.jump.at_mm - self.run.start_mm(self.window)
+        return by_laser_and_joint(estimate, measured, first, at_mm)
+
+    @property
+    def guesses(self) -> tuple[Float, Float]:
+        """Return the sizes (6,) by which a knock alone, or a joint alone, makes the jump."""
+        aside_mm = self.run.T_pc[self.behind, :2, :2] @ self.jump.jump_mm[:2]
+        knock = np.concatenate([self.jump.guess.change, np.zeros(3)])
+        return knock, np.array([0.0, 0, 0, *aside_mm, self.jump.jump_mm[2]])
 
 
 @dataclass(frozen=True)
 class _Fitted:
-    """A cause's size (3,), its covariance, and the estimate with it."""
+    """Sizes (6,) of which those that are ``free`` were estimated, with covariance, and the estimate."""
 
+    free: Bool
     size: Float
     covariance: Float
     estimate: Estimate
@@ -50,7 +77,8 @@ def with_steady_laser(
 ) -> tuple[MeasuredRun, KnockTest | None]:
     """Return the run with what a knock did to the laser, if it was knocked; None where no rings jump.
 
-    A knock, a joint of the pipe and nothing at all are each adjusted with the rings' jump and compared.
+    A knock, a joint of the pipe and neither are each adjusted with the rings' jump and compared by their
+    marginal likelihoods. Both at once are not tried: at a weld (open-2) their freedom explains it best.
 
     Raises
     ------
@@ -60,63 +88,43 @@ def with_steady_laser(
     if run.jump is None:
         return run, None
     behind = int(run.ring_place[np.searchsorted(run.rings.frame, run.jump.frame)])
-    window = _around(behind, run.whole, parameters.window_frames)
+    place = _Place(run, run.jump, _around(behind, run.whole, parameters.window_frames), behind)
     parameters = parameters.model_copy(update={"iterations": min(_STEPS, parameters.iterations)})
-    fitted = [_fitted(c, window, parameters, watch) for c in _causes(run, run.jump, window, behind)]
-    knocked, joint, neither = _costs(fitted, parameters)
-    knock = LaserKnock(run.jump.frame, fitted[0].size, fitted[0].covariance)
-    time_s = float(run.time_s[behind])
-    test = KnockTest(knock, joint - knocked, neither - knocked, run.jump, time_s)
+    by_knock, by_joint = place.guesses
+    causes = (LASER_AND_JOINT, by_knock), (~LASER_AND_JOINT, by_joint), (np.zeros(6, bool), 0 * by_knock)
+    fitted = [_fitted(place, free, guess, parameters, watch) for free, guess in causes]
+    knocked, *others = _likelihoods(fitted, run.jump, parameters)
+    knock = LaserKnock(run.jump.frame, fitted[0].size[LASER_AND_JOINT], fitted[0].covariance)
+    test = KnockTest(knock, knocked - max(others), run.jump, float(run.time_s[behind]))
     return (run.knocked(knock) if test.told else run), test
 
 
-def _causes(run: MeasuredRun, jump: RingJump, window: Window, behind: int) -> tuple[_Cause, _Cause, _Cause]:
-    """Return a knock, a joint, and neither."""
-    sure, at_mm = np.zeros((3, 3)), jump.at_mm - run.start_mm(window)
-    aside_mm = run.T_pc[behind, :2, :2] @ jump.jump_mm[:2]
-
-    def joint(size: Float) -> MeasuredRun:
-        return replace(run, bore=jump.bore.with_joint(jump.at_mm, (size[0], size[1]), size[2]))
-
-    return (
-        _Cause(
-            jump.guess.change,
-            lambda size: run.knocked(LaserKnock(jump.frame, size, sure)),
-            lambda estimate, measured: by_laser(estimate, measured, behind - window.first),
-        ),
-        _Cause(
-            np.append(aside_mm, jump.jump_mm[2]),
-            joint,
-            lambda estimate, measured: by_joint(estimate, measured, at_mm),
-        ),
-        _Cause(np.zeros(3), lambda size: replace(run, bore=jump.bore)),
-    )
-
-
-def _fitted(cause: _Cause, window: Window, parameters: MotionParameters, watch: Watch) -> _Fitted:
-    """Return a cause adjusted, in rounds if it has a size."""
-    size, covariance, state = cause.size, np.zeros((3, 3)), None
-    for _ in range(_ROUNDS if cause.columns else 1):
-        run = cause.taken_out(size)
-        measured = run.measured(window, parameters)
-        first = run.start(window, measured, parameters)
+def _fitted(place: _Place, free: Bool, size: Float, parameters: MotionParameters, watch: Watch) -> _Fitted:
+    """Return the sizes (6,) that are free adjusted, in rounds."""
+    covariance, state = np.zeros((0, 0)), None
+    for _ in range(_ROUNDS if free.any() else 1):
+        run = place.taken_out(size)
+        measured = run.measured(place.window, parameters)
+        first = run.start(place.window, measured, parameters)
         start = first if state is None else replace(state, bore=first.bore)
         estimate = estimate_state(start, measured, parameters, watch)
-        if cause.columns:
-            step, covariance = cause.columns(estimate, measured).solved(estimate)
-            size = size + step
+        if free.any():
+            step, covariance = place.columns(estimate, measured).some(free).solved(estimate)
+            size = size.copy()
+            size[free] += step
         state = estimate.state
-    return _Fitted(size, covariance, estimate, measured)
+    return _Fitted(free, size, covariance, estimate, measured)
 
 
-def _costs(fitted: list[_Fitted], parameters: MotionParameters) -> list[float]:
-    """Return the robust costs of causes, all by the smallest scales that one of them shows."""
+def _likelihoods(fitted: list[_Fitted], jump: RingJump, parameters: MotionParameters) -> list[float]:
+    """Return logarithms of causes' marginal likelihoods, by the smallest scales that one of them shows."""
     scales = [scales_of(f.estimate.adjusted.equations, f.measured.tracks, parameters.alike) for f in fitted]
     same = Scales(min(s.texture for s in scales), min(s.wall_mm for s in scales))
     smooth = np.min([f.estimate.smooth_sigma for f in fitted], axis=0)
     alike = [replace(f.measured, smooth_sigma=smooth) for f in fitted]
     return [
-        linearised(f.estimate.state, measured, parameters, same).cost
+        jump.likelihood_of_size(f.size, f.covariance, f.free)
+        - linearised(f.estimate.state, measured, parameters, same).cost
         for f, measured in zip(fitted, alike, strict=True)
     ]
 
