@@ -252,5 +252,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "16", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "17", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -58,7 +58,7 @@ def measure_depth(
 
     The extreme of a noisy surface exceeds the surface's extreme. By how much, and how it scatters, is found
     by adding noise as the clean wall shows it to the smoothed surface (parametric bootstrap: Efron &
-    Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10).
+    Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10), larger where the map's own σ is.
     """
     relief = surface.relief
     height = region.sign * region.cut(surface.all_mm if region.all_round else surface.local_mm)
@@ -69,7 +69,8 @@ def measure_depth(
     top = float(smooth[inside].max())
     # where points show nothing of what the map shows, the top of a defect may lie below zero
     near = inside & (smooth >= top - 0.5 * abs(top))
-    drawn = np.array([(smooth + clean.draw(height.shape, random))[near].max() for _ in range(draws)])
+    gain = _noise_gain(region, relief)
+    drawn = np.array([(smooth + gain * clean.draw(height.shape, random))[near].max() for _ in range(draws)])
     bias = float(drawn.mean()) - top
     depth = float(height[peak]) - bias
     sharpened = float((region.cut(surface.all_mm) - region.cut(surface.coarse_mm))[peak])
@@ -78,6 +79,14 @@ def measure_depth(
         depth, scatter = _between_rings(relief, region, surface.points, depth, scatter)
     sigma = float(np.hypot(scatter, _shape_sigma(relief, region, depth, surface.points.spacing_mm)))
     return Depth(region.sign * depth, sigma, bias, (int(peak[0]), int(peak[1])))
+
+
+def _noise_gain(region: Region, relief: Relief) -> Float:
+    """Return how many times the wall's usual noise the cells of a region (H, W) have, at least 1.
+
+    The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more.
+    """
+    return np.asarray(np.fmax(region.cut(relief.sigma_mm) / relief.typical.sigma_mm, 1.0))
 
 
 def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:

@@ -37,6 +37,8 @@ class DeviationPoints:
         Index of each cell's first point.
     row, column, deviation_mm : (M,)
         Fractional place in the map, and radius minus the smooth shape of ``Relief.all_mm``.
+    weight : (M,)
+        The points' median variance over their own, at most 1.
     spacing_mm : float
         Median distance between neighbouring rings.
     """
@@ -45,6 +47,7 @@ class DeviationPoints:
     row: Float
     column: Float
     deviation_mm: Float
+    weight: Float
     spacing_mm: float
 
     @property
@@ -56,12 +59,13 @@ class DeviationPoints:
 def fine_surface(relief: Relief, points: DeviationPoints, wanted: Bool, coarse_mm: Float) -> Float:
     """Return the 1 mm mean (S, A) of ``relief.all_mm`` by local quadratic regression on the points.
 
-    A local quadratic has no bias from a peak's curvature (Fan & Gijbels, Local polynomial modelling and its
+    Samples where the line is dim, as on rust or at the bottom of a pit, count by their own variance. A local
+    quadratic has no bias from a peak's curvature (Fan & Gijbels, Local polynomial modelling and its
     applications, 1996, § 3.2). Where too few points lie near, and where it is not ``wanted`` (S, A), the
     map's own mean ``coarse_mm`` (S, A) stands in.
     """
     out = np.full(relief.local_mm.shape, np.nan)
-    place = (points.first, points.row, points.column, points.deviation_mm)
+    place = (points.first, points.row, points.column, points.deviation_mm, points.weight)
 
     def fill(cells: Int) -> None:
         _regress(*place, *relief.cell_mm, *points.kernel_mm, _LEAST, cells, out)
@@ -78,12 +82,20 @@ def deviation_points(relief: Relief, points: PointCloud, spacing_mm: float) -> D
     step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
     i = (points.distance_mm.astype(float) - relief.distance_mm[0]) / relief.cell_mm[0]
     j = np.mod((points.azimuth_rad.astype(float) - relief.azimuth_rad[0]) / step, columns)
-    i, j, radius = (x[(i > -0.5) & (i < rows - 0.5)] for x in (i, j, points.radius_mm.astype(float)))
+    weight = _weight(points.sigma_mm.astype(float))
+    within = (i > -0.5) & (i < rows - 0.5)
+    i, j, radius, weight = (x[within] for x in (i, j, points.radius_mm.astype(float), weight))
     cell = np.rint(i).astype(np.int64) * columns + np.rint(j).astype(np.int64) % columns
     order = np.argsort(cell, kind="stable")
     first = np.searchsorted(cell[order], np.arange(rows * columns + 1))
     deviation = radius - relief.shape_at(i, j)
-    return DeviationPoints(first, i[order], j[order], deviation[order], spacing_mm)
+    return DeviationPoints(first, i[order], j[order], deviation[order], weight[order], spacing_mm)
+
+
+def _weight(sigma_mm: Float) -> Float:
+    """Return the median variance of points over their own (M,)."""
+    usual = float(np.median(sigma_mm)) if sigma_mm.size else 1.0
+    return np.asarray((usual / np.maximum(sigma_mm, usual)) ** 2)
 
 
 @dataclass(frozen=True)
@@ -175,7 +187,7 @@ def cells_of(points: PointCloud, relief: Relief, region: Region) -> tuple[Float,
 
 
 @numba.njit(cache=True, nogil=True)
-def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wanted, out):  # type: ignore[no-untyped-def]
+def _regress(first, i, j, deviation, sure, cell_s, cell_a, along, around, least, wanted, out):  # type: ignore[no-untyped-def]
     rows, columns = out.shape
     reach_s = int(np.ceil(2.5 * along / cell_s))
     reach_a = min(int(np.ceil(2.5 * around / cell_a)), columns // 2 - 1)
@@ -193,7 +205,7 @@ def _regress(first, i, j, deviation, cell_s, cell_a, along, around, least, wante
                     s = (i[k] - row) * cell_s
                     q = j[k] - column
                     q = (q - columns * np.rint(q / columns)) * cell_a
-                    w = np.exp(-0.5 * ((s / along) ** 2 + (q / around) ** 2))
+                    w = sure[k] * np.exp(-0.5 * ((s / along) ** 2 + (q / around) ** 2))
                     ws, wq, wd = w * s, w * q, w * deviation[k]
                     wss, wsq, wqq = ws * s, ws * q, wq * q
                     m00, m10, m01, m20, m11, m02 = (

@@ -1,5 +1,7 @@
 """The local quadratic regression against plain NumPy, and what it is for: a peak keeps its height."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.artefacts.cloud_along import cloud_along
@@ -12,8 +14,12 @@ DISTANCE, AZIMUTH = np.arange(0, 40, 0.5), -np.pi + np.arange(360) * np.pi / 180
 RADIUS = 25.0
 
 
-def relief_and_points(radius):
+def relief_and_points(radius, unsure=1.0):
+    """Return relief and points, every third of which is ``unsure`` times as unsure as the others."""
     wall = wall_of(DISTANCE, AZIMUTH, radius, 0.02)
+    sigma = wall.cloud.sigma_mm.copy()
+    sigma[::3] *= unsure
+    wall = replace(wall, cloud=replace(wall.cloud, sigma_mm=sigma))
     relief = smooth_shape_removed(wall.radius_map, DefectParameters()).rows(slice(0, len(DISTANCE)))
     cloud = cloud_along(wall.cloud)
     return relief, deviation_points(relief, cloud.between(-1.0, 41.0), cloud.ring_spacing_mm())
@@ -34,7 +40,7 @@ def reference(relief, points, row, column):
         np.abs(q) <= (reach[1] + 0.1) * relief.cell_mm[1]
     )
     s, q, value = s[near], q[near], points.deviation_mm[near]
-    weight = np.exp(-0.5 * ((s / along) ** 2 + (q / around) ** 2))
+    weight = points.weight[near] * np.exp(-0.5 * ((s / along) ** 2 + (q / around) ** 2))
     basis = np.stack([np.ones_like(s), s, q, s * s, s * q, q * q], -1)
     normal = basis.T @ (weight[:, None] * basis) + 1e-4 * weight.sum() * np.eye(6)
     found = np.linalg.solve(normal, basis.T @ (weight * value))
@@ -43,7 +49,8 @@ def reference(relief, points, row, column):
 
 def test_agrees_with_numpy_also_over_the_seam():
     radius = RADIUS + np.random.default_rng(0).normal(0, 0.1, (len(DISTANCE), len(AZIMUTH)))
-    relief, points = relief_and_points(radius)
+    relief, points = relief_and_points(radius, unsure=2.5)
+    assert np.unique(np.round(points.weight, 6)).tolist() == [0.16, 1.0]
     surface = surface_of(relief, points)
     for row, column in ((40, 180), (20, 0), (60, 359), (33, 1)):
         assert abs(surface[row, column] - reference(relief, points, row, column)) < 1e-9
