@@ -17,9 +17,16 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
-from stages.twin.compare import Comparison, block_contrasts, block_ratios
+from stages.twin.compare import Comparison, block_ratios, block_textures
 from stages.twin.glints import told_apart
-from stages.twin.locate import LEAST_CONTRAST, ImagePlace, beside, full_size, places_in_image
+from stages.twin.locate import (
+    LEAST_CONTRAST,
+    ImagePlace,
+    beside,
+    full_size,
+    places_displaced,
+    places_in_image,
+)
 from stages.twin.name import (
     cannot_tell,
     clipped,
@@ -39,6 +46,9 @@ from stages.twin.window import beside_blur
 _EVERY = 10
 _COLOURED = 3
 """Laser frames whose colours are looked at for clipping, which takes three times as long to decode."""
+_ROUNDS = 3
+"""Times that texture is looked for where the round before has drawn it: the second finds a third of what the
+first did, the fourth hardly any."""
 
 
 class PhotometryParameters(Parameters):
@@ -65,13 +75,14 @@ class TwinParameters(Parameters):
 
 @dataclass(frozen=True)
 class Photometry:
-    """The photometric state of a run, and where the image is darker or brighter in all frames.
+    """The photometric state of a run, and where the image differs alike in all frames.
 
     Attributes
     ----------
     state : PhotometricState
         Its ``gain_map`` holds what dirt lets through, where some was found.
     places : tuple of ImagePlace
+        Where texture is displaced, then where the image is darker or brighter.
     blurred : tuple of ImagePlace
         Places, none of those, where texture is fainter or stronger.
     blur_px : float
@@ -114,9 +125,19 @@ def photometry_of(
     lines = [s.frame for s in sampled if s.light == Illumination.LASER]
     few = np.array(lines[:: max(len(lines) // _COLOURED, 1)], np.int64)
     state = replace(state, line_clipped=clipped_line(scene, recording.read(few, "bgr")))
-    ratios, contrasts = _blocks(scene, state, sampled)
+    displaced: tuple[ImagePlace, ...] = ()
+    for _ in range(_ROUNDS):
+        ratios, textures = _blocks(scene, state, sampled)
+        found, aside = places_displaced([place for _, place in textures])
+        if aside is None:
+            break
+        displaced = displaced or found
+        whole = np.stack([full_size(a, state.outside.shape, 0.0) for a in aside])
+        state = replace(state, aside=whole if state.aside is None else state.aside + whole)
     places, gain = places_in_image(ratios)
-    blurred, _ = places_in_image(contrasts, LEAST_CONTRAST)
+    blurred, _ = places_in_image([contrast for contrast, _ in textures], LEAST_CONTRAST)
+    # A drop that draws texture aside leaves bright and dark fragments of it.
+    places = (*displaced, *beside(places, displaced))
     if gain is not None:
         state = replace(state, gain_map=full_size(gain, state.outside.shape))
     return Photometry(state, places, beside(blurred, places), parameters.blur_px)
@@ -209,16 +230,13 @@ def _split(frames: CheckedFrames, trajectory: Trajectory, most: int) -> tuple[In
 
 def _blocks(
     scene: Scene, state: PhotometricState, sampled: list[Sampled]
-) -> tuple[list[Float32], list[Float32]]:
-    """Return recorded over predicted brightness, and texture, of blocks of the sampled lit frames."""
+) -> tuple[list[Float32], list[tuple[Float32, Float32]]]:
+    """Return of the sampled lit frames recorded over predicted brightness, and the texture, of blocks."""
     black, renderer = state.noise.black.value, Renderer(replace(scene, outside=state.outside), state)
-    made = [
-        [f(s.image - black, twin, state.noise.white - black) for f in (block_ratios, block_contrasts)]
-        for s in sampled
-        if s.light in state.shows_wall
-        for twin in [renderer.frame(s.frame, s.light)]
-    ]
-    return [m[0] for m in made], [m[1] for m in made]
+    lit = [s for s in sampled if s.light in state.shows_wall]
+    twins = [renderer.frame(s.frame, s.light).drawn_aside(state.aside) for s in lit]
+    made = [(s.image - black, t, state.noise.white - black) for s, t in zip(lit, twins, strict=True)]
+    return [block_ratios(*m) for m in made], [block_textures(*m) for m in made]
 
 
 def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Context) -> None:
@@ -231,14 +249,14 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "7",
+    "8",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
 )
 TWIN = Stage(
     "twin",
-    "15",
+    "16",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

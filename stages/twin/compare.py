@@ -22,6 +22,9 @@ _SILENT = 0.92
 """Share of pixels at one grey level from which noise is less than that of rounding, 1/√12: erf(√1.5)."""
 _LEAST_TEXTURE = 4.0
 """Variance of fine texture, grey levels squared, from which its share shows through noise of 576 pixels."""
+_LEAST_SLOPES = 0.2
+"""Geometric mean of a block's slopes in both directions, as a share of their sum, from which its place is
+known both ways: 0.5 where both are alike, 0 along a stripe. Chosen."""
 _DARK, _WALL, _CORE, _AT_BLACK = int(Region.DARK), int(Region.WALL), int(Region.LINE_CORE), 0.5
 """Regions as the compiled sums know them; half a grey level: at black to the level."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
@@ -241,19 +244,36 @@ def block_ratios(above_black: Float32, twin: TwinFrame, white_above_black: float
         return np.where(of_blocks(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)
 
 
-def block_contrasts(above_black: Float32, twin: TwinFrame, white_above_black: float) -> Float32:
-    """Return which share of its twin's texture each block shows; NaN without lit wall and texture about."""
+def block_textures(
+    above_black: Float32, twin: TwinFrame, white_above_black: float
+) -> tuple[Float32, Float32]:
+    """Return which share of its twin's fine texture each block shows, and where that lies.
+
+    The place (2, rows, columns) is relative to the twin's, px to the right and down, from recorded − twin
+    = −∇twin · place, by least squares over three by three blocks (B. Lucas, T. Kanade, 1981). Both are NaN
+    without lit wall and texture about.
+    """
     use = (twin.region == Region.WALL) & (above_black < white_above_black)
 
     def about(values: Float32 | Bool) -> Float32:
         return np.asarray(cv2.blur(of_blocks(values), (3, 3)), np.float32)
 
-    fine = [
+    seen, made = (
         np.where(use, a - cv2.GaussianBlur(a, (0, 0), BLOCK_PX), np.float32(0))
         for a in (above_black, np.asarray(twin.level))
-    ]
-    cross, own = about(fine[0] * fine[1]), about(fine[1] ** 2)
+    )
+    right, down = (
+        np.asarray(cv2.Sobel(made, cv2.CV_32F, *way, ksize=1, scale=0.5), np.float32)
+        for way in ((1, 0), (0, 1))
+    )
+    cross, own = about(seen * made), about(made**2)
+    rr, rd, dd = about(right**2), about(right * down), about(down**2)
+    to_right, to_down = (-about(slope * (seen - made)) for slope in (right, down))
+    whole = rr * dd - rd**2
     # At the border of the view light and texture end: what lies two blocks from it is no place of its own.
-    whole = cv2.erode((about(use) > 0.99).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    known = whole & (own > _LEAST_TEXTURE)
-    return np.where(known, cross / np.maximum(own, _LEAST_TEXTURE), np.float32(np.nan)).astype(np.float32)
+    inside = cv2.erode((about(use) > 0.99).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    known = inside & (own > _LEAST_TEXTURE)
+    nan, contrast = np.float32(np.nan), cross / np.maximum(own, _LEAST_TEXTURE)
+    place = np.stack([dd * to_right - rd * to_down, rr * to_down - rd * to_right]) / np.maximum(whole, 1e-6)
+    sloped = known & (whole > (_LEAST_SLOPES * (rr + dd)) ** 2)
+    return np.where(known, contrast, nan), np.where(sloped, place, nan).astype(np.float32)

@@ -32,6 +32,9 @@ recordings stays below it."""
 
 LEAST_CONTRAST = 0.25
 """Smallest relative change of texture that counts: poses and radii that err blur it by a tenth or two."""
+LEAST_ASIDE_PX, _OF_PX = 0.3, 0.1
+"""Least displacement of texture that counts, px: a map of the wall and a lens errs by a tenth or two; chosen.
+Relative change that stands for a pixel of it."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,14 @@ class ImagePlace:
     sd: float
     probability: float
 
+    def most_of(self, aside: Float32 | None) -> float:
+        """Return how far, px, texture is drawn aside at most, where (2, H, W) say by how much."""
+        if aside is None:
+            return 0.0
+        v, u = np.mgrid[0 : aside.shape[1], 0 : aside.shape[2]]
+        near = np.hypot(u - self.u_px, v - self.v_px) < self.radius_px
+        return float(np.hypot(*aside[:, near]).max(initial=0.0))
+
 
 def places_in_image(
     ratios: list[Float32], least: float = _LEAST_CHANGE
@@ -65,25 +76,60 @@ def places_in_image(
     """
     if len(ratios) < _FEWEST_FRAMES:
         return (), None
-    stack = np.stack(ratios)
-    known = np.isfinite(stack).sum(0) >= _FEWEST_FRAMES
+    change, spread, known = _stays(np.stack(ratios))
     if not known.any():
         return (), None
-    middle = np.ones(known.shape, np.float32)
-    middle[known] = np.nanmedian(stack[:, known], axis=0)
-    change = np.where(known, middle / _broad(middle, known) - 1, 0).astype(np.float32)
-    spread = _spread_of_rings(change, known)
     bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, least)
-    count, label, _, centre = cv2.connectedComponentsWithStats((np.abs(change) > bound).astype(np.uint8))
-    places, gain = [], np.ones_like(change)
-    for k in range(1, count):
-        inside = label == k
-        if inside.sum() < _FEWEST_BLOCKS:
-            continue
+    gain = np.ones_like(change)
+    found = _joined(np.abs(change) > bound)
+    for inside in found:
         grown = cv2.dilate(inside.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         gain[grown & known] = 1 + change[grown & known]
-        places.append(_place(inside, centre[k], change, spread, int(known.sum())))
-    return tuple(places), gain if places else None
+    return tuple(_place(k, change, spread, int(known.sum())) for k in found), gain if found else None
+
+
+def places_displaced(shifts: list[Float32]) -> tuple[tuple[ImagePlace, ...], Float32 | None]:
+    """Return where texture lies aside in all frames, each of which gives shifts (2, rows, columns), px.
+
+    Then by how much, in the same form, 0 elsewhere; None without any.
+    """
+    if len(shifts) < _FEWEST_FRAMES:
+        return (), None
+    ways = [_stays(1 + np.float32(_OF_PX) * np.stack([s[k] for s in shifts])) for k in (0, 1)]
+    known = ways[0][2] & ways[1][2]
+    if not known.any():
+        return (), None
+    strength = np.hypot(*(change / np.maximum(spread, 1e-9) for change, spread, _ in ways))
+    size = np.hypot(ways[0][0], ways[1][0]).astype(np.float32)
+    # The chance that both ways together are as large: of two normal numbers exp(−s²/2).
+    far = (
+        known & (strength > np.sqrt(2 * np.log(known.sum() / FALSE_ALARM))) & (size > _OF_PX * LEAST_ASIDE_PX)
+    )
+    # Amid a drop nothing is displaced: its rim is closed.
+    whole = cv2.morphologyEx(far.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
+    spread = np.where(strength > 0, size / np.maximum(strength, 1e-9), 1).astype(np.float32)
+    found = _joined(whole)
+    grown = cv2.dilate(np.any(found, axis=0).astype(np.uint8), np.ones((3, 3), np.uint8)) if found else 0
+    aside = np.stack([change for change, _, _ in ways]) * (grown * known) / _OF_PX
+    places = tuple(_place(k, size, spread, int(known.sum())) for k in found)
+    return places, aside.astype(np.float32) if found else None
+
+
+def _stays(stack: Float32) -> tuple[Float32, Float32, Bool]:
+    """Return by how much blocks of frames (F, rows, columns) differ from those about, 1 σ, which count."""
+    known = np.isfinite(stack).sum(0) >= _FEWEST_FRAMES
+    middle = np.ones(known.shape, np.float32)
+    if not known.any():
+        return middle, middle, known
+    middle[known] = np.nanmedian(stack[:, known], axis=0)
+    change = np.where(known, middle / _broad(middle, known) - 1, 0).astype(np.float32)
+    return change, _spread_of_rings(change, known), known
+
+
+def _joined(beyond: Bool) -> list[Bool]:
+    """Return the parts of blocks that touch, those of few blocks left out."""
+    count, label = cv2.connectedComponents(beyond.astype(np.uint8))
+    return [label == k for k in range(1, count) if (label == k).sum() >= _FEWEST_BLOCKS]
 
 
 def beside(places: tuple[ImagePlace, ...], others: tuple[ImagePlace, ...]) -> tuple[ImagePlace, ...]:
@@ -122,18 +168,18 @@ def _broad(values: Float32, known: Bool) -> Float32:
     return np.where((share > 0.05 * weight) & (share > 1e-6), total / np.maximum(share, 1e-6), coarse)
 
 
-def _place(inside: Bool, centre: Float32, change: Float32, spread: Float32, blocks: int) -> ImagePlace:
+def _place(inside: Bool, change: Float32, spread: Float32, blocks: int) -> ImagePlace:
     most = np.unravel_index(np.argmax(np.where(inside, np.abs(change), 0)), change.shape)
     strongest, sd = float(change[most]), max(float(spread[most]), 1e-9)
     chance = min(1.0, 2 * blocks * float(norm.sf(abs(strongest) / sd)))
-    middle = (np.asarray(centre) + 0.5) * BLOCK_PX - 0.5
+    v, u = (np.argwhere(inside).mean(0) + 0.5) * BLOCK_PX - 0.5
     radius = BLOCK_PX * float(np.sqrt(inside.sum() / np.pi))
-    return ImagePlace(float(middle[0]), float(middle[1]), radius, strongest, sd, chance)
+    return ImagePlace(float(u), float(v), radius, strongest, sd, chance)
 
 
-def full_size(gain: Float32, shape: tuple[int, ...]) -> Float32:
-    """Return the gain of blocks at all pixels (H, W)."""
-    out = np.ones(shape, np.float32)
-    big = cv2.resize(gain, None, fx=BLOCK_PX, fy=BLOCK_PX, interpolation=cv2.INTER_LINEAR)
+def full_size(values: Float32, shape: tuple[int, ...], beyond: float = 1.0) -> Float32:
+    """Return the values of blocks at all pixels (H, W); ``beyond`` the last whole block is another."""
+    out = np.full(shape, beyond, np.float32)
+    big = cv2.resize(values, None, fx=BLOCK_PX, fy=BLOCK_PX, interpolation=cv2.INTER_LINEAR)
     out[: big.shape[0], : big.shape[1]] = big
     return out

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 
+import cv2
 import numba
 import numpy as np
 
@@ -61,6 +62,19 @@ class TwinFrame:
         white = np.float32(noise.white - noise.black.value)
         level, variance = _brighter(self.level, self.variance, scale, white, *noise.polynomial)
         return replace(self, level=level, variance=variance)
+
+    def drawn_aside(self, aside: Float32 | None) -> TwinFrame:
+        """Return the frame through a window that draws lit wall aside by (2, H, W), px right and down."""
+        if aside is None:
+            return self
+        v, u = np.mgrid[0 : self.level.shape[0], 0 : self.level.shape[1]].astype(np.float32)
+        wall = self.region == Region.WALL
+        level, whole = (
+            np.asarray(cv2.remap(a, u - aside[0], v - aside[1], cv2.INTER_LINEAR), np.float32)
+            for a in (self.level, wall.astype(np.float32))
+        )
+        # 0.999: amid wall alone, up to rounding.
+        return replace(self, level=np.where(wall & (whole > 0.999), level, self.level))
 
 
 @dataclass(frozen=True)

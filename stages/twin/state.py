@@ -53,6 +53,8 @@ class PhotometricState:
         Exponent that frames have the photo's contrast to; another than 1 only when tried.
     gain_map : (H, W) float32 or None
         What the window lets through, where dirt was found on it.
+    aside : (2, H, W) float32 or None
+        By how much, px to the right and down, the window draws aside what is behind it.
     """
 
     noise: CameraNoise
@@ -66,6 +68,7 @@ class PhotometricState:
     line_clipped: float = 0.0
     power: float = 1.0
     gain_map: Float32 | None = None
+    aside: Float32 | None = None
 
     @property
     def shows_wall(self) -> tuple[Illumination, ...]:

@@ -39,7 +39,7 @@ class Sums:
         self._scene, self._state, self._light = scene, state, dict[int, Illumination]()
         self._renderer = Renderer(scene, state)
         self.comparison = Comparison()
-        self.window = [WindowPlace(p) for p in places]
+        self.window = [WindowPlace(p, aside_px=p.most_of(state.aside)) for p in places]
         self.blocks = BlocksOfFrames(scene.ring)
         self.lit, self.line = CellsOfFrames(), CellsOfFrames()
         self.whole = WholePictures(scene)
@@ -51,8 +51,9 @@ class Sums:
         noise, self._light[frame] = self._state.noise, kind
         above = image.astype(np.float32) - np.float32(noise.black.value)
         before = self._renderer.frame(frame, kind)
-        gain = self._state.gain_map
-        after = before if gain is None else before.brighter(gain, noise)
+        gain, aside = self._state.gain_map, self._state.aside
+        bent = before.drawn_aside(aside)
+        after = bent if gain is None else bent.brighter(gain, noise)
         white = noise.white - noise.black.value
         free = above < white
         if kind != Illumination.LASER:
@@ -64,9 +65,10 @@ class Sums:
         exposure = float(np.exp(exposure_of(above, after)))
         after = after.brighter(exposure, noise)
         if kind in self._state.shows_wall:
-            exposed = after if gain is None else before.brighter(exposure, noise)
+            exposed = after if gain is None and aside is None else before.brighter(exposure, noise)
+            drawn = None if aside is None else np.float32(exposure) * bent.level
             for place in self.window:
-                place.add(frame, above, exposed, free)
+                place.add(frame, above, exposed, free, drawn if place.bends else None)
             self.whole.add_lit(frame, above, after, free)
             self.spots[0].add(frame, above, exposed)
         if kind != Illumination.LED:

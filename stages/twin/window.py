@@ -18,14 +18,17 @@ from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.compare import BLOCK_PX
-from stages.twin.locate import FALSE_ALARM, ImagePlace
+from stages.twin.locate import FALSE_ALARM, LEAST_ASIDE_PX, ImagePlace
 from stages.twin.render import Region, TwinFrame
 
-_POWER_STEP = 0.4
+_POWER_STEP, _ASIDE_PX = 0.4, 0.5
+"""Steps of bending that are tried; 1 σ of a displacement, since blocks of 24 px blunt its peak. Chosen."""
 _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0, 1.2, 1.4, 1.7, 2.0))
 """Bending and radius, in radii of the place, of the drops that are tried."""
 _LEAST_REACH_PX = 48.0
-"""A place is looked at so far about its middle, or over two radii if that is more."""
+"""A place is looked at so far about its middle, or over two radii or this far beyond it if that is more."""
+_LARGE_PX = 16.0
+"""Of spots twice as large every second pixel is looked at: twenty thousand are enough for five numbers."""
 _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 3
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
 _FLATNESS = (0.7, 5.0)
@@ -48,6 +51,18 @@ _NOT_TOLD = (
 )
 
 
+@dataclass(frozen=True)
+class _Fitted:
+    """A law's size, and by how much χ² of frames (F,) falls with the size that other frames tell."""
+
+    fall: Float
+    size: NamedFigure
+
+    @property
+    def chance(self) -> float:
+        return float(t.sf(sigmas(self.fall), len(self.fall) - 1))
+
+
 @dataclass
 class WindowPlace:
     """Sums over compared lit frames at one place: χ² of every law with any size follows from them.
@@ -57,13 +72,15 @@ class WindowPlace:
     place : ImagePlace
     spots : list of (2, 2, h, w)
         Of each frame and pixel (recorded − twin)(law − twin)/σ² and (law − twin)²/σ² of dirt and of scatter
-        that takes or mixes all light; 0 where a pixel does not count.
+        that takes or mixes all light; 0 where a pixel does not count. Of a large place every `_step` pixels.
     drops : list of (2, L)
         Of each frame the same of drops, summed over pixels.
     square, pixels, frame : list
         Of each frame: Σ (recorded − twin)²/σ², pixels, number.
     corner : (2,)
         Column and row of the first pixel of ``spots``.
+    aside_px : float
+        By how much texture is drawn aside at most, as frames beside the compared ones tell.
     """
 
     place: ImagePlace
@@ -73,9 +90,15 @@ class WindowPlace:
     pixels: list[int] = field(default_factory=list)
     frame: list[int] = field(default_factory=list)
     corner: tuple[float, float] = (0.0, 0.0)
+    aside_px: float = 0.0
 
-    def add(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
-        """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped."""
+    def add(
+        self, frame: int, above: Float32, twin: TwinFrame, free: Bool, drawn: Float32 | None = None
+    ) -> None:
+        """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped.
+
+        ``drawn`` is the twin's level where other frames tell that the window draws texture aside.
+        """
         box, v, u = self._box(above.shape)
         level, part = twin.level[box], twin.region[box] == Region.WALL
         away = np.hypot(u - self.place.u_px, v - self.place.v_px)
@@ -86,11 +109,15 @@ class WindowPlace:
         filled = np.where(part, level, level[use].mean()).astype(np.float32)
         rest, weight = above[box] - level, np.where(use, 1 / twin.variance[box], np.float32(0))
         whole = np.stack([-level, cv2.GaussianBlur(filled, (0, 0), _AROUND_PX) - level])
-        near = [slice(k[0], k[-1] + 1) for k in (np.flatnonzero(inside.any(axis)) for axis in (1, 0))]
+        ends = [np.flatnonzero(inside.any(axis))[[0, -1]] for axis in (1, 0)]
+        near = [slice(first, last + 1, self._step) for first, last in ends]
         self.corner = float(u[0, near[1].start]), float(v[near[0].start, 0])
-        self.spots.append(np.stack([whole * (rest * weight), whole**2 * weight], 1)[..., near[0], near[1]])
+        weight_of = weight * np.float32(self._step**2)
+        spots = np.stack([whole * (rest * weight_of), whole**2 * weight_of], 1)
+        self.spots.append(spots[..., near[0], near[1]])
         rest, weight = rest[use], weight[use]
-        changes = np.stack([(made - level)[use] for made in self._drops(filled, u, v)])
+        drops = self._drops(filled, u, v) + ([] if drawn is None else [drawn[box]])
+        changes = np.stack([(made - level)[use] for made in drops])
         sums = [(changes * (rest * weight)).sum(1), (changes**2 * weight).sum(1)]
         self.drops.append(np.asarray(np.stack(sums), float))
         self.square.append(float((rest**2 * weight).sum()))
@@ -98,8 +125,18 @@ class WindowPlace:
         self.frame.append(frame)
 
     @property
+    def bends(self) -> bool:
+        """Whether frames tell that texture is drawn aside."""
+        return self.aside_px > LEAST_ASIDE_PX
+
+    @property
+    def _step(self) -> int:
+        """Every how many pixels spots are looked at: those of a large place are alike."""
+        return max(1, int(self.place.radius_px / _LARGE_PX))
+
+    @property
     def _reach_px(self) -> float:
-        return max(2 * self.place.radius_px, _LEAST_REACH_PX)
+        return max(min(2 * self.place.radius_px, self.place.radius_px + _LEAST_REACH_PX), _LEAST_REACH_PX)
 
     def _box(self, shape: tuple[int, ...]) -> tuple[tuple[slice, slice], Float32, Float32]:
         reach = int(self._reach_px + 2 * _AROUND_PX)
@@ -116,13 +153,8 @@ class WindowPlace:
         made: list[Float32] = []
         for power, size in _DROPS:
             near = 1 - np.minimum((away / (size * self.place.radius_px)) ** 2, 1)
-            at = [
-                (x - corner + (middle - x) * power * near).astype(np.float32)
-                for x, corner, middle in (
-                    (u, u[0, 0], self.place.u_px),
-                    (v, v[0, 0], self.place.v_px),
-                )
-            ]
+            ways = ((u, self.place.u_px), (v, self.place.v_px))
+            at = [(x - x[0, 0] + (middle - x) * power * near).astype(np.float32) for x, middle in ways]
             drop = cv2.remap(level, at[0], at[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
             made.append(np.asarray(drop, np.float32))
         return made
@@ -132,35 +164,37 @@ class WindowPlace:
         if len(self.frame) < _FEWEST_FRAMES:
             return None
         spots = np.stack(self.spots)
-        middle = [self.place.u_px - self.corner[0], self.place.v_px - self.corner[1]]
-        start = np.array([[0.3, *middle, f * self.place.radius_px, 1.0] for f in (0.5, 1.5)])
+        place = np.array([self.place.u_px, self.place.v_px, self.place.radius_px]) - (*self.corner, 0.0)
+        u, v, radius = place / self._step
+        start = np.array([[0.3, u, v, f * radius, 1.0] for f in (0.5, 1.5)])
         tried = {
             "window_dirt": _fall_of_spot(spots[:, 0], start),
             "window_scatter": _fall_of_spot(spots[:, 1], start),
-            "droplet": _fall_of_drop(np.stack(self.drops)),
+            "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
         }
-        name = max(tried, key=lambda n: tried[n][0].sum())
-        fall, size, sd = tried[name]
-        chance = max(self.place.probability, float(t.sf(sigmas(fall), len(fall) - 1)))
+        bends = self.bends and tried["droplet"].chance < FALSE_ALARM
+        # Dirt may lie there, too, but draws nothing aside.
+        name = "droplet" if bends else max(tried, key=lambda n: tried[n].fall.sum())
+        fixed_to = "image" if bends else fixed_to
+        chance = max(self.place.probability, tried[name].chance)
         if chance > FALSE_ALARM or "wall" in fixed_to or ("rows" in fixed_to and "image" not in fixed_to):
             return None
-        rivals = [n for n in tried if n != name and sigmas(fall - tried[n][0]) < _SURE]
-        return self._mismatch([name, *rivals], fixed_to or "image", fall, (size, sd), chance)
+        more = {n: sigmas(tried[name].fall - fit.fall) for n, fit in tried.items() if n != name}
+        rivals = [n for n, by in more.items() if by < _SURE and not bends]
+        return self._mismatch([name, *rivals], fixed_to or "image", tried[name], chance)
 
-    def _mismatch(
-        self, names: list[str], fixed_to: str, fall: Float, size: tuple[float, float], chance: float
-    ) -> Mismatch:
-        place, name = self.place, names[0]
+    def _mismatch(self, names: list[str], fixed_to: str, law: _Fitted, chance: float) -> Mismatch:
+        place, size = self.place, law.size
         where = tuple(
             NamedFigure(n, value, place.radius_px / 2, "px")
             for n, value in (("u_px", place.u_px), ("v_px", place.v_px), ("radius_px", place.radius_px))
         )
         before = sum(self.square) / sum(self.pixels)
-        brighter = name == "window_dirt" and size[0] < 0
-        figure = NamedFigure("power" if name == "droplet" else "share", *size)
+        brighter = names[0] == "window_dirt" and size.value < 0
+        after = before - float(law.fall.sum()) / sum(self.pixels)
         return Mismatch(
-            "" if brighter else " or ".join(names), "intensity", fixed_to, where, (figure,), chance,
-            before, before - float(fall.sum()) / sum(self.pixels), self._said(names, size[0], fixed_to),
+            "" if brighter else " or ".join(names), "intensity", fixed_to, where, (size,), chance,
+            before, after, self._said(names, size.value, fixed_to),
             Look(self.frame[0], place.u_px, place.v_px, 4 * place.radius_px),
         )  # fmt: skip
 
@@ -201,20 +235,20 @@ def beside_blur(
     return tuple(m for m in found if m not in unsure), withdrawn
 
 
-def _fall_of_drop(sums: Float) -> tuple[Float, float, float]:
-    """Return by how much χ² of each frame (F,) falls with the drop that other frames choose; power and 1 σ.
-
-    ``sums`` is (F, 2, L) of drops of every power and width.
-    """
+def _fall_of_drop(sums: Float, aside_px: float) -> _Fitted:
+    """Return the drop that fits best; ``sums`` (F, 2, L) are of those tried, then of what frames tell."""
     frames, fall = np.arange(len(sums)), np.zeros(len(sums))
     gain = 2 * sums[:, 0] - sums[:, 1]
     for half in (frames % 2 == 0, frames % 2 == 1):
         fall[~half] = gain[~half, int(np.argmax(gain[half].sum(0)))]
-    return fall, _DROPS[int(np.argmax(gain.sum(0)))][0], _POWER_STEP / 2
+    best = int(np.argmax(gain.sum(0)))
+    if best == len(_DROPS):
+        return _Fitted(fall, NamedFigure("aside", aside_px, _ASIDE_PX, "px"))
+    return _Fitted(fall, NamedFigure("power", _DROPS[best][0], _POWER_STEP / 2))
 
 
-def _fall_of_spot(sums: Float32, start: Float) -> tuple[Float, float, float]:
-    """Return by how much χ² of each frame (F,) falls with the spot fitted to others; its depth and 1 σ.
+def _fall_of_spot(sums: Float32, start: Float) -> _Fitted:
+    """Return the spot that fits best, its depth as its size.
 
     ``sums`` is (F, 2, h, w); ``start`` (K, 5) holds spots that the search starts from.
     The σ holds what leaving out parts of the frames changes, and by how much the spot's middle differs from
@@ -233,7 +267,8 @@ def _fall_of_spot(sums: Float32, start: Float) -> tuple[Float, float, float]:
     middle = np.exp(-0.5 * ((1 - shape / max(abs(best[0]), 1e-9)) / _MIDDLE) ** 2) * (shape != 0)
     weight = max(float((middle * whole[1]).sum()), 1e-9)
     off = float((middle * (whole[0] - shape * whole[1])).sum()) / weight
-    return fall, float(best[0]), float(np.sqrt(spread + off**2 + _OF_LIGHT**2))
+    sd = float(np.sqrt(spread + off**2 + _OF_LIGHT**2))
+    return _Fitted(fall, NamedFigure("share", float(best[0]), sd))
 
 
 def _spot(place: Float, shape: tuple[int, ...]) -> Float:

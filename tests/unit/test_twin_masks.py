@@ -44,6 +44,7 @@ def test_dirt_of_a_twin_is_left_out_of_the_photo_and_what_is_on_the_wall_is_not(
     ("name", "parameters", "left_out"),
     [
         ("droplet", {"power": 1.0}, True),
+        ("droplet", {"aside": 2.0}, True),
         ("window_dirt", {"share": 0.6}, True),
         ("window_dirt", {"share": 0.1}, False),
         (None, {"share": -1.2}, False),

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.compare import BLOCK_PX, block_contrasts
-from stages.twin.locate import ImagePlace, full_size, places_in_image
+from stages.twin.compare import BLOCK_PX, block_textures
+from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image
 from stages.twin.render import Region, TwinFrame
 from stages.twin.window import WindowPlace, beside_blur, told_once
 
@@ -57,13 +57,43 @@ def test_what_is_on_the_window_is_told_by_frames_or_withdrawn(name):
     assert found.chi2_after < found.chi2_before
 
 
+@pytest.mark.parametrize("drawn_px", [3.0, 0.0])
+def test_a_weak_drop_is_found_by_where_texture_lies_and_named(drawn_px):
+    random, shifts = np.random.default_rng(3), []
+    v, u = np.mgrid[0:200, 0:240].astype(np.float32)
+    away = np.hypot(u - 70, v - 130) / 20
+    aside = drawn_px * np.exp(0.5 - 0.5 * away**2)  # most at 20 px
+    seen = [(x + aside * (x - m) / 20).astype(np.float32) for x, m in ((u, 70), (v, 130))]
+    pictures = []
+    for _ in range(6):
+        level = _textured(random)
+        drawn = cv2.remap(level, *seen, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        pictures.append((level, (drawn + random.standard_normal(level.shape)).astype(np.float32)))
+        shifts.append(block_textures(pictures[-1][1], _frame(level), 1e9)[1])
+    found, aside = places_displaced(shifts)
+    assert len(found) == (drawn_px > 0)
+    if not drawn_px:
+        return
+    assert np.hypot(found[0].u_px - 70, found[0].v_px - 130) < 8
+    assert 20 < found[0].radius_px < 70
+    whole = np.stack([full_size(a, level.shape, 0.0) for a in aside])
+    place = WindowPlace(found[0], aside_px=found[0].most_of(whole))
+    for frame, (level, recorded) in enumerate(pictures):
+        twin = _frame(level)
+        place.add(frame, recorded, twin, np.ones(level.shape, bool), twin.drawn_aside(whole).level)
+    named = place.judged("image")
+    assert named.name == "droplet"
+    assert named.parameters[0].name == "aside"
+    assert 1 < named.parameters[0].value < 4
+
+
 def test_faint_texture_is_found_where_brightness_is_even():
     random = np.random.default_rng(3)
     shares = []
     for _ in range(6):
         level = _textured(random)
         recorded = _dirty_picture(level, "window_scatter") + random.standard_normal(level.shape)
-        shares.append(block_contrasts(recorded.astype(np.float32), _frame(level), 1e9))
+        shares.append(block_textures(recorded.astype(np.float32), _frame(level), 1e9)[0])
     share = np.nanmedian(shares, axis=0)
     assert share[12, 14] < 0.7
     assert share[3, 3] == pytest.approx(1, abs=0.1)
