@@ -16,6 +16,7 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable, Recording
+from pipeline.recording.one_field import OneField
 
 # A step of the encoder counts as a jump when it is this many times the usual largest, and this long.
 _JUMP_FACTOR, _JUMP_MM = 10.0, 1.0
@@ -122,6 +123,8 @@ class CheckedFrames:
         what the run predicts; None where there are none.
     stays : (h, w) bool or None
         As in `Recording`.
+    interlaced : bool
+        Odd rows were taken at another time than even ones, which alone are used.
     """
 
     frame: Int
@@ -132,6 +135,7 @@ class CheckedFrames:
     retimed: int = 0
     withheld: Bool | None = None
     stays: Bool | None = None
+    interlaced: bool = False
 
     def applied_to(self, recording: Recording) -> Recording:
         """Return the recording with these frames, and its encoder in mm and with the motion's sign.
@@ -143,7 +147,8 @@ class CheckedFrames:
         encoder = recording.encoder
         if encoder is not None and self.encoder_factor != 1.0:
             encoder = Encoder(encoder.time_s, encoder.distance_mm * self.encoder_factor)
-        return replace(recording, frames=table, encoder=encoder, stays=self.stays)
+        source = OneField(recording.source) if self.interlaced else recording.source
+        return replace(recording, frames=table, encoder=encoder, source=source, stays=self.stays)
 
 
 def withheld_frames(label: NDArray[np.str_], every: int) -> Bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
@@ -12,7 +14,14 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
 from pipeline.recording.checks import CheckedFrames, withheld_frames
-from stages.premises.changes import Changes, warn_of, warn_of_frames, warn_of_interlacing
+from pipeline.recording.one_field import OneField
+from stages.premises.changes import (
+    Changes,
+    interlaced,
+    refuse_or_warn_of_interlacing,
+    warn_of,
+    warn_of_frames,
+)
 from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
 from stages.premises.light import (
     Light,
@@ -75,7 +84,11 @@ def check_premises(
         When what is stated cannot be right and cannot be mended, or is not to be.
     """
     pictures = look_at_pictures(recording, probe, context)
-    warn_of_interlacing(pictures, context)
+    combed = interlaced(pictures)
+    if combed:
+        refuse_or_warn_of_interlacing(parameters.mend, context)
+        recording = replace(recording, source=OneField(recording.source))
+        pictures = look_at_pictures(recording, probe, context)
     table = _table(recording)
     seen_light = _light(recording.frames, pictures)
     outside = off_the_pipe(pictures)
@@ -123,7 +136,7 @@ def check_premises(
     return CheckedFrames(
         recording.frames.frame[keep], time_s[keep], label[keep], factor,
         int(changes.relabelled.sum()), int(changes.retimed.sum()),
-        withheld if withheld.any() else None, stays,
+        withheld if withheld.any() else None, stays, combed,
     )  # fmt: skip
 
 

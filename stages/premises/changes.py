@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Bool, Float, Int
+from pipeline.errors import UnusableError
 from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable
 from stages.premises.light import Light
@@ -80,14 +81,27 @@ def warn_of_frames(
     )  # fmt: skip
 
 
-def warn_of_interlacing(pictures: Pictures, context: Context) -> None:
-    """Tell of pictures whose odd and even rows were taken at different times."""
-    if np.mean(pictures.combing > _COMBED) > _MANY_COMBED:
-        context.warn(
-            "the pictures are interlaced: odd and even rows were taken at different times. It blurs the "
-            "texture, and distances may be off by more than their σ. What to do: set camera and recorder to "
-            "progressive, or let a converter keep every second row only"
-        )
+def interlaced(pictures: Pictures) -> bool:
+    """Return whether odd and even rows were taken at different times, or in different light."""
+    return bool(np.mean(pictures.combing > _COMBED) > _MANY_COMBED)
+
+
+def refuse_or_warn_of_interlacing(mend: bool, context: Context) -> None:
+    """Tell that even rows alone are used.
+
+    Raises
+    ------
+    UnusableError
+        Unless that is wanted.
+    """
+    what = "the pictures are interlaced: odd and even rows are of different times or of different light"
+    hint = "set camera and recorder to progressive"
+    if not mend:
+        raise UnusableError("premises", what, hint=f"{hint}, or let premises.mend be true")
+    context.warn(
+        f"{what}. Even rows alone are used, so that the picture is half as fine from row to row. What to do: "
+        f"{hint}"
+    )
 
 
 def warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
