@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 from pydantic import Field
-from scipy.ndimage import median_filter
+from scipy.ndimage import binary_propagation, median_filter
 
+from pipeline.adjustment.circles import circles_through
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
+from pipeline.pages import notation
 from pipeline.system.parallel import in_threads
 
 # Frames a thread takes at a time.
 _CHUNK_FRAMES = 16
 # Rings that the report's median is taken of.
 _REPORTED_RINGS = 500
+# Standing water mirrors the line: what is seen below its surface lies outside the pipe. So far outside the
+# circle, in radii, no pipe is oval; the share of the circle, and of the rings, is that of no branch.
+_FAR_OUTSIDE, _WIDE, _MOST_RINGS = 0.25, 0.1, 0.5
+# Spreads about the circle up to which a sample beside them still counts as wall.
+_BESIDE = 3.0
+# So many samples of a ring are enough to tell its circle.
+_ENOUGH = 180
 # Samples of the running median: four on each side, so that a feature of five is kept.
 _NEIGHBOURS = 9
 
@@ -66,6 +77,10 @@ def triangulate_rings(
     for done, count in enumerate(in_threads(place, chunks, context.workers), 1):
         counts += count
         context.progress(done, len(chunks))
+    mirrored = outside_the_pipe(xyz)
+    for whole in (xyz, noise):
+        whole[mirrored] = np.nan
+    _warn_of_mirrored(mirrored, rings, context)
     _report(context, counts, noise)
     return RingPoints(rings.frame, rings.azimuth_rad, xyz, noise)
 
@@ -91,6 +106,52 @@ def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
             ring = median_filter(rho[there], _NEIGHBOURS, mode="wrap")
             row[there] = np.abs(rho[there] - ring) > largest_departure * ring
     return out
+
+
+def outside_the_pipe(xyz_c: Float32) -> Bool:
+    """Return where points (F, A, 3) lie far outside the circle of their ring over a wide arc, in most rings.
+
+    With them go the points beside them, up to where they are as near to the circle as others.
+    """
+    out = np.zeros(xyz_c.shape[:2], bool)
+    few = xyz_c[:, :: max(xyz_c.shape[1] // _ENOUGH, 1), :2]
+    centre, radius = circles_through(few)
+    off = _off_circle(few, centre[:, None], radius[:, None])
+    far = off > _FAR_OUTSIDE * radius[:, None]
+    wide = np.flatnonzero(far.mean(1) > _WIDE)
+    if len(wide) <= _MOST_RINGS * len(xyz_c):
+        return out
+    limit = _BESIDE * robust_spreads(np.where(far, np.nan, off)[wide], axis=1)
+    for row, most in zip(wide, limit, strict=True):
+        off = _off_circle(xyz_c[row, :, :2], centre[row], radius[row])
+        out[row] = _grown(off > _FAR_OUTSIDE * radius[row], ~(off < most))
+    return out
+
+
+def _off_circle(xy: Float32, centre: Float, radius: Float) -> Float:
+    return np.asarray(np.linalg.norm(xy - centre, axis=-1) - radius)
+
+
+def _grown(seed: Bool, into: Bool) -> Bool:
+    """Return ``seed`` (A,) and what is joined to it around the circle ``into``."""
+    twice = binary_propagation(np.tile(seed, 2), mask=np.tile(into, 2))
+    return np.asarray(twice[: len(seed)] | twice[len(seed) :])
+
+
+def _warn_of_mirrored(mirrored: Bool, rings: RingSamples, context: Context) -> None:
+    if mirrored.any():
+        where = np.flatnonzero(mirrored.any(1))
+        context.warn(
+            f"in {len(where)} of {len(mirrored)} rings {100 * mirrored[where].mean():.0f} % of the line lies "
+            f"far outside the circle of the rest, about {_middle_clock(mirrored, rings)} in the picture: "
+            "standing water mirrors it, or the pipe is open there all along. It is not taken for wall, and "
+            "nothing is measured there. What to do: drain the pipe, or judge what lies above the water alone"
+        )
+
+
+def _middle_clock(mirrored: Bool, rings: RingSamples) -> str:
+    middle = np.angle(np.sum(mirrored.sum(0) * np.exp(1j * rings.azimuth_rad)))
+    return notation.clock(float(clock_of_azimuth(middle)))
 
 
 def _triangulate_chunk(rings: RingSamples, frames: slice, probe: Probe) -> tuple[Float32, Float32]:
@@ -130,7 +191,7 @@ def _report(context: Context, counts: Int, noise: Float32) -> None:
 
 TRIANGULATE = Stage(
     "triangulate",
-    "3",
+    "4",
     TriangulateParameters,
     triangulate_rings,
     "ring samples and instrument to wall points with their noise",

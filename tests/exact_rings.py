@@ -49,3 +49,15 @@ def _bracket(room: Callable[[Float], Float], count: int) -> tuple[Float, Float]:
     first = np.argmax(entering, axis=0)
     found = entering.any(axis=0)
     return np.where(found, radii[first], np.nan), np.where(found, radii[first + 1], np.nan)
+
+
+def seen_above_water(azimuth_rad: Float, radius: float, centre_y: float, water_y: float) -> Float:
+    """Return points (A, 2) of a round pipe about (0, centre_y), mirrored where the ray meets still water."""
+    direction = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
+
+    def along(y: float) -> Float:
+        b = direction[:, 1] * y
+        return np.asarray((b + np.sqrt(np.maximum(b * b - y * y + radius**2, 0)))[:, None] * direction)
+
+    wall = along(centre_y)
+    return np.where(wall[:, 1:] > water_y, along(2 * water_y - centre_y), wall)

@@ -75,6 +75,11 @@ class RingSamples:
         """Return the rings seen in pictures that were so many times (F,) too large about the centre."""
         return replace(self, radius_px=(self.radius_px / times[:, None]).astype(np.float32))
 
+    def placed_in(self, points: RingPoints) -> RingSamples:
+        """Return the rings without the samples that have no point on the wall."""
+        lost = self.valid & np.isnan(points.xyz_c[..., 0])
+        return replace(self, validity=np.where(lost, np.uint8(RingValidity.OUTLIER), self.validity))
+
 
 @dataclass(frozen=True)
 class RingPoints:

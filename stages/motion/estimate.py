@@ -31,7 +31,7 @@ from stages.motion.frame_times import believed_times
 from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import BoreSteps, RingCircles, circles_in_rings
+from stages.motion.rings import BoreSteps, RingCircles, circles_in_rings, looking_at_wall
 from stages.motion.route.laying import lay_route
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.tracking.strips import StripGrid, WallView
@@ -75,6 +75,7 @@ def estimate_motion(
     UnusableError
         When neither rings nor texture and encoder determine the motion.
     """
+    recording = looking_at_wall(recording, rings, points)
     run = measure_run(recording, probe, rings, points, parameters, context)
     check = partial(_require_convergence, run.texture.grid.radius_mm)
     estimate = adjust_run(run, parameters, check, context.progress)
@@ -126,7 +127,7 @@ def measure_run(
     UnusableError
         When the rings do not place the pipe, or neither texture nor encoder determines the distance.
     """
-    circles = circles_in_rings(points)
+    circles, rings = circles_in_rings(points), rings.placed_in(points)
     grid = strip_grid(circles.usual_radius_mm, parameters)
     view, encoder = WallView(recording, probe, grid), None
     if use_encoder:

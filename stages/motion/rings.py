@@ -9,26 +9,21 @@ import numpy as np
 from scipy.interpolate import interp1d
 from scipy.ndimage import maximum_filter1d
 
-from pipeline.adjustment.robust import robust_spreads
-from pipeline.arrays import Float, Float32, Int
+from pipeline.adjustment.circles import LEAST_COVERED, circles_through
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
+from pipeline.recording.base import Recording
+from stages.premises.stays import in_full
 
 CORRELATED_FRAMES = 4.0
 """Neighbouring frames in which a ring meets the same relief of the wall, so that their errors are alike: the
 relief's length along the pipe over the way from ring to ring. Taken for all recordings, not measured."""
-_LEAST_COVERED = 0.3
-"""Share of the circle that a ring must show to have a centre. Not measured."""
 _FEWEST_RINGS = 3
-_ROUNDS = 5
-"""Reweighted fits of a circle; on the open recordings the last changes nothing that matters. Not measured."""
-_OUTLYING = 3.0
-"""Spreads at which a sample weighs half in the fit of a circle. Not measured."""
-_FARTHEST_SAMPLE = 2.0
-"""Median distances from the camera's axis up to which a sample may lie on a ring's circle: of a camera 0.6
-radii off the pipe's axis the farthest lies at 1.65. Mirrored lines lie a hundred times as far."""
-_AT_ONCE = 256
+_MOST_NOT_ON_WALL = 0.5
+"""Share of the rings that show no wall in a sector, from which its texture is not followed. A choice:
+half is most of the way."""
 _STEP_MM = 0.5
 """Change of radius that counts as a step of the bore: five times the relief about the smooth pipe
 (`surface_sigma_mm`). A choice."""
@@ -173,23 +168,38 @@ class RingCircles:
 
 
 def circles_in_rings(points: RingPoints) -> RingCircles:
-    """Fit a circle to each ring: algebraic (Kåsa 1976), reweighted, as the wall is round to some 0.1 mm.
+    """Fit a circle to each ring.
 
     Raises
     ------
     UnusableError
         When fewer than three rings show enough of their circle.
     """
-    parts = [_circles(points.xyz_c[a : a + _AT_ONCE, :, :2]) for a in range(0, len(points.frame), _AT_ONCE)]
-    centre, radius = (np.concatenate(p) for p in zip(*parts, strict=True))
+    centre, radius = circles_through(points.xyz_c[..., :2])
     if np.isfinite(radius).sum() < _FEWEST_RINGS:
         raise UnusableError(
             "motion",
             f"only {int(np.isfinite(radius).sum())} laser frames show enough of a ring to place the pipe",
-            limit=f"{_FEWEST_RINGS} rings seen over {100 * _LEAST_COVERED:.0f} % of the circle",
+            limit=f"{_FEWEST_RINGS} rings seen over {100 * LEAST_COVERED:.0f} % of the circle",
             hint="check exposure and that the laser is on; see the rejected ring samples by reason",
         )
     return RingCircles(points.frame, centre, radius)
+
+
+def looking_at_wall(recording: Recording, rings: RingSamples, points: RingPoints) -> Recording:
+    """Return the recording without the sectors of the picture in which most rings' line is not on the wall.
+
+    In standing water the wall above is mirrored: its texture there lies elsewhere, too.
+    """
+    lost = (rings.valid & np.isnan(points.xyz_c[..., 0])).mean(0) > _MOST_NOT_ON_WALL
+    if not lost.any():
+        return recording
+    width, height = recording.source.image_size
+    v, u = np.ogrid[:height, :width]
+    turns = (np.arctan2(v - rings.centre_px[1], u - rings.centre_px[0]) - rings.azimuth_rad[0]) / (2 * np.pi)
+    hidden = lost[np.rint(turns * len(lost)).astype(int) % len(lost)]
+    stays = in_full(recording.stays, (width, height))
+    return replace(recording, stays=hidden if stays is None else hidden | (stays > 0))
 
 
 def rings_of_length(radius_mm: Float, at_mm: Float) -> int:
@@ -244,28 +254,3 @@ def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
     part = radius_mm[near - n : near + n + 1]
     before, behind = np.abs(part - np.median(part[:n])), np.abs(part - np.median(part[n + 1 :]))
     return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
-
-
-def _circles(xy_c: Float32) -> tuple[Float, Float]:
-    """Return centre (F, 2) and radius (F,) of rings (F, A, 2)."""
-    xy = xy_c.astype(float)
-    seen = np.isfinite(xy).all(-1)
-    x = np.where(seen[..., None], xy, 0.0)
-    design = np.concatenate([x, np.ones_like(x[..., :1])], -1)
-    target = np.sum(x * x, -1)
-    distance = np.where(seen, np.sqrt(target), np.nan)
-    usual = np.nanmedian(np.where(seen.any(1)[:, None], distance, 0.0), axis=1)
-    weight = (distance < _FARTHEST_SAMPLE * usual[:, None]).astype(float)
-    usable = seen.mean(1) > _LEAST_COVERED
-    out = np.full((len(xy), 3), np.nan)
-    for _ in range(_ROUNDS):
-        normal = np.einsum("fai,fa,faj->fij", design, weight, design)[usable]
-        right = np.einsum("fai,fa,fa->fi", design, weight, target)[usable]
-        out[usable] = np.linalg.solve(normal, right[..., None])[..., 0]
-        error = target - np.einsum("fai,fi->fa", design, np.nan_to_num(out))
-        size = np.where(seen & usable[:, None], np.abs(error), np.nan)
-        scale = np.ones(len(xy))
-        scale[usable] = robust_spreads(size[usable], axis=1)
-        weight = (weight > 0) / (1 + (error / (_OUTLYING * np.maximum(scale, 1e-6))[:, None]) ** 2)
-    centre = out[:, :2] / 2
-    return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1))

@@ -19,6 +19,7 @@ from stages.motion.bundle_adjustment.equations import landmark_rows
 from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import BoreSteps, circles_in_rings, ring_bins
+from tests.exact_rings import seen_above_water
 from tests.gauge_runs import stated_probe
 from tests.motion_scene import displaced, scene
 
@@ -224,3 +225,14 @@ def test_lines_mirrored_far_away_do_not_draw_the_circle() -> None:
     circles = circles_in_rings(points)
     np.testing.assert_allclose(circles.radius_mm, 50, atol=0.1)
     np.testing.assert_allclose(circles.centre_c, [[3, 0]] * 3, atol=0.1)
+
+
+def test_a_ring_mirrored_in_water_is_the_circle_of_the_part_above() -> None:
+    """With 40 % of the line mirrored, circles came out 9 % too wide and 5 mm aside."""
+    azimuth = np.linspace(-np.pi, np.pi, 1440, endpoint=False)
+    xy = seen_above_water(azimuth, radius=50.0, centre_y=-2.0, water_y=9.0)
+    xyz = np.concatenate([xy, np.zeros((1440, 1))], -1)
+    points = RingPoints(np.arange(3), azimuth, np.stack([xyz] * 3), np.zeros((3, 1440, 3)))
+    circles = circles_in_rings(points)
+    np.testing.assert_allclose(circles.radius_mm, 50, atol=0.1)
+    np.testing.assert_allclose(circles.centre_c, [[0, -2]] * 3, atol=0.1)

@@ -180,3 +180,16 @@ def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
     np.testing.assert_allclose(found.time_s, good.frames.time_s[found.frame])
     assert len(told) == 1
     assert "before the first laser line or behind the last" in told[0]
+
+
+def test_pictures_without_texture_tell_no_order(good, run):
+    random = np.random.default_rng(3)
+    lit = set(good.frames.frame[good.frames.illumination == "led"].tolist())
+    smooth = {
+        k: np.clip(90 + 2 * random.standard_normal(i.shape), 0, 255).astype(np.uint8) if k in lit else i
+        for k, i in good.source.images.items()
+    }
+    spoiled = replace(good, source=MemorySource(smooth, run.probe.camera.image_size))
+    found, told = checked(spoiled, run.probe)
+    assert found.frame.tolist() == list(range(COUNT))
+    assert not told

@@ -9,7 +9,14 @@ from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from stages.triangulate import TRIANGULATE, TriangulateParameters, off_the_ring, triangulate_rings
+from stages.triangulate import (
+    TRIANGULATE,
+    TriangulateParameters,
+    off_the_ring,
+    outside_the_pipe,
+    triangulate_rings,
+)
+from tests.exact_rings import seen_above_water
 from tests.quiet import quiet_context
 
 CAMERA = KannalaBrandt((1600, 1200), (366.1, 365.8), (796.9, 591.8), (-0.0118, 0.0008, -0.0008, 0.0))
@@ -165,3 +172,39 @@ def test_a_sample_far_off_is_counted_and_nothing_of_it_is_left():
         kept = np.isfinite(found)
         assert kept.sum() == np.isfinite(before).sum() - before.shape[-1]
         assert np.array_equal(found[kept], before[kept])
+
+
+WATER_MM = 9.0
+
+
+def half_filled(rings, above_water=0):
+    """Points (rings, A, 3) of a half-filled pipe; the first ``above_water`` rings see no water."""
+    wet = seen_above_water(WIDE, 50.0, -2.0, WATER_MM)
+    dry = seen_above_water(WIDE, 50.0, -2.0, 99.0)
+    xy = np.stack([dry if k < above_water else wet for k in range(rings)])
+    xy = xy + 0.1 * np.random.default_rng(1).standard_normal(xy.shape)
+    return np.concatenate([xy, np.full((*xy.shape[:2], 1), 23.0)], -1).astype(np.float32)
+
+
+def test_what_water_mirrors_is_not_wall():
+    points = half_filled(6)
+    mirrored = outside_the_pipe(points)
+    below = points[..., 1] > WATER_MM
+    assert not np.any(mirrored & ~below)
+    kept = below & ~mirrored
+    assert np.degrees(2 * np.pi / 1440) * kept.sum(1).max() < 4
+    off = np.hypot(points[..., 0], points[..., 1] + 2) - 50
+    assert off[kept].max() < 1
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        half_filled(6, above_water=4),
+        np.stack([np.cos(WIDE) * 55, np.sin(WIDE) * 45, 0 * WIDE], -1)[None].repeat(4, 0),
+        np.stack([np.cos(WIDE) * 50, np.minimum(np.sin(WIDE) * 50, 30), 0 * WIDE], -1)[None].repeat(4, 0),
+    ],
+    ids=["a chamber on part of the way", "oval by a fifth", "filled with mud to 30 mm"],
+)
+def test_wall_that_is_not_round_stays_wall(points):
+    assert not outside_the_pipe(points).any()
