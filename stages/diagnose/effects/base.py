@@ -179,10 +179,7 @@ class EffectModel(ABC):
         return ((),)
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored | None:
-        """Return the parts (M,) of the size that are there and the static law; None where it is no product.
-
-        The amplitudes are the static law's, once for each part.
-        """
+        """Return what a `Product` is made of, else None."""
         return None
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -227,3 +224,32 @@ class EffectModel(ABC):
 
 # Parts (M,) of a size, a law, and its shape: what an effect is that is a product.
 Factored: TypeAlias = tuple[tuple[Float, ...], EffectModel, Shape]
+
+
+class Product(EffectModel):
+    """A law times parts of its size; the amplitudes are the law's, once for each part."""
+
+    @abstractmethod
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
+        """Return the parts (M,) of the size that are there, the law, and its shape."""
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift at each point's part of the size."""
+        each = self._each(points, shape, amplitude)
+        return np.asarray(sum(p[:, None] * law.image_shift_px(points, own, a) for p, law, own, a in each))
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift at each point's part of the size."""
+        each = self._each(points, shape, amplitude)
+        return np.asarray(sum(p * law.sheet_shift_mm(points, own, a) for p, law, own, a in each))
+
+    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift at each point's part of the size."""
+        each = self._each(points, shape, amplitude)
+        return np.asarray(sum(p * law.wall_shift_mm(points, own, a) for p, law, own, a in each))
+
+    def _each(
+        self, points: ImagePoints, shape: Shape, amplitude: Float
+    ) -> list[tuple[Float, EffectModel, Shape, Float]]:
+        parts, law, own = self.factored(points, shape)
+        return [(p, law, own, a) for p, a in zip(parts, np.split(amplitude, len(parts)), strict=True)]

@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Course, CourseKind
-from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 
 # Laws of parts that a knock, heat or play can move during a recording, each with its shapes.
 _MOVABLE: Mapping[str, tuple[Shape, ...]] = {
@@ -59,7 +59,7 @@ _FORMULAS: Mapping[CourseKind, str] = {
 
 
 @dataclass(frozen=True)
-class Coursed(EffectModel):
+class Coursed(Product):
     """A law of the library at one shape of its own, with a course; the shape is the course's number.
 
     A swing has every amplitude twice: of its sine, then of its cosine.
@@ -108,32 +108,15 @@ class Coursed(EffectModel):
         return {CourseKind.EXPONENTIAL: 0.3 * sum(shape), CourseKind.SINUSOID: 0.05}.get(self.kind)
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return the course's factor, of a swing two, and the law."""
-        parts = self._parts(points, shape, np.zeros(len(self.amplitudes)))
-        return tuple(factor for factor, _ in parts), self.static, self.own
-
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift at each point's part of the size."""
-        parts = self._parts(points, shape, amplitude)
-        return np.asarray(sum(f[:, None] * self.static.image_shift_px(points, self.own, a) for f, a in parts))
-
-    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift at each point's part of the size."""
-        parts = self._parts(points, shape, amplitude)
-        return np.asarray(sum(f * self.static.sheet_shift_mm(points, self.own, a) for f, a in parts))
-
-    def _parts(self, points: ImagePoints, shape: Shape, amplitude: Float) -> list[tuple[Float, Float]]:
-        """Return factors (M,) with the law's amplitudes (Q,) that they multiply."""
+        """Return the course's factor, of a swing its sine's and its cosine's, and the law."""
         way = np.zeros(len(points.uv))
         if points.distance_mm is not None:
             # Of the camera, not of the wall point.
             way = points.distance_mm - np.sum(points.xyz_c * points.along_c, axis=1)
+        swings = self.kind is CourseKind.SINUSOID
+        courses = [(shape[0], phase) for phase in (0.0, 90.0)] if swings else [shape]
         at = points.time_s, way, points.speed_mm_s
-        if self.kind is not CourseKind.SINUSOID:
-            return [(Course(self.kind, shape).factor(*at), np.asarray(amplitude))]
-        sine, cosine = np.split(np.asarray(amplitude), 2)
-        waves = (Course(self.kind, (shape[0], phase)).factor(*at) for phase in (0.0, 90.0))
-        return list(zip(waves, (sine, cosine), strict=True))
+        return tuple(Course(self.kind, c).factor(*at) for c in courses), self.static, self.own
 
     def _swing(self, amplitude: Float) -> tuple[Float, float]:
         """Return the law's amplitudes (Q,) along the longer axis of a swing's ellipse, and the phase, deg."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,7 +10,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, Quantity
-from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Directed(Worded):
         }
 
 
-class Drifting(Worded):
+class Drifting(Worded, Product):
     """A static effect that comes up as 1 − exp(−t/t₀); the shape is t₀ in s."""
 
     static: EffectModel
@@ -73,17 +72,6 @@ class Drifting(Worded):
         """Return the share of its final size that is reached, and the static law."""
         return (self.reached(points.time_s, shape),), self.static, ()
 
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the static shift times the share of its final size that is reached."""
-        static = self.static.image_shift_px(points, (), amplitude)
-        return np.asarray(self.reached(points.time_s, shape)[:, None] * static)
-
-    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the static shift times the share of its final size that is reached."""
-        return np.asarray(
-            self.reached(points.time_s, shape) * self.static.sheet_shift_mm(points, (), amplitude)
-        )
-
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the final size and the time constant."""
         _, *following = self.static.quantities((), amplitude).items()
@@ -103,14 +91,6 @@ class Periodic(Worded):
         """Return the frequency."""
         return {"frequency_hz": shape[0]}
 
-    @abstractmethod
-    def moved_px(self, points: ImagePoints, size: Float) -> Float:
-        """Return (M, 2) the image's shift for sizes (M, 2) along x and y at each point's time."""
-
-    @abstractmethod
-    def moved_mm(self, points: ImagePoints, size: Float) -> Float:
-        """Return (M,) the sheet's shift for sizes (M, 2) along x and y at each point's time."""
-
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return frequencies half a resolution cell apart, up to half the frame rate."""
         step = 0.5 / duration_s
@@ -120,19 +100,6 @@ class Periodic(Worded):
     def shape_step(self, shape: Shape) -> float:
         """Return the step of the frequency: the resolution of the recording's duration."""
         return 0.05
-
-    def size_at(self, time_s: Float, shape: Shape, amplitude: Float) -> Float:
-        """Return (M, 2) size along x and y at the times (M,)."""
-        sine, cosine = sine_and_cosine_at(time_s, shape[0])
-        return np.asarray(np.outer(sine, amplitude[:2]) + np.outer(cosine, amplitude[2:]))
-
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the shift at each point's time."""
-        return self.moved_px(points, self.size_at(points.time_s, shape, amplitude))
-
-    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the shift at each point's time."""
-        return self.moved_mm(points, self.size_at(points.time_s, shape, amplitude))
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the ellipse's longer half axis, its direction, and the frequency."""

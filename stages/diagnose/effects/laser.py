@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float
-from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 from stages.diagnose.effects.kinds import (
     Directed,
     Periodic,
@@ -198,7 +198,7 @@ class SheetWaviness(EffectModel):
         ).format(**self.quantities(shape, amplitude))
 
 
-class LaserRocking(Periodic):
+class LaserRocking(Periodic, Product):
     """The sheet's tilt swings at one frequency."""
 
     name = "laser_rocking"
@@ -212,14 +212,6 @@ class LaserRocking(Periodic):
         """Return both waves, of a tilt in degrees."""
         sine, cosine = sine_and_cosine_at(points.time_s, shape[0])
         return (_DEG_PER_MRAD * sine, _DEG_PER_MRAD * cosine), LaserTilt(), ()
-
-    def moved_px(self, points: ImagePoints, size: Float) -> Float:
-        """Return none."""
-        return np.zeros((len(points.uv), 2))
-
-    def moved_mm(self, points: ImagePoints, size: Float) -> Float:
-        """Return q φ(t) cos(ψ − ψ₀) for tilts in mrad."""
-        return np.asarray(1e-3 * np.sum(size * points.xyz_c[:, :2], axis=1))
 
 
 LASER_MODELS: tuple[EffectModel, ...] = (

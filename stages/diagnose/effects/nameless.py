@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 from stages.diagnose.effects.kinds import cosine, sine_and_cosine_at
 
 _REFERENCE_MM = 50.0
@@ -69,7 +69,7 @@ def growth(points: ImagePoints, exponent: float) -> Float:
 
 
 @dataclass(frozen=True)
-class SwingTerm(Nameless):
+class SwingTerm(Nameless, Product):
     """One harmonic of the line with one power of the radius; amplitudes are of its sine, then its cosine."""
 
     name: str
@@ -90,12 +90,6 @@ class SwingTerm(Nameless):
         """Return both waves and the steady pattern."""
         steady = _term(Moves.LINE, self.harmonic, self.exponent)
         return sine_and_cosine_at(points.time_s, shape[0]), steady, STEADY
-
-    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return (r/50)^p cos m(ψ − ψ₀) at each point's time, on the line."""
-        waves, steady, at_rest = self.factored(points, shape)
-        each = zip(waves, np.split(np.asarray(amplitude), 2), strict=True)
-        return np.asarray(sum(wave * steady.wall_shift_mm(points, at_rest, part) for wave, part in each))
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the amplitude and the frequency."""

@@ -17,6 +17,7 @@ from stages.diagnose.effects.kinds import (
     cosine,
     one,
     sine_and_cosine,
+    sine_and_cosine_at,
 )
 
 _SLIP_TIMES = 64
@@ -64,15 +65,11 @@ class ProbeVibration(Periodic):
         "of it) toward azimuth {direction_deg:.1f}°."
     )
 
-    def moved_px(self, points: ImagePoints, size: Float) -> Float:
-        """Return the image from the displaced camera, less that from the stated place."""
-        seen = points.xyz_c.copy()
-        seen[:, :2] -= size
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the image from the displaced camera less that from the stated place; the sheet comes too."""
+        waves, seen = sine_and_cosine_at(points.time_s, shape[0]), points.xyz_c.copy()
+        seen[:, :2] -= np.stack(waves, 1) @ np.reshape(amplitude, (2, 2))
         return image_shift(points, seen)
-
-    def moved_mm(self, points: ImagePoints, size: Float) -> Float:
-        """Return none: the sheet swings with the camera."""
-        return np.zeros(len(points.uv))
 
 
 class EncoderScale(Scalar):
