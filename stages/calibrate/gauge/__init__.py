@@ -21,7 +21,7 @@ from pipeline.recording.checks import CheckedFrames
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Finding, Measurements, RingSource, first_unknowns, solve
 from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges
-from stages.calibrate.gauge.geometry import Gauge
+from stages.calibrate.gauge.geometry import BoreRings, Gauge
 from stages.calibrate.gauge.poses import (
     PosedFrames,
     first_pose,
@@ -113,9 +113,9 @@ def measure_gauge(
     wrong = premises.outvoted_fiducials(posed, gauge)
     T_pc = poses_of_all_frames(recording, posed, rings, probe)
     source = RingSource(rings, frame_index(recording, rings.frame), gauge)
-    _require_bores(source, T_pc, probe, parameters)
-    edges = _edges(recording, posed, wrong, gauge, probe, parameters, context)
     on_bore = source.on_bore(T_pc, probe, parameters)
+    _require_bores(on_bore, T_pc, probe, gauge, parameters)
+    edges = _edges(recording, posed, wrong, gauge, probe, parameters, context)
     time_s, encoder = recording.frames.time_s, recording.encoder
     measured = Measurements(edges, on_bore, time_s, encoder, gauge.radius_sigma_mm, LOOSE)
     start = first_unknowns(T_pc, posed.index, gauge, measured, probe, parameters)
@@ -163,13 +163,14 @@ def _edges(
     return joined(parts)
 
 
-def _require_bores(source: RingSource, T_pc: Float, probe: Probe, parameters: GaugeParameters) -> None:
+def _require_bores(
+    rings: BoreRings, T_pc: Float, probe: Probe, gauge: Gauge, parameters: GaugeParameters
+) -> None:
     """Refuse rings that are too few, or of another bore than stated; no fiducial hides a whole bore."""
-    rings = source.on_bore(T_pc, probe, parameters)
     premises.require_rings(len(np.unique(rings.frame)), parameters)
     xyz_p = transform(T_pc[rings.frame], probe.triangulate(rings.uv))
     error = np.hypot(xyz_p[:, 0], xyz_p[:, 1]) - rings.radius_mm
-    premises.require_bores(source.gauge, rings.section, error)
+    premises.require_bores(gauge, rings.section, error)
 
 
 def _require_determined(result: GaugeCalibration, parameters: GaugeParameters) -> None:
@@ -191,5 +192,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "2", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "3", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )

@@ -16,6 +16,7 @@ from scipy.special import erf
 from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera import Camera
+from pipeline.system.parallel import in_threads
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import GaugeParameters
 
@@ -29,6 +30,7 @@ _LEAST_STEP_GREY, _INSIDE, _MOST_NOISE, _BLUR_PX = 8.0, 0.6, 0.12, (0.3, 2.5)
 _LEAST_SIGMA_PX, _OF_BORDER = 0.03, 0.85
 # Markers are drawn in cells; the outermost is black all round.
 _BORDER_CELLS = 2
+_THREADS = 2
 _SMALL = 1e-3
 
 
@@ -69,10 +71,9 @@ def find_fiducials(
     """Yield what is seen in each image that could be read, with the image."""
     finder = detector(gauge.fiducials.dictionary)
     place = {int(number): k for k, number in enumerate(gauge.ids)}
-    for frame, image in images:
-        if image is None:
-            continue
-        numbers, corners = detect(finder, image)
+    readable = ((frame, image) for frame, image in images if image is not None)
+    found = in_threads(lambda seen: (*seen, *detect(finder, seen[1])), readable, _THREADS)
+    for frame, image, numbers, corners in found:
         known = np.array([int(n) in place for n in numbers], bool)
         marker = np.array([place[int(n)] for n in numbers[known]], np.int64)
         yield Sighting(frame, marker, corners[known], numbers[~known]), image
