@@ -132,3 +132,10 @@ def test_without_a_gauge_run_pictures_decide_nothing_and_that_is_said(tmp_path):
     assert tried.gauge is None
     assert tried.found == tried.withdrawn == ()
     assert "no gauge run" in tried.cannot_tell[-1]
+
+
+def test_an_effect_whose_law_holds_its_course_is_not_given_a_second_one(tmp_path):
+    course = {"kind": "exponential", "time_s": {"value": 3.5, "sd": 0.1}}
+    drift = _effect("baseline_drift", course=course, drift_mm=0.3, time_s=3.5)
+    (switch,) = switches_of(_diagnosis(tmp_path, [drift]) / "diagnosis.json").of_line
+    assert switch.text == "baseline_drift=0.3/3.5s"

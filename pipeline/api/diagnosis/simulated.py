@@ -102,6 +102,8 @@ def _course(said: NamedEffect) -> Course:
     if said.course is None or said.course.get("kind") in (None, "constant"):
         return CONSTANTLY
     kind = CourseKind(str(said.course["kind"]))
+    if {q.name for q in COURSES[kind]} & {q.name for q in ALL_EFFECTS[said.name].quantities}:
+        return CONSTANTLY  # its own law says how it changes, as that of a baseline that drifts
     numbers = {k: Value.model_validate(v) for k, v in said.course.items() if isinstance(v, dict)}
     return Course(kind, tuple(_size(numbers, q.name, q.typical) for q in COURSES[kind]))
 
