@@ -68,7 +68,7 @@ def encoder_at_frames(
     read_s, read_mm = _without_held(encoder.time_s, encoder.distance_mm)
     known = (time_s >= read_s[0] - slack) & (time_s <= read_s[-1] + slack)
     known &= ~_in_gaps(time_s, read_s, read_mm, slack)
-    at_frames, jumps = _without_jumps(time_s, np.interp(time_s, read_s, read_mm))
+    at_frames, jumps = _without_jumps(time_s, np.interp(time_s, *_going_on(read_s, read_mm, slack)))
     context.report("frames outside the encoder's time", int((~known).sum()), "frames")
     context.report("encoder jumps taken out", jumps, "")
     if known.mean() < _LEAST_COVERED or _usual(np.diff(at_frames)) > farthest_mm:
@@ -120,6 +120,13 @@ def _without_held(time_s: Float, distance_mm: Float) -> tuple[Float, Float]:
         if jumps and 1 / _LIKE_USUAL < abs(step[end]) / ((end - begin) * per_row) < _LIKE_USUAL:
             kept[begin + 1 : end + 1] = False
     return time_s[kept], distance_mm[kept]
+
+
+def _going_on(time_s: Float, distance_mm: Float, by_s: float) -> tuple[Float, Float]:
+    """Return times and readings (M + 2,) that go on as they began and ended: a frame may lie just outside."""
+    inner = np.interp([time_s[0] + by_s, time_s[-1] - by_s], time_s, distance_mm)
+    before, behind = 2 * distance_mm[[0, -1]] - inner
+    return np.r_[time_s[0] - by_s, time_s, time_s[-1] + by_s], np.r_[before, distance_mm, behind]
 
 
 def _in_gaps(time_s: Float, read_s: Float, read_mm: Float, frame_s: float) -> Bool:

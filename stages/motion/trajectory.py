@@ -135,7 +135,7 @@ def report_motion(
     context.report("median reprojection error", estimate.reprojection_px, "px")
     context.report("reprojection error against the σ of matching", estimate.excess, "times")
     context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
-    _warn_of_texture(estimate.lasting, texture.poses, context)
+    _warn_of_texture(estimate.lasting, texture.poses, texture.store.spool.count, context)
     _warn_of_trembling(trembling(trajectory.T_pc, texture.poses.frames), context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
@@ -158,7 +158,7 @@ def report_steps(context: Context, steps: int, unsettled: int) -> None:
         )
 
 
-def _warn_of_texture(lasting: float, tracked: TrackedPoses, context: Context) -> None:
+def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, context: Context) -> None:
     """Warn where texture was lost, or where its matches contradict each other more than is usual."""
     lost = tracked.frames[1:][tracked.lost[1:]]
     if len(lost) > _MOST_LOST * len(tracked.frames):
@@ -166,6 +166,12 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, context: Context) ->
             f"in {len(lost)} of {len(tracked.frames)} lit frames too little texture was found, first in "
             f"frame {lost[0]}: there the motion rests on rings, encoder and smoothness. What to do: look at "
             "these pictures; more light, a sharper lens or a slower pull show more texture"
+        )
+    elif not observations:
+        context.warn(
+            "no place of the wall was seen again from picture to picture: distance rests on the encoder "
+            "alone, and roll is not measured. What to do: pull more slowly, record lit frames more often, or "
+            "light the wall better"
         )
     if lasting > _MOST_LASTING:
         context.warn(

@@ -97,6 +97,16 @@ def test_frames_after_its_end_are_not_known() -> None:
     assert not found.known[int(1.1 * RATE) :].any()
 
 
+def test_a_frame_just_before_its_start_or_behind_its_end_lies_where_the_probe_went_on_to() -> None:
+    """Held at the last reading, the end of a run at 280 mm/s lay 0.9 mm (7 σ) short."""
+    time_s, distance = clean()
+    inside = (time_s > 0.025) & (time_s < (FRAMES - 1) / RATE - 0.025)
+    found = readings(time_s[inside], distance[inside])
+    assert found is not None
+    assert found.known.all()
+    np.testing.assert_allclose(found.distance_mm, SPEED * np.arange(FRAMES) / RATE, atol=0.15)
+
+
 @pytest.mark.parametrize(("late_s", "scale"), [(100.0, 1.0), (0.0, 1e6)])
 def test_encoder_of_another_clock_or_unit_is_left_out(late_s: float, scale: float) -> None:
     time_s, distance = clean()
