@@ -267,5 +267,6 @@ class Writer:
     def _write(self, exporter: Exporter, key: str, arguments: Mapping[type, object]) -> None:
         if not is_published(exporter, key, self._folder):
             start = time.monotonic()
+            self._logger.info("writing %s", exporter.name)
             publish(exporter, arguments, key, self._folder)
             self._logger.info("wrote %s, %.1f s", exporter.name, time.monotonic() - start)

@@ -11,7 +11,9 @@ from pathlib import Path
 _TICK_S = 1 / os.sysconf("SC_CLK_TCK")
 _EVERY_S = 0.05
 _UTIME, _AFTER_CSTIME = 11, 15
-_CHANGE = re.compile(r" INFO stage (\w+) (starts|completed|reused)")
+_CHANGE = re.compile(
+    r" INFO (?:stage (?P<stage>\w+) (?P<how>starts|completed|reused)|(?P<files>writing|wrote) )"
+)
 
 
 class Watch:
@@ -72,7 +74,7 @@ class Watch:
 
 
 class Progress:
-    """Tells from a run's log, read on as it grows, at which stages it is."""
+    """Tells from a run's log, read on as it grows, at which stages it is, and whether files are written."""
 
     def __init__(self, log: Path) -> None:
         self._log, self._read, self._at = log, 0, ["start"]
@@ -84,15 +86,17 @@ class Progress:
                 for line in file:
                     self._take(line.decode())
                 self._read = file.tell()
-        return " and ".join(self._at) or "files"
+        return " and ".join(self._at) or "between"
 
     def _take(self, line: str) -> None:
         change = _CHANGE.search(line)
         if change is None:
             return
-        self._at = [stage for stage in self._at if stage not in ("start", change[1])]
-        if change[2] == "starts":
-            self._at.append(change[1])
+        name = change["stage"] or "files"
+        self._at = [at for at in self._at if at not in ("start", name)]
+        if "starts" in change.groups() or "writing" in change.groups():
+            self._at.append(name)
+            self._at.sort(key="files".__eq__)
 
 
 def family(pid: int) -> list[int]:
