@@ -235,6 +235,30 @@ def test_two_names_that_one_unknown_law_may_make_up_for_are_unsure(power, patter
     assert all(low <= one <= high for one in odds)
 
 
+@pytest.mark.parametrize(
+    ("turned_deg", "low", "high"), [(0.0, 0.1, np.inf), (180.0, 0.1, np.inf), (60.0, 0.0, 0.01)]
+)
+def test_two_names_along_one_direction_may_be_one_unknown_law(turned_deg, low, high):
+    """A tilted sheet and a decentred beam toward one side, opposite ones, and one turned away."""
+    random, turn = np.random.default_rng(13), np.radians(turned_deg)
+    sizes = (np.array([0.3, 0.0]), 0.3 * np.array([np.cos(turn), np.sin(turn)]))
+    both = [Term(LIBRARY[n], (), a) for n, a in zip(("laser_tilt", "beam_decentre"), sizes, strict=True)]
+    columns = tuple(Column(t.model.name, a.name) for t in both for a in t.amplitudes)
+    columns += tuple(Column(f"like {t.model.name}", n) for t in both for n in "12")
+    design = random.normal(size=(2000, len(columns)))
+    measured = design[:, :4] @ np.concatenate(sizes) + random.normal(size=2000)
+    about, others = evidence_of(design, measured, columns), [f"like {t.model.name}" for t in both]
+    odds = odds_in(
+        about,
+        both,
+        others,
+        ["same"] * 2,
+        lambda terms: 2 * np.log(30.0) * len(terms),
+        Stated((), np.zeros((0, 0))),
+    )
+    assert all(low <= one <= high for one in odds)
+
+
 def test_a_score_that_few_cells_hold_is_less_surprising():
     random = np.random.default_rng(12)
     of = evidence_of(random.normal(size=(500, 1)), random.normal(size=500), (Column("a", ""),))

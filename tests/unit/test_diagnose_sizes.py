@@ -11,6 +11,7 @@ from pipeline.adjustment.normal_equations import Marginal
 from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import SWINGS
+from stages.diagnose.gauge import fit as fitting
 from stages.diagnose.gauge.confirm import Sized, partial_of, quantities
 from stages.diagnose.gauge.elimination import Reduced, score_inflation
 from stages.diagnose.gauge.fit import Fit
@@ -116,3 +117,22 @@ def test_rings_that_are_left_when_fiducials_are_taken_out_have_no_less_than_inde
     found = partial_of("rings", of, judged, term, Stated((), np.zeros((0, 0))))
     assert found is not None
     assert np.diag(found.covariance) == pytest.approx(0.25, rel=0.01)
+
+
+def test_a_fit_is_not_kept_for_what_far_steps_of_its_poses_only_promised(monkeypatch):
+    cost = {"promised": 1.0, "worse": 3.0, "settled": 2.0, "best": 0.5}
+    reduced = SimpleNamespace(information=np.eye(1), right=np.array([3.0]))
+
+    def moved(found, step):
+        after = "settled" if not step.any() else "worse"
+        return (after if found.state == "promised" else "best"), ()
+
+    monkeypatch.setattr(
+        fitting, "_at", lambda run, state, terms: SimpleNamespace(
+            run=run, state=state, terms=terms, cost=cost[state], reduced=reduced
+        )
+    )  # fmt: skip
+    monkeypatch.setattr(fitting, "_moved", moved)
+    monkeypatch.setattr(fitting, "_prior", lambda *_: (np.zeros((1, 1)), np.zeros(1), np.zeros(1)))
+    monkeypatch.setattr(fitting, "_still", lambda found: found.state != "promised")
+    assert fitting.fit(cast(Any, None), cast(Any, "promised"), ()).state == "best"

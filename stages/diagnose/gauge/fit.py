@@ -123,8 +123,12 @@ def _minimised(found: Fit, iterations: int, worth: float) -> Fit:
             break
         # Where only poses are left to move, a shorter step gains nothing that a full one does not.
         better = _shortened(found.run, found, step, _PARTS[:1] if little else _PARTS)
-        if better is None:
+        if better is None and _still(found):
             return found
+        if better is None:
+            # What poses gain by a far step is only promised by their equations: it is taken, and looked at.
+            found = _at(found.run, *_moved(found, 0.0 * step))
+            continue
         gain, found = found.cost - better.cost, better
         if gain < _CONVERGED:
             break
