@@ -49,6 +49,8 @@ _SHORTEST_MM = 1.0
 _ROUNDS, _MORE = 3, 1.2
 """Times that the smoothness of trembling pictures is looked at again while it grows by a fifth: the prior of
 a motion not known yet holds down strong trembling. Not measured."""
+_RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
+"""Median length of an error of two coordinates, of 1 σ each."""
 
 Adjusted = Minimum[State, Equations]
 
@@ -112,6 +114,22 @@ def scale_between_halves(
             way = _way_mm(adjust(start, alone, parameters, CLOSELY, watch).state)
         apart.append(way / max(whole, _SHORTEST_MM) - 1)
     return float(np.abs(apart).max())
+
+
+def excess_of(in_sigma: Float) -> float:
+    """Return how many times its σ an error is that is known in σ (M, 2)."""
+    size = np.linalg.norm(in_sigma, axis=1)
+    return float(np.median(size)) / _RAYLEIGH_MEDIAN if size.size else 0.0
+
+
+def lasting_excess(in_sigma: Float, landmark: Int) -> float:
+    """Return the part of the errors (M, 2), in σ, that a landmark's neighbouring observations share.
+
+    Noise is new in every picture: it shows whole in the difference of two, and distance hardly feels it.
+    What lasts moves poses along.
+    """
+    step = np.diff(in_sigma, axis=0)[np.diff(landmark) == 0] / np.sqrt(2)
+    return float(np.sqrt(max(excess_of(in_sigma) ** 2 - excess_of(step) ** 2, 0.0)))
 
 
 def _way_mm(state: State) -> float:

@@ -7,13 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
+from pipeline.instrument.camera import Camera
 from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of_encoder
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, noise_of_encoder, scale_of_encoder
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
-from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, scale_between_halves
+from stages.motion.bundle_adjustment.solver import (
+    Estimate,
+    estimate_state,
+    lasting_excess,
+    scale_between_halves,
+)
 from stages.motion.parameters import MotionParameters
+from stages.motion.tracking.strips import StripGrid
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.steady_laser import with_steady_laser
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
@@ -22,6 +29,9 @@ from stages.motion.windows.submaps import Window
 _SHARED_ERROR = 1 / 3
 """Radial error that matches share over their median reprojection error: against a calibrated probe 0.05 px of
 0.14 px in open-1-field, 0.2 px of 0.60 px in its copy at crf 30."""
+_LAG = 1.2
+"""Error along the radius of templates, which are cut far ahead, over the error that a landmark's neighbouring
+matches share: against true poses 0.2 to 0.45 px of 0.28 px in open-1-field's copy at crf 30."""
 _MOST_SHARED_PX = 2.0
 """Where matches disagree by more, the parameter's own limit holds."""
 _ROUNDS, _NOISIER = 4, 1.5
@@ -99,7 +109,10 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     noisy, unsure = with_shared_error(parameters, estimate.adjusted.equations.reprojection_px), 0.0
     if noisy is not parameters:
         parameters, estimate = noisy, estimate_state(estimate.state, measured, noisy, watch)
-        unsure = scale_between_halves(estimate, measured, parameters, watch)
+        residual = estimate.adjusted.equations.texture.residual
+        lag_px = _LAG * lasting_excess(residual, measured.tracks.landmark)
+        halves = scale_between_halves(estimate, measured, parameters, watch)
+        unsure = float(np.hypot(halves, scale_by_lag(lag_px, run.texture.grid, run.probe.camera)))
     delay = delay_of_encoder(estimate, measured)
     if delay is not None and run.encoder is not None and delay.matters:
         free = _without_encoder(estimate, measured, parameters, watch)
@@ -143,3 +156,14 @@ def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> M
     if shared <= parameters.match_bias_px:
         return parameters
     return parameters.model_copy(update={"match_bias_px": min(shared, _MOST_SHARED_PX)})
+
+
+def scale_by_lag(lag_px: float, grid: StripGrid, camera: Camera) -> float:
+    """Return the relative 1 σ of distances by templates that are cut ``lag_px`` off, where they come in view.
+
+    A codec drops the texture of the dim wall far ahead and carries it on from the picture before. Matches all
+    the way past the camera are off by less and less, which is one with a longer way; no residual shows it.
+    """
+    ends = np.array([[grid.radius_mm, 0, grid.far_mm + ahead] for ahead in (-0.5, 0.5)])
+    px_per_mm = float(np.linalg.norm(np.diff(camera.project(ends).uv, axis=0)))
+    return lag_px / px_per_mm / (grid.far_mm - grid.near_mm)

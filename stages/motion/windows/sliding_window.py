@@ -9,10 +9,16 @@ from functools import partial
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
-from stages.motion.bundle_adjustment.solver import Estimate, estimate_state, estimate_with_shared
+from stages.motion.bundle_adjustment.solver import (
+    Estimate,
+    estimate_state,
+    estimate_with_shared,
+    excess_of,
+    lasting_excess,
+)
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.normalisation import alike_samples
@@ -31,9 +37,6 @@ from stages.motion.windows.submaps import (
     shared_information,
     submap_of,
 )
-
-_RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
-"""Median length of an error of two coordinates, of 1 σ each."""
 
 
 @dataclass(frozen=True)
@@ -101,22 +104,6 @@ class _End:
         in_sigma = adjusted.equations.texture.residual / sigma_px[:, None]
         errors = excess_of(in_sigma), lasting_excess(in_sigma, measured.tracks.landmark)
         return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, *errors)
-
-
-def excess_of(in_sigma: Float) -> float:
-    """Return how many times its σ an error is that is known in σ (M, 2)."""
-    size = np.linalg.norm(in_sigma, axis=1)
-    return float(np.median(size)) / _RAYLEIGH_MEDIAN if size.size else 0.0
-
-
-def lasting_excess(in_sigma: Float, landmark: Int) -> float:
-    """Return the part of the errors (M, 2), in σ, that a landmark's neighbouring observations share.
-
-    Noise is new in every picture: it shows whole in the difference of two, and distance hardly feels it.
-    What lasts moves poses along.
-    """
-    step = np.diff(in_sigma, axis=0)[np.diff(landmark) == 0] / np.sqrt(2)
-    return float(np.sqrt(max(excess_of(in_sigma) ** 2 - excess_of(step) ** 2, 0.0)))
 
 
 def adjust_run(
