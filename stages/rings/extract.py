@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, islice
 
-import cv2
 import numpy as np
 from pydantic import Field
 
@@ -267,9 +266,7 @@ def _channel(wavelength_nm: float) -> int:
 
 def mix(bgr: Byte, weights: Float) -> Float32:
     """Return the (H, W) mixture of an image (H, W, 3)."""
-    blue, green, red = cv2.split(bgr)
-    mixed = cv2.addWeighted(blue, weights[0], green, weights[1], 0, dtype=cv2.CV_32F)
-    return np.asarray(cv2.add(mixed, cv2.addWeighted(red, weights[2], red, 0, 0, dtype=cv2.CV_32F), mixed))
+    return np.asarray(bgr @ weights.astype(np.float32), np.float32)
 
 
 def discriminant_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float) -> Float:
