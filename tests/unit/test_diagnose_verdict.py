@@ -74,6 +74,7 @@ def examined(
         (examined(chance=0.98), Verdict.CLASS),
         (examined(grown=0.005), Verdict.NAMED),
         (examined(grown=0.015), Verdict.CLASS),
+        (examined(grown=1.5), Verdict.UNEXPLAINED),
         (examined(unsplit=("principal_point",)), Verdict.CLASS),
     ],
 )

@@ -180,4 +180,5 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.PARTLY
     # A class of effects would leave out what nobody knows.
     known = any(examined.unsplit) or not unknown_rivals(examined)
+    known &= all(odds < 1 for odds in examined.other_growth)
     return Verdict.CLASS if best.named and known else Verdict.UNEXPLAINED
