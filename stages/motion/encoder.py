@@ -26,6 +26,8 @@ encoder differs by its scale, some per mille, and where it slips; a stuck or rev
 _DIFFERENCE_MM = 0.5
 """Smaller differences of a step never count, since texture may err as much in a single frame. Not
 measured."""
+_COARSE = 3.5
+"""Nor do differences within so many σ of a reading, one quantum of a coarse counter: q is √12 σ."""
 _USUAL_PERCENT = 90.0
 _LIKE_USUAL = 3.0
 """An encoder caught up if its jump is what the probe went meanwhile, within this factor of its mean speed.
@@ -91,7 +93,8 @@ def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Conte
     found = ~tracked.lost[1:] & ~tracked.lost[:-1]
     by_wall = np.diff(tracked.T_pc[:, 2, 3])
     by_encoder = np.diff(encoder.distance_mm[tracked.frames])
-    differs = np.abs(by_encoder - by_wall) > np.maximum(_DIFFERENCE_MM, _CONTRADICTED * np.abs(by_wall))
+    least_mm = max(_DIFFERENCE_MM, _COARSE * encoder.sigma_mm)
+    differs = np.abs(by_encoder - by_wall) > np.maximum(least_mm, _CONTRADICTED * np.abs(by_wall))
     judged = found & encoder.known[tracked.frames][1:]
     if judged.sum() < _LEAST_STEPS or differs[judged].mean() < _CONTRADICTED:
         return False

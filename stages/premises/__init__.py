@@ -126,7 +126,7 @@ def check_premises(
         "nothing, if what was passed meanwhile need not be seen", context,
     )  # fmt: skip
     radius_mm = radius_seen_mm(pictures, probe)
-    check_diameter(radius_mm, recording.pipe, context)
+    check_diameter(radius_mm, recording.pipe, probe.lighting.radius_mm, context)
     factor = encoder_factor(recording, time_s, steps, radius_mm, context)
     warn_of_clock(jumps, time_s, recording, context)
     _report(pictures, radius_mm, changes, context)
@@ -239,7 +239,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "9",
+    "10",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -17,6 +17,9 @@ from stages.premises.pictures import CLOSED, Pictures
 # Nominal sizes differ from inner diameters by up to a quarter (ASME B36.10: NPS 1/2 has a 15.8 mm bore);
 # a tenth is worth a word, a half more or less is another pipe, another probe or another unit.
 _WORTH_A_WORD, _ANOTHER = 1.1, 1.5
+# Where inches or metres are taken for mm throughout, lamps come out 6 or 250 times too wide for the pipe of
+# open-1; that much wider (chosen) they are in no pipe, also where their radius is not stated.
+_TOO_WIDE = 2.0
 _UNITS = (("inch", 25.4), ("m", 1000.0), ("cm", 10.0), ("ft", 304.8))
 # A ratio is that of a unit when it comes so near to it; units lie further apart.
 _NEAR_UNIT = 1.25
@@ -54,13 +57,14 @@ def radius_seen_mm(pictures: Pictures, probe: Probe) -> float:
     return float(np.nanmedian(radius_mm))
 
 
-def check_diameter(radius_mm: float, pipe: PipeFacts, context: Context) -> None:
-    """Hold the stated diameter against the ring.
+def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: Context) -> None:
+    """Hold the stated diameter, and the radius ``lamps_mm`` of the probe's lamps, against the ring.
 
     Raises
     ------
     UnusableError
-        When they differ by half or more, naming the unit that would explain it.
+        When the diameter differs by half or more, naming the unit that would explain it, or when the lamps
+        would not fit into the pipe.
     """
     if not np.isfinite(radius_mm):
         return
@@ -75,6 +79,14 @@ def check_diameter(radius_mm: float, pipe: PipeFacts, context: Context) -> None:
             limit=f"a factor of {_ANOTHER:g}",
             hint="check pipe.nominal_diameter_mm in recording.yaml and laser.baseline_mm and the camera in "
             "probe.yaml, all in mm",
+        )
+    if lamps_mm > _TOO_WIDE * radius_mm:
+        raise UnusableError(
+            "premises",
+            f"by the laser ring and the stated probe the pipe's radius is {radius_mm:.4g} mm: the probe with "
+            f"its lamps on a radius of {lamps_mm:.4g} mm does not fit into it",
+            hint="state lengths in mm: laser.baseline_mm and lighting.radius_mm in probe.yaml, "
+            "pipe.nominal_diameter_mm in recording.yaml, and distances in encoder.csv",
         )
     if max(ratio, 1 / ratio) > _WORTH_A_WORD:
         context.warn(

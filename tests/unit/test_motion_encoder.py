@@ -121,6 +121,12 @@ def test_texture_contradicts_a_reversed_or_stuck_encoder_but_not_a_true_one() ->
         assert contradicted(said, tracked(z), quiet_context()) is expected
 
 
+def test_a_coarse_counter_does_not_contradict_the_wall() -> None:
+    z = SPEED * np.arange(FRAMES) / RATE
+    coarse = EncoderReadings(5 * np.round(z / 5), 5 / np.sqrt(12), np.ones(FRAMES, bool))
+    assert not contradicted(coarse, tracked(z), quiet_context())
+
+
 def test_texture_lost_in_most_frames_contradicts_nothing() -> None:
     z = SPEED * np.arange(FRAMES) / RATE
     tracks = tracked(0 * z)

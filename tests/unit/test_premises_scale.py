@@ -54,6 +54,15 @@ def test_a_diameter_that_the_ring_contradicts_ends_the_run(diameter_mm, message,
         checked(replace(good, pipe=PipeFacts(diameter_mm)), run.probe)
 
 
+def test_lengths_in_inch_throughout_end_the_run(good, run):
+    """All of them agree, but for the lamps, and the pipe came out 25 times too small without a word."""
+    laser = replace(run.probe.laser, baseline_mm=BASELINE / 25.4)
+    encoder = Encoder(good.encoder.time_s, good.encoder.distance_mm / 25.4)
+    inch = replace(good, pipe=PipeFacts(2 * RADIUS / 25.4), encoder=encoder)
+    with pytest.raises(UnusableError, match="does not fit"):
+        checked(inch, replace(run.probe, laser=laser))
+
+
 def test_a_baseline_in_metres_ends_the_run(good, run):
     laser = replace(run.probe.laser, baseline_mm=BASELINE / 1000)
     with pytest.raises(UnusableError, match="baseline were stated in m"):
