@@ -111,7 +111,8 @@ def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
 def outside_the_pipe(xyz_c: Float32) -> Bool:
     """Return where points (F, A, 3) lie far outside the circle of their ring over a wide arc, in most rings.
 
-    With them go the points beside them, up to where they are as near to the circle as others.
+    With them go the points beside them, up to where they are as near to the circle as others, and whole rings
+    whose circle is as much wider than the usual one: it is drawn by what is mirrored.
     """
     out = np.zeros(xyz_c.shape[:2], bool)
     few = xyz_c[:, :: max(xyz_c.shape[1] // _ENOUGH, 1), :2]
@@ -125,6 +126,7 @@ def outside_the_pipe(xyz_c: Float32) -> Bool:
     for row, most in zip(wide, limit, strict=True):
         off = _off_circle(xyz_c[row, :, :2], centre[row], radius[row])
         out[row] = _grown(off > _FAR_OUTSIDE * radius[row], ~(off < most))
+    out[radius > (1 + _FAR_OUTSIDE) * np.nanmedian(radius)] = True
     return out
 
 
@@ -144,8 +146,9 @@ def _warn_of_mirrored(mirrored: Bool, rings: RingSamples, context: Context) -> N
         context.warn(
             f"in {len(where)} of {len(mirrored)} rings {100 * mirrored[where].mean():.0f} % of the line lies "
             f"far outside the circle of the rest, about {_middle_clock(mirrored, rings)} in the picture: "
-            "standing water mirrors it, or the pipe is open there all along. It is not taken for wall, and "
-            "nothing is measured there. What to do: drain the pipe, or judge what lies above the water alone"
+            "standing water or a shiny wall mirrors it, or the pipe is open there. It is not taken for wall, "
+            "and nothing is measured there. What to do: drain the pipe, or judge what lies above the water "
+            "alone"
         )
 
 
@@ -191,7 +194,7 @@ def _report(context: Context, counts: Int, noise: Float32) -> None:
 
 TRIANGULATE = Stage(
     "triangulate",
-    "4",
+    "5",
     TriangulateParameters,
     triangulate_rings,
     "ring samples and instrument to wall points with their noise",

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.recording.base import Encoder, FrameTable, PipeFacts
+from pipeline.recording.base import Encoder, PipeFacts
 from stages.premises.light import Steps
 from stages.premises.scale import encoder_factor
 from tests.drawn_run import BASELINE, RADIUS
-from tests.premises_run import COUNT, checked, good_recording, steady_run
+from tests.premises_run import checked, good_recording, steady_run
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 
@@ -74,19 +74,6 @@ def test_a_camera_that_looks_nowhere_ends_the_run(good, run):
     camera = replace(run.probe.camera, focal_px=(1e-9, 1e-9))
     with pytest.raises(UnusableError, match=r"100 % of the laser line's pixels(.|\n)*focal_px"):
         checked(good, replace(run.probe, camera=camera))
-
-
-def test_an_encoder_is_not_reversed_by_pictures_that_show_no_wall(good, run):
-    """Of laser frames alone the "motion of the wall" was noise: it turned a right encoder round."""
-    order = np.arange(0, COUNT, 2)
-    images = {k: good.source.images[n] for k, n in enumerate(order)}
-    table = FrameTable(np.arange(len(order)), good.frames.time_s[order], np.full(len(order), "laser"))
-    source = MemorySource(images, run.probe.camera.image_size)
-    for back in (1, -1):
-        encoder = Encoder(good.encoder.time_s, back * good.encoder.distance_mm)
-        spoiled = replace(good, frames=table, listed=None, source=source, encoder=encoder)
-        found, _ = checked(spoiled, run.probe)
-        assert found.encoder_factor == 1
 
 
 def test_a_ratio_that_fits_no_unit_does_not_turn_the_encoder_round(good):

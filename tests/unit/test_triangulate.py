@@ -197,6 +197,12 @@ def test_what_water_mirrors_is_not_wall():
     assert off[kept].max() < 1
 
 
+def test_a_ring_whose_circle_the_mirrored_line_draws_is_no_wall():
+    points = half_filled(6)
+    points[2, :, :2] *= 1.4
+    assert outside_the_pipe(points)[2].all()
+
+
 @pytest.mark.parametrize(
     "points",
     [
