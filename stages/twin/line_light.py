@@ -160,11 +160,10 @@ class LineSamples:
         Brightness and place of the line are first fitted in every sector of every frame, so that a line that
         is displaced or dim over more than a sector does not count as speckle.
         """
-        spread = np.median([self._spread_in(light, noise, *kept) for kept in self._kept], 0)
-        middle = np.abs(light.profile_x) < _MIDDLE_WIDTHS
-        contrast = float(np.sqrt(spread[middle].mean()))
-        each = [np.sqrt(self._spread_in(light, noise, *kept)[middle].mean()) for kept in self._kept]
-        speckle = Figure(contrast, 1.25 * float(np.std(each)) / np.sqrt(len(each)))
+        each = np.stack([self._spread_in(light, noise, *kept) for kept in self._kept])
+        spread, middle = np.median(each, 0), np.abs(light.profile_x) < _MIDDLE_WIDTHS
+        contrast, of_frame = np.sqrt(spread[middle].mean()), np.sqrt(each[:, middle].mean(1))
+        speckle = Figure(float(contrast), 1.25 * float(np.std(of_frame)) / np.sqrt(len(each)))
         return replace(light, spread=spread, speckle=speckle)
 
     def _spread_in(
