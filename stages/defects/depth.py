@@ -2,7 +2,7 @@
 
 Where only a few rings cross a defect, its deepest place lies between them. Around the pipe it is sampled
 densely: that profile tells the shape of a bell fitted to the points, which is taken to be the same along the
-pipe up to its own length.
+pipe up to its own length, and to move on around the pipe from ring to ring where the defect lies askew.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from pipeline.arrays import Float
 from stages.defects.clean import CleanWall
@@ -35,7 +35,8 @@ _TOP_SHAPE = 0.04
 _MARGIN_MM = 2.5
 _LEAST = 24
 _SHAPE_PRIOR_MM = 0.35  # 0.07 mm, the noise of independent samples, over 0.2, the prior 1 σ of ln p
-_OVERSAMPLED = 3.0  # neighbouring samples of a ring share their noise
+_SKEW_PRIOR_MM = 0.07  # the same over 1, the prior 1 σ of the way around per way along
+_SKEWS = (0.0, 0.7, -0.7)  # fits start askew to either side by 35°, too: from 0 they end in a broad bell
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ def measure_depth(
     sharpened = float((region.cut(surface.all_mm) - region.cut(surface.coarse_mm))[peak])
     scatter = float(np.linalg.norm([drawn.std(), _SHARPENING * np.nan_to_num(sharpened)]))
     if _is_small(relief, region, surface.points):
-        depth, scatter = _between_rings(relief, region, surface.points, depth, scatter)
+        noise = Noise(clean, float(gain[near].mean()), relief.cell_mm, draws, random)
+        depth, scatter = _between_rings(relief, region, surface.points, noise, depth, scatter)
     sigma = float(np.hypot(scatter, _shape_sigma(relief, region, depth, surface.points.spacing_mm)))
     return Depth(region.sign * depth, sigma, bias, (int(peak[0]), int(peak[1])))
 
@@ -134,11 +136,30 @@ def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:
     return not region.all_round and not beside and length < _FEW_RINGS * points.spacing_mm
 
 
+@dataclass(frozen=True)
+class Noise:
+    """What the clean wall shows, ``gain`` times as large, drawn so often on cells of a size."""
+
+    clean: CleanWall
+    gain: float
+    cell_mm: tuple[float, float]
+    draws: int
+    random: np.random.Generator
+
+    def in_sum(self, weight: Float, x_mm: Float, y_mm: Float) -> float:
+        """Return 1 σ of a weighted sum over places (N,) along and around."""
+        i, j = (np.rint(at / c).astype(int) for at, c in zip((x_mm, y_mm), self.cell_mm, strict=True))
+        i, j = i - i.min(), j - j.min()
+        shape = (int(i.max()) + 1, int(j.max()) + 1)
+        drawn = [weight @ self.clean.draw(shape, self.random)[i, j] for _ in range(self.draws)]
+        return self.gain * float(np.sqrt(np.mean(np.square(drawn))))
+
+
 def _between_rings(
-    relief: Relief, region: Region, points: DeviationPoints, depth_mm: float, sigma_mm: float
+    relief: Relief, region: Region, points: DeviationPoints, noise: Noise, depth_mm: float, sigma_mm: float
 ) -> tuple[float, float]:
     """Return depth and 1 σ by a bell, where a bell describes the defect, else what is there already."""
-    bell = fit_bell(relief, region, points)
+    bell = fit_bell(relief, region, points, noise)
     if bell is None or bell.residual_mm > _BELL_MISFIT * bell.height_mm:
         return depth_mm, sigma_mm
     if bell.sigma_mm > _BELL_UNKNOWN * bell.height_mm:
@@ -169,29 +190,33 @@ class Bell:
     residual_mm: float
 
 
-def fit_bell(relief: Relief, region: Region, points: DeviationPoints) -> Bell | None:
-    """Fit height · exp(−(x²/a² + y²/b²)^p) to a region's points; None where few are or none stands out."""
+def fit_bell(relief: Relief, region: Region, points: DeviationPoints, noise: Noise) -> Bell | None:
+    """Fit height · exp(−(x²/a² + (y − k x)²/b²)^p) to a region's points; None where none stands out."""
     x, y, value = _near(relief, region, points)
     value = region.sign * value
     if len(value) < _LEAST or value.max() <= 0:
         return None
     size = np.array(region.mask.shape) * relief.cell_mm
     top = np.argmax(value)
-    start = np.array([value[top], x[top], y[top], *np.log(0.35 * size), 0.0])
-    low = start - np.array([0.5 * value[top], size[0] / 2, size[1] / 2, 1.5, 1.5, 0.5])
-    high = start + np.array([value[top], size[0] / 2, size[1] / 2, 1.0, 1.0, 1.4])
+    start = np.array([value[top], x[top], y[top], *np.log(0.35 * size), 0.0, 0.0])
+    low = start - np.array([0.5 * value[top], size[0] / 2, size[1] / 2, 1.5, 2.5, 0.5, 2.0])
+    high = start + np.array([value[top], size[0] / 2, size[1] / 2, 1.0, 1.0, 1.4, 2.0])
 
     def misfit(t: Float) -> Float:
-        return np.append(_bell(t, x, y) - value, _SHAPE_PRIOR_MM * t[5])
+        return np.concatenate([_bell(t, x, y) - value, [_SHAPE_PRIOR_MM * t[5], _SKEW_PRIOR_MM * t[6]]])
 
-    found = least_squares(misfit, start, bounds=(low, high), x_scale=[1, 1, 1, 0.3, 0.3, 0.5])
+    def fitted(skew: float) -> OptimizeResult:
+        unit = [1, 1, 1, 0.3, 0.3, 0.5, 0.5]
+        return least_squares(misfit, [*start[:6], skew], bounds=(low, high), x_scale=unit)
+
+    found = min(map(fitted, _SKEWS), key=lambda fit: float(fit.cost))
     jacobian = np.asarray(found.jac, float)
-    freedom = max(1.0, len(value) - 6.0)
-    variance = float(found.fun @ found.fun) / freedom
-    curvature = jacobian.T @ jacobian + 1e-9 * np.eye(6)
     height, slope = _millimetre_mean(found.x)
-    covariance = variance * _OVERSAMPLED * np.linalg.inv(curvature)
-    return Bell(height, float(np.sqrt(slope @ covariance @ slope)), float(np.sqrt(variance)))
+    curvature = jacobian.T @ jacobian + 1e-9 * np.eye(len(slope))
+    by_point = (jacobian @ np.linalg.solve(curvature, slope))[: len(value)]
+    residual = float(np.sqrt(found.fun @ found.fun / max(1.0, len(value) - len(slope))))
+    sigma = np.hypot(noise.in_sum(by_point, x, y), residual * np.linalg.norm(by_point))
+    return Bell(height, float(sigma), residual)
 
 
 def _near(relief: Relief, region: Region, points: DeviationPoints) -> tuple[Float, Float, Float]:
@@ -207,18 +232,19 @@ def _near(relief: Relief, region: Region, points: DeviationPoints) -> tuple[Floa
 
 
 def _bell(t: Float, x: Float, y: Float) -> Float:
-    q = ((x - t[1]) / np.exp(t[3])) ** 2 + ((y - t[2]) / np.exp(t[4])) ** 2
+    along = x - t[1]
+    q = (along / np.exp(t[3])) ** 2 + ((y - t[2] - t[6] * along) / np.exp(t[4])) ** 2
     return np.asarray(t[0] * np.exp(-((q + 1e-12) ** np.exp(t[5]))))
 
 
 def _millimetre_mean(t: Float) -> tuple[float, Float]:
-    """Return the mean of the bell over 1 mm × 1 mm at its top, and the gradient by its parameters (6,)."""
+    """Return the mean of the bell over 1 mm × 1 mm at its top, and the gradient by its parameters (7,)."""
     offset = (np.arange(9) - 4) / 9
     x, y = (g.ravel() for g in np.meshgrid(offset, offset))
 
     def mean(p: Float) -> float:
         return float(_bell(p, x + p[1], y + p[2]).mean())
 
-    steps = 1e-4 * np.eye(6)
+    steps = 1e-4 * np.eye(len(t))
     gradient = np.array([(mean(t + d) - mean(t - d)) / 2e-4 for d in steps])
     return mean(t), gradient

@@ -10,7 +10,7 @@ import pytest
 from pipeline.artefacts.measured import PointCloud
 from stages.defects import _is_measured
 from stages.defects.clean import CleanWall
-from stages.defects.depth import fit_bell, measure_depth
+from stages.defects.depth import Noise, fit_bell, measure_depth
 from stages.defects.relief import Relief, Typical
 from stages.defects.segment import Region
 from stages.defects.surface import DeviationPoints, Surface
@@ -26,27 +26,57 @@ def relief() -> Relief:
     return Relief(distance, azimuth, _RADIUS_MM, flat, flat, flat + 0.02, (), harmonics, typical)
 
 
-def points(height_mm: float) -> DeviationPoints:
-    """Return a point every half cell about the middle of the map, on a bell 2 mm wide, with noise."""
+def points(height_mm: float, rows_apart: float = 0.5, skew: float = 0.0) -> DeviationPoints:
+    """Return a point every half column about the middle of the map, on a bell 2 mm wide, with noise.
+
+    Askew its half widths are 3 mm along and 0.8 mm around.
+    """
     random = np.random.default_rng(0)
-    row, column = (g.ravel() for g in np.meshgrid(np.arange(10, 30, 0.5), np.arange(345, 375, 0.5)))
-    off = ((row - 20) * 0.5) ** 2 + ((column - 360) * 2 * np.pi / _COLUMNS * _RADIUS_MM) ** 2
-    deviation = height_mm * np.exp(-off / 4.0) + 0.01 * random.standard_normal(len(row))
+    row, column = (g.ravel() for g in np.meshgrid(np.arange(10, 30, rows_apart), np.arange(345, 375, 0.5)))
+    x, y = (row - 20.5) * 0.5, (column - 360) * 2 * np.pi / _COLUMNS * _RADIUS_MM
+    off = (x / 3) ** 2 + ((y - skew * x) / 0.8) ** 2 if skew else (x * x + y * y) / 4.0
+    deviation = height_mm * np.exp(-off) + 0.01 * random.standard_normal(len(row))
     return DeviationPoints(np.zeros(1, np.int64), row, column, deviation, np.ones(len(row)), 2.0)
 
 
+def noise(shared: bool = False) -> Noise:
+    """Return noise of 0.01 mm, other in every cell or shared by all."""
+    random = np.random.default_rng(3)
+    wall = np.full((_ROWS, _COLUMNS), 0.01) if shared else 0.01 * random.standard_normal((_ROWS, _COLUMNS))
+    return Noise(CleanWall(wall, np.ones(wall.shape, bool), 1.0), 1.0, relief().cell_mm, 50, random)
+
+
 def test_the_height_of_a_bell_is_found() -> None:
-    found = fit_bell(relief(), Region(14, 350, np.ones((12, 20), bool), 1.0), points(1.0))
+    found = fit_bell(relief(), Region(14, 350, np.ones((12, 20), bool), 1.0), points(1.0), noise())
     assert found is not None
     assert found.height_mm == pytest.approx(0.96, abs=0.04)
+
+
+@pytest.mark.parametrize("skew", [1.0, -1.0])
+def test_a_ridge_that_lies_askew_keeps_its_height_between_rings(skew: float) -> None:
+    """Rings 2.5 mm apart: a bell along and around the pipe was told to be twice as high."""
+    region = Region(12, 346, np.ones((16, 28), bool), 1.0)
+    found = fit_bell(relief(), region, points(1.0, 5.0, skew), noise())
+    assert found is not None
+    x, y = np.meshgrid(*2 * [(np.arange(101) - 50) / 101])
+    true = np.exp(-((x / 3) ** 2) - ((y - skew * x) / 0.8) ** 2).mean()
+    assert found.height_mm == pytest.approx(true, abs=0.03)
+
+
+def test_noise_that_points_share_counts_in_a_height() -> None:
+    region = Region(14, 350, np.ones((12, 20), bool), 1.0)
+    apart, shared = (fit_bell(relief(), region, points(1.0), noise(which)) for which in (False, True))
+    assert apart is not None
+    assert shared is not None
+    assert shared.sigma_mm > 3 * apart.sigma_mm
 
 
 def test_where_no_point_stands_out_there_is_no_bell() -> None:
     sunk = points(0.0)
     below = replace(sunk, deviation_mm=sunk.deviation_mm - 0.5)
     region = Region(14, 350, np.ones((12, 20), bool), 1.0)
-    assert fit_bell(relief(), region, below) is None
-    assert fit_bell(relief(), region, sunk) is not None, "the control: noise alone does stand out"
+    assert fit_bell(relief(), region, below, noise()) is None
+    assert fit_bell(relief(), region, sunk, noise()) is not None, "the control: noise alone does stand out"
 
 
 def test_a_find_between_rings_without_any_surface_is_not_measured() -> None:
