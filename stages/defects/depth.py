@@ -209,7 +209,8 @@ def fit_bell(relief: Relief, region: Region, points: DeviationPoints, noise: Noi
         unit = [1, 1, 1, 0.3, 0.3, 0.5, 0.5]
         return least_squares(misfit, [*start[:6], skew], bounds=(low, high), x_scale=unit)
 
-    found = min(map(fitted, _SKEWS), key=lambda fit: float(fit.cost))
+    skews = _SKEWS if size[0] > points.spacing_mm else _SKEWS[:1]  # one ring tells no skew
+    found = min(map(fitted, skews), key=lambda fit: float(fit.cost))
     jacobian = np.asarray(found.jac, float)
     height, slope = _millimetre_mean(found.x)
     curvature = jacobian.T @ jacobian + 1e-9 * np.eye(len(slope))
