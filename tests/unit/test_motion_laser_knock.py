@@ -18,7 +18,7 @@ from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest, RingJump, find_jump
 from stages.motion.bundle_adjustment.unknowns import State
-from stages.motion.rings import NO_STEPS, BoreSteps, circles_in_rings
+from stages.motion.rings import NO_STEPS, BoreSteps, RingCircles, circles_in_rings
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.steady_laser import with_steady_laser
 from stages.motion.windows.submaps import Window
@@ -148,6 +148,20 @@ def test_rings_of_a_run_that_sways_do_not_jump() -> None:
     found = jump_in(knocked(swaying(), KNOCKED_PX, 50))
     assert found is not None
     assert found.frame == 50
+
+
+def test_a_swaying_run_does_not_jump_where_rings_are_missing() -> None:
+    """Every tenth frame withheld for a twin: across the wider gap a line leads farther off the way."""
+    run = swaying()
+    frame = np.setdiff1d(np.arange(100), np.arange(5, 100, 10))
+    sway = 1.5 * np.sin(2 * np.pi * np.stack([frame / 40, frame / 31 + 0.2], 1))
+    radius = 50 + 0.002 * np.random.default_rng(1).standard_normal(len(frame))
+    circles = RingCircles(frame, sway, radius)
+    assert find_jump(circles, 0.9 * frame, run.points, run.probe) is None
+    leapt = replace(circles, centre_c=sway + 0.5 * (frame >= 56)[:, None])
+    found = find_jump(leapt, 0.9 * frame, run.points, run.probe)
+    assert found is not None
+    assert found.frame == 56
 
 
 def test_a_weld_is_no_jump() -> None:

@@ -11,8 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import LaserKnock, RingPoints
 from pipeline.geometry.axis import to_pipe
 from pipeline.instrument.probe import Probe
@@ -111,10 +112,12 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
     shape, frame, at_seen = shape[seen], circles.frame[seen], at_mm[seen]
     if len(shape) < 4 * _SIDE:
         return None
-    jump = np.lib.stride_tricks.sliding_window_view(shape, 2 * _SIDE, axis=0) @ _jump_of_lines()
+    weight, sway = _jump_of_lines(frame)
+    jump = np.einsum("nci,ni->nc", sliding_window_view(shape, 2 * _SIDE, axis=0), weight)
     usual = 1.4826 * np.median(np.abs(jump), axis=0)
-    most = int(np.argmax(np.linalg.norm(jump / usual, axis=1)))
-    size, times, first = jump[most], float(np.linalg.norm(jump[most] / usual)), most + _SIDE
+    spreads = np.linalg.norm(jump / usual, axis=1) / sway
+    most = int(np.argmax(spreads))
+    size, times, first = jump[most], float(spreads[most]), most + _SIDE
     most_mm = _LARGEST_JUMP * circles.usual_radius_mm
     if times < _SUSPECT or not _LEAST_MM < np.linalg.norm(size) < most_mm:
         return None
@@ -208,8 +211,26 @@ def _lasting(radius_mm: Float, at_mm: Float, first: int) -> float:
     return float(np.median(radius_mm[first : first + n]) - np.median(radius_mm[max(first - n, 0) : first]))
 
 
-def _jump_of_lines() -> Float:
-    """Return the weights (2 n,) of rings in the jump between lines through n on either side."""
-    at = np.arange(_SIDE) + 0.5
-    start = np.linalg.pinv(np.stack([np.ones(_SIDE), at], 1))[0]
-    return np.concatenate([-start[::-1], start])
+def _jump_of_lines(frame: Int) -> tuple[Float, Float]:
+    """Return what rings in frames (F,) weigh in the jump between lines through those on either side.
+
+    Returns
+    -------
+    weight : (N, 2 n)
+        Of each 2 n rings in a row, by least squares.
+    sway : (N,)
+        How many times as much of a swaying way is left where rings are missing between: of its third power
+        of time, the first that lines on both sides do not share.
+    """
+    at = sliding_window_view(frame / np.median(np.diff(frame)), 2 * _SIDE)
+    at = np.vstack([np.arange(2 * _SIDE), at - at[:, :1]])
+    at = at - at[:, _SIDE - 1 : _SIDE + 1].mean(1, keepdims=True)
+    weight = np.concatenate([-_start_of_line(at[:, :_SIDE]), _start_of_line(at[:, _SIDE:])], 1)
+    left = np.einsum("ni,ni->n", weight, at**3)
+    return weight[1:], left[1:] / left[0]
+
+
+def _start_of_line(at: Float) -> Float:
+    """Return the weights (N, n) of values at places (N, n) in their fitted line's value at 0."""
+    first, second = (np.sum(at**k, 1, keepdims=True) for k in (1, 2))
+    return np.asarray((second - first * at) / (_SIDE * second - first**2))
