@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from pipeline.arrays import Int
+from pipeline.arrays import Bool, Int
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
@@ -17,9 +17,9 @@ from pipeline.recording.checks import CheckedFrames, withheld_frames
 from pipeline.recording.one_field import OneField
 from stages.premises.changes import (
     Changes,
+    LeftOut,
     interlaced,
     refuse_or_warn_of_interlacing,
-    warn_of,
     warn_of_frames,
 )
 from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
@@ -83,14 +83,8 @@ def check_premises(
     UnusableError
         When what is stated cannot be right and cannot be mended, or is not to be.
     """
-    pictures = look_at_pictures(recording, probe, context)
-    combed = interlaced(pictures)
-    if combed:
-        refuse_or_warn_of_interlacing(parameters.mend, context)
-        recording = replace(recording, source=OneField(recording.source))
-        pictures = look_at_pictures(recording, probe, context)
-    table = _table(recording)
-    seen_light = _light(recording.frames, pictures)
+    recording, pictures, combed = _progressive(recording, probe, parameters, context)
+    table, seen_light = _table(recording), _light(recording.frames, pictures)
     outside = off_the_pipe(pictures)
     astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, seen_light))
     light = np.where(astray | outside, Light.UNKNOWN, seen_light)
@@ -99,45 +93,48 @@ def check_premises(
     if stays is not None:
         pictures = look_at_pictures(recording, probe, context, stays)
     story = _story(recording.frames, table, pictures, light)
-    label = _labels(table, story, light, pictures)
-    stated, encoder = _lights_of(_stated(table, story.row)), recording.encoder
-    copy = copies(pictures, light, stated, story.row, row_times(table, story.row), encoder)
-    label = np.where(copy, _stated(table, story.row), label)
-    steps = steps_of_wall(pictures, shown, copy)
-    sway = sway_of_line(pictures, light)
-    row = rows_by_motion(story.row, steps, rhythm_of(light), table, encoder, sway)
+    copy = _copies(recording, table, pictures, light, story)
+    label = np.where(copy, _stated(table, story.row), _labels(table, story, light, pictures))
+    steps, sway = steps_of_wall(pictures, shown, copy), sway_of_line(pictures, light)
+    row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder, sway)
     stated_s = row_times(table, row)
-    jumps = clock_jumps(stated_s, steps, encoder)
-    time_s = without_jumps(stated_s, jumps)
-    changes = Changes(recording.frames, label, row, time_s)
+    jumps = clock_jumps(stated_s, steps, recording.encoder)
+    changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
+    left_out = LeftOut(outside, astray, copy)
     _refuse_unmended(changes, parameters)
     warn_of_frames(changes, pictures, np.where(outside, Light.WALL, seen_light), table, context)
-    warn_of(
-        recording.frames.frame[outside], "before the first laser line or behind the last are left out",
-        "nothing, if the probe was outside the pipe there; else see why the laser was off", context,
-    )  # fmt: skip
-    warn_of(
-        recording.frames.frame[astray], "were stored in another order than they were taken, and are left out",
-        "look whether the recorder, or what cut the video, mixes pictures up", context,
-    )  # fmt: skip
-    warn_of(
-        recording.frames.frame[copy],
-        "show the picture before once more in place of their own and are left out: the recorder hung",
-        "nothing, if what was passed meanwhile need not be seen", context,
-    )  # fmt: skip
+    left_out.warn(recording.frames.frame, context)
     radius_mm = radius_seen_mm(pictures, probe)
     check_diameter(radius_mm, recording.pipe, probe.lighting.radius_mm, context)
-    factor = encoder_factor(recording, time_s, steps, radius_mm, context)
-    warn_of_clock(jumps, time_s, recording, context)
+    factor = encoder_factor(recording, changes.time_s, steps, radius_mm, context)
+    warn_of_clock(jumps, changes.time_s, recording, context)
     _report(pictures, radius_mm, changes, context)
-    keep = np.concatenate([[True], np.diff(row) > 0]) & ~(copy | astray | outside)
+    keep = np.concatenate([[True], np.diff(row) > 0]) & ~left_out.any
     withheld = withheld_frames(label[keep], parameters.withhold)
     context.report("frames withheld from measurement", int(withheld.sum()), "frames")
     return CheckedFrames(
-        recording.frames.frame[keep], time_s[keep], label[keep], factor,
+        recording.frames.frame[keep], changes.time_s[keep], label[keep], factor,
         int(changes.relabelled.sum()), int(changes.retimed.sum()),
         withheld if withheld.any() else None, stays, combed,
     )  # fmt: skip
+
+
+def _progressive(
+    recording: Recording, probe: Probe, parameters: PremisesParameters, context: Context
+) -> tuple[Recording, Pictures, bool]:
+    """Return the recording and its pictures, of interlaced ones the even rows, and whether they were so."""
+    pictures = look_at_pictures(recording, probe, context)
+    if not interlaced(pictures):
+        return recording, pictures, False
+    refuse_or_warn_of_interlacing(parameters.mend, context)
+    recording = replace(recording, source=OneField(recording.source))
+    return recording, look_at_pictures(recording, probe, context), True
+
+
+def _copies(recording: Recording, table: FrameTable, pictures: Pictures, light: Int, story: Story) -> Bool:
+    """Return which pictures (F,) show the one before once more."""
+    stated, time_s = _lights_of(_stated(table, story.row)), row_times(table, story.row)
+    return copies(pictures, light, stated, story.row, time_s, recording.encoder)
 
 
 def _table(recording: Recording) -> FrameTable:

@@ -104,6 +104,46 @@ def refuse_or_warn_of_interlacing(mend: bool, context: Context) -> None:
     )
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """Pictures that are left out, each (F,) by its reason.
+
+    Attributes
+    ----------
+    outside
+        Taken before the first laser line, or behind the last.
+    astray
+        Stored in another order than they were taken.
+    copy
+        The one before, once more.
+    """
+
+    outside: Bool
+    astray: Bool
+    copy: Bool
+
+    @property
+    def any(self) -> Bool:
+        """(F,) true where a picture is left out."""
+        return np.asarray(self.outside | self.astray | self.copy)
+
+    def warn(self, frame: Int, context: Context) -> None:
+        """Tell which of the frames (F,) are left out, and why."""
+        warn_of(
+            frame[self.outside], "before the first laser line or behind the last are left out",
+            "nothing, if the probe was outside the pipe there; else see why the laser was off", context,
+        )  # fmt: skip
+        warn_of(
+            frame[self.astray], "were stored in another order than they were taken, and are left out",
+            "look whether the recorder, or what cut the video, mixes pictures up", context,
+        )  # fmt: skip
+        warn_of(
+            frame[self.copy],
+            "show the picture before once more in place of their own and are left out: the recorder hung",
+            "nothing, if what was passed meanwhile need not be seen", context,
+        )  # fmt: skip
+
+
 def warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
     """Tell what some pictures do, their frames and what to do; nothing without any."""
     if frame.size:

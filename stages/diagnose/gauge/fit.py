@@ -82,8 +82,7 @@ class Fit:
     @cached_property
     def reduced(self) -> Reduced:
         """The equations with the poses eliminated."""
-        at = self.linearised
-        return eliminate_poses(at.equations, at.motion, len(self.state.T_pc))
+        return eliminate_poses(self.linearised.equations, self.linearised.motion, len(self.state.T_pc))
 
 
 def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int = _ITERATIONS) -> Fit:
