@@ -86,8 +86,11 @@ def measure_depth(
 def _noise_gain(region: Region, relief: Relief) -> Float:
     """Return how many times the wall's usual noise the cells of a region (H, W) have, at least 1.
 
-    The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more.
+    The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more. That
+    the rows of a bead scatter about the pipe's smooth shape is the bead itself, and no noise.
     """
+    if region.all_round:
+        return np.ones(region.mask.shape)
     return np.asarray(np.fmax(region.cut(relief.sigma_mm) / relief.typical.sigma_mm, 1.0))
 
 
