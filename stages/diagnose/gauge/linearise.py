@@ -57,21 +57,9 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     if run.encoder is not None:
         parts.append(_encoder_part(run, run.encoder, state, terms))
     joined = {k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])}
-    return Linearised(Equations(**joined), _motion(run, state), ring_at, edge_at)
-
-
-def _motion(run: GaugeRun, state: Unknowns) -> Rows:
-    """Return what holds the poses together from the first frame that is measured to the last.
-
-    Beyond them poses would follow every step as far as it leads, by metres, and a step that gains be refused.
-    """
     smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
-    measured = np.concatenate([run.edges.frame, run.rings.frame])
-    use = np.all((smooth.frame >= measured.min()) & (smooth.frame <= measured.max()), axis=1)
-    return replace(
-        smooth, frame=smooth.frame[use], by_frame=np.ascontiguousarray(smooth.by_frame[use][..., :POSE]),
-        by_border=smooth.by_border[use], residual=smooth.residual[use], sigma=smooth.sigma[use],
-    )  # fmt: skip
+    motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
+    return Linearised(Equations(**joined), motion, ring_at, edge_at)
 
 
 def beside(run: GaugeRun, state: Unknowns, at: Linearised, model: EffectModel, shape: Shape) -> Linearised:
