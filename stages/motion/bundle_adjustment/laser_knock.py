@@ -114,7 +114,8 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
         return None
     weight, sway = _jump_of_lines(frame)
     jump = np.einsum("nci,ni->nc", sliding_window_view(shape, 2 * _SIDE, axis=0), weight)
-    usual = 1.4826 * np.median(np.abs(jump), axis=0)
+    # Rings of a picture that stands still are the same: then only rounding differs.
+    usual = np.maximum(1.4826 * np.median(np.abs(jump), axis=0), np.finfo(np.float32).eps)
     spreads = np.linalg.norm(jump / usual, axis=1) / sway
     most = int(np.argmax(spreads))
     size, times, first = jump[most], float(spreads[most]), most + _SIDE
