@@ -59,7 +59,7 @@ def measure_depth(
 
     The extreme of a noisy surface exceeds the surface's extreme. By how much, and how it scatters, is found
     by adding noise as the clean wall shows it to the smoothed surface (parametric bootstrap: Efron &
-    Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10), larger where the map's own σ is.
+    Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10), larger where the map's own noise is.
     """
     relief = surface.relief
     height = region.sign * region.cut(surface.all_mm if region.all_round else surface.local_mm)
@@ -86,12 +86,9 @@ def measure_depth(
 def _noise_gain(region: Region, relief: Relief) -> Float:
     """Return how many times the wall's usual noise the cells of a region (H, W) have, at least 1.
 
-    The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more. That
-    the rows of a bead scatter about the pipe's smooth shape is the bead itself, and no noise.
+    The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more.
     """
-    if region.all_round:
-        return np.ones(region.mask.shape)
-    return np.asarray(np.fmax(region.cut(relief.sigma_mm) / relief.typical.sigma_mm, 1.0))
+    return np.asarray(np.fmax(region.cut(relief.noise_mm) / relief.typical.sigma_mm, 1.0))
 
 
 def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:

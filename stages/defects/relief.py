@@ -37,8 +37,10 @@ class Relief:
         Without whatever goes all round: for defects of a part of the circumference.
     all_mm : (S, A)
         With welds left in.
+    noise_mm : (S, A)
+        1 σ of single cells from noise and the wall's natural roughness; NaN where nothing was seen.
     sigma_mm : (S, A)
-        1 σ of ``local_mm`` from noise and the wall's natural roughness; NaN where nothing was seen.
+        1 σ of ``local_mm``: as much, and more in rows that scatter more about the smooth shape.
     welds : tuple of slice
         Rows of all-round beads of the whole wall, counted from the first row here.
     harmonics_mm : (S, 5)
@@ -51,6 +53,7 @@ class Relief:
     radius_mm: float
     local_mm: Float
     all_mm: Float
+    noise_mm: Float
     sigma_mm: Float
     welds: tuple[slice, ...]
     harmonics_mm: Float
@@ -124,12 +127,12 @@ class WallRelief:
         measured = self.radius_map.radius_mm[rows].astype(float)
         basis = basis_of(self.radius_map.azimuth_rad)
         local = measured - self.local_shape_mm[rows] @ basis.T
-        noise = _noise(self.radius_map, rows, local)
+        noise = _noise(self.radius_map, rows, local, self.roughness_mm2)
         welds = tuple(slice(w.start - rows.start, w.stop - rows.start) for w in self.welds)
         return Relief(
             self.radius_map.distance_mm[rows], self.radius_map.azimuth_rad, self.radius_mm,
             local, measured - self.whole_shape_mm[rows] @ basis.T,
-            _sigma(local, noise, self.roughness_mm2), welds, self.whole_shape_mm[rows], self.typical,
+            noise, _sigma(local, noise), welds, self.whole_shape_mm[rows], self.typical,
         )  # fmt: skip
 
 
@@ -179,10 +182,10 @@ def _with_spread(
     basis = basis_of(radius_map.azimuth_rad)
     measured = [radius_map.radius_mm[rows].astype(float) for rows in sampled]
     rest = [m - local[rows] @ basis.T for m, rows in zip(measured, sampled, strict=True)]
-    noise = [_noise(radius_map, rows, r) for rows, r in zip(sampled, rest, strict=True)]
-    noise_mm = _median(noise)
+    noise_mm = _median([_noise(radius_map, *each) for each in zip(sampled, rest, strict=True)])
     roughness = max(0.0, (MAD_TO_SIGMA * _median([np.abs(r) for r in rest])) ** 2 - noise_mm**2)
-    sigma_mm = _median([_sigma(r, n, roughness) for r, n in zip(rest, noise, strict=True)])
+    each = zip(sampled, rest, strict=True)
+    sigma_mm = _median([_sigma(r, _noise(radius_map, rows, r, roughness)) for rows, r in each])
     typical = Typical(sigma_mm, noise_mm)
     return WallRelief(radius_map, _median(measured), local, whole, welds, roughness, typical, sampled)
 
@@ -191,19 +194,19 @@ def _median(parts: list[Float]) -> float:
     return float(np.nanmedian(np.concatenate(parts)))
 
 
-def _noise(radius_map: RadiusMap, rows: slice, local: Float) -> Float:
-    noise = radius_map.sigma_random_mm[rows].astype(float)
+def _noise(radius_map: RadiusMap, rows: slice, local: Float, roughness_mm2: float = 0.0) -> Float:
+    """Return 1 σ of cells from what was measured of their noise, and the wall's roughness."""
+    noise = np.sqrt(radius_map.sigma_random_mm[rows].astype(float) ** 2 + roughness_mm2)
     return np.where(np.isfinite(local), noise, np.nan)
 
 
-def _sigma(local: Float, noise: Float, roughness_mm2: float) -> Float:
+def _sigma(local: Float, noise: Float) -> Float:
     """Return 1 σ of cells; rows that scatter more (flanks of a bead, a ring misplaced) are trusted less."""
-    sigma = np.sqrt(noise**2 + roughness_mm2)
     measured = np.isfinite(local).any(1)
     excess = np.ones((len(local), 1))
     row = MAD_TO_SIGMA * row_median(np.abs(local[measured]))
-    excess[measured, 0] = np.maximum(row / np.sqrt(np.nanmean(sigma[measured] ** 2, 1)), 1.0)
-    return np.asarray(sigma * excess)
+    excess[measured, 0] = np.maximum(row / np.sqrt(np.nanmean(noise[measured] ** 2, 1)), 1.0)
+    return np.asarray(noise * excess)
 
 
 def _in_bands(bands: tuple[slice, ...], count: int) -> Bool:

@@ -23,7 +23,7 @@ def relief() -> Relief:
     azimuth = np.linspace(-np.pi, np.pi, _COLUMNS, endpoint=False)
     distance = 0.5 * np.arange(_ROWS)
     harmonics, typical = np.zeros((_ROWS, 5)), Typical(0.02, 0.02)
-    return Relief(distance, azimuth, _RADIUS_MM, flat, flat, flat + 0.02, (), harmonics, typical)
+    return Relief(distance, azimuth, _RADIUS_MM, flat, flat, flat + 0.02, flat + 0.02, (), harmonics, typical)
 
 
 def points(height_mm: float, rows_apart: float = 0.5, skew: float = 0.0) -> DeviationPoints:
@@ -97,7 +97,7 @@ def test_where_the_map_is_less_sure_noise_adds_more_to_a_depth() -> None:
     cloud = PointCloud(*[np.zeros((0, 3), np.float32)] * 2, *[np.zeros(0, np.float32)] * 4, np.zeros(0, int))
 
     def measured(times: float):  # type: ignore[no-untyped-def]
-        wall = replace(relief(), sigma_mm=np.where(dent > 0, 0.02 * times, 0.02))
+        wall = replace(relief(), noise_mm=np.where(dent > 0, 0.02 * times, 0.02))
         surface = Surface(wall, dent, dent, dent, cloud, points(0.0))
         return measure_depth(region, surface, clean, 200, np.random.default_rng(2))
 
