@@ -125,7 +125,7 @@ def _laser(probe: Probe) -> dict[str, dict[str, float | str | None]]:
     sigma = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
     sigma[1] = sigma[1] if values[0] > sigma[0] else np.nan
     return {
-        name: {"value": float(v), "sd": float(s) if np.isfinite(s) else None, "unit": unit}
+        name: {"value": float(v), "sigma": float(s) if np.isfinite(s) else None, "unit": unit}
         for (name, unit), v, s in zip(_TERMS, values, sigma, strict=True)
     }
 

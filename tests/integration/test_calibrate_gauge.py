@@ -56,7 +56,7 @@ def test_document_and_page_say_what_moved(calibration: Path) -> None:
     assert document["radius_error"][0]["before_largest_mm"] > 0.9
     assert document["radius_error"][0]["sigma_mm"] < 0.01
     tilt = document["laser"]["tilt_deg"]
-    assert abs(tilt["value"] - 0.6) < 3 * tilt["sd"] < 0.05
+    assert abs(tilt["value"] - 0.6) < 3 * tilt["sigma"] < 0.05
     gauge = open_recording(shared("recordings", "open-2-gauge")).content_key
     assert document["made_by"]["input_sha256"]["recording"] == gauge
     _, source = read_with_source(calibration / "probe.yaml")

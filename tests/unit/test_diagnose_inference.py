@@ -18,9 +18,9 @@ from stages.diagnose.gauge.elimination import (
 )
 from stages.diagnose.gauge.feasible import expected_gain
 from stages.diagnose.gauge.formula import APART, joint_p
-from stages.diagnose.gauge.other_growth import odds_in
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import NAMELESS
+from stages.diagnose.gauge.unknown_laws import odds_in
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
 
 FRAMES, GLOBALS = 9, 5

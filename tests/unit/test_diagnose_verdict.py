@@ -48,7 +48,7 @@ def examined(
             confirmed=confirmed,
             unsplit=each,
             quality=quality,
-            other_growth=(grown,) * len(library),
+            unknown_laws=(grown,) * len(library),
         ),
     )
 

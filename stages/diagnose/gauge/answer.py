@@ -53,7 +53,7 @@ def chances(examined: Examined) -> tuple[float, ...]:
     patterns = best.fit.terms[len(best.library_terms) :]
     left = max((shift_px(best.fit, t) for t in patterns), default=0.0)
     others = better_held_out(verdicts)
-    each = zip(best.library_terms, examined.unsplit, examined.confirmed, examined.other_growth, strict=False)
+    each = zip(best.library_terms, examined.unsplit, examined.confirmed, examined.unknown_laws, strict=False)
     out = []
     for term, alike, confirmed, grown in each:
         doubt = everywhere + len(alike) + sum(not c.agrees for c in confirmed)
@@ -97,7 +97,7 @@ def unknown_rivals(examined: Examined) -> tuple[str, ...]:
 def growing_otherwise(examined: Examined) -> tuple[str, ...]:
     """Return for each name that a law which nobody knows leaves unsure what that law would be like."""
     best = examined.best
-    each = zip(best.library_terms, examined.other_growth, strict=True) if best is not None else ()
+    each = zip(best.library_terms, examined.unknown_laws, strict=True) if best is not None else ()
     unsure = dict.fromkeys(t.model.law for t, odds in each if odds > 1 - SURE)
     return tuple(f"one like {law} that grows otherwise with the radius" for law in unsure)
 
@@ -180,5 +180,5 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.PARTLY
     # A class of effects would leave out what nobody knows.
     known = any(examined.unsplit) or not unknown_rivals(examined)
-    known &= all(odds < 1 for odds in examined.other_growth)
+    known &= all(odds < 1 for odds in examined.unknown_laws)
     return Verdict.CLASS if best.named and known else Verdict.UNEXPLAINED

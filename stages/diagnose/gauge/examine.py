@@ -25,10 +25,10 @@ from stages.diagnose.gauge.formula import ADEQUATE, pattern_of, patterns_by_chan
 from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.hypotheses import Judged, judged_of, regimes_of
 from stages.diagnose.gauge.judge import Verdicts, judge
-from stages.diagnose.gauge.other_growth import excess_exponent, odds_of_unknown_laws
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
 from stages.diagnose.gauge.sets import believed
+from stages.diagnose.gauge.unknown_laws import excess_exponent, odds_of_unknown_laws
 from stages.diagnose.inference import Stated, stated_belief
 from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
@@ -99,9 +99,8 @@ class Examined:
         size.
     location : Location or None
     quality : FitQuality or None
-    other_growth : tuple of float
-        For each of the same terms the odds, beside its name, of a law that nobody knows and that grows
-        otherwise with the radius.
+    unknown_laws : tuple of float
+        For each of the same terms the odds, beside its name, of laws that nobody knows.
     patterns_by_chance : float
         How often what patterns without a cause take up is expected when nothing is hidden.
     """
@@ -115,7 +114,7 @@ class Examined:
     location: Location | None = None
     quality: FitQuality | None = None
     sizes: tuple[Sized, ...] = ()
-    other_growth: tuple[float, ...] = ()
+    unknown_laws: tuple[float, ...] = ()
     patterns_by_chance: float = 1.0
 
     @property
@@ -194,7 +193,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
         confirmed=confirmations(run, best, regimes, terms, stated) if terms else (),
         unsplit=unsplit,
         sizes=sizes_of(run, best, stated, alike) if terms else (),
-        other_growth=odds_of_unknown_laws(run, best, stated, ratio, laws),
+        unknown_laws=odds_of_unknown_laws(run, best, stated, ratio, laws),
         location=location_of(run, shown, stated, ratio),
         quality=fit_quality(run, nothing, shown, regimes, stated),
     )

@@ -1,4 +1,4 @@
-"""Laws that nobody knows and that are like a named one: they grow otherwise with the radius.
+"""Laws that nobody knows, in the place of one name or of several: they grow otherwise with the radius.
 
 A name says how an effect grows from the middle of the picture outward. A law that the library lacks may pass
 for it as long as measurements leave that growth open. So each name is held against its own law times a free
