@@ -198,7 +198,7 @@ def warn_of_held(held: HeldOver, context: Context) -> None:
     context.report("likeness of neighbouring rings in what is finest", alike, "")
     if alike > _MOST_ALIKE:
         context.warn(
-            f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure, where sound "
+            f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure, where good "
             "recordings share 16 % at most: the codec shows old light again. σ of the radius holds it, but "
             "findings are less sure than stated: single ones may be false, and depths of small pits too "
             "shallow. What to do: look at the picture of every finding, record with less compression"

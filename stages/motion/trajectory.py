@@ -29,7 +29,7 @@ takes the rest. In open-1-field, mirrored, 0.45."""
 _TOO_FAR = 5.0
 """A right probe moves farther than so many σ along one of its ten or so directions once in 10⁵ recordings."""
 _MOST_LOST = 0.05
-"""Share of the lit frames without enough texture that is told; sound recordings have none. Not measured."""
+"""Share of the lit frames without enough texture that is told; good recordings have none. Not measured."""
 _MOST_LASTING = 0.57
 """Reprojection error, in σ of matching, shared by a landmark's neighbouring matches, that is told: .44 to
 .51 in open-1, open-2, at half their size, shaken, and in a scene of ours; .18 in open-3, of much noise;
@@ -176,7 +176,7 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, c
     if lasting > _MOST_LASTING:
         context.warn(
             f"matches of texture contradict the motion by {lasting:.1f} times their σ, alike in neighbouring "
-            "pictures, where sound recordings have 0.5 at most: reflections, compression or lights that move "
+            "pictures, where good recordings have 0.5 at most: reflections, compression or lights that move "
             "with the probe are taken for the wall. Distance and roll may be off by more than their σ; that "
             "of radii holds by how much the probe was moved. What to do: compare distance and diameter with "
             "known ones, record with less compression"

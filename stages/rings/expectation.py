@@ -1,4 +1,4 @@
-"""What the rings of a sound recording look like, and what is said of one whose rings do not."""
+"""What the rings of a good recording look like, and what is said of one whose rings do not."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from pipeline.machine.stage import Context
 from pipeline.pages import notation
 
 _NOT_THE_LINE = (RingValidity.GLINT, RingValidity.GHOST, RingValidity.OUTLIER, RingValidity.WIDTH)
-# Share of such samples. Sound recordings (the three open ones) have 0.06 % at most, seven glints a frame make
+# Share of such samples. Good recordings (the three open ones) have 0.06 % at most, seven glints a frame make
 # 2.2 %: the geometric middle.
 _MOST_NOT_THE_LINE = 0.004
-# Share of the line that is lost in any other way: 0 in sound recordings. Chosen: from here on a pit of some
+# Share of the line that is lost in any other way: 0 in good recordings. Chosen: from here on a pit of some
 # millimetres may lie unseen.
 _MOST_UNSEEN = 0.02
 # Part of the rings in which an azimuth shows no line, and how far around, from which the sector is named:
@@ -22,7 +22,7 @@ _MOST_UNSEEN = 0.02
 _HIDDEN, _HIDDEN_RAD = 0.5, np.radians(1.0)
 # Hidden parts nearer to each other than an hour of the clock have one cause and are told together.
 _ONE_SECTOR_RAD = np.radians(30.0)
-# Wander in line widths. Speckle and texture leave 0.06 to 0.10 in sound recordings, crf 30 makes 0.15: the
+# Wander in line widths. Speckle and texture leave 0.06 to 0.10 in good recordings, crf 30 makes 0.15: the
 # middle of both.
 _MOST_WANDER = 0.12
 _NAMED_FRAMES = 8
@@ -32,7 +32,7 @@ def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context
     """Warn where frames have no ring, a sector shows no line, or the line is not what it should be.
 
     ``stepped`` says that the wall is a gauge's: its steps and fiducials break the line by design (0.7 to 2.4
-    % of it in the sound gauge of open-1), so that the shares of broken line say nothing there.
+    % of it in the good gauge of open-1), so that the shares of broken line say nothing there.
     """
     rejected = samples.validity == RingValidity.FRAME_REJECTED
     ring = ~rejected.all(1)
@@ -53,7 +53,7 @@ def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context
     if wander_px > _MOST_WANDER * width:
         context.warn(
             f"the line wanders by {wander_px:.2f} px beyond its noise, {wander_px / width:.2f} of its width, "
-            "where sound recordings have 0.1 at most: strong compression, interlacing or coarse speckle. σ "
+            "where good recordings have 0.1 at most: strong compression, interlacing or coarse speckle. σ "
             "holds it; small defects may be missed. What to do: record with less compression"
         )
 
@@ -65,14 +65,14 @@ def _warn_of_shares(validity: Byte, context: Context) -> None:
     if validity.size and unseen.mean() > _MOST_UNSEEN:
         context.warn(
             f"{100 * unseen.mean():.1f} % of the ring samples show no line that could be measured: it is too "
-            "faint or clipped, or there is no wall (a branch, an open joint); sound recordings lose none. "
+            "faint or clipped, or there is no wall (a branch, an open joint); good recordings lose none. "
             "What to do: look where wall is missing in the model; else set the exposure of the laser frames "
             "anew, clean window and laser"
         )
     if validity.size and other.mean() > _MOST_NOT_THE_LINE:
         context.warn(
             f"{100 * other.mean():.1f} % of the ring samples show light that is not the line: glints, "
-            "ghosts, splashes or compression, where sound recordings have 0.1 % at most. They are left out; "
+            "ghosts, splashes or compression, where good recordings have 0.1 % at most. They are left out; "
             "what looks like a line may pass for a finding of one or two rings. What to do: clean the "
             "window, shade reflections, expose the laser frames less; look at the findings' pictures"
         )

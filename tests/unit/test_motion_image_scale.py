@@ -75,7 +75,7 @@ def test_a_little_change_of_the_rings_may_be_either() -> None:
 
 @pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])
 def test_what_drifts_goes_one_way(course: tuple[float, ...], told: bool) -> None:
-    """Grooves of a gauge left a course up and down in a sound probe, 6 σ from a steady scale."""
+    """Grooves of a gauge left a course up and down in a healthy probe, 6 σ from a steady scale."""
     drift = drift_in()[0]
     assert not drift.told
     assert replace(drift, at_frames=GROWS * np.array(course), p_steady=1e-9).told == told

@@ -1,4 +1,4 @@
-"""Rings unlike those of a sound recording are warned of by what is wrong with them; sound ones are not."""
+"""Rings unlike those of a good recording are warned of by what is wrong with them; sound ones are not."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ _MAY_BE_P = 1e-3
 """Chance above which the rings' course may all be due to the scale: that of 3 σ."""
 _ONE_WAY = 0.5
 """Share of its range by which a scale that drifts must have changed from first to last: what warms up or
-comes loose goes one way. Grooves of a gauge left a fifth in a sound probe (a01), drifts have 0.9."""
+comes loose goes one way. Grooves of a gauge left a fifth in a healthy probe (a01), drifts have 0.9."""
 _LARGE = 0.01
 """Course, relative, from which it is not taken out. One of 0.8 % was, within its σ; at 1 % over 80 mm the
 rings' change was taken for a step of the bore. A pipe full of water came to 7 %."""

@@ -27,7 +27,7 @@ _SIDE = 3
 """Rings on either side through which a line is laid; the jump is that of the lines between the two. With five
 the sway of open-1's probe counts four times as much."""
 _SUSPECT, _LEAST_MM = 10.0, 0.1
-"""Jump that is looked into, in spreads of such differences and in mm: sound recordings show 3 to 4 (open-1,
+"""Jump that is looked into, in spreads of such differences and in mm: good recordings show 3 to 4 (open-1,
 a01, a10), a weld 168 (open-2), after which the radius is what it was. A choice."""
 _LARGEST_JUMP = 0.1
 """Share of the radius beyond which a jump is another bore: in gauges and reducers they differ by a fifth

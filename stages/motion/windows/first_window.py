@@ -36,7 +36,7 @@ _MOST_SHARED_PX = 2.0
 """Where matches disagree by more, the parameter's own limit holds."""
 _ROUNDS, _NOISIER = 4, 1.5
 """Times that the noise of readings is looked at again while it is half as large again as taken: the poses
-follow readings that are believed too much. Sound recordings show 0.5 to 1.2 times what is taken (open-1 to
+follow readings that are believed too much. Good recordings show 0.5 to 1.2 times what is taken (open-1 to
 open-3, a05)."""
 
 
