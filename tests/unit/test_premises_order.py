@@ -9,9 +9,10 @@ import pytest
 
 from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light, Steps, rows_by_motion, sway_of_line
-from stages.premises.pictures import Pictures
+from stages.premises.pictures import Pictures, look_at_pictures
 from tests.drawn_run import drawn_run
 from tests.premises_run import COUNT, STEP_MM, checked, good_recording, steady_run, with_rings
+from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 from tests.spoiled_recordings import (
     KeptFrames,
@@ -182,14 +183,26 @@ def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
     assert "before the first laser line or behind the last" in told[0]
 
 
-def test_pictures_without_texture_tell_no_order(good, run):
+@pytest.fixture(scope="module")
+def smooth(good, run):
+    """The recording as if the lit wall had no texture, but noise."""
     random = np.random.default_rng(3)
     lit = set(good.frames.frame[good.frames.illumination == "led"].tolist())
-    smooth = {
+    shown = {
         k: np.clip(90 + 2 * random.standard_normal(i.shape), 0, 255).astype(np.uint8) if k in lit else i
         for k, i in good.source.images.items()
     }
-    spoiled = replace(good, source=MemorySource(smooth, run.probe.camera.image_size))
-    found, told = checked(spoiled, run.probe)
+    return replace(good, source=MemorySource(shown, run.probe.camera.image_size))
+
+
+def test_pictures_without_texture_tell_no_order(smooth, run):
+    found, told = checked(smooth, run.probe)
     assert found.frame.tolist() == list(range(COUNT))
     assert not told
+
+
+def test_pictures_without_texture_tell_no_motion(smooth, good, run):
+    lit = good.frames.illumination == "led"
+    moved, none = (look_at_pictures(r, run.probe, quiet_context()).step[lit] for r in (good, smooth))
+    assert np.isfinite(moved).mean() > 0.9, "the control: texture tells it"
+    assert not np.isfinite(none).any()
