@@ -24,6 +24,7 @@ from pipeline.recording.base import (
 )
 from pipeline.recording.checks import common_frames, encoder_warnings
 from pipeline.recording.images import ImageSequence, is_pattern, open_images
+from pipeline.recording.rounded_stamps import without_rounding
 from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
 from pipeline.recording.video import VideoSource, open_video
 
@@ -228,7 +229,9 @@ class FolderParts:
 def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Recording:
     """Return the recording that a description and what was read make; raises `InputError`."""
     described = describe(section)
-    frames, mended = _match(frames_file, parts.table, parts.source)
+    rate = section.number("frame_rate", above=0)
+    table, rounded = without_rounding(frames_file, parts.table, rate)
+    frames, mended = _match(frames_file, table, parts.source)
     return Recording(
         name=described.name,
         kind=described.kind,
@@ -236,15 +239,15 @@ def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Record
         frames=frames,
         encoder=parts.encoder,
         pipe=described.pipe,
-        frame_rate=section.number("frame_rate", above=0),
+        frame_rate=rate,
         source=parts.source,
         probe_file=described.probe_file,
         content_key=content_key(parts.files),
         warnings=(
-            *described.warnings, *parts.warnings, *mended, *encoder_warnings(parts.encoder, frames)
+            *described.warnings, *parts.warnings, *rounded, *mended, *encoder_warnings(parts.encoder, frames)
         ),
         files=parts.files,
-        listed=parts.table,
+        listed=table,
         inspection=described.inspection,
         imu=parts.imu,
     )  # fmt: skip

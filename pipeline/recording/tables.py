@@ -30,7 +30,7 @@ _KINDS = tuple(k.value for k in Illumination)
 
 
 def read_frame_table(file: Path) -> FrameTable:
-    """Read ``frame,time_s,illumination``; frame numbers and times must rise.
+    """Read ``frame,time_s,illumination``; frame numbers must rise, times must not run backwards.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def frame_table(file: Path, text: str) -> FrameTable:
     if not frame:
         raise InputError(file, "lists no frames", expected="one line a frame")
     refuse_backward(file, frame, "frame", strictly=True)
-    refuse_backward(file, time_s, "time_s", strictly=True)
+    refuse_backward(file, time_s, "time_s", strictly=False)
     return FrameTable(np.array(frame, np.int64), np.array(time_s), np.array(illumination, np.str_))
 
 

@@ -54,7 +54,7 @@ def warn_of_frames(
     frame, lost = changes.frames.frame, changes.lost()
     if lost:
         context.warn(
-            f"{sum(n for _, n in lost)} pictures were lost without frames.csv knowing: before "
+            f"{_pictures(sum(n for _, n in lost))} lost without frames.csv knowing: before "
             f"{_listed([f'frame {f} ({n})' for f, n in lost])}. Times and lights of the "
             f"{changes.retimed.sum()} frames behind were taken from the rows that belong to them. What to "
             "do: nothing, if the recorder is known to drop frames; else correct frames.csv"
@@ -62,8 +62,8 @@ def warn_of_frames(
     wrong = frame[changes.relabelled & ~changes.retimed]
     if wrong.size:
         context.warn(
-            f"the illumination in frames.csv is not what {len(wrong)} pictures show: frame {_listed(wrong)}. "
-            "The pictures are believed. What to do: correct the column illumination"
+            f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. The "
+            "pictures are believed. What to do: correct the column illumination"
         )
     again = frame[np.diff(changes.row, prepend=-1) < 1]
     left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
@@ -72,11 +72,11 @@ def warn_of_frames(
             f"the video ends early: frames.csv lists {left} of {len(table.frame)} frames more than there are "
             "pictures. Only what was filmed is measured. What to do: copy the video again, it may be cut off"
         )
-    warn_of(again, "repeat the picture before and are left out", "nothing, or repair the recorder", context)
-    warn_of(frame[~pictures.seen], "cannot be decoded", "copy the video again", context)
+    warn_of(again, "left out: the one before repeated", "nothing, or repair the recorder", context)
+    warn_of(frame[~pictures.seen], "not to be decoded", "copy the video again", context)
     dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
     warn_of(
-        frame[dark], "show neither a closed laser line in the dark nor a lit wall, and count as stated",
+        frame[dark], "with neither a closed laser line in the dark nor a lit wall, counted as stated",
         "look at them: a covered lens, a lamp that failed, daylight", context,
     )  # fmt: skip
 
@@ -130,24 +130,28 @@ class LeftOut:
     def warn(self, frame: Int, context: Context) -> None:
         """Tell which of the frames (F,) are left out, and why."""
         warn_of(
-            frame[self.outside], "before the first laser line or behind the last are left out",
+            frame[self.outside], "left out: taken before the first laser line or behind the last",
             "nothing, if the probe was outside the pipe there; else see why the laser was off", context,
         )  # fmt: skip
         warn_of(
-            frame[self.astray], "were stored in another order than they were taken, and are left out",
+            frame[self.astray], "left out: stored in another order than taken",
             "look whether the recorder, or what cut the video, mixes pictures up", context,
         )  # fmt: skip
         warn_of(
             frame[self.copy],
-            "show the picture before once more in place of their own and are left out: the recorder hung",
+            "left out: the one before shown once more, as the recorder hung",
             "nothing, if what was passed meanwhile need not be seen", context,
         )  # fmt: skip
 
 
 def warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
-    """Tell what some pictures do, their frames and what to do; nothing without any."""
+    """Tell what is with some pictures, their frames and what to do; nothing without any."""
     if frame.size:
-        context.warn(f"{len(frame)} pictures {what}: frame {_listed(frame)}. What to do: {hint}")
+        context.warn(f"{_pictures(len(frame))} {what}: frame {_listed(frame)}. What to do: {hint}")
+
+
+def _pictures(count: int) -> str:
+    return f"{count} picture{'s' * (count != 1)}"
 
 
 def _listed(names: Sequence[str] | Int) -> str:

@@ -143,7 +143,7 @@ def test_laser_and_led_taken_for_each_other_are_put_right(
     for stage in ("premises", "rings"):
         told = boresight("run", recording, "-o", tmp_path / "run", "--only", stage, *QUICK)
         assert told.code == 0, told.err
-    assert "is not what 24 pictures show: frame 0, 1, 2" in told.err
+    assert "24 pictures in another light than frames.csv states: frame 0, 1, 2" in told.err
     assert counts(tmp_path / "run", "rings")["ring samples rejected: frame_rejected"] == 0
 
 

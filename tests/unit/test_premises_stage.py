@@ -66,7 +66,7 @@ def test_a_loss_that_leaves_the_rhythm_whole_is_seen_by_the_motion(good, run):
     lights, times = spoiled.wrong(found)
     assert lights == 0
     assert times <= 1  # before or after the laser picture between the two of the wall
-    assert "2 pictures were lost" in told[0]
+    assert "2 pictures lost" in told[0]
 
 
 def test_the_frame_from_which_they_were_lost_is_named(good, run):

@@ -54,6 +54,14 @@ def test_what_is_wrong_is_named(rows: slice, columns: slice, reason: RingValidit
     assert text.count("What to do") == 1
 
 
+def test_of_coarse_pictures_the_pixels_are_blamed_not_the_window() -> None:
+    rings = spoilt(slice(None), slice(-5, None), RingValidity.NO_LINE)
+    coarse = replace(rings, width_px=np.full((RINGS, AZIMUTHS), 0.43, np.float32))
+    text = told(coarse, wander_px=0.01)
+    assert "the line is 0.43 px wide" in text
+    assert text.count("What to do") == 1
+
+
 def test_hidden_parts_near_to_each_other_are_told_together() -> None:
     rings = spoilt(slice(None), slice(-5, None), RingValidity.NO_LINE)
     rings.validity[:, 10:15] = RingValidity.GHOST

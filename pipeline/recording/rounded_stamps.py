@@ -1,0 +1,82 @@
+"""Stamps of frames that were rounded until some are equal: 0.1, 0.1, 0.1, 0.2, ..."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.errors import InputError
+from pipeline.recording.base import FrameTable
+
+# Rounding moves a stamp by half a unit; a line laid through many rounded stamps is off by less than a tenth.
+# Their errors are those of a saw: the line's slope may be off by some of the σ of independent ones.
+_WITHIN_UNITS, _SIGMAS = 0.6, 3.0
+# A unit of time is longer than a frame by a tenth at least, else rounding makes no two stamps equal. It holds
+# at most half as many frames again as the stated rate says, and one: a clock that stood still holds more.
+_SHORTEST, _LONGEST = 1.1, 1.5
+# Stamps are multiples of their unit but for the digits of a float.
+_EXACT = 1e-6
+
+
+def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameTable, tuple[str, ...]]:
+    """Return a table whose times rise strictly, and what was noticed: equal stamps, if rounded, are parted.
+
+    Times are those of an even rhythm where it lies within the rounding of all stamps, else frames with equal
+    stamps share the time that rounds to these evenly. ``rate`` is the stated frame rate, 1/s.
+
+    Raises
+    ------
+    InputError
+        At the first of equal stamps that no rounding explains.
+    """
+    step = np.diff(table.time_s)
+    if np.all(step > 0):
+        return table, ()
+    unit_s = float(step[step > 0].min()) if np.any(step > 0) else np.inf
+    in_units = (table.time_s - table.time_s[0]) / unit_s
+    count = np.unique(table.time_s, return_counts=True)[1]
+    whole = np.allclose(in_units, np.rint(in_units), rtol=0, atol=_EXACT * max(float(in_units[-1]), 1.0))
+    held = rate * unit_s
+    if not (np.isfinite(held) and whole and held > _SHORTEST and count.max() <= _LONGEST * held + 1):
+        _refuse(file, table, int(count.max()))
+    even = _even_rhythm(table, unit_s, 1 / rate)
+    time_s, how = (
+        (_shared(table.time_s, unit_s), "share it evenly") if even is None else (even, "go on evenly")
+    )
+    return replace(table, time_s=time_s), (
+        f"the {file.name}'s times are rounded to {unit_s:.3g} s, and up to {count.max()} frames have the same: "
+        f"they are taken to {how}. What to do: write time_s with three decimals at least",
+    )
+
+
+def _even_rhythm(table: FrameTable, unit_s: float, stated_s: float) -> Float | None:
+    """Return the even times (N,) of which all stamps are rounded, None where there are none.
+
+    It has the stated period where the stamps do not tell another: in few seconds they tell little.
+    """
+    place = table.frame - table.frame.mean()
+    fitted_s = float(place @ table.time_s / (place @ place))
+    sigma_s = unit_s / np.sqrt(12 * float(place @ place))
+    period_s = stated_s if abs(fitted_s - stated_s) < _SIGMAS * sigma_s else fitted_s
+    even = table.time_s.mean() + period_s * place
+    return np.asarray(even) if np.abs(even - table.time_s).max() < _WITHIN_UNITS * unit_s else None
+
+
+def _shared(time_s: Float, unit_s: float) -> Float:
+    """Return times (N,) at which those with one stamp share the unit about it."""
+    _, first, index, count = np.unique(time_s, return_index=True, return_inverse=True, return_counts=True)
+    place = (np.arange(len(time_s)) - first[index] + 0.5) / count[index]
+    return np.asarray(time_s + (place - 0.5) * unit_s)
+
+
+def _refuse(file: Path, table: FrameTable, most: int) -> None:
+    i = int(np.flatnonzero(np.diff(table.time_s) <= 0)[0])
+    stands = f"{table.time_s[i]:g}"
+    raise InputError(
+        file, f"time_s goes from {stands} to {stands}; up to {most} frames have one time",
+        place=f"reading {i + 2}", expected="time_s that rises, with three decimals at least",
+        hint="write the times as the camera stamped them, or cut the recording where its clock stood",
+    )  # fmt: skip
