@@ -15,10 +15,12 @@ from stages.diagnose.gauge.elimination import (
     Part,
     eliminate_globals,
     eliminate_poses,
+    of_no_edge,
 )
 from stages.diagnose.gauge.feasible import expected_gain
 from stages.diagnose.gauge.formula import APART, joint_p
 from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.gauge.sets import NAMELESS
 from stages.diagnose.gauge.unknown_laws import odds_in
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
@@ -35,7 +37,7 @@ def equations(random: np.random.Generator, rows: int = 200) -> Equations:
     return Equations(
         random.integers(0, FRAMES, rows), random.normal(size=(rows, 6)), by_global,
         random.normal(size=rows), random.uniform(0.5, 2, rows), random.integers(0, 30, rows), kind,
-        random.uniform(0, 60, (rows, 2)),
+        random.uniform(0, 60, (rows, 2)), *of_no_edge(rows),
     )  # fmt: skip
 
 
@@ -80,6 +82,26 @@ def test_eliminating_poses_and_globals_is_dense_least_squares():
     assert left.information == pytest.approx(kept.T @ kept, rel=1e-6)
     assert left.right == pytest.approx(-kept.T @ rest, rel=1e-6, abs=1e-6)
     assert misfit == pytest.approx(rest @ rest, rel=1e-8)
+
+
+def test_edges_that_few_measurements_see_are_eliminated_as_dense_globals_are():
+    random = np.random.default_rng(8)
+    dense_rows, m = equations(random), motion(random)
+    seen = dense_rows.kind == 0
+    edge = np.where(seen, random.integers(1, 4, len(seen)), -1)
+    by_edge = np.where(seen, dense_rows.by_global[np.arange(len(seen)), edge], 0.0)
+    few = replace(
+        dense_rows, by_global=dense_rows.by_global[:, [0, 4]], edge=edge, by_edge=by_edge, edges=slice(1, 4)
+    )
+    dense_rows.by_global[:, 1:4] = np.where(edge[:, None] == [1, 2, 3], by_edge[:, None], 0.0)
+    told = []
+    for e in (dense_rows, few):
+        reduced, none = eliminate_poses(e, m, FRAMES), np.zeros(3)
+        left, _ = eliminate_globals(reduced, OwnUnknowns(np.arange(1, 4), none, none, none))
+        spread, _ = score_inflation(e, reduced, left, np.arange(1, 4), np.array([-1, 0]), np.eye(1))
+        told.append((left.information, left.right, reduced.misfit, spread))
+    for sparse, full in zip(*told[::-1], strict=True):
+        assert sparse == pytest.approx(full, rel=1e-9)
 
 
 def test_a_part_with_frames_unseen_can_still_be_eliminated():

@@ -13,10 +13,11 @@ from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge import fit as fitting
 from stages.diagnose.gauge.confirm import Sized, partial_of, quantities
-from stages.diagnose.gauge.elimination import Reduced, score_inflation
+from stages.diagnose.gauge.elimination import Reduced
 from stages.diagnose.gauge.fit import Fit
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import freed
+from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.gauge.unknown_laws import OtherGrowth
 from stages.diagnose.inference import Column, Evidence, Stated
 from tests.unit.test_diagnose_inference import FRAMES, GLOBALS, equations

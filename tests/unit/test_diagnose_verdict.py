@@ -10,7 +10,9 @@ from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.run import warn_of_knock
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.confirm import passes_again
+from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Unfitted
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import Member
 from stages.diagnose.result import Confirmation, FitQuality, Verdict
 
@@ -81,6 +83,16 @@ def examined(
 def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict, monkeypatch):
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     assert answer.verdict_of(seen) is verdict
+
+
+@pytest.mark.parametrize(("sizes", "possible"), [((-0.1, 0.01), True), ((-0.1, -0.01), False), ((), True)])
+def test_a_hypothesis_is_possible_only_where_all_its_sizes_are(sizes, possible):
+    # No exposure is shorter than none; a baseline may be off either way.
+    baseline, blur = LIBRARY["baseline"], LIBRARY["motion_blur"]
+    each = zip((baseline, blur), sizes, strict=False)
+    terms = tuple(Term(m, (), np.full(len(m.amplitudes), size)) for m, size in each)
+    fit = cast(Any, SimpleNamespace(terms=terms))
+    assert Judged(fit, cast(Any, None), (), 0.0, 0.0, 0.0).possible is possible
 
 
 @pytest.mark.parametrize(

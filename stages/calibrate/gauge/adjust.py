@@ -36,7 +36,7 @@ _CONVERGED_SIGMA = 0.02
 # With loose motion only the poses are of interest. Frames that see little wander to and fro with it, and the
 # instrument by .1 to .8 of its σ, until all iterations are used up. Derived: the adjustment that follows then
 # starts within 1 σ; it ends where it did but for .05 σ (open-2's gauge).
-_NEAR_SIGMA = 0.5
+NEAR_SIGMA = 0.5
 # Frames that third differences of the motion tie together.
 _REACH = 3
 _CAUCHY = 2.5
@@ -218,7 +218,7 @@ def solve(
 
     ``watch`` is called before every step of an adjustment.
     """
-    state = adjust(start, measured, parameters, watch, enough=_NEAR_SIGMA).state
+    state = adjust(start, measured, parameters, watch, enough=NEAR_SIGMA).state
     on_bore = source.on_bore(state.T_pc, state.probe, parameters)
     measured = replace(measured, rings=on_bore, smooth_sigma=third_difference_sigma(state.T_pc, posed))
     smooth = adjust(state, measured, parameters, watch)

@@ -23,11 +23,11 @@ from stages.diagnose.gauge.elimination import (
     Reduced,
     eliminate_globals,
     eliminate_poses,
-    score_inflation,
 )
 from stages.diagnose.gauge.linearise import asking, beside, linearise
 from stages.diagnose.gauge.points import BASELINE_SIGMA_PX, BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
+from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, instrument_information
 
 _CONVERGED = 0.5
@@ -111,24 +111,25 @@ def fit_beside(
 
 def _minimised(found: Fit, iterations: int, worth: float) -> Fit:
     """Return the fit after so many steps, or where no step gains or the cost cannot come to ``worth``."""
+    settled = False
     for _ in range(iterations):
         prior, pull, _ = _prior(found.state, found.terms, found.run)
         information = found.reduced.information + prior
         downhill = found.reduced.right - pull
         step = np.asarray(np.linalg.solve(information, downhill), np.float64)
         promised = float(step @ downhill)
-        little = promised < _CONVERGED
-        if (little and _still(found)) or found.cost - _AT_MOST * promised > worth:
+        little, still = promised < _CONVERGED, _still(found)
+        if (little and still) or found.cost - _AT_MOST * promised > worth:
             break
-        # Where only poses are left to move, a shorter step gains nothing that a full one does not.
-        better = _shortened(found.run, found, step, _PARTS[:1] if little else _PARTS)
-        if better is None and _still(found):
-            return found
+        # Where poses are left to move, a shorter step gains nothing that a full one does not.
+        better = _shortened(found.run, found, step, _PARTS if still and not little else _PARTS[:1])
+        if better is None and (still or settled):
+            break
         if better is None:
-            # What poses gain by a far step is only promised by their equations: it is taken, and looked at.
-            found = _at(found.run, *_moved(found, 0.0 * step))
+            # What poses gain by a far step is only promised: it is taken once, and looked at.
+            found, settled = _at(found.run, *_moved(found, 0.0 * step)), True
             continue
-        gain, found = found.cost - better.cost, better
+        gain, found, settled = found.cost - better.cost, better, False
         if gain < _CONVERGED:
             break
     return found
@@ -184,7 +185,7 @@ def _reduced(
 ) -> Evidence:
     """Return the evidence of equations, all but the shared columns eliminated."""
     reduced = eliminate_poses(equations, motion, len(found.state.T_pc))
-    own = own_unknowns(run, found, equations.by_global.shape[1])
+    own = own_unknowns(run, found, equations.size)
     left, misfit = eliminate_globals(reduced, own)
     names, value = kept_columns(found, asked)
     inflation, degrees = np.ones(len(names)), np.full(len(names), np.inf)
@@ -239,8 +240,7 @@ def kept_columns(found: Fit, asked: Sequence[tuple[EffectModel, Shape]]) -> tupl
         value += list(t.amplitude)
     for model, shape in asked:
         names += [Column(model.name, a.name, shape) for a in model.amplitudes]
-        value += [0.0] * len(model.amplitudes)
-    return names, np.array(value)
+    return names, np.pad(value, (0, len(names) - len(value)))
 
 
 def own_parameters(state: Unknowns) -> Unknowns:

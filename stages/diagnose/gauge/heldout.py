@@ -128,7 +128,7 @@ def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequenc
         use = part.frames[whole.frame] & np.isin(whole.kind, part.kinds)
         equations = whole.of(part)
         reduced = eliminate_poses(equations, about.motion, len(judged.fit.state.T_pc))
-        left, _ = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.by_global.shape[1]))
+        left, _ = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.size))
         step = left.step + left.follow @ rule(Shared(columns, value, left.information, left.right))
         residual = _residual(equations, reduced.pose_step - reduced.pose_by_global @ step, step)
         # What is off the camera model has no weight, and no residual either.
@@ -168,4 +168,5 @@ def _from_others(others: Evidence, found: Fit, stated: Stated, shared: Shared) -
 
 def _residual(equations: Equations, pose: Float, step: Float) -> Float:
     moved = np.einsum("mi,mi->m", equations.by_pose, pose[equations.frame])
-    return np.asarray(equations.residual + moved + equations.by_global @ step)
+    by_edge = np.where(equations.edge >= 0, step[equations.edge], 0.0) * equations.by_edge
+    return np.asarray(equations.residual + moved + by_edge + equations.by_global @ step[equations.place])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.arrays import Bool, Float
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.effects.nameless import VOCABULARY, Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.formula import adequacy, empirical, is_more, says_the_same, swings
 from stages.diagnose.gauge.hypotheses import Judged, Regime, judged_of, regimes_of
@@ -23,6 +23,7 @@ from stages.diagnose.gauge.sets import (
     beforehand,
     believed,
     cause_of,
+    key,
     members_of,
     terms_of,
 )
@@ -192,8 +193,9 @@ def _near(
     members = members_of(run, best.fit, scores, laws)
     own = {(t.model, t.shape) for t in best.fit.terms}
     asked = [(m.model, m.shape) for m in members if (m.model, m.shape) not in own]
-    about = evidence(run, best.fit, asked)[0]
-    return adequacy(about, best.fit.terms, stated), Sets.of(about, members, stated, ratio)
+    about = evidence(run, best.fit, asked, with_spread=False)[0]
+    of_patterns = evidence(run, best.fit, [p for p in VOCABULARY if p not in own])[0]
+    return adequacy(of_patterns, best.fit.terms, stated), Sets.of(about, members, stated, ratio)
 
 
 def _unfitted(sets: Sets, ranked: Sequence[Judged]) -> list[Unfitted]:
@@ -203,12 +205,12 @@ def _unfitted(sets: Sets, ranked: Sequence[Judged]) -> list[Unfitted]:
     if not here:
         return []
     sets = sets.without_echoes(here)
-    here, fitted = sets.set_of(best.fit), {_key(j.fit.terms) for j in ranked}
+    here, fitted = sets.set_of(best.fit), {key(j.fit.terms) for j in ranked}
     offset = best.surprise + best.beforehand - sets.surprise(here)
     out = []
     for chosen, surprise in sets.likely([here], MOST_EFFECTS).items():
         members, far = sets.in_order(chosen), surprise + offset - best.surprise - best.beforehand
-        if far < _FAR and _key(members) not in fitted:
+        if far < _FAR and key(members) not in fitted:
             one = Unfitted(members, sets.amplitudes(chosen), surprise + offset, 0.0)
             out += [one] if one.possible else []
     return out
@@ -244,21 +246,11 @@ def _beforehand(run: GaugeRun, found: Fit, laws: int) -> float:
     return beforehand(run, [(t.model, t.shape) for t in found.terms], laws)
 
 
-def _by_shape(model: EffectModel) -> bool:
-    """Return whether another shape is another cause."""
-    return model.repeats or isinstance(model, Nameless)
-
-
-def _key(terms: Iterable[Term | Member]) -> frozenset[tuple[str, Shape]]:
-    """Return what makes two hypotheses the same."""
-    return frozenset((t.model.name, t.shape if _by_shape(t.model) else ()) for t in terms)
-
-
 def _distinct(fits: Sequence[Fit]) -> list[Fit]:
     """Return the best fit of each set of effects."""
     best: dict[frozenset[tuple[str, Shape]], Fit] = {}
     for f in fits:
-        key = _key(f.terms)
-        if key not in best or f.cost < best[key].cost:
-            best[key] = f
+        same = key(f.terms)
+        if same not in best or f.cost < best[same].cost:
+            best[same] = f
     return list(best.values())

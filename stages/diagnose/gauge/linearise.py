@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 
 import numpy as np
@@ -25,7 +25,7 @@ from stages.diagnose.effects.library import (
     texture_columns,
     texture_shift_px,
 )
-from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations
+from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations, of_no_edge
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import (
     BASELINE_SIZE,
@@ -56,10 +56,11 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     parts.append(_ring_part(run, state, rings, ring_at, residual, terms))
     if run.encoder is not None:
         parts.append(_encoder_part(run, run.encoder, state, terms))
-    joined = {k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])}
+    arrays = [f.name for f in fields(Equations) if f.name != "edges"]
+    joined = {name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
     smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
     motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
-    return Linearised(Equations(**joined), motion, ring_at, edge_at)
+    return Linearised(Equations(**joined, edges=state.layout.marker), motion, ring_at, edge_at)
 
 
 def beside(run: GaugeRun, state: Unknowns, at: Linearised, model: EffectModel, shape: Shape) -> Linearised:
@@ -160,10 +161,15 @@ def _ring_part(
 ) -> Equations:  # fmt: skip
     mm_per_px = ring_mm_per_px(points)
     shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
-    rows, _ = ring_rows(state, rings, residual, points.uv)
+    rows, _ = ring_rows(_without_edges(state), rings, residual, points.uv)
     return _with_effects(
         rows, -mm_per_px[:, None], shift, run.ring_weight, wall_cells(rings.wall_mm), RING, rings.wall_mm
     )
+
+
+def _without_edges(state: Unknowns) -> Unknowns:
+    """Return a state whose globals are those that rings and encoder depend on."""
+    return replace(state, edge_mm=np.zeros((0, 4)))
 
 
 def _edge_part(
@@ -174,11 +180,13 @@ def _edge_part(
 
     shift = [_term_slope(t, partial(texture_shift, t)) for t in terms]
     # Cells of fiducials, one an edge, count on where those of wall end.
-    cell = -1 - (4 * edges.marker + edges.side)
+    number, at = 4 * edges.marker + edges.side, state.layout.marker
     rows = edge_rows(state, edges)
-    return _with_effects(
-        rows, np.ones((len(edges.uv), 1)), shift, run.edge_weight, cell, EDGE, np.full((len(cell), 2), np.nan)
-    )
+    by_edge = rows.by_border[np.arange(len(number)), at.start + number]
+    rows = replace(rows, by_border=np.delete(rows.by_border, at, axis=1))
+    nowhere = np.full((len(number), 2), np.nan)
+    found = _with_effects(rows, np.ones((len(number), 1)), shift, run.edge_weight, -1 - number, EDGE, nowhere)
+    return replace(found, edge=at.start + number, by_edge=by_edge)
 
 
 def _with_effects(
@@ -193,7 +201,7 @@ def _with_effects(
     usable = (rows.weight > 0) & np.isfinite(weight) & ~bad
     return Equations(
         rows.frame[:, 0], rows.by_frame[:, 0, :POSE], by_global, rows.residual,
-        np.where(usable, weight, 0.0), cell, np.full(len(cell), kind), wall_mm,
+        np.where(usable, weight, 0.0), cell, np.full(len(cell), kind), wall_mm, *of_no_edge(len(cell)),
     )  # fmt: skip
 
 
@@ -224,7 +232,7 @@ def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Seque
         reading = reading - t.model.reading_shift_mm(travel, *t.at(t.amplitude))
     by_pose = np.zeros((count, POSE))
     by_pose[:, 2] = 1
-    by_border = np.zeros((count, state.border_size))
+    by_border = np.zeros((count, _without_edges(state).border_size))
     by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
     shift = [_term_slope(t, partial(_reading_shift, t, travel)) for t in terms]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
@@ -234,5 +242,6 @@ def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Seque
     residual = state.T_pc[:, 2, 3] - scale * reading - offset
     kind = np.full(count, ENCODER_ROW)
     return Equations(
-        np.arange(count), by_pose, by_global, residual, weight, cell, kind, np.full((count, 2), np.nan)
-    )
+        np.arange(count), by_pose, by_global, residual, weight, cell, kind, np.full((count, 2), np.nan),
+        *of_no_edge(count),
+    )  # fmt: skip

@@ -11,7 +11,7 @@ from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.motion_priors import third_difference_sigma
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge import MeasuredRun
-from stages.calibrate.gauge.adjust import adjust
+from stages.calibrate.gauge.adjust import NEAR_SIGMA, adjust
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, prior_directions
 from stages.calibrate.gauge.terms import frame_spread
@@ -22,6 +22,7 @@ from stages.diagnose.gauge.linearise import linearise
 from stages.diagnose.gauge.points import widths_at
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.scan import Scored, refined, scan
+from stages.diagnose.gauge.sets import key
 from stages.diagnose.inference import Stated
 
 # Something was left out when its probability by chance, corrected for all tried, is below this.
@@ -65,10 +66,11 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
     """
     measured, source, posed = measured_run.measured, measured_run.source, measured_run.posed
     measured = replace(measured, rings=_between(measured.rings, posed))
-    loose = adjust(_freed(measured_run.start), measured, _FREE, watch).state
+    loose = adjust(_freed(measured_run.start), measured, _FREE, watch, enough=NEAR_SIGMA).state
     rings = _between(source.on_bore(loose.T_pc, loose.probe, _FREE), posed)
     sigma = third_difference_sigma(loose.T_pc, posed)
-    smooth = adjust(loose, replace(measured, rings=rings, smooth_sigma=sigma), _FREE, watch).state
+    held = replace(measured, rings=rings, smooth_sigma=sigma)
+    smooth = adjust(loose, held, _FREE, watch, enough=NEAR_SIGMA).state
     rings = _between(source.on_bore(smooth.T_pc, smooth.probe, _FREE), posed)
     run = GaugeRun(
         measured.edges, rings, widths_at(source.rings, source.index, rings.frame, rings.outward),
@@ -189,13 +191,11 @@ def _weighed_anew(run: GaugeRun, found: Fit) -> tuple[GaugeRun, Fit]:
 
 def _rivals(run: GaugeRun, found: Fit, tried: Sequence[Fit], ratio: float) -> tuple[Fit, ...]:
     """Return the nearest fits with other effects, with the run's weights."""
-    names = {frozenset((t.model.name, t.shape) for t in found.terms)}
-    near = []
+    names, near = {key(found.terms)}, []
     for f in sorted(tried, key=lambda f: f.cost):
-        key = frozenset((t.model.name, t.shape) for t in f.terms)
-        if key not in names and f.cost < found.cost + _FAR * ratio:
+        if key(f.terms) not in names and f.cost < found.cost + _FAR * ratio:
             near.append(f)
-            names.add(key)
+            names.add(key(f.terms))
     again = (fit(run, f.state, f.terms, _RIVAL_ITERATIONS) for f in near[:_REWEIGHED])
     return tuple(refined(run, f) for f in again)
 

@@ -9,7 +9,7 @@ drawing of lots.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,6 +76,13 @@ def cause_of(model: EffectModel, shape: Shape) -> Cause:
     """Return the law and, where it may come more than once, its order."""
     own = model.own if isinstance(model, Coursed) else shape if model.repeats else ()
     return model.law, own
+
+
+def key(terms: Iterable[Term | Member]) -> frozenset[tuple[str, Shape]]:
+    """Return what makes two hypotheses the same."""
+    return frozenset(
+        (t.model.name, t.shape if t.model.repeats or isinstance(t.model, Nameless) else ()) for t in terms
+    )
 
 
 def believed(of: Evidence, alike: float) -> float:
@@ -232,7 +239,7 @@ class Sets:
     def likely(self, first: Collection[Set], most: int) -> dict[Set, float]:
         """Return the surprise of all sets of up to ``most`` members that were met on the way from some."""
         met = {chosen: self.surprise(chosen) for chosen in first}
-        looked_at: set[Set] = set()
+        looked_at, grown = set[Set](), set[Set]()
         while len(looked_at) < _LOOKED_AT:
             best = min(met.values())
             ahead = [s for s in met if s not in looked_at and met[s] < best - 2 * np.log(_WORTH)]
@@ -240,20 +247,38 @@ class Sets:
                 break
             here = min(ahead, key=met.__getitem__)
             looked_at.add(here)
-            for near in self._near(here, most):
-                if near not in met:
-                    met[near] = self.surprise(near)
+            # Sets with one member more, less or exchanged.
+            for rest in (here, *(here - {gone} for gone in here)):
+                met.setdefault(rest, self.surprise(rest))
+                if rest not in grown and len(rest) < most:
+                    grown.add(rest)
+                    for more, surprise in self._grown(rest):
+                        met.setdefault(more, surprise)
         return met
 
-    def _near(self, chosen: Set, most: int) -> Iterator[Set]:
-        """Yield the sets with one member more, less or exchanged; a model that does not repeat comes once."""
-        for gone in (None, *chosen):
-            rest = chosen - {gone} if gone is not None else chosen
-            if gone is not None:
-                yield rest
-            if len(rest) == most:
-                continue
-            taken = {self.members[k].model.name for k in rest if not self.members[k].model.repeats}
-            for k, member in enumerate(self.members):
-                if k not in rest and member.model.name not in taken:
-                    yield rest | {k}
+    def _grown(self, rest: Set) -> Iterator[tuple[Set, float]]:
+        """Yield a set with each member more, and its surprise; a model that does not repeat comes once."""
+        taken = {self.members[k].model.name for k in rest if not self.members[k].model.repeats}
+        free = [k for k, m in enumerate(self.members) if k not in rest and m.model.name not in taken]
+        first, taken_up, best = self.surprise(rest), *self._taken_up(rest)
+        named = not any(self.members[k].nameless for k in rest)
+        for size in {len(self.place[k]) for k in free}:
+            alike = [k for k in free if len(self.place[k]) == size]
+            at = np.array([self.place[k] for k in alike])
+            both = taken_up[:, at]
+            own = np.eye(size) + self.information[at[:, :, None], at[:, None, :]]
+            own -= np.einsum("rkp,rkq->kpq", both, both)
+            pull = self.right[at] - np.einsum("rkq,r->kq", both, best)
+            gain = np.einsum("kq,kq->k", pull, np.linalg.solve(own, pull[..., None])[..., 0])
+            for k, more in zip(alike, np.linalg.slogdet(own)[1] - gain, strict=True):
+                before = self.members[k].beforehand
+                before -= 2 * np.log(NAMELESS) * (named and self.members[k].nameless)
+                yield rest | {k}, float(first + before + more)
+
+    def _taken_up(self, rest: Set) -> tuple[Float, Float]:
+        """Return (R, K), (R,) whose products are what a set's R columns take of the normal equations."""
+        at = np.concatenate([np.zeros(0, np.int64), *(self.place[k] for k in sorted(rest))])
+        root = np.linalg.cholesky(np.eye(len(at)) + self.information[np.ix_(at, at)])
+        sides = np.column_stack([self.information[at], self.right[at]])
+        taken = np.linalg.solve(root, sides)
+        return taken[:, :-1], taken[:, -1]

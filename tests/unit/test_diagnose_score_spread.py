@@ -13,8 +13,8 @@ from pipeline.adjustment.normal_equations import Marginal
 from pipeline.adjustment.robust import cluster_variance
 from pipeline.arrays import Float
 from stages.calibrate.gauge.terms import WALL_CELL_MM, wall_cells
-from stages.diagnose.gauge.elimination import RING, Equations, eliminate_poses, score_inflation
-from stages.diagnose.gauge.near import beyond_cells
+from stages.diagnose.gauge.elimination import RING, Equations, eliminate_poses, of_no_edge
+from stages.diagnose.gauge.score_spread import beyond_cells, score_inflation
 
 _DRAWS, _POINTS = 60, 6000
 
@@ -64,7 +64,7 @@ def test_what_poses_take_up_of_shared_errors_is_not_missed():
     wall = np.stack([40.0 * (cell // cells), 40.0 * (cell % cells)], -1)
     empty = Equations(
         frame, by_cell[:, :6], by_cell[:, 6:], np.zeros(len(cell)), np.ones(len(cell)), cell,
-        np.full(len(cell), RING), wall,
+        np.full(len(cell), RING), wall, *of_no_edge(len(cell)),
     )  # fmt: skip
     window = np.arange(frames - 3)[:, None] + np.arange(4)
     free = Rows(
