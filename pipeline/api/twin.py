@@ -19,7 +19,7 @@ from pipeline.files.provenance import MadeBy
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import Display, SilentDisplay
 from pipeline.machine.plan import Selection
-from pipeline.machine.run_folder import Exporter
+from pipeline.machine.run_folder import Exporter, RunFolder
 from pipeline.pages import page_template
 from stages.catalogue import PIPELINE
 from stages.texture import TEXTURE
@@ -73,9 +73,10 @@ def twin(
 
 @dataclass(frozen=True)
 class TwinOf:
-    """The folder of the run whose frames are re-rendered."""
+    """The folder of the run whose frames are re-rendered, and its stages that are computed again."""
 
     run: str
+    again: tuple[str, ...] = ()
 
 
 def twin_job(
@@ -96,9 +97,13 @@ def twin_job(
     stages = (*_MEASURED, PHOTOMETRY, TWIN)
     configuration = resolve(stages, None, settings, earlier, run / "run.json")
     job = open_job(record.recording, output, probe, stages, EXPORTERS, configuration, "twin")
+    again: tuple[str, ...] = ()
     if diagnosis is None:
         check_inputs_unchanged(record, {s.kind.__name__.lower(): s.key for s in job.sources})
-    more = value_source(tried), value_source(TwinOf(str(run.resolve())))
+        kept = RunFolder(run).store
+        steps = [job.plan.step(s.label) for s in _MEASURED]
+        again = tuple(s.stage.label for s in steps if not kept.has(s.stage.name, s.key))
+    more = value_source(tried), value_source(TwinOf(str(run.resolve()), again))
     return replace(job, sources=(*job.sources, *more), lent=(run,))
 
 
@@ -108,6 +113,7 @@ def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, A
     return {
         "format": 1,
         "run": of.run,
+        "computed_again": list(of.again),
         "frames": [int(f) for f in found.frame],
         "withheld": found.withheld,
         "noise": _figures(found.noise),

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.job import result_of, run_shown
-from pipeline.api.twin import twin_job
+from pipeline.api.twin import TwinOf, twin_job
 from pipeline.artefacts.twin import Twin
 from pipeline.commands import Assignments, ResultFolder
 from pipeline.machine.display import ProgressDisplay
@@ -33,6 +33,12 @@ def twin(
     console = Console(stderr=True)
     with ProgressDisplay(console) as display:
         job = twin_job(run, output, diagnosis, assignments or (), display)
+    again = job.source(TwinOf).again
+    if again:
+        typer.echo(
+            f"{run} was made by another version of the program or with other parameters; computed again: "
+            + ", ".join(again)
+        )
     run_shown(job, console)
     _show_gauge(job.source(DiagnosisTried))
     _show(result_of(job, Twin), output)

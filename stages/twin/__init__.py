@@ -256,7 +256,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "16",
+    "17",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

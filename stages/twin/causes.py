@@ -45,6 +45,7 @@ as the cosine differ by so much at the ring."""
 _SHAPE, _NARROW_DEG, _OF_WIDTH = 0.03, 20.0, 0.08
 """1 σ of a sector's loss for want of its shape. Of one narrower than two cells only loss times width shows,
 and widths are tried in steps of a quarter: relative 1 σ of the loss, half a step over √3."""
+_OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
 _HALF_SECTORS = 3
 """Sectors side by side in the same half, when one half of the picture is to foretell the other."""
 
@@ -57,38 +58,47 @@ def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring
         if cells is None or len(cells.frame) < _FEWEST_FRAMES:
             continue
         base, laws = lit_laws(cells, lighting, ring) if light == "LEDs" else line_laws(cells)
-        chosen, base = _chosen(cells, base, laws)
+        chosen, base, unsure = _chosen(cells, base, laws, light)
         for best, rivals in chosen:
             if best.law.name == "step":
                 steps[light] = best, cells
             else:
                 found.append(_mismatch(best, rivals, cells, ring))
-        found += _flicker(cells, base, light, ring)
+        found += _flicker_or_else(cells, base, unsure, light, ring)
     return (*_steps(steps, lit, line, ring), *found)
 
 
-def _chosen(cells: Cells, base: Float, laws: Sequence[Law]) -> tuple[list[tuple[Fitted, list[str]]], Float]:
-    """Return causes one after the other, with those that cannot be told from each, and the base with them."""
+def _chosen(
+    cells: Cells, base: Float, laws: Sequence[Law], light: str
+) -> tuple[list[tuple[Fitted, list[str]]], Float, Fitted | None]:
+    """Return causes one after the other, with those that cannot be told from each, and the base with them.
+
+    At last the cause that would come next and that these frames are too few to be sure of, if there is one.
+    """
     chosen: list[tuple[Fitted, list[str]]] = []
+    unsure = None
     for _ in range(_ROUNDS):
         tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
         tries.sort(key=lambda f: -f.fall.sum())
         best = _by_other_sectors(tries[0], cells, base)
         size, led = size_of(best), best.law.name == "led_dead"
         most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED loses more than it has
-        if best.probability > FALSE_ALARM or not _LEAST[best.law.name] < size < most:
+        if not _LEAST[best.law.name] < size < most:
             break
         if best.law.name == "step" and not _shows_at_once(best, cells):
             break
+        if best.probability > FALSE_ALARM:
+            unsure = best
+            break
         rivals = [
-            o.law.name
+            _OWN_STEP[light] if o.law.name == "step" else o.law.name
             for o in tries[1:]
             if o.probability < FALSE_ALARM and sigmas(best.fall - o.fall) < _SURE
         ]
         if not any(_same_sector(best, earlier) for earlier, _ in chosen):
             chosen.append((best, rivals))
         base = np.concatenate([base, best.change[None]])
-    return chosen, base
+    return chosen, base, unsure
 
 
 def _same_sector(one: Fitted, other: Fitted) -> bool:
@@ -189,7 +199,7 @@ def _steps(
         same = _same_step(best, cells.frame[first - 1 : first + 1], other)
         if same and light == "laser" and "LEDs" in steps:
             continue  # told already
-        own = {"LEDs": "lamp_step", "laser": "laser_step"}[light]
+        own = _OWN_STEP[light]
         name = {True: "exposure_step", False: own, None: f"exposure_step or {own}"}[same]
         size = NamedFigure(
             "change", float(np.expm1(best.size)), float(np.exp(best.size)) * best.sd, "relative"
@@ -224,6 +234,26 @@ def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
     sd = float(np.hypot(own.sd, best.sd))
     alike, absent = abs(own.size - best.size) < _SURE * sd, abs(own.size) < _SURE * own.sd
     return None if alike == absent else alike
+
+
+def _flicker_or_else(
+    cells: Cells, base: Float, unsure: Fitted | None, light: str, ring: Ring
+) -> list[Mismatch]:
+    """Return flicker; where it is gone once a cause that frames are unsure of is granted, either of both."""
+    found = _flicker(cells, base, light, ring)
+    if not found or unsure is None or unsure.law.name == "laser_sector":  # a sector changes no frame alone
+        return found
+    if _flicker(cells, np.concatenate([base, unsure.change[None]]), light, ring):
+        return found
+    led = unsure.law.name == "led_dead"
+    at = f"an LED that fails at image azimuth {_half_turn(float(np.degrees(unsure.place[0]))):.0f}°"
+    said = (
+        f"{found[0].statement} {len(cells.frame)} frames do not tell this from "
+        f"{at if led else 'a step of brightness'} from frame "
+        f"{_when(cells.frame, int(unsure.place[int(led)])).value:.0f} on: withhold more frames to tell."
+    )
+    name = f"{found[0].name} or {unsure.law.name if led else _OWN_STEP[light]}"
+    return [replace(found[0], name=name, statement=said)]
 
 
 def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch]:

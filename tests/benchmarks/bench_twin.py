@@ -118,7 +118,7 @@ def swaps(folder: Path, answers: Path, only: str) -> None:
     different = [c for c in every if c.answer]
     worse = better_than_stated = pairs = named = 0
     for k, case in enumerate(every):
-        if only and case.name != only:
+        if only and case.name not in only.split("+"):
             continue
         start = time.process_time()
         line = gauge_line(case, folder)
@@ -176,7 +176,7 @@ def like(folder: Path, run: Path, frames: int) -> None:
 if __name__ == "__main__":
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("what", choices=["swaps", "like"])
-    words.add_argument("--only", default="", help="one case of swaps")
+    words.add_argument("--only", default="", help="cases of swaps, joined by +")
     words.add_argument("--run", type=Path, help="run folder for like")
     words.add_argument("--frames", type=int, default=100, help="frames of the recording for like")
     words.add_argument("folder", type=Path)

@@ -232,7 +232,7 @@ def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
     tilt = Mismatch("laser_tilt", "line", "laser", (), (), 1.0, 9.0, 0.9, "Laser tilt: pictures fit better.")
     gauge = GaugeTwin(np.array([2]), ("laser_tilt=0.6@40",), 9, 9.0, 0.9, 0.8, 2.0, 0.1, 0.09, 16.0, (True,))
     tried = DiagnosisTried(gauge, (tilt,))
-    of = TwinOf("/runs/one")
+    of = TwinOf("/runs/one", ("motion",))
     write_twin(_twin(), tried, of, MadeBy("twin", {}, {}), tmp_path)
     document = json.loads((tmp_path / "twin.json").read_text("utf-8"))
     assert document["noise"]["white_dn"]["value"] is None
@@ -241,8 +241,9 @@ def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
     assert document["gauge"]["chi2_diagnosed"] == 0.9
     said = json.loads(json.dumps(twin_document(_twin(), tried, of)))
     assert document | {"made_by": 0} == said | {"made_by": 0}
-    assert said["run"] == "/runs/one"
+    assert (said["run"], said["computed_again"]) == ("/runs/one", ["motion"])
     page = (tmp_path / "twin.html").read_text("utf-8")
+    assert "motion had to be computed again" in page
     assert page.count("data:image/jpeg;base64") == 3
     assert page.count("</script>") == 1
 

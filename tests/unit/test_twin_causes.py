@@ -62,6 +62,17 @@ def test_an_led_that_fails_is_told_from_a_step():
     assert led.parameters[0].value == pytest.approx(1, abs=0.35)
 
 
+def test_few_frames_call_an_led_that_fails_either_that_or_flicker(monkeypatch):
+    monkeypatch.setattr("tests.unit.test_twin_causes.FRAMES", 6)
+    monkeypatch.setattr("tests.unit.test_twin_causes.NUMBER", NUMBER[:6])
+    share = (1 + 0.3 * np.cos(np.radians(AZIMUTH_DEG - 60))) / 8
+    (led,) = _found(np.log1p(-share) * _step(3))
+    assert led.name == "flicker or led_dead"
+    assert "6 frames do not tell this from an LED that fails" in led.statement
+    (flicker,) = _found(0.06 * np.random.default_rng(4).standard_normal(6)[:, None])
+    assert flicker.name == "flicker"
+
+
 def test_a_dim_sector_is_found_where_it_is():
     away = np.abs(AZIMUTH_DEG - 45)
     dim = np.log1p(-0.6 / (1 + np.exp((away - 20) / 2)))
