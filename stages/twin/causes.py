@@ -157,9 +157,8 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
     size = NamedFigure("lost", size_of(best), _size_sd(best), "share of the light")
     name = best.law.name
     if name == "led_dead":
-        when, where = _when(cells.frame, int(best.place[1])), float(np.degrees(best.place[0]))
-        place = (when, NamedFigure("azimuth_deg", _half_turn(where), 180 / LED_AZIMUTHS, "deg"))
-        said = f"From frame {when.value:.0f} on the LED at image azimuth {place[1].value:.0f}° has lost"
+        place = _of_led(best, cells)
+        said = f"From frame {place[0].value:.0f} on the LED at image azimuth {place[1].value:.0f}° has lost"
         fixed_to, look = "time", ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
     else:
         where, width = best.place[:2]
@@ -245,15 +244,23 @@ def _flicker_or_else(
         return found
     if _flicker(cells, np.concatenate([base, unsure.change[None]]), light, ring):
         return found
-    led = unsure.law.name == "led_dead"
-    at = f"an LED that fails at image azimuth {_half_turn(float(np.degrees(unsure.place[0]))):.0f}°"
+    what, name = "a step of brightness", _OWN_STEP[light]
+    place: tuple[NamedFigure, ...] = (_when(cells.frame, int(unsure.place[0])),)
+    if unsure.law.name == "led_dead":
+        place = _of_led(unsure, cells)
+        what, name = f"an LED that fails at image azimuth {place[1].value:.0f}°", unsure.law.name
     said = (
-        f"{found[0].statement} {len(cells.frame)} frames do not tell this from "
-        f"{at if led else 'a step of brightness'} from frame "
-        f"{_when(cells.frame, int(unsure.place[int(led)])).value:.0f} on: withhold more frames to tell."
+        f"{found[0].statement} {len(cells.frame)} frames do not tell this from {what} from frame "
+        f"{place[0].value:.0f} on: withhold more frames to tell."
     )
-    name = f"{found[0].name} or {unsure.law.name if led else _OWN_STEP[light]}"
-    return [replace(found[0], name=name, statement=said)]
+    return [replace(found[0], name=f"{found[0].name} or {name}", place=place, statement=said)]
+
+
+def _of_led(found: Fitted, cells: Cells) -> tuple[NamedFigure, NamedFigure]:
+    """Return when and where an LED fails."""
+    where = _half_turn(float(np.degrees(found.place[0])))
+    at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
+    return _when(cells.frame, int(found.place[1])), at
 
 
 def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch]:
