@@ -281,6 +281,22 @@ def test_two_names_along_one_direction_may_be_one_unknown_law(turned_deg, low, h
     assert all(low <= one <= high for one in odds)
 
 
+def test_a_wave_beside_a_pixel_that_is_not_square_is_no_law_between_them():
+    """Which way pixels are not square is no choice, so that the two have no direction in common."""
+    random = np.random.default_rng(13)
+    wave, pixel = LIBRARY["sheet_waviness"], LIBRARY["pixel_aspect"]
+    both = [Term(wave, (2.0,), np.array([-1.1, -2.4])), Term(pixel, (), np.array([-0.1]))]
+    columns = tuple(Column(t.model.name, a.name, t.shape) for t in both for a in t.amplitudes)
+    columns += tuple(Column(f"like {t.model.name}", n) for t in both for n in "12")
+    design = random.normal(size=(2000, len(columns)))
+    measured = design[:, :3] @ np.array([-1.1, -2.4, -0.1]) + 0.1 * random.normal(size=2000)
+    about = evidence_of(10 * design, 10 * measured, columns)
+    nobody, rare = Stated((), np.zeros((0, 0))), 2 * np.log(30.0)
+    others = [f"like {t.model.name}" for t in both]
+    odds = odds_in(about, both, others, ["same"] * 2, lambda terms: rare * len(terms), nobody)
+    assert max(odds) < 0.01
+
+
 def test_a_score_that_few_cells_hold_is_less_surprising():
     random = np.random.default_rng(12)
     of = evidence_of(random.normal(size=(500, 1)), random.normal(size=500), (Column("a", ""),))

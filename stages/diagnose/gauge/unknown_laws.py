@@ -119,7 +119,8 @@ def odds_of_unknown_laws(
 
     Such a law is like one of the effects and is there in its place, or in that of several with its harmonic
     and behaviour in time, patterns without a cause among them; or it is what several come to together, if
-    these have one direction. χ² is divided by ``believed``.
+    these have one direction. Two of which one has no direction of its own come to none. χ² is divided by
+    ``believed``.
     """
     at, terms = best.fit.linearised, best.fit.terms
     others = [other_growth(t, at, effect(t.model.law).fixed_to is FixedTo.LASER) for t in best.library_terms]
@@ -147,7 +148,8 @@ def odds_in(
         for k in grown:
             kept = [t for n, t in enumerate(terms) if n == k or n not in group]
             left = [_surprise(about, kept, others[k], apart, stated) for apart in _APART]
-            if len(group) > _AS_ANY or (len(group) > 1 and len(terms[k].amplitude) == len("xy")):
+            headed = all(len(terms[n].amplitude) == len("xy") for n in group)
+            if len(group) > _AS_ANY or (len(group) > 1 and headed):
                 left.append(_surprise(_aligned(about, terms, group, k), terms, "", 0.0, stated))
             gain = alone + before(terms) - before(kept)
             each += [np.exp((gain - one) / 2) for one in left]
