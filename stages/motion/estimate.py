@@ -22,7 +22,7 @@ from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import FrameTable, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
-from stages.motion.bundle_adjustment.laser_knock import find_jump
+from stages.motion.bundle_adjustment.laser_knock import find_jump, texture_breaks
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
@@ -147,6 +147,8 @@ def measure_run(
     bore = BoreSteps.of(circles.radius_mm, at_mm)
     context.report("steps of the bore", len(bore.at_mm), "")
     jump = find_jump(circles, at_mm, points, probe)
+    if jump is not None and texture_breaks(jump, rings.frame, texture.poses):
+        jump = None
     time_s = recording.frames.time_s
     return MeasuredRun(texture, rings, place, time_s, T_pc, encoder, probe, bore, jump=jump)
 
@@ -267,7 +269,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "30",
+    "31",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -23,6 +23,7 @@ from stages.premises.changes import (
     warn_of_frames,
 )
 from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
+from stages.premises.cuts import cuts, warn_of_cuts
 from stages.premises.light import (
     Light,
     alike,
@@ -96,7 +97,8 @@ def check_premises(
     copy = _copies(recording, table, pictures, light, story)
     label = np.where(copy, _stated(table, story.row), _labels(table, story, light, pictures))
     steps, sway = steps_of_wall(pictures, shown, copy), sway_of_line(pictures, light)
-    row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder, sway)
+    radius_mm = radius_seen_mm(pictures, probe)
+    row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder, sway, radius_mm)
     stated_s = row_times(table, row)
     jumps = clock_jumps(stated_s, steps, recording.encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
@@ -104,7 +106,8 @@ def check_premises(
     _refuse_unmended(changes, parameters)
     warn_of_frames(changes, pictures, np.where(outside, Light.WALL, seen_light), table, context)
     left_out.warn(recording.frames.frame, context)
-    radius_mm = radius_seen_mm(pictures, probe)
+    cut = cuts(pictures, shown, left_out.any, changes.time_s)
+    warn_of_cuts(cut, pictures, recording.frames.frame, context)
     check_diameter(radius_mm, recording.pipe, probe.lighting.radius_mm, context)
     factor = encoder_factor(recording, changes.time_s, steps, radius_mm, context)
     warn_of_clock(jumps, changes.time_s, recording, context)
@@ -236,7 +239,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "10",
+    "11",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

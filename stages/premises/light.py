@@ -18,6 +18,9 @@ _MIDDLE = 1 / 3
 # Two lights are told apart where they lie further apart than this many of their own spreads, and where hardly
 # any picture lies between them: a single light that slowly changes fills the middle.
 _APART, _MOST_BETWEEN = 3.0, 0.05
+# Nor are they two that differ by less than this part of their brightness (chosen): two runs of open-3 joined,
+# with one light, differ by 0.01.
+_LEAST_APART = 0.05
 # Dark pictures are those of the laser only where more than this part of them shows its line.
 _MOST_DARK = 0.5
 # Of fewer pictures in one light the spread is not known.
@@ -45,6 +48,8 @@ _LONGEST_STEP = 4.0
 # pixel, in the time that would have passed. In open-1 to open-3, a01 and a09 it moves up to 3
 # times as far, twice in a run more than 2.5; where all pictures of open-1 were moved by 4 px, 5.4 times.
 _LINE_LEAPS, _LEAST_SWAY_PX = 2.5, 0.5
+# Ways agree where they differ by less: steps of the wall err by a tenth, a loss makes one 1.5 times as long.
+_AGREES = 0.25
 # The encoder is asked within so many frames whether the probe itself leapt.
 _NEARBY = 10
 
@@ -104,7 +109,8 @@ def _two_lights(brightness: Float) -> tuple[float, float] | None:
     spread = max(spread_about_median(brightness[~bright]), spread_about_median(brightness[bright]))
     place = (brightness - low) / (high - low)
     between = float((np.abs(place - 0.5) < _MIDDLE / 2).mean())
-    return (low, high) if high - low > _APART * spread and between < _MOST_BETWEEN else None
+    apart = high - low > max(_APART * spread, _LEAST_APART * high)
+    return (low, high) if apart and between < _MOST_BETWEEN else None
 
 
 def _otsu(value: Float) -> float:
@@ -199,23 +205,31 @@ def sway_of_line(pictures: Pictures, light: Int) -> Float:
 
 
 def rows_by_motion(
-    row: Int, steps: Steps, rhythm: int, table: FrameTable, encoder: Encoder | None, sway: Float
+    row: Int,
+    steps: Steps,
+    rhythm: int,
+    table: FrameTable,
+    encoder: Encoder | None,
+    sway: Float,
+    radius_mm: float = np.nan,
 ) -> Int:
     """Return ``row`` (F,) with more or fewer rows skipped where the wall moves by more or less than usual.
 
     The lights fix the number of lost pictures but for whole rhythms of theirs; the motion of the wall, at the
     usual speed of the steps around, counts these. A leap that the encoder shows too is the probe's own.
     Over pictures that were left out it tells nothing: the speed is not known so long. Nor where the line's
-    ``sway`` (F,) leaps: the camera was knocked there.
+    ``sway`` (F,) leaps: the camera was knocked there. Nor where the encoder goes as far as the
+    wall, with the pipe's ``radius_mm``: the usual steps are wrong then, since blocks of a codec stand.
     """
     if len(steps.end) < _LEAST_STEPS:
         return row
     time = row_times(table, row)
     period = float(np.median(np.diff(time)))
     out, left = row.copy(), len(table.frame) - 1 - int(row[-1])
-    for start, end, lost in _leaps(steps, time, rhythm, _SIGMAS_LOST if left > 0 else _SIGMAS):
+    for start, end, lost, size in _leaps(steps, time, rhythm, _SIGMAS_LOST if left > 0 else _SIGMAS):
         skips = np.diff(row[start : end + 1]) - 1
         believed = left >= lost or _encoder_was_steady(encoder, float(time[end]), period)
+        believed &= not _encoder_agrees(encoder, time[[start, end]], size * radius_mm)
         believed &= sway[start + 1 : end + 1].max() < _LINE_LEAPS * (1 + abs(lost) / rhythm)
         if (lost > 0 and believed) or (lost < 0 and skips.max() + lost >= 0):
             first = int(np.argmax(skips)) + start + 1 if skips.max() > 0 else (start + end + 1) // 2
@@ -224,8 +238,8 @@ def rows_by_motion(
     return out
 
 
-def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tuple[int, int, int]]:
-    """Return (start, end, pictures lost in whole rhythms) of the steps that stand out, the clearest first."""
+def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tuple[int, int, int, float]]:
+    """Return (start, end, pictures lost in whole rhythms, size) of steps that stand out, clearest first."""
     period_s = float(np.median(np.diff(time_s)))
     passed = np.maximum(time_s[steps.end] - time_s[steps.start], 1e-9)
     speed = median_filter(steps.size / passed, _AROUND_STEP, mode="nearest")
@@ -236,7 +250,15 @@ def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tupl
     stand_out = (np.abs(excess) > sigmas * sigma) & (lost != 0) & (one > sigmas * sigma / 2)
     stand_out &= passed < _LONGEST_STEP * np.median(passed)
     clearest = sorted(np.flatnonzero(stand_out), key=lambda k: -abs(float(excess[k])))
-    return [(int(steps.start[k]), int(steps.end[k]), int(lost[k])) for k in clearest]
+    return [(int(steps.start[k]), int(steps.end[k]), int(lost[k]), float(steps.size[k])) for k in clearest]
+
+
+def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float) -> bool:
+    """Return whether the encoder goes a way between two times; False without one, or beyond its ends."""
+    if encoder is None or time_s[0] < encoder.time_s[0] or time_s[1] > encoder.time_s[-1]:
+        return False
+    shown_mm = float(np.diff(np.interp(time_s, encoder.time_s, encoder.distance_mm))[0])
+    return abs(shown_mm - way_mm) < _AGREES * abs(way_mm)
 
 
 def _encoder_was_steady(encoder: Encoder | None, time_s: float, period_s: float) -> bool:

@@ -118,6 +118,18 @@ def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():
     np.testing.assert_array_equal(row, np.arange(120))
 
 
+@pytest.mark.parametrize(("mm_a_frame", "lost"), [(1.0, 2), (2.0, 0)])
+def test_steps_that_a_codec_holds_back_make_no_loss(mm_a_frame, lost):
+    """Blocks of a codec stood, most steps came out at half, and the others were taken for lost pictures."""
+    frame = np.arange(0, 120, 2)
+    size = np.where(frame[1:] == 60, 0.04, 0.02) + 0.0001 * np.sin(frame[1:])
+    table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
+    encoder = Encoder(table.time_s, 30 * mm_a_frame * table.time_s)
+    steps = Steps(frame[:-1], frame[1:], size)
+    row = rows_by_motion(np.arange(120), steps, 2, table, encoder, np.ones(120), radius_mm=100.0)
+    assert row[-1] - 119 == lost
+
+
 @pytest.mark.parametrize("knocked", [False, True])
 def test_a_camera_knocked_in_mid_run_is_no_loss(knocked):
     """Its pictures moved by 4 px, the wall seemed to leap, and times were taken from other rows."""

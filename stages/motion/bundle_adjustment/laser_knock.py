@@ -22,6 +22,7 @@ from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.extra_columns import ExtraColumns, RingsInPipe
 from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.rings import BoreSteps, RingCircles, rings_of_length
+from stages.motion.tracking.landmarks import TrackedPoses
 
 _SIDE = 3
 """Rings on either side through which a line is laid; the jump is that of the lines between the two. With five
@@ -129,6 +130,14 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
     bore = BoreSteps.of(circles.radius_mm - size[2] * (circles.frame >= behind), at_mm)
     place_mm = float(at_seen[first - 1] + at_seen[first]) / 2
     return RingJump.of(behind, size, ring, probe, place_mm, bore)
+
+
+def texture_breaks(jump: RingJump, ring_frame: Int, poses: TrackedPoses) -> bool:
+    """Return whether texture is lost beside the jump of rings (F,): it cannot tell a knock from a cut."""
+    place = int(np.searchsorted(ring_frame, jump.frame))
+    first, last = ring_frame[max(place - 1, 0)], ring_frame[min(place + 1, len(ring_frame) - 1)]
+    lost = poses.frames[poses.lost]
+    return bool(np.any((first < lost) & (lost < last)))
 
 
 @dataclass(frozen=True)

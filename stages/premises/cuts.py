@@ -1,0 +1,54 @@
+"""Places where the pictures do not go on from each other: recordings that were cut, joined or paused."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+
+from pipeline.arrays import Bool, Float, Int
+from pipeline.machine.stage import Context
+from stages.premises.light import Light
+from stages.premises.pictures import Pictures
+
+# The wall changes by so many times as much as in any step about it. Two runs joined make 3.0, 2.1 and 2.0
+# (open-1 to open-3), 8 lost pictures 1.4, all else in 90 spoilt copies of open-1 1.1: the middle. Lamps that
+# fail change it more, but texture goes on.
+_CHANGES = 1.7
+# Texture goes on where the wall moves by less than so many usual steps in the sense of the run.
+_GOES_ON = 3.0
+# Eight steps on either side, with which one is compared, and fewest of them in a recording.
+_BESIDE, _FEWEST = np.arange(-8, 9) != 0, 12
+
+
+def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
+    """Return the places (K,) of lit pictures whose wall is not that of the picture before them.
+
+    Parameters
+    ----------
+    shown, left_out, time_s : (F,)
+        `Light` of each picture, whether it is left out, and its time: over a gap the encoder tells how far
+        the probe went, and pictures are known to be missing.
+    """
+    place = np.flatnonzero((pictures.partner >= 0) & (shown == Light.WALL) & ~left_out)
+    before = pictures.partner[place]
+    most_s = (place - before + 0.5) * np.median(np.diff(time_s))
+    same = (shown[before] == Light.WALL) & (time_s[place] - time_s[before] < most_s)
+    place = place[same & np.isfinite(pictures.change[place])]
+    if len(place) < _FEWEST:
+        return np.empty(0, np.int64)
+    change, step = pictures.change[place], pictures.step[place]
+    usual = np.nanmedian(step) if np.any(np.isfinite(step)) else np.nan
+    goes_on = np.abs(step - usual) < _GOES_ON * np.abs(usual)
+    beside = maximum_filter(change, footprint=_BESIDE, mode="nearest")
+    return np.asarray(place[(change > _CHANGES * beside) & ~goes_on])
+
+
+def warn_of_cuts(place: Int, pictures: Pictures, frame: Int, context: Context) -> None:
+    """Tell between which of the frames (F,) the recording was cut."""
+    for k in place:
+        context.warn(
+            f"the pictures do not go on from frame {frame[pictures.partner[k]]} to {frame[k]}: the wall "
+            "changes much more than in any step about, and its texture is another. The recording was cut, "
+            "paused, or joined of two. How far the probe went meanwhile is not known: distances behind are "
+            "off by it; laser, encoder or pipe may seem to jump there. What to do: run each part by itself"
+        )

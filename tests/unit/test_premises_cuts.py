@@ -1,0 +1,65 @@
+"""Two runs joined in one recording are told; lost pictures, failing lamps and standing probes are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.arrays import Float
+from stages.premises.cuts import cuts
+from stages.premises.light import Light
+from stages.premises.pictures import Pictures
+
+COUNT, CUT = 60, 31
+NUMBERS = np.arange(COUNT)
+NOTHING = np.zeros(COUNT, bool)
+SHOWN = np.where(NUMBERS % 2, Light.WALL, Light.LINE)
+
+
+def pictures(change: Float, step: Float) -> Pictures:
+    plain = np.ones(COUNT)
+    return Pictures(
+        plain, plain, np.ones((COUNT, 1), np.float32), np.zeros(1), plain, NUMBERS - 2, change, step
+    )
+
+
+def steady() -> tuple[Float, Float]:
+    random = np.random.default_rng(1)
+    return 6 + 0.1 * random.standard_normal(COUNT), 0.02 + 0.001 * random.standard_normal(COUNT)
+
+
+def found(change: Float, step: Float, time_s: Float = NUMBERS / 30) -> list[int]:
+    return [int(k) for k in cuts(pictures(change, step), SHOWN, NOTHING, time_s)]
+
+
+@pytest.mark.parametrize("step", [np.nan, -0.3, 0.4], ids=["none", "back", "far"])
+def test_a_wall_that_is_another_is_a_cut(step: float) -> None:
+    change, steps = steady()
+    change[CUT], steps[CUT] = 13.0, step
+    assert found(change, steps) == [CUT]
+
+
+def test_no_cut_is_told_where_nothing_or_one_thing_alone_happens() -> None:
+    change, steps = steady()
+    assert found(change, steps) == []
+    assert found(np.where(NUMBERS == CUT, 40.0, change), steps) == [], "lamps fail, texture goes on"
+    assert found(change, np.where(NUMBERS == CUT, np.nan, steps)) == [], "blurred"
+
+
+def test_pictures_that_are_known_to_be_missing_are_no_cut() -> None:
+    change, steps = steady()
+    change[CUT], steps[CUT] = 13.0, 0.4
+    assert found(change, steps, np.where(NUMBERS >= CUT, NUMBERS + 28, NUMBERS) / 30) == []
+
+
+def test_a_probe_that_stood_and_goes_on_makes_no_cut() -> None:
+    change, steps = steady()
+    still = NUMBERS < CUT
+    assert found(np.where(still, 0.3, change), np.where(still, 0.0, steps)) == []
+
+
+def test_of_pictures_that_are_left_out_nothing_is_told() -> None:
+    change, steps = steady()
+    change[CUT], steps[CUT] = 13.0, np.nan
+    assert cuts(pictures(change, steps), SHOWN, NUMBERS == CUT, NUMBERS / 30).size == 0
+    assert cuts(pictures(change, steps), SHOWN, NOTHING, NUMBERS / 30).size == 1
