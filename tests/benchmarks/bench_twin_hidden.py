@@ -7,6 +7,9 @@ what was put in, and the same counts with every case scored by another one's ans
 
 ``python -m tests.benchmarks.bench_twin_hidden nulls RUN...``: whole twins of runs in which nothing is hidden,
 each of frames that no other one compares; what is found is a false alarm.
+
+``python -m tests.benchmarks.bench_twin_hidden cost RUN``: processor time of rendering a frame, and of all
+that is done with a compared one; the first comparison also decodes its frames.
 """
 
 from __future__ import annotations
@@ -29,9 +32,10 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.display import SilentDisplay
 from pipeline.machine.plan import Selection
 from pipeline.machine.stage import Context
-from pipeline.recording.base import Recording
+from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin import PhotometryParameters, TwinParameters, compared_with, photometry_of
+from stages.twin.render import Renderer
 from stages.twin.scene import Scene, scene_of
 from tests.hidden_effects import Change, Hidden, effects
 from tests.hidden_shine import shining
@@ -209,9 +213,37 @@ def nulls(run: Opened, size: int) -> tuple[int, int]:
     return sets, false
 
 
+def cost(run: Opened, few: Few) -> None:
+    """Print the processor time of rendering a frame, and of comparing one with all that is made of it."""
+    kept, recording = run.scene, cast(Any, run)
+    scene = Scene(kept.probe, kept.surface, kept.reflectance, kept.trajectory)
+    photometry = photometry_of(
+        scene, recording, run.frames, run.rings, PhotometryParameters(sampled=few[0]), _context()
+    )
+    state, parameters = photometry.state, TwinParameters(compared=few[1])
+    for light in np.unique(run.frames.illumination):
+        lit = np.isin(run.frames.frame, scene.trajectory.frame) & (run.frames.illumination == light)
+        numbers = run.frames.frame[lit][: few[1]]
+        renderer = Renderer(replace(scene, outside=state.outside), state)
+        renderer.frame(int(numbers[0]), Illumination(light))  # compiles, and works out what all share
+        start = time.process_time()
+        for number in numbers[1:]:
+            renderer.frame(int(number), Illumination(light))
+        each = (time.process_time() - start) / (len(numbers) - 1)
+        print(
+            f"{light}: {each:.3f} s to render a frame of {state.outside.size / 1e6:.2f} megapixels",
+            flush=True,
+        )
+    for said in ("first", "again"):
+        start = time.process_time()
+        twin = compared_with(scene, recording, run.frames, run.rings, photometry, parameters, _context())
+        each = (time.process_time() - start) / len(twin.frame)
+        print(f"{each:.3f} s to render and compare each of {len(twin.frame)} frames, {said}", flush=True)
+
+
 if __name__ == "__main__":
     words = argparse.ArgumentParser(description=__doc__)
-    words.add_argument("what", choices=["hidden", "nulls"])
+    words.add_argument("what", choices=["hidden", "nulls", "cost"])
     words.add_argument("runs", type=Path, nargs="+")
     words.add_argument("--only", default="", help="cases whose name holds one of these words, joined by +")
     words.add_argument("--sampled", type=int, default=6, help="measured frames of each light")
@@ -223,6 +255,8 @@ if __name__ == "__main__":
     if given.what == "hidden":
         for folder in given.runs:
             hidden(opened(folder, given.out), (given.sampled, given.compared), given.seed, given.only)
+    elif given.what == "cost":
+        cost(opened(given.runs[0], given.out), (given.sampled, given.compared))
     else:
         looked = np.sum([nulls(opened(r, given.out), given.of_set) for r in given.runs], 0)
         print(f"false alarms in {looked[1]} of {looked[0]} nulls of {len(given.runs)} runs")
