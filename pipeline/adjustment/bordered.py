@@ -16,7 +16,7 @@ from pipeline.adjustment.elimination import BLOCK, Sums, add_landmarks, add_rows
 from pipeline.adjustment.normal_equations import BandedCholesky, marginalised
 from pipeline.adjustment.robust import Loss, Squares
 from pipeline.arrays import Float, Int
-from pipeline.system.parallel import in_threads
+from pipeline.system.parallel import side_by_side
 
 
 @dataclass(frozen=True)
@@ -182,8 +182,7 @@ class BorderedSystem:
 
         other, half = self._sums.like(), count // 2
         shares = [(self._sums, slice(0, half)), (other, slice(half, count))]
-        for _ in in_threads(lambda share: add_share(*share), shares, len(shares)):
-            pass
+        side_by_side(lambda share: add_share(*share), shares)
         self._sums.add(other)
         return inverse, right
 

@@ -47,7 +47,7 @@ class Sums:
 
     def like(self) -> Sums:
         """Return sums of nothing, of the same sizes."""
-        return Sums(*(np.zeros_like(a) for a in self.arrays))
+        return Sums(*(np.zeros(a.shape) for a in self.arrays))
 
     @property
     def arrays(self) -> tuple[Float, ...]:
@@ -115,7 +115,7 @@ def add_landmarks(  # type: ignore[no-untyped-def]
     most = 0
     for k in range(len(start) - 1):
         most = max(most, start[k + 1] - start[k])
-    cross, solved, side = np.empty((most, 3, 6)), np.empty((most, 6, 3)), np.empty((3, size))
+    cross, side = np.empty((3, 6 * most)), np.empty((3, size))
     h = np.empty((3, 3))
     for k in range(len(start) - 1):
         ws, g = s_weight[k], right_point[k]
@@ -129,14 +129,14 @@ def add_landmarks(  # type: ignore[no-untyped-def]
         for m in range(start[k], start[k + 1]):
             _add_observation(
                 weight[m], frame[m], by_pose[m], by_point[m], by_instrument[m], residual[m], first,
-                band, border, right, h, g, side, cross[m - start[k]],
+                band, border, right, h, g, side, cross[:, 6 * (m - start[k]) : 6 * (m - start[k]) + 6],
             )  # fmt: skip
         for a in range(3):
             h[a, a] *= 1.0 + damping
         _invert(h, inverse[k])
         _eliminate_from_corner(inverse[k], g, side, corner, right_border)
         seen = frame[start[k] : start[k + 1]]
-        _eliminate_from_frames(seen, cross, solved, inverse[k], g, side, band, border, right)
+        _eliminate_from_frames(seen, cross, inverse[k], g, side, band, border, right)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -165,25 +165,24 @@ def _add_observation(  # type: ignore[no-untyped-def]
     w, f, jp, jx, jc, r, first, band, border, right, h, g, side, cross
 ):
     """Add one texture observation; products of tiny matrices are written out, which is faster."""
-    cross[:] = 0.0
     row, block = f * band.shape[2], band[f, 0]
-    for c in range(2):
-        wr = w * r[c]
-        for a in range(3):
-            g[a] -= wr * jx[c, a]
-            for b in range(3):
-                h[a, b] += w * jx[c, a] * jx[c, b]
-            for b in range(6):
-                cross[a, b] += w * jx[c, a] * jp[c, b]
-            for b in range(jc.shape[1]):
-                side[a, first + b] += w * jx[c, a] * jc[c, b]
-        for a in range(6):
-            wa = w * jp[c, a]
-            right[row + a] -= wr * jp[c, a]
-            for b in range(a + 1):
-                block[a, b] += wa * jp[c, b]
-            for b in range(jc.shape[1]):
-                border[row + a, first + b] += wa * jc[c, b]
+    r0, r1 = w * r[0], w * r[1]
+    for a in range(3):
+        x0, x1 = w * jx[0, a], w * jx[1, a]
+        g[a] = g[a] - r0 * jx[0, a] - r1 * jx[1, a]
+        for b in range(3):
+            h[a, b] = h[a, b] + x0 * jx[0, b] + x1 * jx[1, b]
+        for b in range(6):
+            cross[a, b] = x0 * jp[0, b] + x1 * jp[1, b]
+        for b in range(jc.shape[1]):
+            side[a, first + b] = side[a, first + b] + x0 * jc[0, b] + x1 * jc[1, b]
+    for a in range(6):
+        p0, p1 = w * jp[0, a], w * jp[1, a]
+        right[row + a] = right[row + a] - r0 * jp[0, a] - r1 * jp[1, a]
+        for b in range(a + 1):
+            block[a, b] = block[a, b] + p0 * jp[0, b] + p1 * jp[1, b]
+        for b in range(jc.shape[1]):
+            border[row + a, first + b] = border[row + a, first + b] + p0 * jc[0, b] + p1 * jc[1, b]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -201,30 +200,26 @@ def _eliminate_from_corner(hi, g, side, corner, right_border):  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _eliminate_from_frames(frame, cross, solved, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
-    """Subtract what one landmark, seen in ``frame``, takes from its frames; ``cross`` is (·, 3, 6)."""
+def _eliminate_from_frames(frame, cross, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
+    """Subtract what one landmark, seen in ``frame``, takes from its frames; ``cross`` is (3, 6 n)."""
+    size = band.shape[2]
+    taken = np.empty(6 * len(frame))
     for i in range(len(frame)):
-        row = frame[i] * band.shape[2]
+        f, row = frame[i], frame[i] * size
         for a in range(6):
-            x0, x1, x2 = cross[i, 0, a], cross[i, 1, a], cross[i, 2, a]
+            x0, x1, x2 = cross[0, 6 * i + a], cross[1, 6 * i + a], cross[2, 6 * i + a]
             s0 = x0 * hi[0, 0] + x1 * hi[1, 0] + x2 * hi[2, 0]
             s1 = x0 * hi[0, 1] + x1 * hi[1, 1] + x2 * hi[2, 1]
             s2 = x0 * hi[0, 2] + x1 * hi[1, 2] + x2 * hi[2, 2]
-            solved[i, a, 0], solved[i, a, 1], solved[i, a, 2] = s0, s1, s2
             right[row + a] -= s0 * g[0] + s1 * g[1] + s2 * g[2]
             for b in range(side.shape[1]):
                 border[row + a, b] -= s0 * side[0, b] + s1 * side[1, b] + s2 * side[2, b]
-        for j in range(i + 1):
-            _subtract_pair(solved[i], cross[j], band[frame[i], frame[i] - frame[j]])
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _subtract_pair(solved, cross, block):  # type: ignore[no-untyped-def]
-    for a in range(6):
-        for b in range(6):
-            block[a, b] -= (
-                solved[a, 0] * cross[0, b] + solved[a, 1] * cross[1, b] + solved[a, 2] * cross[2, b]
-            )
+            for k in range(6 * i + 6):
+                taken[k] = s0 * cross[0, k] + s1 * cross[1, k] + s2 * cross[2, k]
+            for j in range(i + 1):
+                own = band[f, f - frame[j], a]
+                for b in range(6):
+                    own[b] -= taken[6 * j + b]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
@@ -36,6 +36,13 @@ def in_threads(function: Callable[[Item], Made], items: Iterable[Item], threads:
                 yield ahead.popleft().result()
         while ahead:
             yield ahead.popleft().result()
+
+
+def side_by_side(function: Callable[[Item], Made], items: Sequence[Item]) -> list[Made]:
+    """Return ``function`` of a few items, the first on the caller's thread, each other on one of its own."""
+    with ThreadPoolExecutor(max(len(items) - 1, 1)) as pool:
+        others = [pool.submit(function, item) for item in items[1:]]
+        return [function(items[0]), *(other.result() for other in others)]
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.cloud_along import CloudAlong
 from pipeline.artefacts.measured import PointCloud
-from pipeline.system.parallel import in_threads
+from pipeline.system.parallel import side_by_side
 from stages.defects.along import Stretch, widened
 from stages.defects.grow import millimetre_mean
 from stages.defects.relief import Relief, WallRelief
@@ -24,7 +24,7 @@ _MARGIN_MM, _MARGIN_IN_RINGS = 10.0, 3.0
 # tells it, and below it moves a depth by no more than its noise.
 _UNSURE = 3.0
 _AROUND_MM = 0.45  # 1 σ of the kernel around the pipe: within a ring, samples lie close
-_LEAST, _THREADS = 12, 2
+_LEAST = 12
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,7 @@ def fine_surface(relief: Relief, points: DeviationPoints, wanted: Bool, coarse_m
         _regress(*place, *relief.cell_mm, *points.kernel_mm, _LEAST, cells, out)
 
     cells = np.argwhere(wanted & relief.seen)
-    for _ in in_threads(fill, (cells[: len(cells) // 2], cells[len(cells) // 2 :]), _THREADS):
-        pass
+    side_by_side(fill, (cells[: len(cells) // 2], cells[len(cells) // 2 :]))
     return np.where(np.isfinite(out), out, coarse_mm)
 
 

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from pipeline.system.parallel import in_threads
+from pipeline.system.parallel import in_threads, side_by_side
 from tests.patience import patience
 
 
@@ -41,3 +41,16 @@ def test_threads_end_with_the_caller() -> None:
     next(made)
     made.close()
     assert threading.active_count() == before
+
+
+def test_a_few_are_made_at_once_the_first_by_the_caller() -> None:
+    meeting = threading.Barrier(2, timeout=patience(60))
+    by = side_by_side(lambda k: (meeting.wait() >= 0, k, threading.get_ident()), (3, 7))
+    assert [k for _, k, _ in by] == [3, 7]
+    assert by[0][2] == threading.get_ident() != by[1][2]
+
+
+@pytest.mark.parametrize("wrong", [0, 1])
+def test_an_error_of_either_is_raised(wrong: int) -> None:
+    with pytest.raises(ZeroDivisionError):
+        side_by_side(lambda k: 1 // (k - wrong), (0, 1))

@@ -114,11 +114,12 @@ class RadialCamera(ABC):
     def _polar(self, xyz_c: Float) -> tuple[Polar, Bool]:
         p = np.asarray(xyz_c, float)
         r = np.hypot(p[..., 0], p[..., 1])
-        on_axis = r < _ON_AXIS * np.abs(p[..., 2])
+        least = _ON_AXIS * np.abs(p[..., 2])
+        on_axis = r < least
+        r = np.where(on_axis, least, r)
         theta = np.arctan2(r, p[..., 2])
         valid = (theta <= self.theta_max) & (r + np.abs(p[..., 2]) > 0) & np.isfinite(r)
-        r = np.where(valid, np.where(on_axis, _ON_AXIS * np.abs(p[..., 2]), r), np.nan)
-        theta = np.arctan2(r, np.where(valid, p[..., 2], np.nan))
+        r, theta = np.where(valid, r, np.nan), np.where(valid, theta, np.nan)
         unit = np.where(on_axis[..., None], np.array([1.0, 0.0]), p[..., :2] / r[..., None])
         return Polar(r, theta, self._rho(theta), unit), valid
 

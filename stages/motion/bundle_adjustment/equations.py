@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -204,9 +205,12 @@ def linearised(
     rows.append(residuals.axis_rows(state, parameters.axis_bend_sigma))
     scale_sigma, radius_sigma_mm = measured.probe.encoder_scale_sigma, _RADIUS_SHARE * state.nominal_radius_mm
     rows.append(residuals.prior_rows(state, scale_sigma, radius_sigma_mm, measured.shared))
-    rings = residuals.ring_rows(state, measured.rings, GemanMcClure(_REDESCENT * scales.wall_mm))
-    texture = landmark_rows(state, measured, parameters)
-    return rescaled(Equations(len(state.T_pc), tuple(rows), rings, texture), measured.tracks, scales)
+    with ThreadPoolExecutor(1) as beside:
+        loss = GemanMcClure(_REDESCENT * scales.wall_mm)
+        rings = beside.submit(residuals.ring_rows, state, measured.rings, loss)
+        texture = landmark_rows(state, measured, parameters)
+    equations = Equations(len(state.T_pc), tuple(rows), rings.result(), texture)
+    return rescaled(equations, measured.tracks, scales)
 
 
 def rescaled(equations: Equations, tracks: Tracks, scales: Scales) -> Equations:
@@ -236,10 +240,11 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     by_pose, by_instrument = np.empty((count, 2, 6)), np.empty((count, 2, unsure + MATCH_BIASES))
 
     def fill(part: slice) -> None:
-        found = _observed(state, measured, parameters.match_bias_px, part)
+        found = _observed(state, T_cp, measured, parameters.match_bias_px, part)
         for whole, own in zip((residual, by_point, by_pose, by_instrument), found, strict=True):
             whole[part] = own
 
+    T_cp = inverse(state.T_pc)
     parts = [slice(a, a + _AT_ONCE) for a in range(0, count, _AT_ONCE)]
     for _ in in_threads(fill, parts, _THREADS):
         pass
@@ -252,12 +257,12 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
 
 
 def _observed(
-    state: State, measured: Measurements, match_bias_px: float, part: slice
+    state: State, T_cp: Float, measured: Measurements, match_bias_px: float, part: slice
 ) -> tuple[Float, Float, Float, Float]:
     """Return residuals of some observations and their derivatives by point, pose and instrument."""
     tracks, camera = measured.tracks, measured.camera_at(state)
-    T = state.T_pc[tracks.frame[part]]
-    xyz_c = transform(inverse(T), state.xyz_p[tracks.landmark[part]])
+    T, back = state.T_pc[tracks.frame[part]], T_cp[tracks.frame[part]]
+    xyz_c = transform(back, state.xyz_p[tracks.landmark[part]])
     bias = _match_bias(xyz_c, tracks.uv[part] - camera.centre_px) * match_bias_px
     residual = camera.project(xyz_c).uv + bias @ state.instrument[-MATCH_BIASES:] - tracks.uv[part]
     by_c, by_parameters = camera.project_jacobian(xyz_c)

@@ -13,10 +13,9 @@ import numba
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32, Int, Int32
-from pipeline.system.parallel import in_threads
+from pipeline.system.parallel import side_by_side
 from stages.rings.kernels import FAST
 
-_THREADS = 2
 _MOST_STEPS = 30
 """Gauss-Newton steps of one match; those that need more do not converge. Not measured."""
 _SMALL_STEP = 0.003
@@ -70,7 +69,7 @@ class Patches:
             return _match(*wide, width, *templates, *wanted, _MOST_STEPS)  # type: ignore[no-any-return]
 
         middle = len(index) // 2
-        halves = in_threads(found, (slice(middle), slice(middle, None)), _THREADS)
+        halves = side_by_side(found, (slice(middle), slice(middle, None)))
         offset, correlation, residual = (np.concatenate(parts) for parts in zip(*halves, strict=True))
         return Matches(offset, correlation, residual * _sigma(covariance))
 

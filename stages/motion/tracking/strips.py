@@ -18,7 +18,7 @@ from pipeline.arrays import Bool, Byte, Float, Float32, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording, in_background
-from pipeline.system.parallel import in_threads
+from pipeline.system.parallel import side_by_side
 from stages.motion.tracking.normalisation import (
     SOFTENING_PX,
     equally_sharp,
@@ -196,7 +196,7 @@ def unroll(image: Image, probe: Probe, T_pc: Float, grid: StripGrid, hidden: Hid
     coarse_uv, light = _coarse_view(probe, T_pc, grid, first_row)
     middle = len(coarse_uv) // 2
     halves = (coarse_uv[: middle + 1], coarse_uv[middle:])
-    parts = in_threads(lambda half: sample(image, half, _COARSE), halves, len(halves))
+    parts = side_by_side(lambda half: sample(image, half, _COARSE), halves)
     grey, seen = (np.concatenate(part) for part in zip(*parts, strict=True))
     ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
     seen[(ahead > hidden.line_mm[0]) & (ahead < hidden.line_mm[1])] = False
