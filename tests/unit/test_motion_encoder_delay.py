@@ -108,3 +108,8 @@ def test_readings_that_scatter_by_more_than_their_rounding_are_believed_less() -
         assert got.run.encoder.sigma_mm == pytest.approx(noise_mm, rel=0.35)
         z = got.estimate.state.T_pc[:, 2, 3] - given.truth.T_pc[:, 2, 3]
         assert np.std(np.diff(z)) < 0.02, "believed as before it is 0.06"
+
+
+def test_an_encoder_that_stands_has_no_delay() -> None:
+    still = replace(readings(0.0), distance_mm=np.zeros(len(TIME_S)))
+    assert find_delay(TIME_S, way(TIME_S), still) is None

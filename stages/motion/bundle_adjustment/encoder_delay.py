@@ -34,6 +34,8 @@ _MOVES = 3.0
 """Delays that count move readings by more than three times their rounding, beside shift and scale: less does
 no harm, and at even speed any delay moves them by 1.4 times, since both readings are rounded."""
 _ROUNDS = 5
+_STANDS = 1e-12
+"""Share of a reading's square beside its shift from which it moves at all: less is rounding."""
 _REDESCENT = 2.5
 """Whitened differences of more pull less: those of a slip, which would else be taken for a delay."""
 
@@ -118,15 +120,19 @@ def _costs(z: Float, reading: Float, sigma_mm: float, walk_mm: float) -> Float:
     root = np.linalg.cholesky(sigma_mm**2 * np.eye(len(z)) + walk_mm**2 * np.minimum(count[:, None], count))
     white = solve_triangular(root, np.column_stack([z, np.ones_like(z), reading]), lower=True)
     steps = np.log(np.diagonal(root)).sum()
-    misfit = [_misfit(white[:, 0], white[:, [1, 2 + k]]) for k in range(reading.shape[1])]
-    return np.asarray(np.array(misfit) + steps, float)
+    return np.asarray(_misfits(white[:, 0], white[:, 1], white[:, 2:]) + steps, float)
 
 
-def _misfit(z: Float, by: Float) -> float:
-    """Return the robust cost of whitened distances (M,) by origin and scale (M, 2)."""
-    one, redescending = np.ones_like(z), GemanMcClure(_REDESCENT)
-    weight = one
+def _misfits(z: Float, origin: Float, reading: Float) -> Float:
+    """Return the robust costs (K,) of whitened distances (M,) by ``origin`` (M,) and each reading (M, K)."""
+    one, redescending = np.ones_like(reading), GemanMcClure(_REDESCENT)
+    weight, off = one, one
     for loss in (Cauchy(),) * _ROUNDS + (redescending,) * _ROUNDS:
-        off = z - by @ np.linalg.lstsq(by * np.sqrt(weight)[:, None], z * np.sqrt(weight), rcond=None)[0]
+        at_origin, whole = weight * origin[:, None], origin**2 @ weight
+        rest = reading - origin[:, None] * (np.sum(at_origin * reading, 0) / whole)
+        size, all_size = np.sum(weight * rest**2, 0), np.sum(weight * reading**2, 0)
+        moves = size > _STANDS * all_size  # an encoder that stands has no scale
+        scale = np.where(moves, z @ (weight * rest), 0.0) / np.where(moves, size, 1.0)
+        off = z[:, None] - origin[:, None] * (z @ at_origin / whole) - rest * scale
         weight = loss.weight(off, one)
-    return float(redescending.cost(off, one).sum())
+    return np.asarray(redescending.cost(off, one).sum(0), float)
