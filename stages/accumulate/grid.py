@@ -12,11 +12,10 @@ from functools import partial
 
 import numba
 import numpy as np
-from scipy.ndimage import median_filter
 
 from pipeline.adjustment.held_over import HeldOver
 from pipeline.adjustment.local_spread import local_spread
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import robust_spread, running_median
 from pipeline.arrays import Float, Float32, Int
 from pipeline.system.parallel import in_threads
 from stages.accumulate.survey import RingSurvey, WallSamples
@@ -197,7 +196,7 @@ def _roughness(radius: Float32, sigma: Float32, grid: MapGrid) -> Float32:
     Relief finer than a few cells cannot be told from it and counts as noise.
     """
     filled = np.where(np.isfinite(radius), radius, np.nanmedian(radius))
-    fine = radius - median_filter(filled, size=_FINE_CELLS, mode="nearest")
+    fine = radius - running_median(filled, _FINE_CELLS)
     return _spread_by_place(np.abs(fine) / sigma, grid)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from scipy.ndimage import median_filter
 
 from pipeline.adjustment.bordered import BorderedSystem, Rows
 from pipeline.adjustment.elimination import BLOCK
@@ -17,7 +18,12 @@ from pipeline.adjustment.normal_equations import (
     marginalised,
     solved,
 )
-from pipeline.adjustment.robust import cluster_covariance, cluster_variance, two_way_variance
+from pipeline.adjustment.robust import (
+    cluster_covariance,
+    cluster_variance,
+    running_median,
+    two_way_variance,
+)
 from pipeline.arrays import Float
 
 
@@ -107,6 +113,12 @@ def test_independent_errors_are_not_widened_and_copies_are() -> None:
     assert cluster_variance(scores, np.arange(4000) // 4)[0] / plain == pytest.approx(1, abs=0.2)
     copies = np.repeat(scores[:1000], 4, axis=0)
     assert cluster_variance(copies, np.arange(4000) // 4)[0] / np.sum(copies**2) == pytest.approx(4, rel=1e-2)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5, 8, 9, 40])
+def test_running_medians_of_two_halves_are_those_of_the_whole(rows: int) -> None:
+    value = np.random.default_rng(rows).normal(size=(rows, 30)).astype(np.float32)
+    assert np.array_equal(running_median(value, (9, 5)), median_filter(value, (9, 5), mode="nearest"))
 
 
 def test_the_border_follows_with_frames_at_their_best() -> None:
