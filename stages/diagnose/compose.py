@@ -67,7 +67,6 @@ def composed(
         fit=examined.quality if examined is not None else None,
         record_next=_next(said, asked),
         feasibility=examined.feasibility if examined is not None else (),
-        inseparable=examined.inseparable if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
         remainder=Remainder(_of_rest(said), None, said.members, identifiable) if partly else None,

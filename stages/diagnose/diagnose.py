@@ -40,7 +40,6 @@ from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.answer import verdict_of
 from stages.diagnose.profile.finding import Finding
-from stages.diagnose.resimulate import RESIMULATION, Resimulated, Resimulation
 from stages.diagnose.result import Diagnosis, FitQuality, Verdict
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.premises import PREMISES
@@ -68,15 +67,12 @@ class Diagnosed:
     found : Diagnosis
     probe : Probe
         As corrected; as stated without a gauge run that tells the instrument.
-    simulated : Resimulated or None
-        The gauge run simulated again with and without what was found.
     image : OnImage or None
         The residual on one picture.
     """
 
     found: Diagnosis
     probe: Probe
-    simulated: Resimulated | None
     image: OnImage | None
 
 
@@ -90,7 +86,6 @@ def diagnose(
     gauge_frames: Annotated[CheckedFrames, Of("gauge")] | None,
     of_gauge: Annotated[Seen, Of("gauge")] | None,
     corrected: Annotated[Corrected, Of("gauge")] | None,
-    resimulation: Annotated[Resimulation, Of("gauge")] | None,
     corrected_motion: Annotated[CorrectedMotion, Of("field")] | None,
     probe: Probe,
     noticed: Noticed,
@@ -124,11 +119,10 @@ def diagnose(
     found = with_readings(with_pictures(found, seen), (of_field, of_gauge))
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
-    simulated = resimulation.simulated if resimulation is not None else None
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
     if correction is None or not (correction.put_in or correction.unsaid) or not _worse(found.fit):
-        return Diagnosed(found, correction.probe if correction is not None else probe, simulated, image)
-    return Diagnosed(replace(found, notes=(*found.notes, _NOT_CORRECTED)), probe, simulated, image)
+        return Diagnosed(found, correction.probe if correction is not None else probe, image)
+    return Diagnosed(replace(found, notes=(*found.notes, _NOT_CORRECTED)), probe, image)
 
 
 def _by_correction(
@@ -183,11 +177,11 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "8", DiagnosisParameters, diagnose,
+    "diagnosis", "9", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what bears it out",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)
-_OF_GAUGE = (PREMISES, RINGS, LINE_PROFILE, FIDUCIALS, GAUGE_EVIDENCE, CORRECTION, RESIMULATION)
+_OF_GAUGE = (PREMISES, RINGS, LINE_PROFILE, FIDUCIALS, GAUGE_EVIDENCE, CORRECTION)
 
 
 def diagnosis_stages(with_field: bool, with_gauge: bool) -> tuple[Stage, ...]:

@@ -264,7 +264,6 @@ class Diagnosis:
     fit: FitQuality | None = None
     record_next: str = ""
     feasibility: tuple[Feasible, ...] = ()
-    inseparable: tuple[tuple[str, ...], ...] = ()
     candidates: tuple[Candidate, ...] = ()
     shortcomings: tuple[str, ...] = ()
     ring_picture: Picture | None = None
@@ -278,13 +277,12 @@ class Diagnosis:
         if not names:
             return self
         members = tuple(n for n in self.members if n not in names)
-        groups = (tuple(n for n in group if n not in names) for group in self.inseparable)
         left = self.remainder
         if left is not None:
             left = replace(left, members=tuple(n for n in left.members if n not in names))
         nameless = self.verdict is Verdict.CLASS and not members
         return replace(
             self, verdict=Verdict.UNEXPLAINED if nameless else self.verdict,
-            members=members, remainder=left, inseparable=tuple(g for g in groups if len(g) > 1),
+            members=members, remainder=left,
             record_next=record_next(members) if self.members else self.record_next,
         )  # fmt: skip

@@ -36,7 +36,7 @@ from stages.calibrate.gauge import MeasuredRun
 from stages.calibrate.gauge.adjust import adjust
 from stages.calibrate.gauge.state import GaugeParameters
 from stages.diagnose.channels import GaugeMeasured
-from stages.diagnose.resimulate import gauge_scene
+from stages.diagnose.gauge_scene import gauge_scene
 from stages.twin.cells import sigmas
 from stages.twin.line_blocks import BlockLight, LineBlocks, blocks_of, light_of, squares
 

@@ -37,9 +37,9 @@ def test_what_to_record_next_names_each_recording_once():
 
 def test_an_effect_that_is_not_known_is_in_no_class():
     pair = ("laser_cone", "focal_scale")
-    both = Diagnosis("", "", Verdict.CLASS, 0.0, members=pair, inseparable=(pair,))
+    both = Diagnosis("", "", Verdict.CLASS, 0.0, members=pair)
     left = both.not_knowing(("focal_scale",))
-    assert (left.verdict, left.members, left.inseparable) == (Verdict.CLASS, ("laser_cone",), ())
+    assert (left.verdict, left.members) == (Verdict.CLASS, ("laser_cone",))
     assert "focal_scale" not in left.record_next
     assert both.not_knowing(pair).verdict is Verdict.UNEXPLAINED
     assert both.not_knowing(()) is both

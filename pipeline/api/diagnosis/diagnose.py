@@ -171,7 +171,7 @@ def _apply(done: Diagnosed, before: Uncorrected, folder: Path, display: Display)
 
     change = apply_correction(done.found.effects, before, folder, display)
     with disk_errors_named(folder):
-        write_page(done.found, Shown(done.simulated, change, done.image), folder)
+        write_page(done.found, Shown(change, done.image), folder)
     return change
 
 
@@ -199,7 +199,7 @@ def write_diagnosis(done: Diagnosed, made_by: MadeBy, folder: Path) -> None:
     from pipeline.api.diagnosis.report import Shown, write_page
 
     write_probe(done.probe, folder / "probe.yaml", made_by)
-    write_page(done.found, Shown(done.simulated, None, done.image), folder)
+    write_page(done.found, Shown(None, done.image), folder)
     arrays = _arrays(done.found)
     if arrays:
         # Named as a stream: savez would else append .npz to a name of its own.

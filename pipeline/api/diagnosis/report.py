@@ -10,7 +10,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from pipeline.adjustment.robust import root_mean_square
 from pipeline.api.diagnosis.apply import GeometryChange, consequence
 from pipeline.arrays import Float
 from pipeline.files.disk import replace_text
@@ -19,7 +18,6 @@ from pipeline.pages.notation import measured
 from pipeline.physics.catalogue import ALL_EFFECTS
 from stages.diagnose.compared import OnImage
 from stages.diagnose.compose import to_json
-from stages.diagnose.resimulate import Resimulated
 from stages.diagnose.result import (
     Candidate,
     Diagnosis,
@@ -42,7 +40,6 @@ _HEADLINES = {
 class Shown:
     """What a page shows beside the answer; None where there is nothing to show."""
 
-    simulated: Resimulated | None = None
     change: GeometryChange | None = None
     image: OnImage | None = None
 
@@ -57,7 +54,7 @@ def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
     """
     change = shown.change
     text = page_template("diagnose").render(
-        d=to_json(found), headline=headline(found), simulated=shown.simulated, change=change,
+        d=to_json(found), headline=headline(found), change=change,
         sizes=[sizes(e) for e in found.effects],
         consequence=consequence(change) if change is not None else size_of_mismatch(found),
         hours=_by_hour(change) if change is not None else (), pictures=_pictures(found, shown),
@@ -128,8 +125,6 @@ def _pictures(found: Diagnosis, shown: Shown) -> dict[str, bytes]:
         made["wall"] = wall_figure(found.wall_picture)
     if shown.image is not None:
         made["image"] = image_figure(shown.image)
-    if shown.simulated is not None:
-        made["simulated"] = simulated_figure(shown.simulated)
     if found.candidates:
         made["candidates"] = candidates_figure(found.candidates)
     return made
@@ -214,27 +209,6 @@ def image_figure(shown: OnImage) -> bytes:
         ylabel="v, px",
     )
     figure.colorbar(lines, ax=both, label="ring farther out than texture has it, px")
-    return rendered(figure)
-
-
-def simulated_figure(simulated: Resimulated) -> bytes:
-    """Return measured less simulated rings of the held-out frames, without and with what was found."""
-    figure = Figure(figsize=(9.6, 3.6), layout="constrained")
-    both = figure.subplots(1, 2, sharex=True)
-    order = np.argsort(simulated.azimuth_rad)
-    degrees = np.degrees(simulated.azimuth_rad[order])
-    for axes, off, title in zip(
-        both, (simulated.without_px, simulated.with_px), ("Stated instrument", "With what was found"),
-        strict=True,
-    ):  # fmt: skip
-        axes.axhspan(-simulated.floor_px, simulated.floor_px, color="#e0a030", alpha=0.35, lw=0)
-        axes.scatter(degrees, off[order], s=4, color=_ACCENT, lw=0)
-        rms = root_mean_square(off)
-        axes.set_title(f"{title}: {rms:.3f} px r.m.s.", fontsize=11, loc="left")
-        axes.set(xlabel="azimuth in the image, °", xlim=(-180, 180), xticks=range(-180, 181, 90))
-        axes.grid(alpha=0.3)
-        axes.spines[["top", "right"]].set_visible(False)
-    both[0].set_ylabel("measured − simulated ring, px")
     return rendered(figure)
 
 

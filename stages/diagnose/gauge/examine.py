@@ -19,7 +19,7 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, with_courses
 from stages.diagnose.effects.nameless import GenericTerm, Moves
 from stages.diagnose.gauge.confirm import Sized, confirmations, sizes_of
-from stages.diagnose.gauge.feasible import ability, feasibility, inseparable, not_told_apart
+from stages.diagnose.gauge.feasible import ability, feasibility, not_told_apart
 from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.formula import ADEQUATE, pattern_of, patterns_by_chance, swings
 from stages.diagnose.gauge.heldout import fit_quality
@@ -92,8 +92,6 @@ class Examined:
         The same terms' amplitudes with their covariances.
     feasibility : tuple of Feasible
         What could be seen of each effect, before any residual was looked at.
-    inseparable : tuple of tuple of str
-        Groups of effects that are not told apart here at their typical sizes.
     unsplit : tuple of tuple of str
         For each of the best hypothesis' effects, those that this run is not expected to tell from it at its
         size.
@@ -109,7 +107,6 @@ class Examined:
     verdicts: Verdicts | None
     confirmed: tuple[tuple[Confirmation, ...], ...]
     feasibility: tuple[Feasible, ...]
-    inseparable: tuple[tuple[str, ...], ...]
     unsplit: tuple[tuple[str, ...], ...] = ()
     location: Location | None = None
     quality: FitQuality | None = None
@@ -153,7 +150,6 @@ def examine(
             nothing = fit(measurements, start, ())
             about, shapes = ability(measurements, nothing, library)
             table = feasibility(about, shapes, library, stated)
-            groups = inseparable(table, about, shapes, library, stated)
             coursed = with_courses(library, courses)
             nothing = nothing.watched(partial(progress, 1, _PARTS))
             searched = search(nothing.run, nothing, coursed, stated)
@@ -161,7 +157,7 @@ def examine(
             # Effects that the library lacks move rings and fiducials as well.
             swung = swings(searched.run, searched.nothing, stated)
             beyond = patterns_by_chance(searched.run, searched.nothing, stated, swung)
-            seen = Examined(searched, None, (), table, groups, patterns_by_chance=beyond)
+            seen = Examined(searched, None, (), table, patterns_by_chance=beyond)
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))
             return _judged(replace(seen, verdicts=judge(searched, coursed, stated, swung)), coursed, stated)

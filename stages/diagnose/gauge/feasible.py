@@ -47,30 +47,6 @@ def feasibility(
     return tuple(_feasible(name, about, seen, library, stated) for name in seen)
 
 
-def inseparable(
-    table: Sequence[Feasible], about: Evidence, shapes: Mapping[str, Shape],
-    library: Mapping[str, EffectModel], stated: Stated,
-) -> tuple[tuple[str, ...], ...]:  # fmt: skip
-    """Return the groups of effects that are not told apart here at their typical sizes."""
-    typical = {f.name: f.typical for f in table if f.detectable < f.typical}
-    groups: list[set[str]] = []
-    for name, size in typical.items():
-        block = places_of(about, library[name], shapes[name])
-        amplitude = np.full(len(block), size / np.sqrt(len(block)))
-        near = {
-            other
-            for other in typical
-            if other != name
-            and expected_gain(
-                about, stated, block, amplitude, places_of(about, library[other], shapes[other])
-            )
-            < APART
-        }
-        joined = [g for g in groups if g & near or name in g]
-        groups = [g for g in groups if g not in joined] + [set().union(*joined, near, {name})]
-    return tuple(tuple(n for n in shapes if n in g) for g in groups if len(g) > 1)
-
-
 def not_told_apart(
     run: GaugeRun, nothing: Fit, terms: Sequence[Term], library: Mapping[str, EffectModel], stated: Stated,
     alike: float,
