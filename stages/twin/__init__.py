@@ -37,6 +37,7 @@ from stages.twin.name import (
     worst_places,
 )
 from stages.twin.on_wall import unnamed
+from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
 from stages.twin.state import PhotometricState, Sampled, clipped_line, estimate_state, sample_frames
@@ -87,12 +88,15 @@ class Photometry:
         Places, none of those, where texture is fainter or stronger.
     blur_px : float
         1 σ of lens and pixel that it holds for.
+    pixels : tuple of Mismatch
+        Defective pixels of the sensor.
     """
 
     state: PhotometricState
     places: tuple[ImagePlace, ...]
     blurred: tuple[ImagePlace, ...]
     blur_px: float
+    pixels: tuple[Mismatch, ...] = ()
 
 
 def measure_photometry(
@@ -140,7 +144,12 @@ def photometry_of(
     places = (*displaced, *beside(places, displaced))
     if gain is not None:
         state = replace(state, gain_map=full_size(gain, state.outside.shape))
-    return Photometry(state, places, beside(blurred, places), parameters.blur_px)
+    pixels = defective_pixels(
+        [s.image.astype(np.uint8) for s in sampled],
+        [s.light in state.shows_wall for s in sampled],
+        ~(state.outside | state.edge),
+    )
+    return Photometry(state, places, beside(blurred, places), parameters.blur_px, pixels)
 
 
 def compare_with_twin(
@@ -191,7 +200,7 @@ def compared_with(
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
     on_window, glints = told_apart(on_window, sums.glints())
     found: tuple[Mismatch, ...] = (
-        *over_time, *on_window,
+        *over_time, *on_window, *photometry.pixels,
         *unnamed(samples and samples.clear_of((*on_window, *glints)), scene.surface), *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
@@ -249,14 +258,14 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "8",
+    "9",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
 )
 TWIN = Stage(
     "twin",
-    "17",
+    "18",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

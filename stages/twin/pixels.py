@@ -1,0 +1,45 @@
+"""Pixels of the sensor that are bright without light, or dark in any light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from pipeline.arrays import Bool, Byte, Int
+from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
+
+_LEAST_GREY, _AROUND_PX, _MOST_PIXELS, _FEWEST_FRAMES = 12, 5, 3, 6
+"""Grey levels by which a pixel differs from the median of five by five about it, in every frame: wall moves
+and noise changes. More pixels side by side are no defect of single ones, but dirt, a scratch or text. Fewest
+lit frames. Chosen."""
+
+
+def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) -> tuple[Mismatch, ...]:
+    """Return which pixels, of those ``seen`` (H, W), are bright in all frames (H, W), or dark in all lit."""
+    if sum(lit) < _FEWEST_FRAMES:
+        return ()
+    most = np.iinfo(np.int16).max
+    more, less = (np.full(seen.shape, most, np.int16) for _ in range(2))
+    for image, shows_wall in zip(images, lit, strict=True):
+        beyond = image.astype(np.int16) - np.asarray(cv2.medianBlur(image, _AROUND_PX), np.int16)
+        more = np.minimum(more, beyond)
+        less = np.minimum(less, -beyond) if shows_wall else less
+    hot, dead = (_single((a >= _LEAST_GREY) & seen) for a in (more, less))
+    both = np.concatenate([hot, dead])
+    if not len(both):
+        return ()
+    nan, pixels = float("nan"), int(seen.sum())
+    size = NamedFigure("share", len(both) / pixels, float(np.sqrt(len(both))) / pixels, "of pixels")
+    v, u = (float(a) for a in both[0])
+    said = f"{len(hot)} single pixels are too bright in all frames, {len(dead)} too dark in all lit ones."
+    look = Look(0, u, v, 4.0 * _AROUND_PX)
+    return (Mismatch("defective_pixels", "intensity", "image", (), (size,), nan, nan, nan, said, look),)
+
+
+def _single(differs: Bool) -> Int:
+    """Return row and column (N, 2) of what differs in a few pixels, not more, side by side."""
+    count, _, stats, centre = cv2.connectedComponentsWithStats(differs.astype(np.uint8))
+    small = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] <= _MOST_PIXELS]
+    return np.asarray(np.round(centre[small])[:, ::-1], int).reshape(-1, 2)

@@ -1,0 +1,39 @@
+"""Defective pixels: told from wall that moves, from noise, and from dirt that is larger."""
+
+import cv2
+import numpy as np
+
+from stages.twin.pixels import defective_pixels
+
+SHAPE, FRAMES = (120, 160), 14
+SEEN = np.ones(SHAPE, bool)
+
+
+def _frames(hot=(), dead=(), dirt=None):
+    random = np.random.default_rng(3)
+    wall = cv2.GaussianBlur(random.normal(0, 60, (SHAPE[0] + 10 * FRAMES, SHAPE[1])), (0, 0), 2)
+    images = []
+    for k in range(FRAMES):
+        lit = k % 2 == 0
+        level = 70 + wall[10 * k : 10 * k + SHAPE[0]] if lit else np.full(SHAPE, 16.0)
+        image = level + random.normal(0, 3, SHAPE)
+        for at in hot:
+            image[at] += 50
+        for at in dead:
+            image[at] = 16
+        if dirt is not None:
+            image[dirt] = 16
+        images.append(np.clip(image, 0, 255).astype(np.uint8))
+    return images, [k % 2 == 0 for k in range(FRAMES)], SEEN
+
+
+def test_hot_and_dead_pixels_are_counted():
+    (found,) = defective_pixels(*_frames([(20, 30), (90, 100)], [(60, 70)]))
+    assert found.name == "defective_pixels"
+    assert found.statement.startswith("2 single pixels are too bright in all frames, 1 too dark")
+    assert found.parameters[0].value == 3 / SEEN.size
+
+
+def test_moving_wall_noise_and_dirt_are_no_defective_pixels():
+    assert defective_pixels(*_frames()) == ()
+    assert defective_pixels(*_frames(dirt=(slice(40, 43), slice(50, 60)))) == ()
