@@ -10,9 +10,9 @@ from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
+from stages.motion.bore import ONE_BORE
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import NO_STEPS
 from stages.motion.tracking.landmarks import OBSERVATION, ObservationStore, TrackedPoses
 from stages.motion.tracking.strips import StripGrid
 from stages.motion.tracking.tracker import TrackedTexture
@@ -54,7 +54,7 @@ def long_motion(
     texture = TrackedTexture(store, grid, TrackedPoses(lit, guess[lit], np.zeros(len(lit), bool)))
     distance = step_mm * k / SCALE + ENCODER_SIGMA_MM * random.standard_normal(frames)
     encoder = EncoderReadings(distance - distance[0], ENCODER_SIGMA_MM, np.ones(frames, bool))
-    return LongMotion(MeasuredRun(texture, rings, laser, k / 30, guess, encoder, probe, NO_STEPS), T_pc)
+    return LongMotion(MeasuredRun(texture, rings, laser, k / 30, guess, encoder, probe, ONE_BORE), T_pc)
 
 
 def _poses(z_mm: Float) -> Float:

@@ -15,9 +15,8 @@ from stages.motion.estimate import (
     JointEstimate,
     adjust_at_once,
     estimate_motion,
-    measure_run,
-    places_of,
 )
+from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import RingBins, circles_in_rings, ring_bins
 from stages.motion.tracking.landmarks import Tracks

@@ -13,7 +13,6 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.arrays import Int
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along, frames_at
@@ -22,20 +21,16 @@ from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import FrameTable, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
-from stages.motion.bundle_adjustment.laser_knock import find_jump, texture_breaks
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
-from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
 from stages.motion.events import find_events
-from stages.motion.frame_times import believed_times
 from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
+from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import BoreSteps, RingCircles, circles_in_rings, looking_at_wall
+from stages.motion.rings import circles_in_rings, looking_at_wall
 from stages.motion.route.laying import lay_route
-from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.tracking.strips import StripGrid, WallView
-from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track_texture
+from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
     doubting_texture,
     report_instrument,
@@ -43,20 +38,15 @@ from stages.motion.trajectory import (
     report_steps,
     trajectory_of,
 )
-from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.sliding_window import adjust_run, joined_at_once
 
 _LARGEST_CHANGE = 0.1
 """Share by which the radius may differ from the rings' before the adjustment counts as diverged: the rings'
 median radius errs by far less. Not measured."""
-_LEAST_TRACKED = 0.5
-"""Share of the lit frames that texture must be followed in where there is no encoder. Not measured."""
 _MOST_TURNED = np.radians(45)
 """Largest angle between the optical axis and the pipe's: the laser would draw an ellipse of 1.4 to 1 there.
 In the sharpest elbow (short radius, a diameter, by ASME B16.9) a probe as long as the pipe is wide turns
 by 30°."""
-_FEWEST_COLUMNS = 240
-"""Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
 _OBSERVATIONS_AT_ONCE = 1 << 16
 
 
@@ -109,50 +99,6 @@ def estimate_motion(
     )  # fmt: skip
 
 
-def measure_run(
-    recording: Recording,
-    probe: Probe,
-    rings: RingSamples,
-    points: RingPoints,
-    parameters: MotionParameters,
-    context: Context,
-    use_encoder: bool = True,
-) -> MeasuredRun:
-    """Track the wall's texture and gather what was measured: texture, rings, times and encoder.
-
-    Without ``use_encoder`` the encoder has no say, so that it can be compared with what is seen.
-
-    Raises
-    ------
-    UnusableError
-        When the rings do not place the pipe, or neither texture nor encoder determines the distance.
-    """
-    circles, rings = circles_in_rings(points), rings.placed_in(points)
-    grid = strip_grid(circles.usual_radius_mm, parameters)
-    view, encoder = WallView(recording, probe, grid), None
-    if use_encoder:
-        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
-    texture, predictor = _track(view, circles, encoder, parameters, context)
-    times = believed_times(recording, texture.poses, context)
-    if encoder is not None and times is not recording.frames.time_s:
-        recording = replace(recording, frames=replace(recording.frames, time_s=times))
-        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
-    if encoder is not None and contradicted(encoder, texture.poses, context):
-        encoder = None
-        texture, predictor = _track(view, circles, None, parameters, context)
-    _require_distance(texture.poses, encoder)
-    place = places_of(recording, rings.frame)
-    T_pc = predictor.between(texture.poses)
-    at_mm = T_pc[places_of(recording, circles.frame), 2, 3] + probe.laser.baseline_mm
-    bore = BoreSteps.of(circles.radius_mm, at_mm)
-    context.report("steps of the bore", len(bore.at_mm), "")
-    jump = find_jump(circles, at_mm, points, probe)
-    if jump is not None and texture_breaks(jump, rings.frame, texture.poses):
-        jump = None
-    time_s = recording.frames.time_s
-    return MeasuredRun(texture, rings, place, time_s, T_pc, encoder, probe, bore, jump=jump)
-
-
 @dataclass(frozen=True)
 class JointEstimate:
     """All frames of a recording adjusted at once.
@@ -201,46 +147,6 @@ def adjust_at_once(
     return JointEstimate(measured, estimate.state, estimate.adjusted.equations, trajectory)
 
 
-def strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:
-    """Return the sampling of the wall between the near and the far angle, in a pipe of a radius."""
-    near = radius_mm / np.tan(np.radians(parameters.near_angle_deg))
-    far = radius_mm / np.tan(np.radians(parameters.far_angle_deg))
-    columns = max(4 * round(2 * np.pi * radius_mm / parameters.strip_step_mm / 4), _FEWEST_COLUMNS)
-    return StripGrid(radius_mm, columns, near, far)
-
-
-def places_of(recording: Recording, frame: Int) -> Int:
-    """Return the places of frame numbers in the recording's list of frames."""
-    return np.asarray(np.searchsorted(recording.frames.frame, frame))
-
-
-def _track(
-    view: WallView,
-    circles: RingCircles,
-    encoder: EncoderReadings | None,
-    parameters: MotionParameters,
-    context: Context,
-) -> tuple[TrackedTexture, PosePredictor]:
-    frames, lit = view.recording.frames, view.lit
-    predictor = PosePredictor(frames.time_s, encoder, circles.centre_at(frames.frame))
-    tracker = TextureTracker(view.probe, view.grid, parameters, view.hidden, context.scratch)
-    images = view.images(lit)
-    found = track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
-    return found, predictor
-
-
-def _require_distance(tracked: TrackedPoses, encoder: EncoderReadings | None) -> None:
-    share = float(np.mean(~tracked.lost[1:])) if len(tracked.lost) > 1 else 0.0
-    if encoder is None and share < _LEAST_TRACKED:
-        raise UnusableError(
-            "motion",
-            f"the wall's texture could be followed in only {100 * share:.0f} % of the lit frames and "
-            "there is no encoder, so distance is not determined",
-            limit="half of the lit frames",
-            hint="give the encoder file, light the wall better, or record lit frames more often",
-        )
-
-
 def _require_convergence(radius_mm: float, estimate: Estimate) -> None:
     """Refuse an estimate that ran away from the pipe that the rings show."""
     found = float(estimate.state.globals[0])
@@ -269,7 +175,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "31",
+    "32",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.interpolate import interp1d
-from scipy.ndimage import maximum_filter1d
 
 from pipeline.adjustment.circles import LEAST_COVERED, circles_through
 from pipeline.arrays import Float, Int
@@ -24,11 +23,6 @@ _FEWEST_RINGS = 3
 _MOST_NOT_ON_WALL = 0.5
 """Share of the rings that show no wall in a sector, from which its texture is not followed. A choice:
 half is most of the way."""
-_STEP_MM = 0.5
-"""Change of radius that counts as a step of the bore: five times the relief about the smooth pipe
-(`surface_sigma_mm`). A choice."""
-_LENGTH_RADII, _FEWEST_RINGS_OF_LENGTH = 0.5, 5
-"""A length of a bore is at least half its radius long: welds and rings of deposit are shorter. A choice."""
 _FARTHEST_PX = 20.0
 """A ring farther than this from where it is expected is a hole or an outlier, of little weight. Up to there
 derivatives change evenly: with relief of 5 px rms nothing is left of their pull. A choice."""
@@ -75,64 +69,6 @@ class RingBins:
         away = residual_mm / np.einsum("mi,mi->m", normal_c, self.by_pixel)
         away = np.clip(away, -_FARTHEST_PX, _FARTHEST_PX)
         return np.asarray(self.by_instrument - away[:, None, None] * self.instrument_by_pixel)
-
-
-@dataclass(frozen=True)
-class BoreSteps:
-    """Where the bore steps (k,), and how much wider (k + 1,) than the longest the lengths between are, mm.
-
-    A pipe of one bore has no steps. Held to one radius, two bores 2 mm apart moved the probe by 20 σ. From
-    ``aside_from_mm`` on the pipe lies farther across by ``aside_mm``, along x and y of its sections.
-    """
-
-    at_mm: Float
-    wider_mm: Float
-    aside_from_mm: float = np.inf
-    aside_mm: tuple[float, float] = (0.0, 0.0)
-
-    @staticmethod
-    def of(radius_mm: Float, at_mm: Float) -> BoreSteps:
-        """Return the steps that radii (F,) of rings at distances (F,) show; NaN where a ring has none."""
-        order = np.argsort(at_mm, kind="stable")
-        order = order[np.isfinite(radius_mm[order])]
-        radius_mm, at_mm = radius_mm[order], at_mm[order]
-        if len(radius_mm) < 2 * _FEWEST_RINGS_OF_LENGTH + 2:
-            return NO_STEPS
-        n = rings_of_length(radius_mm, at_mm)
-        if len(radius_mm) < 2 * n + 2:
-            return NO_STEPS
-        median = np.median(np.lib.stride_tricks.sliding_window_view(radius_mm, n), axis=1)
-        size = np.abs(median[n + 1 :] - median[: -n - 1])  # of a step at ring n + k
-        highest = size == maximum_filter1d(size, 2 * n + 1)
-        place = n + np.flatnonzero(highest & (size > _STEP_MM))
-        near = place[np.diff(place, prepend=-n) >= n]
-        place = np.array([_stepped_at(radius_mm, int(k), n) for k in near], np.int64)
-        lengths = np.split(radius_mm, place)
-        usual = np.array([np.median(part) for part in lengths])
-        return BoreSteps(at_mm[place], usual - usual[np.argmax([len(part) for part in lengths])])
-
-    def wider_at(self, distance_mm: Float) -> Float:
-        """Return how much wider (M,) the bore is at distances (M,), mm."""
-        return np.asarray(self.wider_mm[np.searchsorted(self.at_mm, distance_mm)])
-
-    def behind(self, start_mm: float) -> BoreSteps:
-        """Return the steps with distance counted from ``start_mm``."""
-        return replace(self, at_mm=self.at_mm - start_mm, aside_from_mm=self.aside_from_mm - start_mm)
-
-    def with_joint(self, at_mm: float, aside_mm: tuple[float, float], wider_mm: float) -> BoreSteps:
-        """Return the steps with a joint behind which the pipe lies aside and is wider."""
-        place = int(np.searchsorted(self.at_mm, at_mm))
-        wider = np.insert(self.wider_mm, place, self.wider_mm[place])
-        wider[place + 1 :] += wider_mm
-        return BoreSteps(np.insert(self.at_mm, place, at_mm), wider, at_mm, aside_mm)
-
-    def off_at(self, distance_mm: Float, azimuth_rad: Float) -> Float:
-        """Return how much farther from the axis the wall is (M,) at distances and azimuths (M,), mm."""
-        (x, y), behind = self.aside_mm, distance_mm > self.aside_from_mm
-        return self.wider_at(distance_mm) + behind * (x * np.cos(azimuth_rad) + y * np.sin(azimuth_rad))
-
-
-NO_STEPS = BoreSteps(np.zeros(0), np.zeros(1))
 
 
 @dataclass(frozen=True)
@@ -202,12 +138,6 @@ def looking_at_wall(recording: Recording, rings: RingSamples, points: RingPoints
     return replace(recording, stays=hidden if stays is None else hidden | (stays > 0))
 
 
-def rings_of_length(radius_mm: Float, at_mm: Float) -> int:
-    """Return how many rings, with radii (F,) at distances (F,), the shortest length of a bore has."""
-    apart_mm = max(float(np.ptp(at_mm)) / len(at_mm), 1e-9)
-    return max(round(_LENGTH_RADII * float(np.median(radius_mm)) / apart_mm), _FEWEST_RINGS_OF_LENGTH)
-
-
 def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigma_mm: float) -> RingBins:
     """Condense each ring to the mean of every azimuth bin that is at least half seen.
 
@@ -247,10 +177,3 @@ def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigm
     farther = probe.triangulate_jacobian(uv + outward)[1] @ unsure - by_instrument
     ok = np.isfinite(np.column_stack([xyz_c, sigma])).all(1) & np.isfinite(farther).all((1, 2))
     return RingBins(frame[ok], xyz_c[ok], by_instrument[ok], by_pixel[ok], farther[ok], sigma[ok])
-
-
-def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
-    """Return the first ring behind a step: medians of ``n`` rings tell it to half as many only."""
-    part = radius_mm[near - n : near + n + 1]
-    before, behind = np.abs(part - np.median(part[:n])), np.abs(part - np.median(part[n + 1 :]))
-    return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))

@@ -12,9 +12,9 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
+from stages.motion.bore import Bore
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import estimate_state
-from stages.motion.rings import BoreSteps
 from stages.motion.trajectory import doubting_texture
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
@@ -95,7 +95,7 @@ def test_a_step_of_the_bore_may_explain_what_the_rings_do() -> None:
     estimate = estimate_state(made.truth, made.measured, MotionParameters(match_bias_px=0.01))
     plain = drift_of_scale(estimate, made.measured)
     middle = float(np.median(made.truth.T_pc[:, 2, 3]))
-    bore = BoreSteps(np.array([middle + 20.0]), np.zeros(2))
+    bore = Bore(np.array([middle + 20.0]), np.zeros(2))
     state = replace(estimate.state, bore=bore)
     stepped = drift_of_scale(
         replace(estimate, adjusted=replace(estimate.adjusted, state=state)), made.measured

@@ -15,10 +15,11 @@ from pipeline.geometry.axis import distance_along
 from pipeline.instrument.laser import LaserSheet
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
+from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest, RingJump, find_jump, texture_breaks
 from stages.motion.bundle_adjustment.unknowns import State
-from stages.motion.rings import NO_STEPS, BoreSteps, RingCircles, circles_in_rings
+from stages.motion.rings import RingCircles, circles_in_rings
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.steady_laser import with_steady_laser
@@ -41,7 +42,7 @@ class SceneRun:
 
     made: Scene
     jump: RingJump
-    bore: BoreSteps = NO_STEPS
+    bore: Bore = ONE_BORE
     knock: LaserKnock | None = None
 
     def __getattr__(self, name: str) -> Any:
@@ -82,7 +83,7 @@ def ring_shifted(made: Scene, shift_mm: float) -> Scene:
 def knock_in(made: Scene, jump_mm: tuple[float, float, float]) -> KnockTest:
     """Return what a run says of a jump of centre and radius in the middle frame."""
     ring = made.measured.rings.xyz_c[made.measured.rings.frame == BEHIND]
-    jump = RingJump.of(BEHIND, np.array(jump_mm), ring, made.measured.probe, joint_at(FRAMES), NO_STEPS)
+    jump = RingJump.of(BEHIND, np.array(jump_mm), ring, made.measured.probe, joint_at(FRAMES), ONE_BORE)
     run = cast(MeasuredRun, SceneRun(made, jump))
     found = with_steady_laser(run, MotionParameters(match_bias_px=0.01), lambda: None)[1]
     assert found is not None
@@ -128,7 +129,7 @@ def test_a_jump_of_which_texture_cannot_tell_is_said_to_be_one() -> None:
     told: list[str] = []
     context = replace(quiet_context(), warn=told.append)
     ring, instrument = 50.0 * np.array([[1, 0, 0.44], [0, 1, 0.44], [-1, 0, 0.44], [0, -1, 0.44]]), probe()
-    jump = RingJump.of(7, np.array([0.5, 0, 0]), ring, instrument, 30.0, NO_STEPS)
+    jump = RingJump.of(7, np.array([0.5, 0, 0]), ring, instrument, 30.0, ONE_BORE)
     for better in (-50.0, 2.0, 50.0):
         KnockTest(jump.guess, better, jump, 1.0).warn(context)
     assert ["does not tell for sure" in words for words in told] == [True, False]
@@ -144,7 +145,7 @@ def test_where_texture_is_lost_beside_a_jump_it_tells_no_knock(lost: int, breaks
     """Two runs joined came out as a laser knocked by 0.82 ± 0.03 degrees."""
     lit = np.arange(1, 60, 2)
     poses = TrackedPoses(lit, np.tile(np.eye(3, 4), (len(lit), 1, 1)), lit == lost)
-    jump = RingJump(26, np.array([2.0, 0, 0]), np.eye(3), 37.0, NO_STEPS)
+    jump = RingJump(26, np.array([2.0, 0, 0]), np.eye(3), 37.0, ONE_BORE)
     assert texture_breaks(jump, lit - 1, poses) == breaks
 
 

@@ -14,11 +14,12 @@ from pipeline.adjustment.robust import GemanMcClure
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.geometry.axis import to_pipe
+from stages.motion.bore import Bore
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.equations import landmark_rows
 from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import BoreSteps, circles_in_rings, ring_bins
+from stages.motion.rings import circles_in_rings, ring_bins
 from tests.exact_rings import seen_above_water
 from tests.gauge_runs import stated_probe
 from tests.motion_scene import displaced, scene
@@ -69,14 +70,14 @@ def test_steps_of_the_bore_are_found_and_the_wall_follows_them(given) -> None:
     radius_mm = np.where(at_mm < 32, wavy, wavy - 2.0)
     radius_mm[[7, 41]] = np.nan, 70.0
     order = random.permutation(100)
-    assert not len(BoreSteps.of(wavy, at_mm).at_mm), "the control: a pipe of one bore has none"
-    steps = BoreSteps.of(radius_mm[order], at_mm[order])
+    assert not len(Bore.of(wavy, at_mm).at_mm), "the control: a pipe of one bore has none"
+    steps = Bore.of(radius_mm[order], at_mm[order])
     assert steps.at_mm == pytest.approx([32.0])
     assert steps.wider_mm == pytest.approx([2.0, 0.0], abs=0.3)
 
     state = given[1]
     wall = state.xyz_p
-    narrow = replace(state, bore=BoreSteps(np.array([30.0]), np.array([0.0, -2.0])))
+    narrow = replace(state, bore=Bore(np.array([30.0]), np.array([0.0, -2.0])))
     apart = residuals.surface(narrow, wall)[0] - residuals.surface(state, wall)[0]
     np.testing.assert_allclose(apart, np.where(to_pipe(state.axis, wall)[0] > 30, 2.0, 0.0), atol=1e-9)
 

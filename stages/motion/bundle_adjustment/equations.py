@@ -12,6 +12,7 @@ from pipeline.adjustment.elimination import by_point_and_pose
 from pipeline.adjustment.motion_priors import LOOSE, smooth_motion_rows
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, robust_spread
 from pipeline.arrays import Float
+from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
@@ -40,6 +41,8 @@ _LEAST_EXCESS = 0.3
 """Matches are never believed to be more than three times better than predicted. Not measured."""
 _NO_PIXEL_PX = 1000.0
 """Residual of a landmark that projects nowhere."""
+_PLACE_MM = 0.5
+"""1 σ, mm, of where a reducer lies against landmarks on it: half the way from ring to ring. Not measured."""
 _DAMPED = 1e-5
 """Relative damping with which covariances are computed where rounding made the equations singular."""
 LEAST_REACH = 4
@@ -250,9 +253,10 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
         pass
     start = np.searchsorted(tracks.landmark, np.arange(len(state.xyz_p) + 1))
     relief, normal, by_border = residuals.surface(state, state.xyz_p)
+    unsure_mm = _PLACE_MM * state.bore.slope_at(to_pipe(state.axis, state.xyz_p)[0])
     return LandmarkRows(
         start, tracks.frame, by_pose, by_point, by_instrument, residual, tracks.sigma_px,
-        normal, by_border, relief, np.full(len(relief), parameters.surface_sigma_mm), Cauchy(),
+        normal, by_border, relief, np.hypot(parameters.surface_sigma_mm, unsure_mm), Cauchy(),
     )  # fmt: skip
 
 

@@ -92,7 +92,8 @@ class RingsInPipe:
         rings, T = measured.rings, state.T_pc[measured.rings.frame]
         xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument[: rings.by_instrument.shape[2]]
         xyz_p = transform(T, xyz_c)
-        normal = residuals.surface(state, xyz_p)[1]
+        moved_mm = residuals.camera_moved(state)[1][rings.frame]
+        normal = residuals.surface(state, xyz_p, moved_mm)[1]
         span, azimuth, _ = to_pipe(state.axis, xyz_p)
         return RingsInPipe(xyz_c, span, azimuth, np.einsum("mi,mij->mj", normal, T[:, :3, :3]))
 

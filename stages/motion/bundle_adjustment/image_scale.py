@@ -16,11 +16,11 @@ from numpy.polynomial import legendre
 from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.machine.stage import Context
+from stages.motion.bore import Bore
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.extra_columns import ExtraColumns, RingsInPipe, chance
 from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.bundle_adjustment.unknowns import State
-from stages.motion.rings import BoreSteps
 
 _COURSE, _WIDTH = 3, 4
 """Degrees of the polynomials: warming up by an exponential of a third of the run is followed by three to a
@@ -194,7 +194,7 @@ def _ring_gain(rings: RingsInPipe, state: State, measured: Measurements) -> tupl
     return -gain, float(np.median(gain)) if gain.size else 0.0
 
 
-def _widths(at_mm: Float, bore: BoreSteps) -> Float:
+def _widths(at_mm: Float, bore: Bore) -> Float:
     """Return what the pipe's width may add at distances (M,): (M, 4 + steps), smooth, and a step at each."""
     steps = (at_mm[:, None] > bore.at_mm).astype(float)
     return np.concatenate([_polynomials(at_mm, _WIDTH), steps], 1)

@@ -18,10 +18,11 @@ from pipeline.artefacts.measured import LaserKnock, RingPoints
 from pipeline.geometry.axis import to_pipe
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
+from stages.motion.bore import Bore, rings_of_length
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.extra_columns import ExtraColumns, RingsInPipe
 from stages.motion.bundle_adjustment.solver import Estimate
-from stages.motion.rings import BoreSteps, RingCircles, rings_of_length
+from stages.motion.rings import RingCircles
 from stages.motion.tracking.landmarks import TrackedPoses
 
 _SIDE = 3
@@ -66,7 +67,7 @@ class RingJump:
         Jump per change of the laser (`LaserKnock.change`).
     at_mm : float
         Where the rings lie that jump.
-    bore : BoreSteps
+    bore : Bore
         The pipe's, if the laser made the jump.
     """
 
@@ -74,10 +75,10 @@ class RingJump:
     jump_mm: Float
     by_laser: Float
     at_mm: float
-    bore: BoreSteps
+    bore: Bore
 
     @staticmethod
-    def of(frame: int, jump_mm: Float, xyz_c: Float, probe: Probe, at_mm: float, bore: BoreSteps) -> RingJump:
+    def of(frame: int, jump_mm: Float, xyz_c: Float, probe: Probe, at_mm: float, bore: Bore) -> RingJump:
         """Return the jump (3,) before a frame whose ring lies at points (A, 3); NaN where it is not seen."""
         xyz_c = xyz_c[np.isfinite(xyz_c).all(1)].astype(float)
         outward = xyz_c * [1, 1, 0] / np.linalg.norm(xyz_c[:, :2], axis=1)[:, None]
@@ -127,7 +128,7 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
         return None
     behind = int(frame[first])
     ring = points.xyz_c[int(np.searchsorted(points.frame, behind))]
-    bore = BoreSteps.of(circles.radius_mm - size[2] * (circles.frame >= behind), at_mm)
+    bore = Bore.of(circles.radius_mm - size[2] * (circles.frame >= behind), at_mm)
     place_mm = float(at_seen[first - 1] + at_seen[first]) / 2
     return RingJump.of(behind, size, ring, probe, place_mm, bore)
 

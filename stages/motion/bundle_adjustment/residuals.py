@@ -29,15 +29,16 @@ _VIEW_RAD = 0.2
 shows turns: carried on at the pace of the frames before, they came to 86°. Not measured."""
 
 
-def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
+def surface(state: State, xyz_p: Float, moved_mm: Float | float = 0.0) -> tuple[Float, Float, Float]:
     """Return the residual (M,) of points (M, 3) against the smooth pipe, with derivatives.
 
-    The derivatives are by the point, (M, 3), and by the border, (M, B).
+    The derivatives are by the point, (M, 3), and by the border, (M, B). The bore is looked up at places so
+    much less far along the pipe as points were ``moved_mm`` (M,) since it was measured.
     """
     s, psi, rho = to_pipe(state.axis, xyz_p)
     basis = state.axis_basis(s)
     a2, b2 = state.globals[1:3]
-    radius = state.globals[0] + state.bore.off_at(s, psi)
+    radius, slope = state.globals[0] + state.bore.off_at(s - moved_mm, psi), state.bore.slope_at(s - moved_mm)
     residual = rho - radius - a2 * np.cos(2 * psi) - b2 * np.sin(2 * psi)
     frame = state.section_frames(s)
     c, sn = np.cos(psi)[:, None], np.sin(psi)[:, None]
@@ -47,23 +48,44 @@ def surface(state: State, xyz_p: Float) -> tuple[Float, Float, Float]:
     shape = np.stack([-np.ones_like(psi), -np.cos(2 * psi), -np.sin(2 * psi), np.zeros_like(psi)], -1)
     deflect = [-basis * c, -basis * sn]
     instrument = np.zeros((len(psi), len(state.instrument)))
-    return residual, gradient, np.concatenate([shape, *deflect, instrument], 1)
+    if state.bore.reduces:
+        by_width = state.bore.width_by_instrument(state.bore.wider_at(s - moved_mm))
+        residual -= by_width @ state.instrument[: by_width.shape[1]]
+        instrument[:, : by_width.shape[1]] = -by_width
+    by_border = np.concatenate([shape, *deflect, instrument], 1)
+    if state.bore.reduces:
+        gradient -= slope[:, None] * frame[:, :, 2]
+        upright = 1 / np.hypot(1, slope)  # along the wall's normal
+        return residual * upright, gradient * upright[:, None], by_border * upright[:, None]
+    return residual, gradient, by_border
 
 
 def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
-    """Return the equations: every ring bin lies on the pipe's smooth surface."""
+    """Return the equations: every ring bin lies on the pipe's smooth surface.
+
+    How wide the bore is where a ring lies, the ring itself has shown: that does not say how far along it is.
+    """
     T = state.T_pc[rings.frame]
+    along, moved_mm = camera_moved(state)
     unsure = rings.by_instrument.shape[2]
     xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument[:unsure]
-    residual, normal, by_border = surface(state, transform(T, xyz_c))
+    residual, normal, by_border = surface(state, transform(T, xyz_c), moved_mm[rings.frame])
     normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
     turn = -np.einsum("mj,mjk->mk", normal_c, skew(xyz_c))
     first = state.border_size - len(state.instrument)
     by_instrument = rings.instrument_where_expected(residual, normal_c)
-    by_border[:, first : first + unsure] = np.einsum("mj,mjq->mq", normal_c, by_instrument)
+    by_border[:, first : first + unsure] += np.einsum("mj,mjq->mq", normal_c, by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
-    by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
+    by_place = np.einsum("mi,mi->m", normal, along[rings.frame])[:, None] * along[rings.frame]
+    by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal - by_place * state.bore.reduces, turn
     return Rows(rings.frame[:, None], by_frame, by_border, residual, rings.sigma_mm, loss)
+
+
+def camera_moved(state: State) -> tuple[Float, Float]:
+    """Return the pipe's direction (N, 3) at the camera, and how far (N,) it was moved along it, mm."""
+    s = to_pipe(state.axis, state.T_pc[:, :3, 3])[0]
+    moved_mm = s - state.guess_mm if len(state.guess_mm) else np.zeros(len(s))
+    return state.section_frames(s)[:, :, 2], moved_mm
 
 
 def turn_rows(state: State, sigma_rad: float) -> Rows:

@@ -83,6 +83,7 @@ def estimate_state(
     """
     with _refusing_undetermined():
         loose = adjust(start, measured, parameters, ROUGHLY, watch).state
+        loose = loose.with_bore_in_place(measured.probe.laser.baseline_mm)
         sigma = _smoothness(loose.T_pc, measured.tracks.poses.known)
         smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         for _ in range(_ROUNDS):

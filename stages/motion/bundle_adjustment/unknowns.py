@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import BSpline
 
 from pipeline.arrays import Float, Int
-from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, from_pipe
+from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, from_pipe, to_pipe
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
-from stages.motion.rings import NO_STEPS, BoreSteps
+from stages.motion.bore import ONE_BORE, Bore
 
 GLOBALS = 4
 ENCODER_SCALE = GLOBALS - 1
@@ -40,8 +40,10 @@ class State:
     knot_mm, nominal_radius_mm : float
     instrument : (Q,)
         Corrections of the instrument along its principal uncertainties, then of texture matching, in σ.
-    bore : BoreSteps
+    bore : Bore
         Not unknown: where the rings show another bore.
+    guess_mm : (N,)
+        Distances of the camera with which the rings' places in the bore were worked out; empty: those of now.
     """
 
     T_pc: Float
@@ -53,7 +55,8 @@ class State:
     knot_mm: float
     nominal_radius_mm: float
     instrument: Float
-    bore: BoreSteps = NO_STEPS
+    bore: Bore = ONE_BORE
+    guess_mm: Float = field(default_factory=lambda: np.zeros(0))
 
     @property
     def knots(self) -> int:
@@ -91,6 +94,17 @@ class State:
     def section_frames(self, distance_mm: Float) -> Float:
         """Return the axis' frames (M, 3, 3) in P at distances (M,)."""
         return frames_at(self.axis, distance_mm)[1]
+
+    def with_bore_in_place(self, ahead_mm: float) -> State:
+        """Return the state with a reducer placed where its rings, ``ahead_mm`` of the camera, lie by now."""
+        if not self.bore.reduces or not len(self.guess_mm):
+            return self
+        now = to_pipe(self.axis, self.T_pc[:, :3, 3])[0]
+        order = np.argsort(self.guess_mm, kind="stable")
+        guess = self.guess_mm[order]
+        moved = np.interp(self.bore.rings_mm - ahead_mm, guess, now[order] - guess)
+        rings_mm = np.maximum.accumulate(self.bore.rings_mm + moved)
+        return replace(self, bore=replace(self.bore, rings_mm=rings_mm), guess_mm=now)
 
     def step(self, frames: Float, border: Float, landmarks: Float) -> State:
         """Return the state after a step of the frames (N, 7), the border (B,) and the landmarks (L, 3)."""

@@ -19,6 +19,7 @@ from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording, in_background
 from pipeline.system.parallel import side_by_side
+from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.tracking.normalisation import (
     SOFTENING_PX,
     equally_sharp,
@@ -54,12 +55,16 @@ class StripGrid:
         Samples around, a multiple of 4.
     near_mm, far_mm : float
         Wall ahead of the camera that is sampled.
+    bore : Bore
+        How much wider the pipe is than the cylinder. In a reducer what lies on a cylinder is stretched while
+        the camera comes near, and patches of it are matched wrongly.
     """
 
     radius_mm: float
     columns: int
     near_mm: float
     far_mm: float
+    bore: Bore = ONE_BORE
 
     @property
     def step_mm(self) -> float:
@@ -72,10 +77,16 @@ class StripGrid:
         return int((self.far_mm - self.near_mm) / self.step_mm) // _COARSE[0] * _COARSE[0]
 
     def wall(self, row: Float, column: Float) -> Float:
-        """Return points (..., 3) of strip positions (...) on the cylinder about the z-axis."""
+        """Return points (..., 3) of strip positions (...) on the wall about the z-axis."""
         psi = column * (2 * np.pi / self.columns) - np.pi
-        r = self.radius_mm
+        r = self.radius_mm + self.bore.wider_at(row * self.step_mm)
         return np.stack(np.broadcast_arrays(r * np.cos(psi), r * np.sin(psi), row * self.step_mm), -1)
+
+    def in_sight(self, row: Float, from_mm: float) -> Bool:
+        """Return which rows (H,), ascending, a camera at a distance sees past the wall before them."""
+        at_mm = row * self.step_mm
+        slope = (self.radius_mm + self.bore.wider_at(at_mm)) / np.maximum(at_mm - from_mm, self.step_mm)
+        return np.asarray(slope <= np.minimum.accumulate(slope))
 
     def position(self, xyz: Float) -> tuple[Float, Float]:
         """Return strip row and column (...) of points (..., 3)."""
@@ -200,6 +211,7 @@ def unroll(image: Image, probe: Probe, T_pc: Float, grid: StripGrid, hidden: Hid
     grey, seen = (np.concatenate(part) for part in zip(*parts, strict=True))
     ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
     seen[(ahead > hidden.line_mm[0]) & (ahead < hidden.line_mm[1])] = False
+    seen[~grid.in_sight(first_row + np.arange(float(grid.rows)), T_pc[2, 3])] = False
     if hidden.stays is not None:
         seen &= sample(hidden.stays, coarse_uv, _COARSE)[0] == 0
     usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST)

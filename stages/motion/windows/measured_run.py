@@ -9,12 +9,13 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import LaserKnock, RingSamples
 from pipeline.instrument.probe import Probe
+from stages.motion.bore import Bore
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
 from stages.motion.bundle_adjustment.laser_knock import RingJump
 from stages.motion.bundle_adjustment.unknowns import State, straight_start
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import BoreSteps, RingBins, ring_bins
+from stages.motion.rings import RingBins, ring_bins
 from stages.motion.tracking.landmarks import Tracks
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.submaps import Window
@@ -39,7 +40,7 @@ class MeasuredRun:
     encoder : EncoderReadings or None
     probe : Probe
         As stated.
-    bore : BoreSteps
+    bore : Bore
         Of the straightened pipe.
     image_scale : (N,) or None
         By how many times the pictures are larger than the probe's camera has them, where that drifts.
@@ -56,7 +57,7 @@ class MeasuredRun:
     T_pc: Float
     encoder: EncoderReadings | None
     probe: Probe
-    bore: BoreSteps
+    bore: Bore
     image_scale: Float | None = None
     jump: RingJump | None = None
     knock: LaserKnock | None = None
@@ -100,11 +101,15 @@ class MeasuredRun:
         T_pc[:, 2, 3] -= self.start_mm(window)
         z, grid = T_pc[:, 2, 3], self.texture.grid
         span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
-        corrections = measured.unsure.shape[1] + MATCH_BIASES
+        corrections, bore = measured.unsure.shape[1] + MATCH_BIASES, self.bore.behind(self.start_mm(window))
         straight = straight_start(
             T_pc, measured.tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, corrections
         )
-        return replace(straight, bore=self.bore.behind(self.start_mm(window)))
+        if not bore.reduces:
+            return replace(straight, bore=bore)
+        rings = measured.rings
+        bore = bore.measured_by(rings.xyz_c, rings.by_instrument, grid.radius_mm)
+        return replace(straight, bore=bore, guess_mm=z)
 
     def start_mm(self, window: Window) -> float:
         """Return the distance of a window's first frame, from which its own are counted."""

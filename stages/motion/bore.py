@@ -1,0 +1,153 @@
+"""How wide the pipe is along its way, as the rings show it: steps of the bore, and reducers between bores."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, median_filter
+
+from pipeline.arrays import Float, Int
+
+_STEP_MM = 0.5
+"""Change of radius that counts as a step of the bore: five times the relief about the smooth pipe
+(`surface_sigma_mm`). A choice."""
+_LENGTH_RADII, _FEWEST_RINGS_OF_LENGTH = 0.5, 5
+"""A length of a bore is at least half its radius long: welds and rings of deposit are shorter. A choice."""
+_MOST_RINGS_IN_STEP = 2
+"""Rings in a row that a step may leave between the two bores; with more it is a reducer. Chamfers of gauges
+hold one. A choice."""
+
+
+@dataclass(frozen=True)
+class Bore:
+    """Where the bore steps (k,), and how much wider (k + 1,) than the rings' median the lengths between are.
+
+    A pipe of one bore has no steps. Held to one radius, two bores 2 mm apart moved the probe by 20 σ. In a
+    reducer the width is that of its rings, linear between them: ``rings_mm`` (r,) and ``rings_wider_mm``
+    (r,), which are then given for the whole pipe and hold the steps as well. From ``aside_from_mm`` on the
+    pipe lies farther across by ``aside_mm``, along x and y of its sections. By another instrument the width
+    is another: ``by_instrument`` (2, Q) mm per σ, times width and width squared.
+    """
+
+    at_mm: Float
+    wider_mm: Float
+    aside_from_mm: float = np.inf
+    aside_mm: tuple[float, float] = (0.0, 0.0)
+    rings_mm: Float = field(default_factory=lambda: np.zeros(1))
+    rings_wider_mm: Float = field(default_factory=lambda: np.zeros(1))
+    by_instrument: Float = field(default_factory=lambda: np.zeros((2, 0)))
+
+    @staticmethod
+    def of(radius_mm: Float, at_mm: Float) -> Bore:
+        """Return the bore that radii (F,) of rings at distances (F,) show; NaN where a ring has none."""
+        order = np.argsort(at_mm, kind="stable")
+        order = order[np.isfinite(radius_mm[order])]
+        radius_mm, at_mm = radius_mm[order], at_mm[order]
+        if len(radius_mm) < 2 * _FEWEST_RINGS_OF_LENGTH + 2:
+            return ONE_BORE
+        n = rings_of_length(radius_mm, at_mm)
+        place = _steps(radius_mm, n)
+        if not len(place):
+            return ONE_BORE
+        usual = np.array([np.median(part) for part in np.split(radius_mm, place)])
+        of_length = np.repeat(usual, np.diff(place, prepend=0, append=len(radius_mm)))
+        smooth, middle = median_filter(radius_mm, 3), float(np.median(radius_mm))
+        reducer = _in_reducers(smooth - of_length, place)
+        if not reducer.any():
+            return Bore(at_mm[place], usual - middle)
+        wider = np.where(reducer, smooth, of_length) - middle
+        return replace(ONE_BORE, rings_mm=at_mm, rings_wider_mm=wider)
+
+    @property
+    def reduces(self) -> bool:
+        """Whether the width changes over a length."""
+        return len(self.rings_mm) > 1
+
+    def wider_at(self, distance_mm: Float) -> Float:
+        """Return how much wider (M,) the bore is at distances (M,), mm."""
+        stepped = self.wider_mm[np.searchsorted(self.at_mm, distance_mm)]
+        return np.asarray(stepped + np.interp(distance_mm, self.rings_mm, self.rings_wider_mm))
+
+    def slope_at(self, distance_mm: Float) -> Float:
+        """Return how much wider (M,) the bore becomes per mm at distances (M,)."""
+        if not self.reduces:
+            return np.zeros(np.shape(distance_mm))
+        slope = np.diff(self.rings_wider_mm) / np.maximum(np.diff(self.rings_mm), 1e-9)
+        inside = np.searchsorted(self.rings_mm, distance_mm)
+        return np.asarray(np.concatenate([[0.0], slope, [0.0]])[inside])
+
+    def width_by_instrument(self, wider_mm: Float) -> Float:
+        """Return what widths (M,) change by (M, Q) per σ of the instrument, mm."""
+        return np.stack([wider_mm, wider_mm**2], -1) @ self.by_instrument
+
+    def measured_by(self, xyz_c: Float, by_instrument: Float, radius_mm: float) -> Bore:
+        """Return the bore with what is known of how rings (M, 3) in C change with the instrument (M, 3, Q).
+
+        Held to widths of the stated instrument, a reducer of 10 mm shrank its σ to a half.
+        """
+        radius = np.hypot(xyz_c[:, 0], xyz_c[:, 1])
+        outward = xyz_c * [1, 1, 0] / radius[:, None]
+        change = np.einsum("mi,miq->mq", outward, by_instrument)
+        powers = np.vander(radius - radius_mm, 3, increasing=True)
+        return replace(self, by_instrument=np.linalg.lstsq(powers, change, rcond=None)[0][1:])
+
+    def behind(self, start_mm: float) -> Bore:
+        """Return the bore with distance counted from ``start_mm``."""
+        aside_from = self.aside_from_mm - start_mm
+        at_mm, rings_mm = self.at_mm - start_mm, self.rings_mm - start_mm
+        return replace(self, at_mm=at_mm, rings_mm=rings_mm, aside_from_mm=aside_from)
+
+    def with_joint(self, at_mm: float, aside_mm: tuple[float, float], wider_mm: float) -> Bore:
+        """Return the bore with a joint behind which the pipe lies aside and is wider."""
+        place = int(np.searchsorted(self.at_mm, at_mm))
+        wider = np.insert(self.wider_mm, place, self.wider_mm[place])
+        wider[place + 1 :] += wider_mm
+        steps = np.insert(self.at_mm, place, at_mm)
+        return replace(self, at_mm=steps, wider_mm=wider, aside_from_mm=at_mm, aside_mm=aside_mm)
+
+    def off_at(self, distance_mm: Float, azimuth_rad: Float) -> Float:
+        """Return how much farther from the axis the wall is (M,) at distances and azimuths (M,), mm."""
+        (x, y), behind = self.aside_mm, distance_mm > self.aside_from_mm
+        return self.wider_at(distance_mm) + behind * (x * np.cos(azimuth_rad) + y * np.sin(azimuth_rad))
+
+
+ONE_BORE = Bore(np.zeros(0), np.zeros(1))
+
+
+def rings_of_length(radius_mm: Float, at_mm: Float) -> int:
+    """Return how many rings, with radii (F,) at distances (F,), the shortest length of a bore has."""
+    apart_mm = max(float(np.ptp(at_mm)) / len(at_mm), 1e-9)
+    return max(round(_LENGTH_RADII * float(np.median(radius_mm)) / apart_mm), _FEWEST_RINGS_OF_LENGTH)
+
+
+def _steps(radius_mm: Float, n: int) -> Int:
+    """Return the first rings (k,) behind steps between lengths of at least ``n`` rings."""
+    if len(radius_mm) < 2 * n + 2:
+        return np.zeros(0, np.int64)
+    median = np.median(np.lib.stride_tricks.sliding_window_view(radius_mm, n), axis=1)
+    size = np.abs(median[n + 1 :] - median[: -n - 1])  # of a step at ring n + k
+    highest = size == maximum_filter1d(size, 2 * n + 1)
+    place = n + np.flatnonzero(highest & (size > _STEP_MM))
+    near = place[np.diff(place, prepend=-n) >= n]
+    return np.array([_stepped_at(radius_mm, int(k), n) for k in near], np.int64)
+
+
+def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
+    """Return the first ring behind a step: medians of ``n`` rings tell it to half as many only."""
+    part = radius_mm[near - n : near + n + 1]
+    before, behind = np.abs(part - np.median(part[:n])), np.abs(part - np.median(part[n + 1 :]))
+    return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
+
+
+def _in_reducers(off_mm: Float, place: Int) -> np.ndarray:
+    """Return which rings (F,), off the length they lie in, belong to a reducer about a step."""
+    apart, inside = np.abs(off_mm) > _STEP_MM / 2, np.zeros(len(off_mm), bool)
+    for first in place:
+        start, end = int(first), int(first)
+        while start > 0 and apart[start - 1]:
+            start -= 1
+        while end < len(apart) and apart[end]:
+            end += 1
+        inside[start:end] |= end - start > _MOST_RINGS_IN_STEP
+    return inside

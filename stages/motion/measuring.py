@@ -1,0 +1,149 @@
+"""What motion is estimated from: the wall's texture, followed; the rings and their bore; the encoder."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.measured import RingPoints, RingSamples
+from pipeline.errors import UnusableError
+from pipeline.instrument.probe import Probe
+from pipeline.machine.stage import Context
+from pipeline.recording.base import Recording
+from stages.motion.bore import Bore
+from stages.motion.bundle_adjustment.laser_knock import find_jump, texture_breaks
+from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
+from stages.motion.frame_times import believed_times
+from stages.motion.parameters import MotionParameters
+from stages.motion.rings import RingCircles, circles_in_rings
+from stages.motion.tracking.landmarks import TrackedPoses
+from stages.motion.tracking.strips import StripGrid, WallView
+from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track_texture
+from stages.motion.windows.measured_run import MeasuredRun
+
+_LEAST_TRACKED = 0.5
+"""Share of the lit frames that texture must be followed in where there is no encoder. Not measured."""
+_FEWEST_COLUMNS = 240
+"""Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
+_FOLLOWED_ANEW = 2
+"""Times that texture is followed anew where the bore changes, which is known better each time. Without
+an encoder texture seems to move faster by as much as a bore is narrower."""
+
+
+def measure_run(
+    recording: Recording,
+    probe: Probe,
+    rings: RingSamples,
+    points: RingPoints,
+    parameters: MotionParameters,
+    context: Context,
+    use_encoder: bool = True,
+) -> MeasuredRun:
+    """Track the wall's texture and gather what was measured: texture, rings, times and encoder.
+
+    Without ``use_encoder`` the encoder has no say, so that it can be compared with what is seen.
+
+    Raises
+    ------
+    UnusableError
+        When the rings do not place the pipe, or neither texture nor encoder determines the distance.
+    """
+    circles, rings = circles_in_rings(points), rings.placed_in(points)
+    grid = strip_grid(circles.usual_radius_mm, parameters)
+    view, encoder = WallView(recording, probe, grid), None
+    if use_encoder:
+        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
+    texture, predictor = _track(view, circles, encoder, parameters, context)
+    times = believed_times(recording, texture.poses, context)
+    if encoder is not None and times is not recording.frames.time_s:
+        recording = replace(recording, frames=replace(recording.frames, time_s=times))
+        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
+    if encoder is not None and contradicted(encoder, texture.poses, context):
+        encoder = None
+        texture, predictor = _track(view, circles, None, parameters, context)
+    _require_distance(texture.poses, encoder)
+    place = places_of(recording, rings.frame)
+    T_pc, at_mm, bore = _in_bore(circles, texture, predictor, view, encoder)
+    for _ in range(_FOLLOWED_ANEW):
+        if not bore.reduces:
+            break
+        view = replace(view, grid=replace(grid, bore=bore))
+        anew, predictor = _track(view, circles, encoder, parameters, context)
+        if anew.poses.lost.sum() > texture.poses.lost.sum():
+            break
+        texture = anew
+        T_pc, at_mm, bore = _in_bore(circles, texture, predictor, view)
+    if bore.reduces:
+        context.warn(
+            f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer "
+            "or taper): texture there is matched less well, and distances may be off by more than their σ. "
+            "What to do: compare the distance with a known one, or cut the recording before and behind"
+        )
+    context.report("steps of the bore", len(bore.at_mm) + bore.reduces, "")
+    jump = find_jump(circles, at_mm, points, probe)
+    if jump is not None and texture_breaks(jump, rings.frame, texture.poses):
+        jump = None
+    time_s = recording.frames.time_s
+    return MeasuredRun(texture, rings, place, time_s, T_pc, encoder, probe, bore, jump=jump)
+
+
+def strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:
+    """Return the sampling of the wall between the near and the far angle, in a pipe of a radius."""
+    near = radius_mm / np.tan(np.radians(parameters.near_angle_deg))
+    far = radius_mm / np.tan(np.radians(parameters.far_angle_deg))
+    columns = max(4 * round(2 * np.pi * radius_mm / parameters.strip_step_mm / 4), _FEWEST_COLUMNS)
+    return StripGrid(radius_mm, columns, near, far)
+
+
+def places_of(recording: Recording, frame: Int) -> Int:
+    """Return the places of frame numbers in the recording's list of frames."""
+    return np.asarray(np.searchsorted(recording.frames.frame, frame))
+
+
+def _track(
+    view: WallView,
+    circles: RingCircles,
+    encoder: EncoderReadings | None,
+    parameters: MotionParameters,
+    context: Context,
+) -> tuple[TrackedTexture, PosePredictor]:
+    frames, lit = view.recording.frames, view.lit
+    predictor = PosePredictor(frames.time_s, encoder, circles.centre_at(frames.frame))
+    tracker = TextureTracker(view.probe, view.grid, parameters, view.hidden, context.scratch)
+    images = view.images(lit)
+    found = track_texture(images, predictor, tracker, lambda done: context.progress(done, len(lit)))
+    return found, predictor
+
+
+def _in_bore(
+    circles: RingCircles,
+    texture: TrackedTexture,
+    predictor: PosePredictor,
+    view: WallView,
+    encoder: EncoderReadings | None = None,
+) -> tuple[Float, Float, Bore]:
+    """Return first guesses of all poses (N, 4, 4), distances (F,) of the rings, and the bore they show.
+
+    In a reducer an ``encoder`` says better where than texture that was followed on a cylinder.
+    """
+    T_pc, place = predictor.between(texture.poses), places_of(view.recording, circles.frame)
+    at_mm = T_pc[place, 2, 3] + view.probe.laser.baseline_mm
+    bore = Bore.of(circles.radius_mm, at_mm)
+    if encoder is not None and bore.reduces:
+        way = encoder.distance_mm - encoder.distance_mm[texture.poses.frames[0]]
+        bore = Bore.of(circles.radius_mm, way[place] + view.probe.laser.baseline_mm)
+    return T_pc, at_mm, bore
+
+
+def _require_distance(tracked: TrackedPoses, encoder: EncoderReadings | None) -> None:
+    share = float(np.mean(~tracked.lost[1:])) if len(tracked.lost) > 1 else 0.0
+    if encoder is None and share < _LEAST_TRACKED:
+        raise UnusableError(
+            "motion",
+            f"the wall's texture could be followed in only {100 * share:.0f} % of the lit frames and "
+            "there is no encoder, so distance is not determined",
+            limit="half of the lit frames",
+            hint="give the encoder file, light the wall better, or record lit frames more often",
+        )

@@ -1,0 +1,77 @@
+"""The bore as rings show it: reducers, the wall in them, and what a camera sees of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.arrays import Float
+from stages.motion.bore import ONE_BORE, Bore
+from stages.motion.bundle_adjustment import residuals
+from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.tracking.strips import StripGrid
+from tests.motion_scene import RADIUS, scene
+
+AT_MM = 0.8 * np.arange(100)
+WIDER_MM = -np.clip((AT_MM - 35) * 0.8, 0, 9.6)
+RELIEF_MM = 0.03 * np.random.default_rng(3).standard_normal(100)
+REDUCER = replace(ONE_BORE, rings_mm=AT_MM, rings_wider_mm=WIDER_MM)
+
+
+def test_a_reducer_is_as_wide_as_its_rings() -> None:
+    seen = 50 + WIDER_MM + RELIEF_MM
+    seen[[7, 40]] = np.nan, 70.0
+    bore = Bore.of(seen, AT_MM)
+    assert bore.reduces
+    assert bore.wider_at(AT_MM) + np.nanmedian(seen) == pytest.approx(50 + WIDER_MM, abs=0.4)
+    inside = np.array([38.1, 42.1, 45.3])
+    assert bore.slope_at(inside) == pytest.approx(-0.8, abs=0.15)
+    assert bore.behind(10.0).wider_at(inside - 10) == pytest.approx(bore.wider_at(inside))
+
+
+@pytest.mark.parametrize("step_mm", [0.0, -3.0])
+def test_a_pipe_of_one_bore_or_with_a_step_has_no_reducer(step_mm: float) -> None:
+    bore = Bore.of(50.0 + RELIEF_MM + step_mm * (AT_MM > 40), AT_MM)
+    assert not bore.reduces
+    assert len(bore.at_mm) == (step_mm != 0)
+
+
+def test_the_wall_of_a_reducer_slopes() -> None:
+    state = replace(scene(9, 25, seed=2).truth, bore=REDUCER)
+    inside = state.xyz_p * [1, 1, 0] + [0, 0, 40.1]
+    _, gradient, _ = residuals.surface(state, inside)
+    for i, h in enumerate(1e-4 * np.eye(3)):
+        ahead, behind = (residuals.surface(state, inside + sign * h)[0] for sign in (1, -1))
+        np.testing.assert_allclose(gradient[:, i], (ahead - behind) / 2e-4, atol=0.02, err_msg=str(i))
+    assert np.abs(gradient[:, 2]).min() > 0.5, "the control: it does slope"
+
+
+def test_a_reducer_does_not_hold_the_probe_where_its_rings_were_taken_to_be() -> None:
+    made = scene(60, 25, seed=2)
+    guess = made.truth.T_pc[:, 2, 3]
+    state = replace(made.truth, bore=REDUCER, guess_mm=guess)
+    ahead = state.T_pc.copy()
+    ahead[:, 2, 3] += 0.03 * guess
+
+    def off(there: State) -> Float:
+        return residuals.ring_rows(there, made.measured.rings, residuals.Squares()).residual
+
+    farther = replace(state, T_pc=ahead)
+    by_place, by_place_farther = (replace(s, guess_mm=np.zeros(0)) for s in (state, farther))
+    apart = np.abs(off(farther) - off(state)).max()
+    held = np.abs(off(by_place_farther) - off(by_place)).max()
+    assert apart < 0.1 * held, "looked up by place, rings would move the probe back"
+    moved = farther.with_bore_in_place(made.measured.probe.laser.baseline_mm)
+    assert moved.bore.rings_mm[60] - AT_MM[60] == pytest.approx(0.03 * (AT_MM[60] - 22), abs=0.1)
+
+
+def test_strips_lie_on_the_wall_and_hide_what_lies_behind_an_edge() -> None:
+    wider = Bore(np.array([30.0]), np.array([0.0, 6.5]))
+    grid = StripGrid(RADIUS, 480, 12.0, 60.0, wider)
+    row = np.arange(60.0) / grid.step_mm
+    assert np.hypot(*grid.wall(row, 0 * row)[:, :2].T) == pytest.approx(RADIUS + 6.5 * (np.arange(60) > 30))
+    hidden = np.flatnonzero(~grid.in_sight(row, -20.0)) - 30
+    assert hidden.min() == 1
+    assert hidden.max() == int(50 * 6.5 / RADIUS), "as far as the sight past the edge reaches the wider wall"
+    narrower = replace(grid, bore=replace(wider, wider_mm=np.array([0.0, -6.5])))
+    assert narrower.in_sight(row, -20.0).all()
