@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,28 +65,19 @@ def measure_run(
         texture, predictor = _track(view, circles, None, parameters, context)
     _require_distance(texture.poses, encoder)
     place = places_of(recording, rings.frame)
-    T_pc, at_mm, bore = _in_bore(circles, texture, predictor, view, encoder)
-    for _ in range(_FOLLOWED_ANEW):
-        if not bore.reduces:
-            break
-        view = replace(view, grid=replace(grid, bore=bore))
-        anew, predictor = _track(view, circles, encoder, parameters, context)
-        if anew.poses.lost.sum() > texture.poses.lost.sum():
-            break
-        texture = anew
-        T_pc, at_mm, bore = _in_bore(circles, texture, predictor, view)
-    if bore.reduces:
-        context.warn(
-            f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer "
-            "or taper): texture there is matched less well, and distances may be off by more than their σ. "
-            "What to do: compare the distance with a known one, or cut the recording before and behind"
-        )
+    followed = _in_bore(circles, texture, predictor, view, encoder)
+    if followed.bore.reduces:
+        followed = _in_reducer(followed, circles, view, encoder, parameters, context)
+        _warn_of_reducer(followed.bore, context)
+    bore = followed.bore
     context.report("steps of the bore", len(bore.at_mm) + bore.reduces, "")
-    jump = find_jump(circles, at_mm, points, probe)
-    if jump is not None and texture_breaks(jump, rings.frame, texture.poses):
+    jump = find_jump(circles, followed.at_mm, points, probe)
+    if jump is not None and texture_breaks(jump, rings.frame, followed.texture.poses):
         jump = None
     time_s = recording.frames.time_s
-    return MeasuredRun(texture, rings, place, time_s, T_pc, encoder, probe, bore, jump=jump)
+    return MeasuredRun(
+        followed.texture, rings, place, time_s, followed.T_pc, encoder, probe, bore, jump=jump
+    )  # fmt: skip
 
 
 def strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:
@@ -117,14 +108,24 @@ def _track(
     return found, predictor
 
 
+@dataclass(frozen=True)
+class _Followed:
+    """Texture that was followed, the poses (N, 4, 4) it gives, where rings lie (F,) by them, and the bore."""
+
+    texture: TrackedTexture
+    T_pc: Float
+    at_mm: Float
+    bore: Bore
+
+
 def _in_bore(
     circles: RingCircles,
     texture: TrackedTexture,
     predictor: PosePredictor,
     view: WallView,
     encoder: EncoderReadings | None = None,
-) -> tuple[Float, Float, Bore]:
-    """Return first guesses of all poses (N, 4, 4), distances (F,) of the rings, and the bore they show.
+) -> _Followed:
+    """Return first guesses of the poses, and the bore that the rings show by them.
 
     In a reducer an ``encoder`` says better where than texture that was followed on a cylinder.
     """
@@ -134,7 +135,35 @@ def _in_bore(
     if encoder is not None and bore.reduces:
         way = encoder.distance_mm - encoder.distance_mm[texture.poses.frames[0]]
         bore = Bore.of(circles.radius_mm, way[place] + view.probe.laser.baseline_mm)
-    return T_pc, at_mm, bore
+    return _Followed(texture, T_pc, at_mm, bore)
+
+
+def _in_reducer(
+    followed: _Followed,
+    circles: RingCircles,
+    view: WallView,
+    encoder: EncoderReadings | None,
+    parameters: MotionParameters,
+    context: Context,
+) -> _Followed:
+    """Return texture that is followed on a wall as wide as its rings, not on a cylinder."""
+    for _ in range(_FOLLOWED_ANEW):
+        view = replace(view, grid=replace(view.grid, bore=followed.bore))
+        texture, predictor = _track(view, circles, encoder, parameters, context)
+        if texture.poses.lost.sum() > followed.texture.poses.lost.sum():
+            break
+        followed = _in_bore(circles, texture, predictor, view)
+        if not followed.bore.reduces:
+            break
+    return followed
+
+
+def _warn_of_reducer(bore: Bore, context: Context) -> None:
+    context.warn(
+        f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer or "
+        "taper): texture there is matched less well, and distances may be off by more than their σ. What to "
+        "do: compare the distance with a known one, or cut the recording before and behind the reducer"
+    )
 
 
 def _require_distance(tracked: TrackedPoses, encoder: EncoderReadings | None) -> None:

@@ -39,8 +39,7 @@ _REDESCENT = 2.5
 counts. The usual tuning constant; not measured here."""
 _LEAST_EXCESS = 0.3
 """Matches are never believed to be more than three times better than predicted. Not measured."""
-_NO_PIXEL_PX = 1000.0
-"""Residual of a landmark that projects nowhere."""
+_NO_PIXEL_PX = 1000.0  # residual of a landmark that projects nowhere
 _PLACE_MM = 0.5
 """1 σ, mm, of where a reducer lies against landmarks on it: half the way from ring to ring. Not measured."""
 _DAMPED = 1e-5

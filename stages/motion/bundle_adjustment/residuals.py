@@ -76,8 +76,9 @@ def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     by_instrument = rings.instrument_where_expected(residual, normal_c)
     by_border[:, first : first + unsure] += np.einsum("mj,mjq->mq", normal_c, by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
-    by_place = np.einsum("mi,mi->m", normal, along[rings.frame])[:, None] * along[rings.frame]
-    by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal - by_place * state.bore.reduces, turn
+    if state.bore.reduces:
+        normal = normal - np.einsum("mi,mi->m", normal, along[rings.frame])[:, None] * along[rings.frame]
+    by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
     return Rows(rings.frame[:, None], by_frame, by_border, residual, rings.sigma_mm, loss)
 
 
