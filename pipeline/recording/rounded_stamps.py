@@ -47,7 +47,7 @@ def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameT
         (_shared(table.time_s, unit_s), "share it evenly") if even is None else (even, "go on evenly")
     )
     return replace(table, time_s=time_s), (
-        f"the {file.name}'s times are rounded to {unit_s:.3g} s, up to {count.max()} frames have the same: "
+        f"the times in {file.name} are rounded to {unit_s:.3g} s, up to {count.max()} frames have the same: "
         f"they are taken to {how}. What to do: write time_s with three decimals at least",
     )
 

@@ -252,5 +252,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "20", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "21", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

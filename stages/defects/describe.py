@@ -21,6 +21,7 @@ from pipeline.pages import notation
 from stages.defects.corroborate import Witnesses, darkness
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
+from stages.defects.portraits import Features, probabilities
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of
@@ -30,73 +31,10 @@ _NEARLY_ROUND = 1.25
 # Another kind is told from the probability that is usually taken for more than chance.
 _WORTH_TELLING = 0.05
 _SMALL_MM2 = 60.0  # below this a quartic surface follows everything
-_UNKNOWN_ROUGHNESS = 0.08
+_UNKNOWN_ROUGHNESS = 0.08, 0.08
+# Coefficients of a quartic surface.
+_QUARTIC = 15
 _ROUND = " It goes all round: it may be the gap of a joint or the hollow root of a weld."
-
-
-@dataclass(frozen=True)
-class Features:
-    """Shape of a defect.
-
-    Attributes
-    ----------
-    length_mm, width_mm : float
-        Extent along the pipe and around it.
-    slim_mm : float
-        Smaller axis of the ellipse of the same second moments.
-    elongation : float
-        Larger axis over smaller.
-    roughness : float
-        RMS from a smooth (quartic) surface over depth.
-    direction_rad : float
-        Of the larger axis from the pipe's axis, in [0, π/2].
-    """
-
-    length_mm: float
-    width_mm: float
-    slim_mm: float
-    elongation: float
-    roughness: float
-    direction_rad: float
-
-
-@dataclass(frozen=True)
-class Likeness:
-    """Median of a feature for a kind, and by which factor two of three examples stay around it.
-
-    An ``open`` one counts no less the more there is of it: a groove all round is longer than any gouge.
-    """
-
-    median: float
-    factor: float
-    open: bool = False
-
-    def log_likelihood(self, value: float) -> float:
-        """Return that of a lognormal with a floor, so that no single feature rules a kind out."""
-        value = min(value, self.median) if self.open else value
-        z = np.log(max(value, 1e-3) / self.median) / np.log(self.factor)
-        return float(np.log(np.exp(-0.5 * z * z) / np.log(self.factor) + 1e-4))
-
-
-@dataclass(frozen=True)
-class Portrait:
-    """What a kind looks like; ``sign`` is +1 for kinds into the wall."""
-
-    kind: DefectKind
-    sign: float
-    slim_mm: Likeness
-    elongation: Likeness
-    roughness: Likeness
-
-
-_PORTRAITS = (
-    Portrait(DefectKind.PIT, 1.0, Likeness(5.0, 1.7), Likeness(1.3, 1.4), Likeness(0.08, 2.0)),
-    Portrait(DefectKind.CORROSION, 1.0, Likeness(20.0, 1.8), Likeness(1.4, 1.4), Likeness(0.12, 2.0)),
-    Portrait(DefectKind.GOUGE, 1.0, Likeness(2.5, 1.5), Likeness(7.0, 1.7, open=True), Likeness(0.12, 2.0)),
-    Portrait(DefectKind.CRACK, 1.0, Likeness(1.0, 1.4), Likeness(14.0, 1.8, open=True), Likeness(0.15, 2.0)),
-    Portrait(DefectKind.DENT, -1.0, Likeness(22.0, 1.6), Likeness(1.3, 1.3), Likeness(0.03, 1.7)),
-    Portrait(DefectKind.DEPOSIT, -1.0, Likeness(11.0, 1.9), Likeness(1.6, 1.5), Likeness(0.12, 1.8)),
-)
 
 
 def features_of(relief: Relief, region: Region, depth: Depth) -> Features:
@@ -111,38 +49,25 @@ def features_of(relief: Relief, region: Region, depth: Depth) -> Features:
     slim = float(np.sqrt(max(16 * values[0] - 1.0, cell[1] ** 2)))
     elongation = float(np.sqrt(values[1] / max(values[0] - 1.0 / 16, values[0] / 4)))
     direction = float(np.arccos(min(1.0, abs(vectors[0, 1]))))
-    return Features(length, width, slim, elongation, _roughness(relief, region, depth), direction)
+    return Features(length, width, slim, elongation, *_roughness(relief, region, depth), direction)
 
 
-def _roughness(relief: Relief, region: Region, depth: Depth) -> float:
+def _roughness(relief: Relief, region: Region, depth: Depth) -> tuple[float, float]:
+    """Return the roughness and its 1 σ: how far the noise of the place may scatter about its mean square."""
     surface = region.cut(millimetre_mean(relief.local_mm, relief.cell_mm))
     i, j = np.nonzero(region.mask & np.isfinite(surface))
-    if len(i) * relief.cell_mm[0] * relief.cell_mm[1] < _SMALL_MM2:
+    area_mm2 = len(i) * relief.cell_mm[0] * relief.cell_mm[1]
+    if area_mm2 < _SMALL_MM2:
         return _UNKNOWN_ROUGHNESS
     x, y = (2 * (k - k.min()) / max(1, np.ptp(k)) - 1 for k in (i, j))
     basis = np.stack([x**m * y**n for m in range(5) for n in range(5 - m)], -1)
     values = surface[i, j]
     rest = values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
-    noise = relief.typical.noise_mm / 2
+    noise = float(np.sqrt(np.mean(region.cut(relief.noise_mm)[i, j] ** 2))) / 2
     excess = max(0.0, float(np.mean(rest**2)) - noise**2)
-    return float(np.sqrt(excess)) / max(abs(depth.depth_mm), 1e-6)
-
-
-def probabilities(features: Features, region: Region) -> dict[DefectKind, float]:
-    """Return the probability of every kind that is possible, likeliest first (naive Bayes, equal priors)."""
-    if region.all_round:
-        return {DefectKind.WELD if region.sign < 0 else DefectKind.GOUGE: 1.0}
-    logs = {
-        p.kind: p.slim_mm.log_likelihood(features.slim_mm)
-        + p.elongation.log_likelihood(features.elongation)
-        + p.roughness.log_likelihood(features.roughness)
-        for p in _PORTRAITS
-        if p.sign == region.sign
-    }
-    top = max(logs.values())
-    total = sum(np.exp(v - top) for v in logs.values())
-    ranked = sorted(logs, key=lambda k: -logs[k])
-    return {k: float(np.exp(logs[k] - top) / total) for k in ranked}
+    free = max(area_mm2 - _QUARTIC, 1.0)
+    deep = max(abs(depth.depth_mm), 1e-6)
+    return float(np.sqrt(excess)) / deep, noise * float((2 / free) ** 0.25) / deep
 
 
 @dataclass(frozen=True)
@@ -158,7 +83,7 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
     """Return the defect of a region as if it were surely there; it has no number yet."""
     relief = surface.relief
     features = features_of(relief, region, depth)
-    likely = probabilities(features, region)
+    likely = probabilities(features, region, relief.radius_mm)
     kind, share = next(iter(likely.items()))
     clock_from, clock_to = _clock(relief, region)
     peak_distance, peak_clock = _peak(relief, region, depth)
