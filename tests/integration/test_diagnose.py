@@ -129,7 +129,7 @@ def test_a_second_diagnosis_computes_nothing(diagnosed, field_run, pair):
     words = ["diagnose", "--run", str(field_run), "--gauge", str(pair[1]), "-o", str(diagnosed)]
     assert CliRunner().invoke(app, words).exit_code == 0
     assert set(states(diagnosed).values()) == {"reused"}
-    assert len(states(diagnosed)) == 15
+    assert len(states(diagnosed)) == 14
     assert contents(diagnosed) == before
 
 
