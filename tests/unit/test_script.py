@@ -80,7 +80,7 @@ def find_tilt(
     field: Annotated[Recording, Of("field")], probe: Probe, *, parameters: Parameters, context: Context
 ) -> Diagnosed:
     context.warn("frames 3 to 5 were left out")
-    return Diagnosed(replace(FOUND, recording=field.name), probe, None, None)
+    return Diagnosed(replace(FOUND, recording=field.name), probe, None)
 
 
 @pytest.fixture
