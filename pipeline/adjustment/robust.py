@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from pipeline.arrays import Float, Float32, Int
 from pipeline.system.parallel import side_by_side
@@ -107,6 +106,8 @@ def running_median(value: Float32, size: tuple[int, int]) -> Float32:
 
     Both halves are worked on at once, each with the rows that its windows reach of the other.
     """
+    from scipy.ndimage import median_filter  # loaded where it is needed: a spread alone does without
+
     half, reach = len(value) // 2, size[0] // 2
     before = min(half, reach)
     medians = side_by_side(

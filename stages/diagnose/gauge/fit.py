@@ -111,25 +111,24 @@ def fit_beside(
 
 def _minimised(found: Fit, iterations: int, worth: float) -> Fit:
     """Return the fit after so many steps, or where no step gains or the cost cannot come to ``worth``."""
-    settled = False
     for _ in range(iterations):
         prior, pull, _ = _prior(found.state, found.terms, found.run)
         information = found.reduced.information + prior
         downhill = found.reduced.right - pull
         step = np.asarray(np.linalg.solve(information, downhill), np.float64)
         promised = float(step @ downhill)
-        little, still = promised < _CONVERGED, _still(found)
-        if (little and still) or found.cost - _AT_MOST * promised > worth:
+        little = promised < _CONVERGED
+        if (little and _still(found)) or found.cost - _AT_MOST * promised > worth:
             break
-        # Where poses are left to move, a shorter step gains nothing that a full one does not.
-        better = _shortened(found.run, found, step, _PARTS if still and not little else _PARTS[:1])
-        if better is None and (still or settled):
-            break
+        # Where only poses are left to move, a shorter step gains nothing that a full one does not.
+        better = _shortened(found.run, found, step, _PARTS[:1] if little else _PARTS)
+        if better is None and _still(found):
+            return found
         if better is None:
-            # What poses gain by a far step is only promised: it is taken once, and looked at.
-            found, settled = _at(found.run, *_moved(found, 0.0 * step)), True
+            # What poses gain by a far step is only promised by their equations: it is taken, and looked at.
+            found = _at(found.run, *_moved(found, 0.0 * step))
             continue
-        gain, found, settled = found.cost - better.cost, better, False
+        gain, found = found.cost - better.cost, better
         if gain < _CONVERGED:
             break
     return found
