@@ -1,4 +1,4 @@
-"""Spreads place by place over a wall: noise of a part of the window or of a codec's blocks is no average."""
+"""Medians and spreads place by place over a wall: noise behind a part of the window is no average."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32
+from pipeline.system.parallel import side_by_side
 
 # Places have such a length along the pipe; of so many sectors each is 13 mm wide in a pipe of 100 mm. It
 # holds some 300 independent cells, which tell its spread to 6 %; 10 mm of defect fill less than half of it.
@@ -57,3 +59,17 @@ def _spread_of(values: Float | Float32) -> float:
     """Return the robust spread of what is known of some values, NaN where it is too little."""
     known = values[np.isfinite(values)]
     return robust_spread(known) if known.size >= _FEWEST_CELLS else float("nan")
+
+
+def running_median(value: Float32, size: tuple[int, int]) -> Float32:
+    """Return the median (S, A) of so many rows and columns, both odd, about each of finite values (S, A).
+
+    Both halves are worked on at once, each with the rows that its windows reach of the other.
+    """
+    half, reach = len(value) // 2, size[0] // 2
+    before = min(half, reach)
+    medians = side_by_side(
+        lambda part: median_filter(part, size=size, mode="nearest"),
+        (value[: half + reach], value[half - before :]),
+    )
+    return np.concatenate([medians[0][:half], medians[1][before:]])

@@ -19,7 +19,6 @@ from typing import Protocol
 import numpy as np
 
 from pipeline.arrays import Float, Float32, Int
-from pipeline.system.parallel import side_by_side
 
 MAD_TO_SIGMA = 1.4826
 """1/Φ⁻¹(3/4): half of all normal errors are smaller than Φ⁻¹(3/4) σ = 0.67449 σ (Huber 1981, § 5.1)."""
@@ -99,22 +98,6 @@ def robust_spread(residual: Float | Float32) -> float:
     size = np.abs(residual)
     middle = np.nanmedian(size) if np.isnan(size).any() else np.median(size)
     return MAD_TO_SIGMA * float(middle)
-
-
-def running_median(value: Float32, size: tuple[int, int]) -> Float32:
-    """Return the median (S, A) of so many rows and columns, both odd, about each of finite values (S, A).
-
-    Both halves are worked on at once, each with the rows that its windows reach of the other.
-    """
-    from scipy.ndimage import median_filter  # loaded where it is needed: a spread alone does without
-
-    half, reach = len(value) // 2, size[0] // 2
-    before = min(half, reach)
-    medians = side_by_side(
-        lambda part: median_filter(part, size=size, mode="nearest"),
-        (value[: half + reach], value[half - before :]),
-    )
-    return np.concatenate([medians[0][:half], medians[1][before:]])
 
 
 def robust_spreads(residual: Float | Float32, axis: int) -> Float:

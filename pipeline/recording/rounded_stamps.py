@@ -43,12 +43,15 @@ def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameT
     if not (np.isfinite(held) and whole and held > _SHORTEST and count.max() <= _LONGEST * held + 1):
         _refuse(file, table, int(count.max()))
     even = _even_rhythm(table, unit_s, 1 / rate)
-    time_s, how = (
-        (_shared(table.time_s, unit_s), "share it evenly") if even is None else (even, "go on evenly")
-    )
+    time_s, how = even, "an even rhythm, which rounds to all of them, takes their place"
+    if time_s is None:
+        time_s, how = (
+            _shared(table.time_s, unit_s),
+            "frames with one time are spread evenly over its rounding",
+        )
     return replace(table, time_s=time_s), (
-        f"the times in {file.name} are rounded to {unit_s:.3g} s, up to {count.max()} frames have the same: "
-        f"they are taken to {how}. What to do: write time_s with three decimals at least",
+        f"the times in {file.name} are rounded to {unit_s:.3g} s, so that up to {count.max()} frames have "
+        f"one time: {how}. What to do: write time_s with three decimals at least",
     )
 
 

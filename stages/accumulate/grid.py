@@ -14,8 +14,8 @@ import numba
 import numpy as np
 
 from pipeline.adjustment.held_over import HeldOver
-from pipeline.adjustment.local_spread import local_spread
-from pipeline.adjustment.robust import robust_spread, running_median
+from pipeline.adjustment.local_spread import local_spread, running_median
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
 from pipeline.system.parallel import in_threads
 from stages.accumulate.survey import RingSurvey, WallSamples

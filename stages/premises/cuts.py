@@ -47,8 +47,9 @@ def warn_of_cuts(place: Int, pictures: Pictures, frame: Int, context: Context) -
     """Tell between which of the frames (F,) the recording was cut."""
     for k in place:
         context.warn(
-            f"the pictures do not go on from frame {frame[pictures.partner[k]]} to {frame[k]}: the wall "
-            "changes much more than in any step about, and its texture is another. The recording was cut, "
-            "paused, or joined of two. How far the probe went meanwhile is not known: distances behind are "
-            "off by it; laser, encoder or pipe may seem to jump there. What to do: run each part by itself"
+            f"the wall in frame {frame[k]} is not the one in frame {frame[pictures.partner[k]]} before: it "
+            "changes much more than in any step around, and no texture is common to both. Probably the "
+            "recording was cut or paused here, or two were joined. How far the probe went in between is "
+            "not known: distances from here on are wrong by that, and laser, encoder or pipe may seem to "
+            "jump. What to do: process the two parts as recordings of their own"
         )

@@ -11,6 +11,7 @@ from scipy.ndimage import median_filter
 from pipeline.adjustment.bordered import BorderedSystem, Rows
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, minimise
+from pipeline.adjustment.local_spread import running_median
 from pipeline.adjustment.normal_equations import (
     ArrowEquations,
     covariance_of,
@@ -18,12 +19,7 @@ from pipeline.adjustment.normal_equations import (
     marginalised,
     solved,
 )
-from pipeline.adjustment.robust import (
-    cluster_covariance,
-    cluster_variance,
-    running_median,
-    two_way_variance,
-)
+from pipeline.adjustment.robust import cluster_covariance, cluster_variance, two_way_variance
 from pipeline.arrays import Float
 
 

@@ -35,6 +35,7 @@ def test_times_that_rise_are_left_alone() -> None:
 def test_rounded_times_of_an_even_rhythm_are_those_of_the_rhythm(unit_s: float) -> None:
     found, (noticed,) = parted(np.round(TIMES_S / unit_s) * unit_s)
     assert f"rounded to {unit_s:g} s" in noticed
+    assert "an even rhythm" in noticed
     np.testing.assert_allclose(np.diff(found), 1 / RATE, rtol=1e-9)
     assert np.abs(found - TIMES_S).max() < unit_s / 4
 
@@ -47,7 +48,7 @@ def test_a_rhythm_that_is_not_the_stated_one_is_that_of_the_stamps() -> None:
 def test_rounded_times_of_an_uneven_rhythm_stay_within_their_rounding() -> None:
     kept = np.sort(np.random.default_rng(1).choice(TIMES_S, COUNT * 3 // 4, replace=False))
     found, (noticed,) = parted(np.round(kept, 1))
-    assert "share it evenly" in noticed
+    assert "spread evenly over its rounding" in noticed
     assert np.all(np.diff(found) > 0)
     assert np.abs(found - kept).max() < 0.1
 
