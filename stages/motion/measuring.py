@@ -68,7 +68,7 @@ def measure_run(
     followed = _in_bore(circles, texture, predictor, view, encoder)
     if followed.bore.reduces:
         followed = _in_reducer(followed, circles, view, encoder, parameters, context)
-        _warn_of_reducer(followed.bore, context)
+        _warn_of_reducer(followed.bore, encoder, context)
     bore = followed.bore
     context.report("steps of the bore", len(bore.at_mm) + bore.reduces, "")
     jump = find_jump(circles, followed.at_mm, points, probe)
@@ -158,11 +158,15 @@ def _in_reducer(
     return followed
 
 
-def _warn_of_reducer(bore: Bore, context: Context) -> None:
+def _warn_of_reducer(bore: Bore, encoder: EncoderReadings | None, context: Context) -> None:
+    distances = "distances may be off by more than their σ"
+    if encoder is not None:
+        distances = "σ of distances holds by how much texture and encoder differ"
     context.warn(
         f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer or "
-        "taper): texture there is matched less well, and distances may be off by more than their σ. What to "
-        "do: compare the distance with a known one, or cut the recording before and behind the reducer"
+        f"taper): texture is matched less well there; {distances}, and radii may be off by more than their "
+        "σ, most of all on the slope. What to do: compare distance and diameters with known ones, or process "
+        "the pipe before and behind the reducer as recordings of their own"
     )
 
 

@@ -143,3 +143,12 @@ def test_a_diameter_that_errs_as_the_way_does_speaks_against_the_probe(wider: fl
     assert words in told[0]
     doubt = EncoderScale(1.02, 0.001, 0.002).doubt_of_probe(wider)
     assert doubt == pytest.approx(0.02 if wider else 0.0), "σ of radii must hold what is told"
+
+
+@pytest.mark.parametrize("scale", [0.98, 1.004])
+def test_texture_that_is_not_trusted_contradicts_no_encoder(scale: float) -> None:
+    found = EncoderScale(scale, 0.0005, 0.0005)
+    assert found.contradicted, "the control"
+    doubted = found.without_trust_in_texture()
+    assert not doubted.contradicted
+    assert doubted.sigma >= abs(scale - 1)

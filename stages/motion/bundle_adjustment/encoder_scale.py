@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +46,10 @@ class EncoderScale:
     def contradicted(self) -> bool:
         """Whether pictures and encoder cannot both be as stated."""
         return self.in_sigma > _TOO_FAR
+
+    def without_trust_in_texture(self) -> EncoderScale:
+        """Return the scale with texture as unsure as it and the encoder differ."""
+        return replace(self, sigma=float(np.hypot(self.sigma, abs(self.scale - 1))))
 
     def warn(self, context: Context, wider: float) -> None:
         """Tell of an encoder that the pictures contradict, in a pipe ``wider`` than nominal by that share."""

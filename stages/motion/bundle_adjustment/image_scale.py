@@ -195,9 +195,13 @@ def _ring_gain(rings: RingsInPipe, state: State, measured: Measurements) -> tupl
 
 
 def _widths(at_mm: Float, bore: Bore) -> Float:
-    """Return what the pipe's width may add at distances (M,): (M, 4 + steps), smooth, and a step at each."""
+    """Return what the pipe's width may add at distances (M,): (M, 4 + ...), smooth, and a step at each.
+
+    In a reducer that is by how much its width differs from what the rings showed, and where it lies.
+    """
     steps = (at_mm[:, None] > bore.at_mm).astype(float)
-    return np.concatenate([_polynomials(at_mm, _WIDTH), steps], 1)
+    reducer = np.stack([bore.wider_at(at_mm), bore.slope_at(at_mm)], -1)[:, : 2 * bore.reduces]
+    return np.concatenate([_polynomials(at_mm, _WIDTH), steps, reducer], 1)
 
 
 def _polynomials(at: Float, degree: int) -> Float:
