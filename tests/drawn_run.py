@@ -21,6 +21,7 @@ from tests.ring_images import MemorySource
 from tests.unit.drawn_pipe import led_light
 
 RADIUS, BASELINE = 50.0, 22.0
+WallRadius = Callable[[Float, Float], Float]
 _TEXEL_MM = 0.5
 
 
@@ -42,15 +43,30 @@ def small_probe() -> Probe:
     return Probe(camera, LaserSheet(BASELINE), np.diag(sigma**2))
 
 
-def drawn_run(z_mm: Float, roll_rad: Float, *, contrast: float = 0.35, encoder: bool = True) -> DrawnRun:
-    """Draw a run whose frames are laser and led by turns; ``contrast`` 0 leaves the wall plain."""
+def round_wall(s: Float, psi: Float) -> Float:
+    """Return the radius (...) of a pipe without any shape."""
+    return RADIUS + 0 * psi
+
+
+def drawn_run(
+    z_mm: Float,
+    roll_rad: Float,
+    *,
+    contrast: float = 0.35,
+    encoder: bool = True,
+    radius_at: WallRadius = round_wall,
+) -> DrawnRun:
+    """Draw a run whose frames are laser and led by turns; ``contrast`` 0 leaves the wall plain.
+
+    ``radius_at`` is a wall that each ray meets once and that slopes by less than half of it.
+    """
     probe, count = small_probe(), len(z_mm)
     T_pc = _poses(z_mm, roll_rad)
     light = np.array(["laser", "led"] * count)[:count]
     random = np.random.default_rng(0)
     wall = _texture(contrast)
-    images = {k: _picture(probe, T_pc[k], wall, random) for k in range(count) if light[k] == "led"}
-    rings = rings_on_wall(probe, T_pc, np.flatnonzero(light == "laser"), random)
+    images = {k: _picture(probe, T_pc[k], wall, random, radius_at) for k in np.flatnonzero(light == "led")}
+    rings = rings_on_wall(probe, T_pc, np.flatnonzero(light == "laser"), random, radius_at)
     points = triangulate_rings(rings, probe, TriangulateParameters(), quiet_context())
     time_s = np.arange(count) / 30
     readings = Encoder(time_s, np.round((z_mm - z_mm[0]) / 0.05) * 0.05) if encoder else None
@@ -81,8 +97,10 @@ def _texture(contrast: float) -> Float32:
     return (0.5 * (1 + contrast * smooth / smooth.std())).clip(0.02, 1).astype(np.float32)
 
 
-def _picture(probe: Probe, T_pc: Float, wall: Float32, random: np.random.Generator) -> Byte:
-    xyz = _wall_hits(probe, T_pc)
+def _picture(
+    probe: Probe, T_pc: Float, wall: Float32, random: np.random.Generator, radius_at: WallRadius
+) -> Byte:
+    xyz = _wall_hits(probe, T_pc, radius_at)
     row = ((xyz[..., 2] + 20) / _TEXEL_MM).astype(np.float32)
     column = ((np.arctan2(xyz[..., 1], xyz[..., 0]) + np.pi) * RADIUS / _TEXEL_MM).astype(np.float32)
     wide = np.concatenate([wall, wall[:, :2]], 1)
@@ -92,10 +110,22 @@ def _picture(probe: Probe, T_pc: Float, wall: Float32, random: np.random.Generat
     return np.clip(np.rint(image + random.standard_normal(image.shape)), 0, 255).astype(np.uint8)
 
 
-def _wall_hits(probe: Probe, T_pc: Float) -> Float:
+def _wall_hits(probe: Probe, T_pc: Float, radius_at: WallRadius) -> Float:
     width, height = probe.camera.image_size
     uv = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).astype(float)
-    return _on_cylinder(probe.camera.unproject(uv).ray @ T_pc[:3, :3].T, T_pc[:3, 3])
+    ray = probe.camera.unproject(uv).ray @ T_pc[:3, :3].T
+    xyz = _on_cylinder(ray, T_pc[:3, 3])
+    return xyz if radius_at is round_wall else _on_wall(xyz, ray, radius_at)
+
+
+def _on_wall(xyz: Float, ray: Float, radius_at: WallRadius) -> Float:
+    outward = np.maximum(np.hypot(ray[..., 0], ray[..., 1]), 1e-9)
+    for _ in range(30):
+        off = radius_at(xyz[..., 2], np.arctan2(xyz[..., 1], xyz[..., 0])) - np.hypot(
+            xyz[..., 0], xyz[..., 1]
+        )
+        xyz = xyz + (0.5 * off / outward)[..., None] * ray
+    return xyz
 
 
 def _on_cylinder(ray_p: Float, origin: Float) -> Float:
@@ -105,17 +135,12 @@ def _on_cylinder(ray_p: Float, origin: Float) -> Float:
     return origin + t[..., None] * ray_p
 
 
-def round_wall(s: Float, psi: Float) -> Float:
-    """Return the radius (...) of a pipe without any shape."""
-    return RADIUS + 0 * psi
-
-
 def rings_on_wall(
     probe: Probe,
     T_pc: Float,
     frames: Int,
     random: np.random.Generator,
-    radius_at: Callable[[Float, Float], Float] = round_wall,
+    radius_at: WallRadius = round_wall,
     sigma_px: float = 0.05,
     azimuths: int = 180,
 ) -> RingSamples:
@@ -135,7 +160,7 @@ def rings_on_wall(
     )  # fmt: skip
 
 
-def _sheet_on_wall(T_pc: Float, outward_c: Float, radius_at: Callable[[Float, Float], Float]) -> Float:
+def _sheet_on_wall(T_pc: Float, outward_c: Float, radius_at: WallRadius) -> Float:
     ray = outward_c @ T_pc[:3, :3].T
     source = T_pc[:3, 3] + BASELINE * T_pc[:3, 2]
     reach = np.full(len(ray), RADIUS)

@@ -46,7 +46,7 @@ class Bore:
         radius_mm, at_mm = radius_mm[order], at_mm[order]
         if len(radius_mm) < 2 * _FEWEST_RINGS_OF_LENGTH + 2:
             return ONE_BORE
-        n = rings_of_length(radius_mm, at_mm)
+        n = min(rings_of_length(radius_mm, at_mm), len(radius_mm) // 2 - 1)
         place = _steps(radius_mm, n)
         if not len(place):
             return ONE_BORE
@@ -123,8 +123,6 @@ def rings_of_length(radius_mm: Float, at_mm: Float) -> int:
 
 def _steps(radius_mm: Float, n: int) -> Int:
     """Return the first rings (k,) behind steps between lengths of at least ``n`` rings."""
-    if len(radius_mm) < 2 * n + 2:
-        return np.zeros(0, np.int64)
     median = np.median(np.lib.stride_tricks.sliding_window_view(radius_mm, n), axis=1)
     size = np.abs(median[n + 1 :] - median[: -n - 1])  # of a step at ring n + k
     highest = size == maximum_filter1d(size, 2 * n + 1)

@@ -159,14 +159,12 @@ def _in_reducer(
 
 
 def _warn_of_reducer(bore: Bore, encoder: EncoderReadings | None, context: Context) -> None:
-    distances = "distances may be off by more than their σ"
-    if encoder is not None:
-        distances = "σ of distances holds by how much texture and encoder differ"
+    by = "what other reducers showed" if encoder is None else "how much texture and encoder differ"
     context.warn(
         f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer or "
-        f"taper): texture is matched less well there; {distances}, and radii may be off by more than their "
-        "σ, most of all on the slope. What to do: compare distance and diameters with known ones, or process "
-        "the pipe before and behind the reducer as recordings of their own"
+        f"taper): texture is matched less well there. σ of distances holds {by}; radii may be off by more "
+        "than their σ, most of all on the slope. What to do: compare distance and diameters with known "
+        "ones, or process the pipe before and behind the reducer as recordings of their own"
     )
 
 

@@ -14,7 +14,7 @@ from pipeline.adjustment.robust import GemanMcClure
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.geometry.axis import to_pipe
-from stages.motion.bore import Bore
+from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.bundle_adjustment.equations import landmark_rows
 from stages.motion.bundle_adjustment.unknowns import GLOBALS, State
@@ -113,6 +113,27 @@ def test_ring_rows(given) -> None:
     measured, state = given
     # The axis' frames turn a little with its deflection, which the derivative leaves out.
     check_rows(lambda s: residuals.ring_rows(s, measured.rings, GemanMcClure(0.1)), state, 0.02, 2e-4)
+
+
+def test_ring_rows_in_a_taper(given) -> None:
+    measured, state = given
+    # One slope throughout, so that no difference is taken across an edge.
+    taper = replace(ONE_BORE, rings_mm=np.array([-50.0, 300.0]), rings_wider_mm=np.array([-12.0, 30.0]))
+    rings = measured.rings
+    taper = taper.measured_by(rings.xyz_c, rings.by_instrument, state.nominal_radius_mm)
+    guess_mm = to_pipe(state.axis, state.T_pc[:, :3, 3])[0] - 0.7
+
+    def rows(there: State, bore: Bore) -> Rows:
+        return residuals.ring_rows(replace(there, bore=bore, guess_mm=guess_mm), rings, GemanMcClure(0.1))
+
+    check_rows(lambda s: rows(s, taper), state, 0.02, 3e-4)
+    held = replace(taper, by_instrument=np.zeros((2, 0)))
+    follow = rows(state, taper).by_border - rows(state, held).by_border
+    first = state.border_size - len(state.instrument)
+    for b in range(first, state.border_size):
+        wanted = slope(lambda s: rows(s, taper).residual - rows(s, held).residual, state, border=b)
+        np.testing.assert_allclose(follow[:, b], wanted, atol=1e-5, err_msg=f"border {b}")
+    assert np.abs(follow).max() > 1e-3, "the control: widths follow the instrument"
 
 
 def test_encoder_rows(given) -> None:

@@ -63,6 +63,30 @@ def test_pose_lies_within_its_sigma(steady: DrawnRun, encoder: bool) -> None:
     assert got.events == ()
 
 
+def reducer(s: Float, psi: Float) -> Float:
+    return RADIUS * (1 - 0.15 * np.clip((s - 45) / 20, 0, 1)) + 0 * psi
+
+
+@pytest.fixture(scope="module")
+def reduced() -> DrawnRun:
+    k = np.arange(64)
+    return drawn_run(STEP * k, 0.004 * k, radius_at=reducer)
+
+
+@pytest.mark.parametrize("encoder", [True, False])
+def test_a_reducer_is_told_and_nothing_else_is_blamed(reduced: DrawnRun, encoder: bool) -> None:
+    """Taken for one bore, distance was 6 mm off, and encoder and lens were named."""
+    run = reduced if encoder else without_encoder(reduced)
+    told: list[str] = []
+    got = estimated(run, replace(quiet_context(), warn=told.append))
+    z, roll, sigma = errors(got, run)
+    assert abs(z[-1]) < 3 * sigma[-1, 0]
+    assert 0.1 < sigma[-1, 0] < 0.02 * STEP * 64
+    assert abs(roll[-1]) < 3 * sigma[-1, 1] + 1e-3
+    assert len(told) == 1
+    assert "width changes by 15.0 mm" in told[0]
+
+
 @pytest.mark.parametrize("wrong", [1.0, 1.05])
 def test_encoder_of_another_scale_is_told_and_pulls_no_distance(steady: DrawnRun, wrong: float) -> None:
     """Its scale is stated to .2 %: at 5 %, distance followed it by 4 of its stated σ, without a word."""

@@ -8,7 +8,7 @@ both, low polynomials of time and of distance, are added to the equations at the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -80,6 +80,10 @@ class ScaleDrift:
         """Whether the scale cannot have been steady, and went one way."""
         one_way = abs(self.change) > _ONE_WAY * float(np.ptp(self.at_frames))
         return self.p_steady < _SURE_P and one_way
+
+    def not_told(self) -> ScaleDrift:
+        """Return the course where nothing can be told of it."""
+        return replace(self, p_steady=1.0, p_neither=1.0)
 
     @property
     def change(self) -> float:
@@ -195,13 +199,9 @@ def _ring_gain(rings: RingsInPipe, state: State, measured: Measurements) -> tupl
 
 
 def _widths(at_mm: Float, bore: Bore) -> Float:
-    """Return what the pipe's width may add at distances (M,): (M, 4 + ...), smooth, and a step at each.
-
-    In a reducer that is by how much its width differs from what the rings showed, and where it lies.
-    """
+    """Return what the pipe's width may add at distances (M,): (M, 4 + steps), smooth, and a step at each."""
     steps = (at_mm[:, None] > bore.at_mm).astype(float)
-    reducer = np.stack([bore.wider_at(at_mm), bore.slope_at(at_mm)], -1)[:, : 2 * bore.reduces]
-    return np.concatenate([_polynomials(at_mm, _WIDTH), steps, reducer], 1)
+    return np.concatenate([_polynomials(at_mm, _WIDTH), steps], 1)
 
 
 def _polynomials(at: Float, degree: int) -> Float:

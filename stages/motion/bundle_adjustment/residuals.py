@@ -49,6 +49,9 @@ def surface(state: State, xyz_p: Float, moved_mm: Float | float = 0.0) -> tuple[
     deflect = [-basis * c, -basis * sn]
     instrument = np.zeros((len(psi), len(state.instrument)))
     if state.bore.reduces:
+        # Where the axis turns toward a point, that lies farther along it, and the bore is wider there.
+        ahead = (slope * rho)[:, None] * _basis_slope(state, s)
+        deflect = [-basis * c - ahead * c, -basis * sn - ahead * sn]
         by_width = state.bore.width_by_instrument(state.bore.wider_at(s - moved_mm))
         residual -= by_width @ state.instrument[: by_width.shape[1]]
         instrument[:, : by_width.shape[1]] = -by_width
@@ -58,6 +61,12 @@ def surface(state: State, xyz_p: Float, moved_mm: Float | float = 0.0) -> tuple[
         upright = 1 / np.hypot(1, slope)  # along the wall's normal
         return residual * upright, gradient * upright[:, None], by_border * upright[:, None]
     return residual, gradient, by_border
+
+
+def _basis_slope(state: State, distance_mm: Float) -> Float:
+    """Return by how much the axis turns (M, knots) per deflection, rad/mm, at distances (M,)."""
+    ahead, behind = (state.axis_basis(distance_mm + step) for step in (AXIS_STEP_MM, -AXIS_STEP_MM))
+    return (ahead - behind) / (2 * AXIS_STEP_MM)
 
 
 def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
@@ -76,8 +85,10 @@ def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     by_instrument = rings.instrument_where_expected(residual, normal_c)
     by_border[:, first : first + unsure] += np.einsum("mj,mjq->mq", normal_c, by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
-    if state.bore.reduces:
-        normal = normal - np.einsum("mi,mi->m", normal, along[rings.frame])[:, None] * along[rings.frame]
+    if state.bore.reduces:  # the place in the bore goes along with the camera
+        place = to_pipe(state.axis, transform(T, xyz_c))[0] - moved_mm[rings.frame]
+        slope = state.bore.slope_at(place)
+        normal = normal + (slope / np.hypot(1, slope))[:, None] * along[rings.frame]
     by_frame[:, 0, :3], by_frame[:, 0, 3:6] = normal, turn
     return Rows(rings.frame[:, None], by_frame, by_border, residual, rings.sigma_mm, loss)
 
@@ -108,7 +119,7 @@ def view_rows(state: State) -> Rows:
     """Return the equations: the camera looks along the pipe."""
     n = len(state.T_pc)
     s = to_pipe(state.axis, state.T_pc[:, :3, 3])[0]
-    slope = (state.axis_basis(s + AXIS_STEP_MM) - state.axis_basis(s - AXIS_STEP_MM)) / (2 * AXIS_STEP_MM)
+    slope = _basis_slope(state, s)
     section, by_border = state.section_frames(s), np.zeros((n, 2, state.border_size))
     for i in range(2):
         first = GLOBALS + i * state.knots

@@ -66,7 +66,8 @@ def with_steady_scale(
 ) -> SteadyRun:
     """Look whether the image scale drifts over a window, and take it out where the window is the whole run.
 
-    A large drift is told and not taken out.
+    A large drift is told and not taken out. In a reducer nothing is told: rings and texture depart there as
+    they do where the image scale drifts.
 
     Raises
     ------
@@ -74,6 +75,8 @@ def with_steady_scale(
         When the motion is not determined.
     """
     drift = drift_of_scale(estimate, measured)
+    if run.bore.reduces:
+        drift = drift.not_told()
     if not drift.told or window != run.whole or drift.large:
         return SteadyRun(run, estimate, measured, drift, taken_out=False)
     first = drift
