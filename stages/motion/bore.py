@@ -17,6 +17,9 @@ _LENGTH_RADII, _FEWEST_RINGS_OF_LENGTH = 0.5, 5
 _MOST_RINGS_IN_STEP = 2
 """Rings in a row that a step may leave between the two bores; with more it is a reducer. Chamfers of gauges
 hold one. A choice."""
+_PLACE_MM = 0.5
+"""1 σ of where a reducer lies against landmarks on it: half the way from ring to ring. Without it four of five
+drawn ones were .03 to .4 mm farther off along the pipe, one .1 mm less."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,10 @@ class Bore:
         slope = np.diff(self.rings_wider_mm) / np.maximum(np.diff(self.rings_mm), 1e-9)
         inside = np.searchsorted(self.rings_mm, distance_mm)
         return np.asarray(np.concatenate([[0.0], slope, [0.0]])[inside])
+
+    def sigma_at(self, distance_mm: Float) -> Float:
+        """Return the 1 σ (M,) of the width for texture at distances (M,), mm: a slope may lie elsewhere."""
+        return _PLACE_MM * np.abs(self.slope_at(distance_mm))
 
     def width_by_instrument(self, wider_mm: Float) -> Float:
         """Return what widths (M,) change by (M, Q) per σ of the instrument, mm."""

@@ -81,7 +81,7 @@ def test_a_reducer_is_told_and_nothing_else_is_blamed(reduced: DrawnRun, encoder
     got = estimated(run, replace(quiet_context(), warn=told.append))
     z, roll, sigma = errors(got, run)
     assert abs(z[-1]) < 3 * sigma[-1, 0]
-    assert 0.1 < sigma[-1, 0] < 0.02 * STEP * 64
+    assert 0.2 < sigma[-1, 0] < 0.02 * STEP * 64, "σ holds what texture on a slope may be off by"
     assert abs(roll[-1]) < 3 * sigma[-1, 1] + 1e-3
     assert len(told) == 1
     assert "width changes by 15.0 mm" in told[0]

@@ -39,9 +39,8 @@ _REDESCENT = 2.5
 counts. The usual tuning constant; not measured here."""
 _LEAST_EXCESS = 0.3
 """Matches are never believed to be more than three times better than predicted. Not measured."""
-_NO_PIXEL_PX = 1000.0  # residual of a landmark that projects nowhere
-_PLACE_MM = 0.5
-"""1 σ, mm, of where a reducer lies against landmarks on it: half the way from ring to ring. Not measured."""
+_NO_PIXEL_PX = 1000.0
+"""Residual of a landmark that projects nowhere."""
 _DAMPED = 1e-5
 """Relative damping with which covariances are computed where rounding made the equations singular."""
 LEAST_REACH = 4
@@ -252,7 +251,7 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
         pass
     start = np.searchsorted(tracks.landmark, np.arange(len(state.xyz_p) + 1))
     relief, normal, by_border = residuals.surface(state, state.xyz_p)
-    unsure_mm = _PLACE_MM * state.bore.slope_at(to_pipe(state.axis, state.xyz_p)[0])
+    unsure_mm = state.bore.sigma_at(to_pipe(state.axis, state.xyz_p)[0])
     return LandmarkRows(
         start, tracks.frame, by_pose, by_point, by_instrument, residual, tracks.sigma_px,
         normal, by_border, relief, np.hypot(parameters.surface_sigma_mm, unsure_mm), Cauchy(),

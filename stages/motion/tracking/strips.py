@@ -82,12 +82,6 @@ class StripGrid:
         r = self.radius_mm + self.bore.wider_at(row * self.step_mm)
         return np.stack(np.broadcast_arrays(r * np.cos(psi), r * np.sin(psi), row * self.step_mm), -1)
 
-    def in_sight(self, row: Float, from_mm: float) -> Bool:
-        """Return which rows (H,), ascending, a camera at a distance sees past the wall before them."""
-        at_mm = row * self.step_mm
-        slope = (self.radius_mm + self.bore.wider_at(at_mm)) / np.maximum(at_mm - from_mm, self.step_mm)
-        return np.asarray(slope <= np.minimum.accumulate(slope))
-
     def position(self, xyz: Float) -> tuple[Float, Float]:
         """Return strip row and column (...) of points (..., 3)."""
         psi = np.arctan2(xyz[..., 1], xyz[..., 0])
@@ -211,7 +205,6 @@ def unroll(image: Image, probe: Probe, T_pc: Float, grid: StripGrid, hidden: Hid
     grey, seen = (np.concatenate(part) for part in zip(*parts, strict=True))
     ahead = (first_row + np.arange(grid.rows)) * grid.step_mm - T_pc[2, 3]
     seen[(ahead > hidden.line_mm[0]) & (ahead < hidden.line_mm[1])] = False
-    seen[~grid.in_sight(first_row + np.arange(float(grid.rows)), T_pc[2, 3])] = False
     if hidden.stays is not None:
         seen &= sample(hidden.stays, coarse_uv, _COARSE)[0] == 0
     usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST)
