@@ -18,8 +18,8 @@ _MOST_RINGS_IN_STEP = 2
 """Rings in a row that a step may leave between the two bores; with more it is a reducer. Chamfers of gauges
 hold one. A choice."""
 _PLACE_MM = 0.5
-"""1 σ of where a reducer lies against landmarks on it: half the way from ring to ring. Without it four of five
-drawn ones were .03 to .4 mm farther off along the pipe, one .1 mm less."""
+"""1 σ of where a reducer lies against landmarks on it: half the way from ring to ring. Without it four of
+five drawn ones were .03 to .4 mm farther off along the pipe, one .1 mm less."""
 
 
 @dataclass(frozen=True)
