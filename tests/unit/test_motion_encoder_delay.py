@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
+from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.encoder_delay import find_delay
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.unknowns import State
@@ -74,6 +75,7 @@ class Made:
     encoder: EncoderReadings | None
     probe: Probe
     time_s: Float
+    bore: Bore = ONE_BORE
     jump: None = None
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
