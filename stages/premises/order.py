@@ -10,8 +10,8 @@ from stages.premises.light import Light, pattern_breaks
 from stages.premises.pictures import CLOSED, Pictures
 
 # In usual steps: two pictures exchanged go on by two, back by one, on by two. The middle between these and
-# one step on, or none.
-_ON, _BACK = 1.5, -0.5
+# one step on, or none; half a step off its place is a picture in another's.
+_ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
 # Neighbours in two lights that were exchanged look like two losses, of which the wall shows nothing: it goes
 # on by 1 in place of 1.5 times the usual way at least.
 _NO_LOSS = 1.25
@@ -29,7 +29,7 @@ _SMOOTH, _LIKE_OTHERS = 0.01, 0.75
 
 
 def out_of_order(pictures: Pictures, light: Int) -> Bool:
-    """Return (F,) true for pictures that were exchanged with a neighbour, of the same light or of the other.
+    """Return (F,) true for pictures exchanged with one of the same light, or with a neighbour of the other.
 
     Those of the laser among themselves do not show it, and where lights are not told apart nothing does.
     """
@@ -38,10 +38,25 @@ def out_of_order(pictures: Pictures, light: Int) -> Bool:
     if len(place) < _FEWEST:
         return out
     size = pictures.step[place]
-    in_usual = size / median_filter(size, _AROUND, mode="nearest")
-    back = (in_usual[:-2] > _ON) & (in_usual[1:-1] < _BACK) & (in_usual[2:] > _ON)
-    out[place[:-2][back]] = out[place[1:-1][back]] = True
+    out[place] = _off_their_place(size / median_filter(size, _AROUND, mode="nearest"))
     return out | _lights_exchanged(light, place, size)
+
+
+def _off_their_place(step: Float) -> Bool:
+    """Return which pictures (K,) lie off the way that those before and behind make, by steps in usual ones.
+
+    The wall leaps on, goes back, and comes to where it would have been at its usual speed: no probe moves so,
+    nor do lost pictures, behind which it stays ahead.
+    """
+    out, ahead = np.zeros(len(step), bool), np.cumsum(step - 1)
+    for first in np.flatnonzero(step > _ON):
+        near = slice(first, first + _AROUND)
+        astray = np.abs(ahead[near] - ahead[first] + step[first] - 1) > _ASTRAY
+        went_back = np.logical_or.accumulate(step[near] < _BACK)
+        again = np.flatnonzero((step[near] > _ON) & went_back & ~astray)
+        if again.size:
+            out[first : first + again[0]] = astray[: again[0]]
+    return out
 
 
 def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
