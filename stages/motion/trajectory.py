@@ -16,6 +16,7 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES
 from stages.motion.bundle_adjustment.solver import trembles
+from stages.motion.mirrored import mirrored_way
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.sliding_window import RunEstimate
@@ -23,9 +24,6 @@ from stages.motion.windows.submap_joining import JoinedRun
 
 _START_MM = 60.0
 """Length of pipe whose direction is the z-axis of P: two knots of the axis. Not measured."""
-_MIRROR = 0.3, 1.5
-"""Parts of the way to its mirror image that the principal point moves in mirrored pictures: the distortion
-takes the rest. In open-1-field, mirrored, 0.45."""
 _TOO_FAR = 5.0
 """A right probe moves farther than so many σ along one of its ten or so directions once in 10⁵ recordings."""
 _MOST_LOST = 0.05
@@ -96,25 +94,18 @@ def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) ->
         context.warn(
             f"the stated probe does not fit this recording: it had to be moved by {farthest:.0f} times its "
             f"stated σ, most of all {probe.parameter_names[most]} by {change[most]:+.3g}"
-            f"{_mirrored(probe, most, change[most])}; "
-            "radii and distances may be wrong by more than their σ. Run boresight diagnose, or "
-            "calibrate the probe anew",
+            f"; radii and distances may be wrong by more than their σ. {_remedy(probe, trajectory)}"
         )
 
 
-def _mirrored(probe: Probe, moved: int, by: float) -> str:
-    """Return a mirrored picture as a cause where the principal point moves towards its mirror image."""
-    name, camera = probe.parameter_names[moved], probe.camera
-    if name not in ("cx", "cy"):
-        return ""
-    axis = int(name == "cy")
-    mirrored = camera.image_size[axis] - 1 - 2 * float(camera.centre_px[axis])
-    if not _MIRROR[0] * abs(mirrored) < by * np.sign(mirrored) < _MIRROR[1] * abs(mirrored):
-        return ""
-    way = "upside down" if axis else "left to right"
-    return (
-        f" (a picture mirrored {way} would have it {mirrored:+.3g} aside: see whether the recorder mirrors)"
-    )
+def _remedy(probe: Probe, trajectory: Trajectory) -> str:
+    """Return what to do about a probe that does not fit."""
+    if way := mirrored_way(probe, trajectory):
+        return (
+            f"It does fit pictures that are {way}: clock positions are then, too. What to do: switch "
+            "this off in camera and recorder, or turn the pictures back, and run again"
+        )
+    return "Run boresight diagnose, or calibrate the probe anew"
 
 
 def report_motion(

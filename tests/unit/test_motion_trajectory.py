@@ -80,13 +80,3 @@ def test_nothing_is_said_of_a_probe_left_as_stated() -> None:
     assert told(probe(np.zeros((COUNT, COUNT))), np.zeros(COUNT)) == {
         "instrument moved by the adjustment, at most": 0.0
     }
-
-
-@pytest.mark.parametrize(
-    ("cx", "by", "named"), [(796.9, 2.3, True), (796.9, -2.3, False), (799.5, 2.3, False)]
-)
-def test_a_mirrored_picture_is_named_where_it_can_be_told(cx: float, by: float, named: bool) -> None:
-    stated = probe(loose(cx=0.06))
-    camera = KannalaBrandt((1600, 1200), (360.0, 360.0), (cx, 599.5))
-    text = str(told(replace(stated, camera=camera), at("cx", by))["warning"])
-    assert ("mirrored left to right" in text) == named

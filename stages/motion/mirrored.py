@@ -1,0 +1,72 @@
+"""Pictures that a recorder mirrors, told by how the stated probe would have to be to see what they show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.artefacts.measured import Trajectory
+from pipeline.instrument.probe import Probe
+
+_WAYS = {"mirrored left to right": "x", "mirrored upside down": "y", "turned by 180°": "xy"}
+"""What a recorder may do to pictures, and along which axes of the image they are mirrored then."""
+_SURE = float(np.log(1000))
+"""Log odds against the pictures being as stated, from which on it is told: a choice."""
+_FITS, _LEAST_VARIANCE = 5.0, 1e-6
+"""A mirrored probe fits where it is moved by so many times what it usually would be at most: one that is
+right is moved farther once in 10⁵ recordings. The least variance is in stated ones."""
+_WHOLLY = 0.01
+"""A mirrored probe counts where what is uncertain of the stated one can make it up to this part. A choice."""
+
+
+def mirrored_way(probe: Probe, trajectory: Trajectory) -> str:
+    """Return how the pictures of a run are mirrored, empty where they are not or nothing tells it.
+
+    A mirrored probe has its principal point, and the tilt and the source of its laser, on the other side. The
+    run's estimate of the instrument, freed of what was stated, is compared with either.
+    """
+    if trajectory.instrument is None or trajectory.instrument_covariance is None:
+        return ""
+    to_sigma = np.linalg.pinv(probe.principal_uncertainties())
+    found = to_sigma @ (trajectory.instrument - probe.parameters)
+    covariance = to_sigma @ trajectory.instrument_covariance @ to_sigma.T
+    odds = {"": _SURE}
+    for way, axes in _WAYS.items():
+        change = _mirrored(probe, axes) - probe.parameters
+        if _can_be(probe, change) and _fits(to_sigma @ change, found, covariance):
+            odds[way] = _log_odds(to_sigma @ change, found, covariance)
+    return max(odds, key=odds.__getitem__)
+
+
+def _mirrored(probe: Probe, axes: str) -> Float:
+    """Return the parameters (P,) of a probe that sees the world as ``probe`` does in mirrored pictures."""
+    names, out = probe.parameter_names, probe.parameters.copy()
+    for axis in axes:
+        size = probe.camera.image_size["xy".index(axis)]
+        for name, sum_of_both in ((f"c{axis}", size - 1), (f"tilt_{axis}", 0), (f"decentre_{axis}_mm", 0)):
+            if name in names:
+                out[names.index(name)] = sum_of_both - out[names.index(name)]
+    return out
+
+
+def _can_be(probe: Probe, change: Float) -> bool:
+    """Return whether a change (P,) of the parameters lies in the directions that are uncertain."""
+    unsure = probe.principal_uncertainties()
+    made_up = unsure @ np.linalg.lstsq(unsure, change, rcond=None)[0]
+    return bool(np.any(change) and np.linalg.norm(made_up - change) < _WHOLLY * np.linalg.norm(change))
+
+
+def _fits(change: Float, found: Float, covariance: Float) -> bool:
+    """Return whether the data move a prior mean at ``change`` (Q,) by no more than they usually would."""
+    usual = np.sqrt(np.maximum(1 - np.diagonal(covariance), _LEAST_VARIANCE))
+    return bool((np.abs(found + covariance @ change - change) / usual).max() < _FITS)
+
+
+def _log_odds(change: Float, found: Float, covariance: Float) -> float:
+    """Return the log odds of a prior mean moved by ``change`` (Q,) against none, both of unit covariance.
+
+    The data's part is what the posterior ``found`` (Q,) with ``covariance`` (Q, Q) has beyond the prior
+    N(0, 1); with it both evidences are Gaussian integrals (Bishop, "Pattern recognition and machine
+    learning", 2.3).
+    """
+    return float(change @ found - change @ change / 2 + change @ covariance @ change / 2)
