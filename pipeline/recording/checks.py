@@ -88,8 +88,21 @@ def check_probe_fits(recording: Recording, probe: Probe) -> None:
         raise InputError(
             recording.path, f"its images are {found[0]} x {found[1]} pixels",
             expected=f"{wanted[0]} x {wanted[1]}, as the probe's camera says",
-            hint="give the probe file of this camera at this resolution with --probe",
+            hint=_size_hint(tuple(found), tuple(wanted)),
         )  # fmt: skip
+
+
+def _size_hint(found: tuple[int, ...], wanted: tuple[int, ...]) -> str:
+    """Return what to do about images (width, height) of another size than the camera's."""
+    if found == wanted[::-1]:
+        return "turn the pictures back by 90° in the recorder, or give a probe file of this camera so turned"
+    cut = [name for name, f, w in zip(("columns", "rows"), found, wanted, strict=True) if f < w]
+    if len(cut) == 1 and any(f == w for f, w in zip(found, wanted, strict=True)):
+        return (
+            f"if the recorder cut {cut[0]} off, switch that off; or give a probe file with this image_size, "
+            "and with centre_px less what was cut off at the left and above"
+        )
+    return "give the probe file of this camera at this resolution with --probe"
 
 
 def refuse_changed(recording: Recording) -> None:

@@ -78,7 +78,7 @@ def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: 
             f"are {nearest:g} mm{_unit_hint(ratio)}",
             limit=f"a factor of {_ANOTHER:g}",
             hint="check pipe.nominal_diameter_mm in recording.yaml and laser.baseline_mm and the camera in "
-            "probe.yaml, all in mm",
+            "probe.yaml, all in mm, and that the recorder neither scales nor frames the pictures",
         )
     if lamps_mm > _TOO_WIDE * radius_mm:
         raise UnusableError(

@@ -19,6 +19,7 @@ from stages.calibrate.gauge.adjust import RingSource
 from stages.calibrate.gauge.edges import Sighting, find_fiducials, fit_steps
 from stages.calibrate.gauge.geometry import BoreRings, Gauge, gauge_of
 from stages.calibrate.gauge.poses import first_pose, posed_frames
+from stages.calibrate.gauge.result import warn_of_misfit
 from stages.calibrate.gauge.state import SheetModel, Unknowns
 from stages.calibrate.gauge.terms import Equations, edge_equations, expected_ring, ring_equations
 from tests.gauge_runs import (
@@ -34,6 +35,7 @@ from tests.gauge_runs import (
     rings_of,
     stated_probe,
 )
+from tests.quiet import quiet_context
 
 
 @pytest.fixture(scope="module")
@@ -295,3 +297,16 @@ def test_fiducials_that_crowd_into_one_place_give_no_pose(spread_px: float) -> N
     random = np.random.default_rng(0)
     crowded = Sighting(0, np.arange(6), 800 + random.normal(0, spread_px, (6, 4, 2)), np.zeros(0, np.int64))
     assert first_pose(crowded, gauge_of(facts(), facts().fiducials), stated_probe().camera, random) is None
+
+
+def test_pictures_that_no_such_probe_takes_are_told_and_sound_ones_are_not(run: GaugeRun) -> None:
+    """Pixels 2 % too wide gave a cone 125 σ off that was stated as sure as ever, and nothing was said."""
+    said: list[str] = []
+    context = replace(quiet_context(), warn=said.append)
+    warn_of_misfit(calibrated(run), context)
+    assert said == []
+    uv, (cx, _) = run.edges.uv.copy(), run.stated.camera.centre_px
+    uv[:, 0] = cx + 1.02 * (uv[:, 0] - cx)
+    warn_of_misfit(calibrated(replace(run, edges=replace(run.edges, uv=uv))), context)
+    assert "the edges of the fiducials lie" in said[0]
+    assert "scales, stretches, cuts or stabilises" in said[0]

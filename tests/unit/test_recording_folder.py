@@ -165,6 +165,18 @@ def test_images_of_another_size_than_the_cameras(folder: Path) -> None:
         check_probe_fits(recording, other)
 
 
+@pytest.mark.parametrize(
+    ("size", "hint"),
+    [((48, 64), "turn the pictures back by 90°"), ((64, 60), "cut rows off"), ((80, 48), "cut columns off"),
+     ((32, 24), "at this resolution"), ((128, 96), "at this resolution")],
+)  # fmt: skip
+def test_images_that_were_turned_or_cut_are_told_so(folder: Path, size: tuple[int, int], hint: str) -> None:
+    recording, probe = open_recording(folder), read_probe(folder / "probe.yaml")
+    other = replace(probe, camera=replace(probe.camera, image_size=size))
+    with pytest.raises(InputError, match=hint):
+        check_probe_fits(recording, other)
+
+
 # File, what is replaced, by what, and what the complaint must say.
 SPOILED = {
     "missing key": ("recording.yaml", "kind: inspection\n", "", r"key kind: is missing"),

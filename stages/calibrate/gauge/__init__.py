@@ -30,7 +30,7 @@ from stages.calibrate.gauge.poses import (
     poses_of_all_frames,
 )
 from stages.calibrate.gauge.premises import require_gauge
-from stages.calibrate.gauge.result import GaugeCalibration, calibration_of
+from stages.calibrate.gauge.result import GaugeCalibration, calibration_of, warn_of_misfit
 from stages.calibrate.gauge.state import GaugeParameters, Unknowns
 
 __all__ = ["GAUGE", "GaugeCalibration", "GaugeParameters", "calibrate_gauge", "require_gauge"]
@@ -81,6 +81,7 @@ def calibrate_gauge(
     )
     result = calibration_of(recording.name, recording.frames.frame, gauge, finding)
     _require_determined(result, parameters)
+    warn_of_misfit(result, context)
     return result
 
 

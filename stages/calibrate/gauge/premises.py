@@ -112,7 +112,8 @@ def require_bores(gauge: Gauge, section: Int, radius_error_mm: Float) -> None:
                 f"in section {k + 1} from {gauge.start_mm[k]:g} mm on, the bore measures "
                 f"{2 * (radius + error):.1f} mm where recording.yaml says {2 * radius:g} mm",
                 limit=f"{2 * _WRONG_BORE_MM:g} mm in diameter",
-                hint="are the bores listed in the order in which the probe passes them?",
+                hint="are the bores listed in the order in which the probe passes them, and does the "
+                "recorder leave the pictures as they are (not scaled, stretched or cut)?",
             )
 
 
