@@ -166,7 +166,7 @@ def run(
         follow_recording(recording, output, probe, quiet_s, console)
     job = prepare(recording, output, probe=probe, configuration=parameters)
     _warn(console, "Look at this first", job.recording.warnings)
-    display = ProgressDisplay(console)
+    display = ProgressDisplay(console, warn_at_once=False)
     try:
         with display, compiled_ahead(_kernels()):
             outcome = run_job(job, Selection(from_stage, only, resume), display)

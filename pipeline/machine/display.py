@@ -54,7 +54,8 @@ class ProgressDisplay:
         What the stages that ended warn of.
     """
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, *, warn_at_once: bool = True) -> None:
+        """Print warnings when their stage ends; else count them there, and the caller prints them."""
         self._progress = Progress(
             TextColumn("{task.description:<20}"),
             BarColumn(),
@@ -63,7 +64,7 @@ class ProgressDisplay:
             console=console,
             transient=True,
         )
-        self._console = console
+        self._console, self._warn_at_once = console, warn_at_once
         self._whole = self._progress.add_task("whole run", total=None, told="starting")
         self._tasks: dict[str, TaskID] = {}
         self._stages, self._ended = 0, 0
@@ -100,11 +101,11 @@ class ProgressDisplay:
         self._ended += 1
         self._move_whole()
         time = f"{outcome.seconds:8.1f} s" if outcome.state == State.COMPLETED else ""
-        self._console.print(
-            f"  {outcome.name:<20} {state_word(outcome.state):<10}{time}".rstrip(), highlight=False
-        )
-        for warning in warnings_of([outcome]):
-            self.warnings.append(warning)
+        line, warnings = f"  {outcome.name:<20} {state_word(outcome.state):<10}{time}", warnings_of([outcome])
+        self.warnings += warnings
+        counted = "" if self._warn_at_once or not warnings else f"  [yellow]warnings: {len(warnings)}[/]"
+        self._console.print(f"{line}{counted}".rstrip(), highlight=False)
+        for warning in warnings if self._warn_at_once else ():
             self._console.print(f"  [bold yellow]warning[/]: {escape(warning)}", highlight=False)
 
     def _move_whole(self) -> None:

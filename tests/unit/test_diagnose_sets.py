@@ -76,6 +76,17 @@ def test_what_is_there_is_reached_from_a_wrong_set_and_its_amplitudes_are_told()
     assert max(map(len, met)) == 3
 
 
+def test_sets_met_by_adding_a_member_have_their_own_surprise():
+    """Two effects and two patterns without a cause: the first pattern alone makes a set less likely."""
+    four, _, _ = drawn({0: 0.6})
+    other = next(t for t in GENERIC if t.name == "generic_line_0_1")
+    sets = replace(four, members=(*four.members[:2], replace(four.members[2], model=other), four.members[3]))
+    met = sets.likely([frozenset(), frozenset({0, 3})], 4)
+    assert {frozenset({3}), frozenset({0, 2, 3}), frozenset({0, 1})} <= met.keys()
+    for chosen, surprise in met.items():
+        assert surprise == pytest.approx(sets.surprise(chosen), abs=1e-6)
+
+
 @pytest.mark.parametrize(("like", "left"), [(0.99, 3), (0.8, 4)])
 def test_a_pattern_that_describes_an_effect_is_no_rival_of_it(like, left):
     sets, _, _ = drawn({0: 1.0}, like)

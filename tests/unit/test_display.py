@@ -71,3 +71,12 @@ def test_what_ends_early_is_called_stopped_and_its_warnings_are_kept(console, ou
     assert "stopped" in out.getvalue()
     assert state.value not in out.getvalue()
     assert display.warnings == ["rings: 10 of 160 frames"]
+
+
+@pytest.mark.parametrize("at_once", [True, False])
+def test_a_warning_is_printed_by_the_display_or_left_to_its_caller(console, out, at_once):
+    with ProgressDisplay(console, warn_at_once=at_once) as display:
+        display.planned(2)
+        display.ended(StageOutcome("rings", "1", "", State.COMPLETED, 1.0, (Number(WARNING, "10 of 160"),)))
+    assert out.getvalue().count("10 of 160") == at_once
+    assert out.getvalue().count("warnings: 1") == (not at_once)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
+from pipeline.geometry.axis import to_pipe
+from stages.motion import MotionParameters
 from stages.motion.bore import ONE_BORE, Bore
-from stages.motion.bundle_adjustment import residuals
+from stages.motion.bundle_adjustment import equations, residuals
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.tracking.strips import StripGrid
 from tests.motion_scene import RADIUS, scene
@@ -63,6 +65,19 @@ def test_a_reducer_does_not_hold_the_probe_where_its_rings_were_taken_to_be() ->
     assert apart < 0.1 * held, "looked up by place, rings would move the probe back"
     moved = farther.with_bore_in_place(made.measured.probe.laser.baseline_mm)
     assert moved.bore.rings_mm[60] - AT_MM[60] == pytest.approx(0.03 * (AT_MM[60] - 22), abs=0.1)
+
+
+def test_texture_is_less_sure_of_the_wall_in_a_reducer() -> None:
+    """The width is known to half a millimetre along the pipe: 0.4 mm across at a slope of 0.8."""
+    made = scene(60, 25, seed=2)
+    state, parameters = replace(made.truth, bore=REDUCER), MotionParameters(surface_sigma_mm=0.1)
+    at_mm = to_pipe(state.axis, state.xyz_p)[0]
+    inside, outside = (at_mm > 36) & (at_mm < 46), (at_mm < 34) | (at_mm > 48)
+    sigma_mm = equations.landmark_rows(state, made.measured, parameters).surface_sigma
+    assert inside.any()
+    assert outside.any()
+    assert sigma_mm[inside] == pytest.approx(np.hypot(0.1, 0.4), rel=1e-6)
+    assert sigma_mm[outside] == pytest.approx(0.1)
 
 
 def test_strips_lie_on_the_wall() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -12,10 +14,12 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
-from stages.motion.bore import Bore
+from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import estimate_state
 from stages.motion.trajectory import doubting_texture
+from stages.motion.windows.steady_scale import with_steady_scale
+from stages.motion.windows.submaps import Window
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
 from tests.motion_scene import scene
@@ -24,6 +28,7 @@ from tests.ring_images import MemorySource
 
 FRAMES, LANDMARKS = 60, 500
 GROWS = 0.005
+REDUCER = replace(ONE_BORE, rings_mm=np.arange(2.0), rings_wider_mm=np.arange(2.0))
 
 
 def drift_in(**changes: float) -> tuple[ScaleDrift, list[str]]:
@@ -71,6 +76,19 @@ def test_a_little_change_of_the_rings_may_be_either() -> None:
     drift, _ = drift_in(widens=0.002)
     assert drift.ambiguous
     assert np.ptp(drift.stated_sigma) * drift.ring_mm > 0.05
+
+
+@pytest.mark.parametrize("changes", [{"picture_grows": GROWS}, {"widens": 0.002}], ids=["grows", "either"])
+def test_in_a_reducer_no_drift_is_told(changes: dict[str, float]) -> None:
+    """Rings and texture depart from each other there as they do where the picture grows."""
+    made, parameters = scene(FRAMES, LANDMARKS, noise=1.0, **changes), MotionParameters(match_bias_px=0.01)
+    estimate = estimate_state(made.truth, made.measured, parameters)
+    part_of_run, nobody = Window(0, FRAMES), cast(Any, None)
+    for bore, told in ((ONE_BORE, True), (REDUCER, False)):
+        run = cast(Any, SimpleNamespace(bore=bore, whole=None, image_scale=None, time_s=made.measured.time_s))
+        steady = with_steady_scale(run, part_of_run, estimate, made.measured, parameters, nobody)
+        assert (steady.drift.told or steady.drift.ambiguous) == told
+        assert (steady.scale_sigma is not None) == told
 
 
 @pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])

@@ -11,7 +11,7 @@ from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light, Steps, rows_by_motion, sway_of_line
 from stages.premises.pictures import Pictures, look_at_pictures
 from tests.drawn_run import drawn_run
-from tests.premises_run import COUNT, STEP_MM, checked, good_recording, steady_run, with_rings
+from tests.premises_run import COUNT, STEP_MM, checked, with_rings
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 from tests.spoiled_recordings import (
@@ -19,16 +19,6 @@ from tests.spoiled_recordings import (
     Spoiled,
     repeated,
 )
-
-
-@pytest.fixture(scope="module")
-def run():
-    return steady_run()
-
-
-@pytest.fixture(scope="module")
-def good():
-    return good_recording()
 
 
 def test_repeated_pictures_are_left_out(good, run):

@@ -13,19 +13,9 @@ from pipeline.recording.base import Encoder, PipeFacts
 from stages.premises.light import Steps
 from stages.premises.scale import encoder_factor
 from tests.drawn_run import BASELINE, RADIUS
-from tests.premises_run import checked, good_recording, steady_run
+from tests.premises_run import checked
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
-
-
-@pytest.fixture(scope="module")
-def run():
-    return steady_run()
-
-
-@pytest.fixture(scope="module")
-def good():
-    return good_recording()
 
 
 @pytest.mark.parametrize(

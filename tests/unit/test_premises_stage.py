@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.errors import UnusableError
 from pipeline.recording.base import FrameTable
-from tests.premises_run import COUNT, checked, good_recording, steady_run
+from tests.premises_run import COUNT, checked
 from tests.ring_images import MemorySource
 from tests.spoiled_recordings import (
     SPOILERS,
@@ -17,16 +17,6 @@ from tests.spoiled_recordings import (
     swapped_from,
     wrong_at_random,
 )
-
-
-@pytest.fixture(scope="module")
-def run():
-    return steady_run()
-
-
-@pytest.fixture(scope="module")
-def good():
-    return good_recording()
 
 
 def test_a_right_recording_is_left_alone(good, run):

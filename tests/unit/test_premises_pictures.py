@@ -1,0 +1,58 @@
+"""The light of pictures, and how far the wall moves in pictures that are cut off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.recording.base import Illumination, Recording
+from stages.premises.light import Light, light_seen
+from stages.premises.pictures import Pictures, look_at_pictures
+from tests.drawn_run import RADIUS, DrawnRun
+from tests.premises_run import STEP_MM
+from tests.quiet import quiet_context
+from tests.ring_images import MemorySource
+
+COUNT = 60
+LIT = np.arange(COUNT) % 2 == 1
+
+
+@pytest.mark.parametrize(("brighter", "told"), [(0.03, False), (0.08, True)])
+def test_two_lights_differ_in_brightness(brighter: float, told: bool) -> None:
+    """Two runs of open-3 joined, in one light, differ by a hundredth of their brightness."""
+    brightness = 10 * (1 + brighter * LIT) + 0.01 * np.random.default_rng(1).standard_normal(COUNT)
+    line, nothing = np.ones((COUNT, 1), np.float32), np.full(COUNT, np.nan)
+    seen = Pictures(
+        brightness,
+        np.where(LIT, 0.0, 0.9),
+        line,
+        np.zeros(1),
+        nothing,
+        np.arange(COUNT) - 2,
+        nothing,
+        nothing,
+    )
+    expected = np.where(LIT, Light.WALL, Light.LINE) if told else np.full(COUNT, Light.UNKNOWN)
+    np.testing.assert_array_equal(light_seen(seen), expected)
+
+
+def cut_off(run: DrawnRun, good: Recording, columns: int) -> tuple[Recording, DrawnRun]:
+    """Return a recording whose pictures end after so many columns, and its run."""
+    height = run.probe.camera.image_size[1]
+    images = {k: np.ascontiguousarray(i[:, :columns]) for k, i in good.source.images.items()}
+    camera = replace(run.probe.camera, image_size=(columns, height))
+    recording = replace(good, source=MemorySource(images, (columns, height)))
+    return recording, replace(run, probe=replace(run.probe, camera=camera))
+
+
+def test_a_wall_that_leaves_the_picture_is_seen_to_move_as_far(run: DrawnRun, good: Recording) -> None:
+    """The edge of the picture stays where it is: taken for wall, it left 26 of 29 steps untold."""
+    recording, cut = cut_off(run, good, 300)
+    seen = look_at_pictures(recording, cut.probe, quiet_context())
+    lit = np.isin(good.frames.frame, good.frames.of(Illumination.LED))
+    steps = seen.step[lit & (seen.partner >= 0)]
+    # Pictures step by 4.3 rows of the unrolled wall, and phase correlation errs by up to one of them.
+    assert steps == pytest.approx(2 * STEP_MM / RADIUS, rel=0.25)
+    assert np.median(steps) == pytest.approx(2 * STEP_MM / RADIUS, rel=0.05)
