@@ -16,6 +16,12 @@ Image = Byte
 """A camera image: (rows, columns) grey or (rows, columns, 3) colour."""
 
 
+def runs_of(mask: Bool) -> list[slice]:
+    """Return the runs of neighbouring true cells of a mask (N,)."""
+    edge = np.flatnonzero(np.diff(mask, prepend=False, append=False))
+    return [slice(int(first), int(end)) for first, end in zip(edge[::2], edge[1::2], strict=True)]
+
+
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
     """Return a C-contiguous view, or a copy, that cannot be written to: compiled code then knows one kind."""
     view = np.ascontiguousarray(array).view()

@@ -48,9 +48,9 @@ def covariance_of(information: Float, least: float = 1e-14) -> Float:
     return np.asarray((vector / value) @ vector.T * scale * scale[:, None])
 
 
-def log_determinant(information: Float, least: float = 1e-14) -> float:
+def log_determinant(information: Float) -> float:
     """Return the natural logarithm of the determinant of an information matrix."""
-    scale, value, _ = spectrum(information, least)
+    scale, value, _ = spectrum(information, 1e-14)
     return float(np.sum(np.log(value)) - 2 * np.sum(np.log(scale)))
 
 

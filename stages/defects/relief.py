@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import find_objects, gaussian_filter1d, label
+from scipy.ndimage import gaussian_filter1d
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA, basis_of, ring_harmonics, robust_spread, row_median
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Float, runs_of
 from pipeline.artefacts.measured import RadiusMap
 from stages.defects.along import sample, slow_along, stretches
 from stages.defects.parameters import DefectParameters
@@ -241,7 +241,7 @@ def weld_rows(
     out: list[slice] = []
     for sign in (-1.0, 1.0):
         height = sign * mean
-        for rows in _runs(height > limit):
+        for rows in runs_of(height > limit):
             peak = rows.start + int(np.argmax(height[rows]))
             bead = _run_around(height, peak, max(limit / 2, 0.15 * height[peak]), longest)
             if bead is None or bead in out:
@@ -255,13 +255,8 @@ def _run_around(height: Float, peak: int, level: float, longest: int) -> slice |
     """Return the rows about ``peak`` that are above ``level``, None where they are more than ``longest``."""
     first = max(0, peak - longest - 1)
     near = height[first : peak + longest + 2] > level
-    bead = next(r for r in _runs(near) if r.start <= peak - first < r.stop)
+    bead = next(r for r in runs_of(near) if r.start <= peak - first < r.stop)
     return slice(bead.start + first, bead.stop + first) if bead.stop - bead.start <= longest else None
-
-
-def _runs(mask: Bool) -> list[slice]:
-    labels, _ = label(mask)
-    return [rows for (rows,) in find_objects(labels)]
 
 
 def _all_round(height: Float, peak: float) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Float, runs_of
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
@@ -113,12 +113,10 @@ def _without_held(time_s: Float, distance_mm: Float) -> tuple[Float, Float]:
     It hung where its reading rests and then jumps by about what the probe usually goes in such a time.
     """
     step, usual = np.diff(distance_mm), _usual(np.diff(distance_mm))
-    resting = np.concatenate([[False], step == 0, [False]])
-    first = np.flatnonzero(~resting[:-1] & resting[1:])
-    after = np.flatnonzero(resting[:-1] & ~resting[1:])
     kept = np.ones(len(time_s), bool)
     per_row = np.abs(step[step != 0]).mean() if np.any(step) else 0.0
-    for begin, end in zip(first, after, strict=True):
+    for rest in runs_of(step == 0):
+        begin, end = rest.start, rest.stop
         jumps = end < len(step) and abs(step[end]) > max(_JUMP_TIMES * usual, _DIFFERENCE_MM)
         if jumps and 1 / _LIKE_USUAL < abs(step[end]) / ((end - begin) * per_row) < _LIKE_USUAL:
             kept[begin + 1 : end + 1] = False

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Bool, Float, Int
+from pipeline.arrays import Bool, Float, Int, runs_of
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
 from pipeline.recording.base import FrameTable
@@ -64,15 +64,13 @@ def find_events(
     return tuple(sorted(found, key=lambda e: (e.frame_from, e.kind)))
 
 
-def _runs(mask: Bool) -> Iterator[tuple[int, int]]:
-    """Yield first and last index of each run of true."""
-    edge = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    for a, b in zip(edge[::2], edge[1::2], strict=True):
-        yield int(a), int(b) - 1
+def _ends_of_runs(mask: Bool) -> list[tuple[int, int]]:
+    """Return first and last index of each run of true."""
+    return [(run.start, run.stop - 1) for run in runs_of(mask)]
 
 
 def _stops(f: Int, t: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
-    for a, b in _runs(np.abs(speed) < max(_STOP_SHARE * cruise, _LEAST_SPEED_MM_S)):
+    for a, b in _ends_of_runs(np.abs(speed) < max(_STOP_SHARE * cruise, _LEAST_SPEED_MM_S)):
         if t[b] - t[a] >= _SHORTEST_STOP_S:
             lasted = float(t[b] - t[a])
             yield MotionEvent("stop", int(f[a]), int(f[b]), lasted, "s", "The probe stood still.")
@@ -81,7 +79,7 @@ def _stops(f: Int, t: Float, speed: Float, cruise: float) -> Iterator[MotionEven
 def _reversals(f: Int, z: Float, speed: Float, cruise: float) -> Iterator[MotionEvent]:
     moving = np.where(np.abs(speed) > _MOVING_SHARE * cruise, np.sign(speed), 0)
     main = 1 if z[-1] >= z[0] else -1
-    for a, b in _runs(moving == -main):
+    for a, b in _ends_of_runs(moving == -main):
         back = float(abs(z[b] - z[a]))
         if back > _SHORTEST_REVERSAL_MM:
             yield MotionEvent("reversal", int(f[a]), int(f[b]), back, "mm", "The probe moved back.")
@@ -111,7 +109,7 @@ def _duplicates(f: Int, z: Float, tracked: TrackedPoses) -> Iterator[MotionEvent
 
 def _lost(f: Int, tracked: TrackedPoses) -> Iterator[MotionEvent]:
     note = "The wall showed too little texture to be followed."
-    for a, b in _runs(tracked.lost & (np.arange(len(tracked.lost)) > 0)):
+    for a, b in _ends_of_runs(tracked.lost & (np.arange(len(tracked.lost)) > 0)):
         first, last = int(f[tracked.frames[a]]), int(f[tracked.frames[b]])
         yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", note)
 
@@ -120,7 +118,7 @@ def _slips(f: Int, slip: Float) -> Iterator[MotionEvent]:
     step = np.diff(slip)
     usual = robust_spread(step) + 1e-6
     note = "The encoder and the wall's texture disagree: the encoder slipped."
-    for a, b in _runs(np.abs(step) > max(_SLIP_SPREADS * usual, _SLIP_STEP_MM)):
+    for a, b in _ends_of_runs(np.abs(step) > max(_SLIP_SPREADS * usual, _SLIP_STEP_MM)):
         size = float(slip[b + 1] - slip[a])
         if abs(size) > _SLIP_MM:
             yield MotionEvent("encoder_slip", int(f[a]), int(f[b + 1]), size, "mm", note)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.arrays import Bool, Byte, Float
+from pipeline.arrays import Bool, Byte, Float, runs_of
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.machine.stage import Context
@@ -129,5 +129,5 @@ def _runs_around(mask: Bool) -> list[tuple[int, int]]:
     if mask.all() or not mask.any():
         return [(0, len(mask))] if mask.all() else []
     first = int(np.argmin(mask))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.roll(mask, -first).astype(np.int8), [0]])))
-    return [((int(a) + first) % len(mask), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    runs = runs_of(np.roll(mask, -first))
+    return [((run.start + first) % len(mask), run.stop - run.start) for run in runs]

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import chance_of, sigmas
@@ -77,12 +78,11 @@ class WholePictures:
     frame: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
 
     def _mismatch(
-        self, name: str, fixed_to: str, size: NamedFigure, chance: float, of: str, said: str,
-        place: tuple[NamedFigure, ...] = (),
-    ) -> Mismatch:  # fmt: skip
+        self, name: str, fixed_to: str, size: NamedFigure, chance: float, of: str, said: str
+    ) -> Mismatch:
         channel, at = "line" if fixed_to == "line" else "intensity", self.frame[of][0]
         look = self.scene.ring.whole(at)
-        return Mismatch(name, channel, fixed_to, place, (size,), chance, np.nan, np.nan, said, look)
+        return Mismatch(name, channel, fixed_to, (), (size,), chance, np.nan, np.nan, said, look)
 
     def add_lit(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped."""
@@ -267,5 +267,5 @@ def _size_beside_one(value: Float, column: Float) -> Float:
         size = float(c @ (value - value[use].mean())) / max(float(c @ c), 1e-9)
         rest = value - size * column
         away = np.abs(rest - np.median(rest))
-        use = away < _SURE * max(1.4826 * float(np.median(away)), _LEAST_SPREAD)
+        use = away < _SURE * max(robust_spread(away), _LEAST_SPREAD)
     return np.array([size, float(np.quantile(column, 0.95)), size**2 * float(c @ c)])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import Float
+from pipeline.arrays import Float, runs_of
 
 WIDTH, HEIGHT = 900.0, 220.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64.0, 12.0, 10.0, 34.0
@@ -80,9 +80,7 @@ def plot(title: str, unit: str, x: Float, curves: Sequence[Curve]) -> Plot | Non
 
 
 def _drawn(curve: Curve, x: Float, y: Float, range_y: float) -> Drawn:
-    known = np.isfinite(y)
-    breaks = np.flatnonzero(np.diff(known.astype(int))) + 1
-    runs = [r for r in np.split(np.arange(len(y)), breaks) if known[r[0]]]
+    runs = runs_of(np.isfinite(y))
     lines = tuple(_points(x[r], y[r]) for r in runs)
     if curve.sigma is None:
         return Drawn(curve.name, curve.style, lines, ())

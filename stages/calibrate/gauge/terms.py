@@ -117,9 +117,9 @@ def _wall_at(state: Unknowns, T: Float, uv: Float) -> tuple[Float, Float, Float]
     return xyz_c, np.stack([xyz_p[:, 0] / radius, xyz_p[:, 1] / radius, 0 * radius], -1), radius
 
 
-def wall_cells(wall_mm: Float, size_mm: float = WALL_CELL_MM) -> Int:
+def wall_cells(wall_mm: Float) -> Int:
     """Return numbers (M,) of the square cells of wall in which points (M, 2) lie."""
-    cell = np.floor(wall_mm / size_mm).astype(np.int64)
+    cell = np.floor(wall_mm / WALL_CELL_MM).astype(np.int64)
     return np.asarray(cell[:, 0] * 10_000 + cell[:, 1])
 
 

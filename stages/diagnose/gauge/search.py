@@ -205,9 +205,9 @@ def by_chance(scores: Sequence[Scored]) -> float:
     return float(min((s.p_value for s in scores), default=1.0) * max(len(scores), 1))
 
 
-def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored], most: int = _REFITTED) -> list[Fit]:
+def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored]) -> list[Fit]:
     """Return the fits with each of the most promising effects added, best first; no impossible sizes."""
-    promising = _promising(scores, most)
+    promising = _promising(scores)
     worth = [s for s in promising if s.score.gain > _WORTH_REFITTING * promising[0].score.gain]
     found = found if run.measures_as(found.run) else replace(found, run=run)
     fits: list[Fit] = []
@@ -220,10 +220,10 @@ def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored], most: int = _REF
     return sorted(possible or fits, key=lambda f: f.cost)
 
 
-def _promising(scores: Sequence[Scored], most: int) -> list[Scored]:
+def _promising(scores: Sequence[Scored]) -> list[Scored]:
     """Return the scores of the most gain: so many laws with their best courses, and the best law's others."""
     ranked = sorted(scores, key=lambda s: -s.score.gain)
-    laws = list(dict.fromkeys(s.model.law for s in ranked))[:most]
+    laws = list(dict.fromkeys(s.model.law for s in ranked))[:_REFITTED]
     best = [next(s for s in ranked if s.model.law == law) for law in laws]
     others = [s for s in ranked if laws and s.model.law == laws[0] and s is not best[0]]
     return [*best, *others[:_OTHER_COURSES]]

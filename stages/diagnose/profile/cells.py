@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.arrays import Bool, Float, Float32, Int, runs_of
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.measure import LineProfiles
@@ -108,20 +108,14 @@ def _speed(radius: Float, time_s: Float, azimuth_rad: Float, steady: Bool) -> Fl
     basis = np.concatenate([np.ones((len(azimuth_rad), 1)), np.cos(waves), np.sin(waves)], axis=1)
     out = np.full(radius.shape, np.nan)
     # With 0.3 of a ring missing, its low harmonics are hardly told apart (chosen).
-    for run in _runs(steady & (np.isfinite(radius).mean(1) > 0.7)):
-        if len(run) < 4:
+    for run in runs_of(steady & (np.isfinite(radius).mean(1) > 0.7)):
+        if run.stop - run.start < 4:
             continue
         parts = [
             np.linalg.lstsq(basis[g], r[g], rcond=None)[0] for r in radius[run] for g in [np.isfinite(r)]
         ]
         out[run] = CubicSpline(time_s[run], np.array(parts))(time_s[run], 1) @ basis.T
     return out
-
-
-def _runs(good: Bool) -> list[Int]:
-    """Return the indices of every run of neighbours that are all good."""
-    index = np.flatnonzero(good)
-    return np.split(index, np.flatnonzero(np.diff(index) > 1) + 1) if len(index) else []
 
 
 @dataclass(frozen=True)
@@ -199,10 +193,10 @@ def make_cells(profiles: LineProfiles, geometry: LineGeometry) -> Cells:
     )  # fmt: skip
 
 
-def fit_gaussians(profile: Float, offset_px: Float, start_px: float = 1.2) -> tuple[Float, Float, Float]:
+def fit_gaussians(profile: Float, offset_px: Float) -> tuple[Float, Float, Float]:
     """Return centre, width and height (N,) of Gaussians fitted to the middle of profiles (N, B), px."""
     n = len(profile)
-    centre, log_width, peak = np.zeros(n), np.full(n, np.log(start_px)), np.ones(n)
+    centre, log_width, peak = np.zeros(n), np.full(n, np.log(1.2)), np.ones(n)
     near = np.abs(offset_px) < 12
     t, p = offset_px[near], profile[:, near]
     for _ in range(_STEPS):

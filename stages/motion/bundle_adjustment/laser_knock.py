@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import LaserKnock, RingPoints
 from pipeline.geometry.axis import to_pipe
@@ -117,7 +118,7 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
     weight, sway = _jump_of_lines(frame)
     jump = np.einsum("nci,ni->nc", sliding_window_view(shape, 2 * _SIDE, axis=0), weight)
     # Rings of a picture that stands still are the same: then only rounding differs.
-    usual = np.maximum(1.4826 * np.median(np.abs(jump), axis=0), np.finfo(np.float32).eps)
+    usual = np.maximum(robust_spreads(jump, axis=0), np.finfo(np.float32).eps)
     spreads = np.linalg.norm(jump / usual, axis=1) / sway
     most = int(np.argmax(spreads))
     size, times, first = jump[most], float(spreads[most]), most + _SIDE
