@@ -1,4 +1,4 @@
-"""Premises: what the tables of a recording state, held against its pictures before anything relies on it."""
+"""Premises: the tables of a recording are compared with its pictures before anything relies on them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from stages.premises.light import (
 from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
 from stages.premises.repeats import copies, repeated, rows_of_repeats
-from stages.premises.rows import Lights, Story, cheapest_story
+from stages.premises.rows import Alignment, Lights, aligned
 from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm
 from stages.premises.stays import places_that_stay
 
@@ -77,7 +77,7 @@ class PremisesParameters(Parameters):
 def check_premises(
     recording: Recording, probe: Probe, parameters: PremisesParameters, context: Context
 ) -> CheckedFrames:
-    """Hold lights, times, diameter and encoder of a recording against its pictures; mend and warn.
+    """Compare stated lights, times, diameter and encoder with the pictures; correct what is wrong, and warn.
 
     Raises
     ------
@@ -93,12 +93,12 @@ def check_premises(
     stays = places_that_stay(recording, probe, recording.frames.frame[shown == Light.WALL], context)
     if stays is not None:
         pictures = look_at_pictures(recording, probe, context, stays)
-    story = _story(recording.frames, table, pictures, light)
-    copy = _copies(recording, table, pictures, light, story)
-    label = np.where(copy, _stated(table, story.row), _labels(table, story, light, pictures))
+    alignment = _aligned(recording.frames, table, pictures, light)
+    copy = _copies(recording, table, pictures, light, alignment)
+    label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
     steps, sway = steps_of_wall(pictures, shown, copy), sway_of_line(pictures, light)
     radius_mm = radius_seen_mm(pictures, probe)
-    row = rows_by_motion(story.row, steps, rhythm_of(light), table, recording.encoder, sway, radius_mm)
+    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, recording.encoder, sway, radius_mm)
     stated_s = row_times(table, row)
     jumps = clock_jumps(stated_s, steps, recording.encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
@@ -125,7 +125,7 @@ def check_premises(
 def _progressive(
     recording: Recording, probe: Probe, parameters: PremisesParameters, context: Context
 ) -> tuple[Recording, Pictures, bool]:
-    """Return the recording and its pictures, of interlaced ones the even rows, and whether they were so."""
+    """Return the recording, its pictures, and whether they are interlaced: then both have even rows only."""
     pictures = look_at_pictures(recording, probe, context)
     if not interlaced(pictures):
         return recording, pictures, False
@@ -134,14 +134,16 @@ def _progressive(
     return recording, look_at_pictures(recording, probe, context), True
 
 
-def _copies(recording: Recording, table: FrameTable, pictures: Pictures, light: Int, story: Story) -> Bool:
-    """Return which pictures (F,) show the one before once more."""
-    stated, time_s = _lights_of(_stated(table, story.row)), row_times(table, story.row)
-    return copies(pictures, light, stated, story.row, time_s, recording.encoder)
+def _copies(
+    recording: Recording, table: FrameTable, pictures: Pictures, light: Int, alignment: Alignment
+) -> Bool:
+    """Return which pictures (F,) repeat an earlier one."""
+    stated, time_s = _lights_of(_stated(table, alignment.row)), row_times(table, alignment.row)
+    return copies(pictures, light, stated, alignment.row, time_s, recording.encoder)
 
 
 def _table(recording: Recording) -> FrameTable:
-    """Return all rows of the table of frames, where those of the pictures are its first."""
+    """Return all rows of the table of frames if its first rows are those of the pictures."""
     frame, listed = recording.frames.frame, recording.listed
     whole = listed is not None and np.array_equal(listed.frame[: len(frame)], frame)
     return listed if whole and listed is not None else recording.frames
@@ -190,29 +192,29 @@ def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:
     )
 
 
-def _story(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int) -> Story:
-    """Return which row belongs to which picture; as they come where the table knows one light."""
+def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int) -> Alignment:
+    """Return which row belongs to which picture: they follow in order where the table states one light."""
     count, stated = len(frames.frame), _lights_of(table.illumination)
     wrong = (light != Light.UNKNOWN) & (light != stated[:count])
     if len(np.unique(stated)) < 2:
         lit = count > 2 and stated[0] == Light.WALL
         rows = np.arange(count)
-        return Story(rows_of_repeats(rows, pictures) if lit else rows, np.zeros(count, bool))
+        return Alignment(rows_of_repeats(rows, pictures) if lit else rows, np.zeros(count, bool))
     if not wrong.any():
-        return Story(np.arange(count), np.zeros(count, bool))
+        return Alignment(np.arange(count), np.zeros(count, bool))
     again = repeated(pictures, light)
     told = np.where(again, Light.UNKNOWN, light)  # of a picture shown twice nothing tells its own light
-    return cheapest_story(Lights(told, stated, pattern_breaks(light), again))
+    return aligned(Lights(told, stated, pattern_breaks(light), again))
 
 
-def _labels(table: FrameTable, story: Story, light: Int, pictures: Pictures) -> Labels:
-    """Return the illumination (F,) of every picture: as it shows, else as its row states."""
-    stated = _stated(table, story.row)
+def _labels(table: FrameTable, alignment: Alignment, light: Int, pictures: Pictures) -> Labels:
+    """Return the illumination (F,) of every picture: as it shows, or as its row states if it shows none."""
+    stated = _stated(table, alignment.row)
     led, both = stated == _LED, stated == _BOTH
     wall = _LED if led.sum() >= both.sum() else _BOTH
     if led.any() and both.any() and alike(pictures, led, both):
         stated = np.where(stated == _LASER, _LASER, wall)
-    believed = np.where(story.swapped, np.where(stated == _LASER, wall, _LASER), stated)
+    believed = np.where(alignment.swapped, np.where(stated == _LASER, wall, _LASER), stated)
     if len(np.unique(_lights_of(table.illumination))) < 2:
         return np.asarray(believed)
     shown = np.where(light == Light.LINE, _LASER, np.where(believed == _LASER, wall, believed))

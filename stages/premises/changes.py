@@ -1,4 +1,4 @@
-"""What differs between a recording's tables and its pictures, and how it is told."""
+"""What differs between a recording's tables and its pictures, and the warnings about it."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from stages.premises.light import Light
 from stages.premises.pictures import Pictures
 
 _SHOWN = 8
-# Neighbouring rows differ no more than every second: 1.0 ± 0.06 times in noise, .3 to .4 in lit pictures of
-# open-1 to open-3, a01 and a05; with every second row from two frames later 1.7 to 5. A laser line moves too
-# little to tell.
+# A picture counts as combed when neighbouring rows differ by so many times as much as rows two apart. The
+# ratio is 1.0 ± 0.06 in noise, .3 to .4 in lit pictures of open-1 to open-3, a01 and a05, and 1.7 to 5 where
+# every second row is from two frames later. Pictures of the laser line are not combed: it moves too little.
 _COMBED, _MANY_COMBED = 1.3, 0.25
 
 
@@ -54,30 +54,30 @@ def warn_of_frames(
     frame, lost = changes.frames.frame, changes.lost()
     if lost:
         context.warn(
-            f"{_pictures(sum(n for _, n in lost))} lost without frames.csv knowing: before "
-            f"{_listed([f'frame {f} ({n})' for f, n in lost])}. Times and lights of the "
-            f"{changes.retimed.sum()} frames behind were taken from the rows that belong to them. What to "
-            "do: nothing, if the recorder is known to drop frames; else correct frames.csv"
+            f"{_pictures(sum(n for _, n in lost))} lost although frames.csv lists them: before "
+            f"{_listed([f'frame {f} ({n})' for f, n in lost])}. The {changes.retimed.sum()} frames after "
+            "them now have the times and lights of the rows that belong to them. What to do: nothing, if the "
+            "recorder is known to drop frames; else correct frames.csv"
         )
     wrong = frame[changes.relabelled & ~changes.retimed]
     if wrong.size:
         context.warn(
-            f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. The "
-            "pictures are believed. What to do: correct the column illumination"
+            f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. What "
+            "the pictures show is used. What to do: correct the column illumination"
         )
     again = frame[np.diff(changes.row, prepend=-1) < 1]
     left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
     if left > 0:
         context.warn(
-            f"the video ends early: frames.csv lists {left} of {len(table.frame)} frames more than there are "
-            "pictures. Only what was filmed is measured. What to do: copy the video again, it may be cut off"
+            f"the video ends early: it lacks the last {left} of the {len(table.frame)} frames in frames.csv. "
+            "Only what was filmed is measured. What to do: copy the video again, it may be cut off"
         )
     warn_of(again, "left out: the one before repeated", "nothing, or repair the recorder", context)
-    warn_of(frame[~pictures.seen], "not to be decoded", "copy the video again", context)
+    warn_of(frame[~pictures.seen], "that cannot be decoded", "copy the video again", context)
     dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
     warn_of(
-        frame[dark], "with neither a closed laser line in the dark nor a lit wall, counted as stated",
-        "look at them: a covered lens, a lamp that failed, daylight", context,
+        frame[dark], "that show neither a laser line in the dark nor a lit wall, taken as stated",
+        "look at them: the lens was covered, a lamp failed, or daylight came in", context,
     )  # fmt: skip
 
 
@@ -87,21 +87,18 @@ def interlaced(pictures: Pictures) -> bool:
 
 
 def refuse_or_warn_of_interlacing(mend: bool, context: Context) -> None:
-    """Tell that even rows alone are used.
+    """Warn that only even rows are used.
 
     Raises
     ------
     UnusableError
-        Unless that is wanted.
+        When interlaced pictures are not to be used.
     """
-    what = "the pictures are interlaced: odd and even rows are of different times or of different light"
+    what = "the pictures are interlaced: odd and even rows differ in time or in light"
     hint = "set camera and recorder to progressive"
     if not mend:
         raise UnusableError("premises", what, hint=f"{hint}, or let premises.mend be true")
-    context.warn(
-        f"{what}. Even rows alone are used, so that the picture is half as fine from row to row. What to do: "
-        f"{hint}"
-    )
+    context.warn(f"{what}. Only even rows are used, which halves the vertical resolution. What to do: {hint}")
 
 
 @dataclass(frozen=True)
@@ -115,7 +112,7 @@ class LeftOut:
     astray
         Stored in another order than they were taken.
     copy
-        The one before, once more.
+        A repetition of an earlier picture.
     """
 
     outside: Bool
@@ -140,12 +137,12 @@ class LeftOut:
         warn_of(
             frame[self.copy],
             "left out: the one before shown once more, as the recorder hung",
-            "nothing, if what was passed meanwhile need not be seen", context,
+            "nothing, if the wall that was passed meanwhile need not be seen", context,
         )  # fmt: skip
 
 
 def warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
-    """Tell what is with some pictures, their frames and what to do; nothing without any."""
+    """Warn of what is wrong with pictures, of which frames, and what to do; not without pictures."""
     if frame.size:
         context.warn(f"{_pictures(len(frame))} {what}: frame {_listed(frame)}. What to do: {hint}")
 

@@ -1,4 +1,4 @@
-"""Pictures stored in another order than they were taken, and those from before or behind the pipe."""
+"""Pictures that were stored in another order than taken, and pictures from outside the pipe."""
 
 from __future__ import annotations
 

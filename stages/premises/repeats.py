@@ -1,4 +1,4 @@
-"""Pictures that are shown once more in place of their own: by a recorder that hung, or by a converter."""
+"""Frames that show an earlier picture again, because the recorder hung or a converter repeated it."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from pipeline.recording.base import Encoder
 from stages.premises.light import Light
 from stages.premises.pictures import Pictures
 
-# A picture repeats the one before where it changes by so small a part of what is usual; half as much again
-# as a usual step tells one step from two.
+# A picture repeats the one before if it differs from it by less than this part of the usual change. A step of
+# less than 1.5 usual ones counts as one step, a longer one as two.
 _STANDS, _ONE_STEP = 0.25, 1.5
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
 
 
 def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
-    """Return ``row`` (F,) of a recording in one light with repeated pictures on the row before them.
+    """Return the ``row`` (F,) of every picture; a repeated one, in one light, gets the row before its own.
 
-    A picture is repeated where the wall stands for that one picture and moves before and after. Where it
-    then goes on by a usual step, the table counted the repetition, and all rows behind move up; where it goes
-    on by two, the repetition stands in for a lost picture, and the rows behind are right.
+    A picture is repeated where the wall does not move for one picture, but before and after it. If the next
+    step is a usual one, the table does not list the repetition, and all later pictures move up by a row. If
+    it is twice as long, the repetition replaces a lost picture, and the later rows are right.
     """
     size = np.abs(np.nan_to_num(pictures.step))
     usual = median_filter(size, _AROUND_STEP, mode="nearest")
@@ -38,7 +38,7 @@ def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
 
 
 def repeated(pictures: Pictures, light: Int) -> Bool:
-    """Return (F,) true for pictures that differ from the one before by a quarter of what is usual at most."""
+    """Return (F,) true for pictures that differ from the one before by less than a quarter of the usual."""
     follows = pictures.partner == np.arange(len(light)) - 1
     out = np.zeros(len(light), bool)
     for kind in (Light.LINE, Light.WALL):
@@ -52,13 +52,13 @@ def repeated(pictures: Pictures, light: Int) -> Bool:
 def copies(
     pictures: Pictures, light: Int, stated: Int, row: Int, time_s: Float, encoder: Encoder | None
 ) -> Bool:
-    """Return (F,) true for pictures that are one before once more, in place of their own.
+    """Return (F,) true for frames that show an earlier picture again in place of their own.
 
-    A recorder that hangs stores one picture for some frames, and the table goes on. ``stated`` (F,) is the
-    light that the ``row`` (F,) of every picture states: where lights take turns, a run of copies contradicts
-    it. Where the probe merely stands, each light repeats its own picture and nothing is contradicted. One
-    that repeats the last picture of its light, while those about it change, is a copy too, and so is a run of
-    them (`_hung`). ``time_s`` (F,) is when the pictures were taken.
+    A recorder that hangs stores one picture for several frames, while the table goes on. Where lights take
+    turns, such a run of copies contradicts the light that is ``stated`` (F,) by the ``row`` (F,) of each
+    picture. Where the probe only stands still, each light repeats its own picture, which contradicts nothing.
+    A picture that repeats the last one of its light while those about it change is a copy too, and so is a
+    run of them (`_hung`). ``time_s`` (F,) is when the pictures were taken.
     """
     again = repeated(pictures, light) & (np.diff(row, prepend=-1) > 0)
     runs, _ = label(again)
@@ -84,7 +84,7 @@ def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
 def _hung(pictures: Pictures, light: Int, time_s: Float, encoder: Encoder | None) -> Bool:
     """Return (F,) true where each light repeats its own last picture for a while, and the wall then leaps.
 
-    A probe that stands shows the same, but goes on by a usual step, and the encoder stands with it.
+    A probe that stands still repeats them too, but moves on by a usual step, and its encoder stands as well.
     """
     out = np.zeros(len(light), bool)
     wall = np.flatnonzero((light == Light.WALL) & (pictures.partner >= 0))
@@ -102,13 +102,13 @@ def _hung(pictures: Pictures, light: Int, time_s: Float, encoder: Encoder | None
 
 
 def _unchanged(pictures: Pictures, place: Int) -> Bool:
-    """Return which pictures (K,) of one light change by a part of what is usual only."""
+    """Return which pictures (K,) of one light change by less than a quarter of the usual change."""
     change = pictures.change[place]
     return np.asarray(change < _STANDS * np.median(change)) if len(place) else np.zeros(0, bool)
 
 
 def _leaps(step: Float, moving: Bool, behind: int) -> bool:
-    """Return whether a step (of K) is none that a wall which goes on as before and after makes."""
+    """Return whether the step (of K) at ``behind`` is longer than those around it, or of the other sign."""
     near = np.abs(np.arange(len(step)) - behind) <= _AROUND_STEP
     usual = step[near & moving & np.isfinite(step) & (np.arange(len(step)) != behind)]
     if not usual.size or not np.isfinite(step[behind]):

@@ -1,9 +1,9 @@
-"""Which row of the table of frames belongs to which picture: the cheapest story that explains both.
+"""Which row of the table of frames belongs to which picture: an alignment of the two sequences.
 
-A story is a course of two things along the pictures: how many rows were skipped so far (pictures lost that
-the table still lists), and whether the table has the two lights swapped. It costs one for each accident; the
-cheapest is found by dynamic programming (Viterbi). A wrong table is told from lost pictures by the rhythm of
-the lights: a lost picture breaks it, a wrong label does not.
+Its state at each picture is how many rows were skipped so far (pictures that were lost although the table
+lists them), and whether the table has the two lights swapped. Each fault (a lost picture, a wrong label, a
+swap) has a cost, and dynamic programming (Viterbi) finds the alignment of least cost. The rhythm of the
+lights tells wrong labels from lost pictures: a lost picture breaks it, a wrong label does not.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
 
-# One accident each: a wrong label, a loss, a swap, a loss that leaves the rhythm whole, a break of the rhythm
-# without a loss. Only their comparison matters, so all cost the same.
-_ACCIDENT = 1.0
-# Of two losses that explain the same lights, the smaller is believed. A loss before the first picture leaves
-# the rhythm whole, so that it could explain away wrong labels at no cost: each such picture costs more.
+# The cost of one fault: a wrong label, a loss, a swap, a loss that does not break the rhythm, or a break of
+# the rhythm without a loss. Nothing is known of how often each occurs, so all cost the same.
+_FAULT = 1.0
+# Of two losses that explain the same lights, the smaller is believed. A loss before the first picture does
+# not break the rhythm, so that it could explain away wrong labels at no cost: each such picture costs more.
 _EACH_LOST, _EACH_LOST_FIRST = 0.2, 0.5
-# Rows left over when the pictures end are half an accident, a video cut short. So are rows that are missing
-# where the table has one for each picture: it was cut. In any other table each missing row is an accident.
+# Rows that are left over when the pictures end cost half a fault: the video was cut short. So do missing rows
+# where the table has as many rows as pictures: the table was cut. Elsewhere each missing row is a fault.
 _ROWS_OFF = 0.5
 # Most pictures that can be lost in all beyond those that the table has too many rows for.
 _MOST_LOST = 12
@@ -30,8 +30,8 @@ _IMPOSSIBLE = 1e9
 
 
 @dataclass(frozen=True)
-class Story:
-    """The row (F,) of each picture, perhaps beyond the table, and where the table is swapped (F,)."""
+class Alignment:
+    """The row (F,) of each picture, perhaps beyond the table, and where its lights are swapped (F,)."""
 
     row: Int
     swapped: Bool
@@ -39,12 +39,12 @@ class Story:
 
 @dataclass(frozen=True)
 class Lights:
-    """Lights to be matched: as pictures (F,) show them (−1: unknown) and as the table's N rows state them.
+    """Lights to be aligned: those that pictures (F,) show (−1: unknown), and those that the N rows state.
 
     Attributes
     ----------
     breaks : (F,) bool
-        Where the pictures' own rhythm breaks.
+        Where the light is not the one that the pictures before it lead to expect.
     repeats : (F,) bool
         Pictures that repeat the one before.
     """
@@ -55,11 +55,11 @@ class Lights:
     repeats: Bool
 
 
-def cheapest_story(lights: Lights) -> Story:
-    """Return the cheapest story of a recording's rows and pictures."""
+def aligned(lights: Lights) -> Alignment:
+    """Return the alignment of pictures and rows that has the least cost."""
     count, rows = len(lights.picture), len(lights.row)
     shifts = np.arange(-min(int(lights.repeats.sum()), _MOST_LOST), _most_lost(rows - count) + 1)
-    cost = shifts[:, None] * _EACH_LOST_FIRST + (shifts != 0)[:, None] * _ACCIDENT + [0.0, _ACCIDENT]
+    cost = shifts[:, None] * _EACH_LOST_FIRST + (shifts != 0)[:, None] * _FAULT + [0.0, _FAULT]
     cost[shifts < 0] = _IMPOSSIBLE
     came_from = np.zeros((count, *cost.shape), np.int32)
     cost = cost + _wrong(lights, shifts, 0)
@@ -71,9 +71,9 @@ def cheapest_story(lights: Lights) -> Story:
 
 
 def _rows_off(shifts: Int, left_over: int) -> Float:
-    """Return the cost (S,) of a table that ends elsewhere than the pictures."""
+    """Return the cost (S,), at each shift, of a table that does not end where the pictures end."""
     missing = np.maximum(shifts - left_over, 0) * (left_over != 0)
-    return np.asarray(_ROWS_OFF * (shifts != left_over) + _ACCIDENT * missing)
+    return np.asarray(_ROWS_OFF * (shifts != left_over) + _FAULT * missing)
 
 
 def _most_lost(left_over: int) -> int:
@@ -81,24 +81,24 @@ def _most_lost(left_over: int) -> int:
 
 
 def _wrong(lights: Lights, shifts: Int, place: int) -> Float:
-    """Return the cost (S, 2) of the label of one picture at each shift, as stated and swapped."""
+    """Return the cost (S, 2) of one picture's label at each shift: as the table states it, and swapped."""
     seen, row = int(lights.picture[place]), place + shifts
     known = (row >= 0) & (row < len(lights.row)) & (seen >= 0)
     stated = lights.row[np.clip(row, 0, len(lights.row) - 1)]
     wrong = np.stack([stated != seen, stated == seen], -1)
-    return np.where(known[:, None], wrong, False) * _ACCIDENT
+    return np.where(known[:, None], wrong, False) * _FAULT
 
 
 def _advanced(cost: Float, breaks: bool, repeats: bool) -> tuple[Float, Int]:
     """Return the least cost (S, 2) of the next picture's states, and the flat index each comes from."""
     index = np.arange(cost.size).reshape(cost.shape)
-    stay = cost + _ACCIDENT * breaks
+    stay = cost + _FAULT * breaks
     lost, lost_from = _cheapest_below(cost, index)
-    lost = lost + _ACCIDENT * (not breaks)
+    lost = lost + _FAULT * (not breaks)
     best, source = np.minimum(stay, lost), np.where(stay <= lost, index, lost_from)
     if repeats:
-        best, source = _less(best, source, _shifted_down(cost) + _ACCIDENT, np.roll(index, -1, 0))
-    swapped = stay[:, ::-1] + _ACCIDENT
+        best, source = _less(best, source, _shifted_down(cost) + _FAULT, np.roll(index, -1, 0))
+    swapped = stay[:, ::-1] + _FAULT
     return _less(best, source, swapped, index[:, ::-1])
 
 
@@ -111,21 +111,21 @@ def _shifted_down(cost: Float) -> Float:
 
 
 def _cheapest_below(cost: Float, index: Int) -> tuple[Float, Int]:
-    """Return what it costs to come to each shift from the best lower one, and that one's index."""
+    """Return the cost (S, 2) of reaching each shift from the best lower one, and the index of that."""
     level = np.arange(len(cost))[:, None] * _EACH_LOST
     out, source = np.full(cost.shape, _IMPOSSIBLE), index.copy()
     least = np.minimum.accumulate(cost - level, 0)
     first = np.where(cost - level <= least, np.arange(len(cost))[:, None], 0)
     at = np.maximum.accumulate(first, 0)
-    out[1:] = least[:-1] + level[1:] + _ACCIDENT
+    out[1:] = least[:-1] + level[1:] + _FAULT
     source[1:] = np.take_along_axis(index, at[:-1], 0)
     return out, source
 
 
-def _traced_back(cost: Float, came_from: Int, shifts: Int) -> Story:
+def _traced_back(cost: Float, came_from: Int, shifts: Int) -> Alignment:
     state = int(np.argmin(cost))
     states = np.empty(len(came_from), np.int64)
     for place in range(len(came_from) - 1, -1, -1):
         states[place] = state
         state = int(came_from[place].flat[state])
-    return Story(np.arange(len(states)) + shifts[states // 2], states % 2 == 1)
+    return Alignment(np.arange(len(states)) + shifts[states // 2], states % 2 == 1)

@@ -14,19 +14,19 @@ from pipeline.recording.base import Encoder, PipeFacts, Recording
 from stages.premises.light import Steps
 from stages.premises.pictures import CLOSED, Pictures
 
-# Nominal sizes differ from inner diameters by up to a quarter (ASME B36.10: NPS 1/2 has a 15.8 mm bore);
-# a tenth is worth a word, a half more or less is another pipe, another probe or another unit.
-_WORTH_A_WORD, _ANOTHER = 1.1, 1.5
-# Where inches or metres are taken for mm throughout, lamps come out 6 or 250 times too wide for the pipe of
-# open-1; that much wider (chosen) they are in no pipe, also where their radius is not stated.
+# Nominal sizes differ from inner diameters by up to a quarter (ASME B36.10: NPS 1/2 has a 15.8 mm bore). From
+# a tenth on there is a warning; a factor of 1.5 means another pipe, another probe or another unit.
+_WARNED, _ANOTHER = 1.1, 1.5
+# Largest radius of the lamps, in radii of the pipe (chosen). If all lengths of open-1 are stated in inches or
+# metres, its lamps are 6 or 250 times as wide as its pipe, also with the default radius of the lamps.
 _TOO_WIDE = 2.0
 _UNITS = (("inch", 25.4), ("m", 1000.0), ("cm", 10.0), ("ft", 304.8))
-# A ratio is that of a unit when it comes so near to it; units lie further apart.
+# A ratio is taken for that of a unit within this factor; the units differ by more from each other.
 _NEAR_UNIT = 1.25
-# Unrolled walls show motion to about a tenth, bores of a gauge differ from their mean: twice is neither.
+# Unrolled walls show motion to about a tenth, and a gauge's bores differ from their mean: neither makes two.
 _CONTRADICTS = 2.0
 _LEAST_STEPS, _ONE_SIGN = 8, 0.8
-# The line is on the laser sheet wherever a probe is as stated; half of it leaves room for chance lines.
+# With the right probe every pixel of the line lies on the laser sheet; half leaves room for false lines.
 _MOST_LOST = 0.5
 
 
@@ -48,17 +48,17 @@ def radius_seen_mm(pictures: Pictures, probe: Probe) -> float:
     if lost > _MOST_LOST:
         raise UnusableError(
             "premises",
-            f"by the stated probe {100 * lost:.0f} % of the laser line's pixels look past the laser sheet or "
-            "nowhere at all",
+            f"with the stated probe, {100 * lost:.0f} % of the laser line's pixels have rays that miss "
+            "the laser sheet",
             limit=f"{100 * _MOST_LOST:.0f} %",
-            hint="check camera.focal_px, centre_px and distortion and the laser in probe.yaml; the "
-            "camera's lengths are px of these pictures",
+            hint="check camera.focal_px, centre_px, distortion and the laser in probe.yaml; the camera must "
+            "be stated for pictures of this size",
         )
     return float(np.nanmedian(radius_mm))
 
 
 def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: Context) -> None:
-    """Hold the stated diameter, and the radius ``lamps_mm`` of the probe's lamps, against the ring.
+    """Compare the stated diameter, and the radius ``lamps_mm`` of the probe's lamps, with the laser ring.
 
     Raises
     ------
@@ -74,8 +74,8 @@ def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: 
     if max(ratio, 1 / ratio) > _ANOTHER:
         raise UnusableError(
             "premises",
-            f"by the laser ring and the stated probe the pipe's diameter is {2 * radius_mm:.4g} mm, stated "
-            f"are {nearest:g} mm{_unit_hint(ratio)}",
+            f"with the stated probe the laser ring has a diameter of {2 * radius_mm:.4g} mm, but the pipe's "
+            f"is stated as {nearest:g} mm{_unit_hint(ratio)}",
             limit=f"a factor of {_ANOTHER:g}",
             hint="check pipe.nominal_diameter_mm in recording.yaml and laser.baseline_mm and the camera in "
             "probe.yaml, all in mm, and that the recorder neither scales nor frames the pictures",
@@ -83,16 +83,16 @@ def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: 
     if lamps_mm > _TOO_WIDE * radius_mm:
         raise UnusableError(
             "premises",
-            f"by the laser ring and the stated probe the pipe's radius is {radius_mm:.4g} mm: the probe with "
-            f"its lamps on a radius of {lamps_mm:.4g} mm does not fit into it",
+            f"with the stated probe the laser ring has a radius of {radius_mm:.4g} mm: the probe, whose "
+            f"lamps are on a radius of {lamps_mm:.4g} mm, does not fit into such a pipe",
             hint="state lengths in mm: laser.baseline_mm and lighting.radius_mm in probe.yaml, "
             "pipe.nominal_diameter_mm in recording.yaml, and distances in encoder.csv",
         )
-    if max(ratio, 1 / ratio) > _WORTH_A_WORD:
+    if max(ratio, 1 / ratio) > _WARNED:
         context.warn(
-            f"by the laser ring and the stated probe the pipe's diameter is {2 * radius_mm:.1f} mm, stated "
-            f"are {nearest:g} mm. What to do: check nominal_diameter_mm; deviations from nominal and wall "
-            "losses refer to it"
+            f"with the stated probe the laser ring has a diameter of {2 * radius_mm:.1f} mm, but the pipe's "
+            f"is stated as {nearest:g} mm. What to do: check nominal_diameter_mm; deviations from it and "
+            "wall losses refer to it"
         )
 
 
@@ -109,7 +109,7 @@ def _unit_hint(ratio: float) -> str:
 
 @dataclass(frozen=True)
 class _Ratio:
-    """Encoder over texture: the median of the steps, how many there are, the share of the commoner sign."""
+    """Ratio of encoder to texture: the median over steps, their number, and the share that has its sign."""
 
     value: float
     steps: int
@@ -119,14 +119,14 @@ class _Ratio:
 def encoder_factor(
     recording: Recording, time_s: Float, steps: Steps, radius_mm: float, context: Context
 ) -> float:
-    """Return by what the encoder is to be multiplied to be in mm and in the sense of the wall's motion; warn.
+    """Return the factor that brings the encoder to mm and to the direction of the wall's motion; warn of it.
 
     Parameters
     ----------
     time_s : (F,)
-        Of the pictures, as they are believed now.
+        Times of the pictures, corrected.
     radius_mm
-        Of the pipe as the ring shows it: the texture's motion is seen in pipe radii.
+        The pipe's radius from the laser ring: the texture's motion is measured in pipe radii.
     """
     if recording.encoder is None or not np.isfinite(radius_mm):
         return 1.0
@@ -156,7 +156,7 @@ def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _
     known = (time_s >= encoder.time_s[0]) & (time_s <= encoder.time_s[-1])
     reading = np.interp(time_s, encoder.time_s, encoder.distance_mm)
     by_encoder, by_wall = reading[steps.end] - reading[steps.start], steps.size * radius_mm
-    # Half of the fastest tenth's step: a ratio of two short ways says little.
+    # Only steps of half the fast ones' size (the 0.9 quantile) count: the ratio of two short steps is unsure.
     moving = np.abs(by_wall) > 0.5 * np.nanquantile(np.abs(by_wall), 0.9) if len(by_wall) else by_wall > 0
     use = known[steps.end] & known[steps.start] & moving
     if not use.any():

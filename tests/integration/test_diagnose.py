@@ -269,7 +269,7 @@ def test_what_a_recording_lacks_is_told_and_nothing_is_guessed(pair, spoilt, ver
 
 
 def test_a_field_whose_size_the_ring_contradicts_is_refused(pair, tmp_path):
-    with pytest.raises(UnusableError, match=r"diameter is 50\.\d+ mm, stated are 76\.2 mm"):
+    with pytest.raises(UnusableError, match=r"diameter of 50\.\d+ mm, but the pipe's is stated as 76\.2 mm"):
         field_alone(of_another_size(open_recording(pair[0])), pair[0], tmp_path)
 
 

@@ -7,11 +7,11 @@ from tests.drawn_run import DrawnRun
 from tests.premises_run import good_recording, steady_run
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def run() -> DrawnRun:
     return steady_run()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def good() -> Recording:
     return good_recording()

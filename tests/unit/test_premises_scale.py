@@ -80,7 +80,7 @@ def test_a_ratio_that_fits_no_unit_does_not_turn_the_encoder_round(good):
 def test_another_diameter_and_another_clock_are_told(good, run):
     table = replace(good.frames, time_s=good.frames.time_s * 1000)
     _, told = checked(replace(good, frames=table, pipe=PipeFacts(2.3 * RADIUS)), run.probe)
-    assert any("diameter is 100" in t for t in told)
+    assert any("diameter of 100" in t for t in told)
     assert any("check the unit (s) of time_s" in t for t in told)
 
 

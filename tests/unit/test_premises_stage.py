@@ -129,4 +129,4 @@ def test_covered_lens_counts_as_stated_and_is_told(good, run):
     covered = replace(good, source=MemorySource(images, good.source.image_size))
     found, told = checked(covered, run.probe)
     assert (found.relabelled, found.retimed) == (0, 0)
-    assert any("neither a closed laser line" in t and "frame 0, 1, 2, 3, 4, 5" in t for t in told)
+    assert any("neither a laser line in the dark" in t and "frame 0, 1, 2, 3, 4, 5" in t for t in told)
