@@ -20,6 +20,7 @@ from pipeline.recording.base import Illumination, Recording
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
 from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED, clip_level_of, noise_response
+from stages.rings.seam import seam_of, warn_of_seam
 from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors, cut_sectors
 from stages.rings.trace import RingTrace, trace_ring
@@ -97,6 +98,7 @@ def extract_rings(
     typical = _typical(samples, wander)
     _report(context, samples, typical)
     warn_of_rings(samples, typical, recording.kind == "gauge", context)
+    warn_of_seam(seam_of(_some(samples)), context)
     np.hypot(samples.sigma_px, wander.at(samples.amplitude), out=samples.sigma_px, casting="same_kind")
     return samples
 
