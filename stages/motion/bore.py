@@ -8,6 +8,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from pipeline.arrays import Float, Int
+from pipeline.machine.stage import Context
 
 _STEP_MM = 0.5
 """Change of radius that counts as a step of the bore: five times the relief about the smooth pipe
@@ -120,6 +121,20 @@ class Bore:
 
 
 ONE_BORE = Bore(np.zeros(0), np.zeros(1))
+
+
+def warn_of_steps(bore: Bore, context: Context) -> None:
+    """Say where the bore steps (not in a reducer), and what cannot be relied on there."""
+    if not len(bore.at_mm):
+        return
+    change = 2 * np.diff(bore.wider_mm)
+    steps = ", ".join(f"by {by:+.1f} mm at {at:.0f} mm" for at, by in zip(bore.at_mm, change, strict=True))
+    context.warn(
+        f"the pipe's diameter steps {steps} (a joint of two sizes, a socket, a gauge). The edge is smeared "
+        "over about a tenth of the diameter: radii there are wrong by more than their σ, and what is found "
+        "all around it is the step itself. Texture near it is hidden or matched less well, so that roll may "
+        "be off, too. What to do: process the lengths of one bore as recordings of their own"
+    )
 
 
 def rings_of_length(radius_mm: Float, at_mm: Float) -> int:

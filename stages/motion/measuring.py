@@ -12,7 +12,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
-from stages.motion.bore import Bore
+from stages.motion.bore import Bore, warn_of_steps
 from stages.motion.bundle_adjustment.laser_knock import find_jump, texture_breaks
 from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
 from stages.motion.frame_times import believed_times
@@ -70,6 +70,7 @@ def measure_run(
         followed = _in_reducer(followed, circles, view, encoder, parameters, context)
         _warn_of_reducer(followed.bore, encoder, context)
     bore = followed.bore
+    warn_of_steps(bore, context)
     context.report("steps of the bore", len(bore.at_mm) + bore.reduces, "")
     jump = find_jump(circles, followed.at_mm, points, probe)
     if jump is not None and texture_breaks(jump, rings.frame, followed.texture.poses):

@@ -8,11 +8,12 @@ import pytest
 from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
 from stages.motion import MotionParameters
-from stages.motion.bore import ONE_BORE, Bore
+from stages.motion.bore import ONE_BORE, Bore, warn_of_steps
 from stages.motion.bundle_adjustment import equations, residuals
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.tracking.strips import StripGrid
 from tests.motion_scene import RADIUS, scene
+from tests.quiet import quiet_context
 
 AT_MM = 0.8 * np.arange(100)
 WIDER_MM = -np.clip((AT_MM - 35) * 0.8, 0, 9.6)
@@ -36,6 +37,16 @@ def test_a_pipe_of_one_bore_or_with_a_step_has_no_reducer(step_mm: float) -> Non
     bore = Bore.of(50.0 + RELIEF_MM + step_mm * (AT_MM > 40), AT_MM)
     assert not bore.reduces
     assert len(bore.at_mm) == (step_mm != 0)
+    said: list[str] = []
+    warn_of_steps(bore, replace(quiet_context(), warn=said.append))
+    assert len(said) == (step_mm != 0)
+    assert step_mm == 0 or "steps by -6.0 mm at 41 mm" in said[0]
+
+
+def test_a_reducer_is_told_as_such_and_as_no_step() -> None:
+    said: list[str] = []
+    warn_of_steps(REDUCER, replace(quiet_context(), warn=said.append))
+    assert said == []
 
 
 def test_the_wall_of_a_reducer_slopes() -> None:
