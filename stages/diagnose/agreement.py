@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,7 +11,7 @@ from scipy import stats
 
 from pipeline.arrays import Float
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.inference import DEGREES
+from stages.diagnose.inference import DEGREES, UNKNOWN
 from stages.diagnose.result import Confirmation, Value
 
 # They agree when their difference is no rarer than this.
@@ -91,6 +91,33 @@ def same(first: Float, second: Float, gap: Float, size: float, rarest: float = A
 
 def _spread(gap: Float, size: float) -> Float:
     return np.asarray(gap + (_LAW * size) ** 2 * np.eye(len(gap)))
+
+
+def chance_of_name(
+    p_value: float, doubts: int, agreements: Sequence[Agreement], fits_p: float = 1.0, otherwise: float = 0.0
+) -> float:
+    """Return the probability that the named cause made it, and not chance, a rival, or something unknown.
+
+    Chance weighs −e p ln p, the most that a p-value can say for it (T. Sellke, M. J. Bayarri and J. O.
+    Berger, "Calibration of p values for testing precise null hypotheses", Am. Stat., 2001). Rivals that were
+    not told apart, and all else that speaks against the name, weigh as much as it. What is unknown loses by
+    the likelihood ratio of the best second prediction, or wins by that of one that fails; those of one
+    recording share its pictures and count once. It also wins where what the name leaves is no noise: by as
+    much as the chance of that, ``fits_p``, can say; and by how likely it is with a course of its own in the
+    name's place, ``otherwise``.
+    """
+    nothing = _at_most(p_value)
+    ratios = [a.ratio for a in agreements]
+    failed = [a.ratio for a in agreements if not a.confirmation.agrees]
+    ratio = min(failed) if failed else max(ratios, default=1.0)
+    unknown = UNKNOWN * (1 / (ratio * _at_most(fits_p)) + otherwise)
+    return float(1 / (1 + nothing + doubts + unknown))
+
+
+def _at_most(p_value: float) -> float:
+    """Return how likely chance may be at most, beside something else, when it gives such a p-value."""
+    p = float(np.clip(p_value, 1e-300, 1 / np.e))
+    return float(-np.e * p * np.log(p))
 
 
 def sized(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:

@@ -10,9 +10,9 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
-from stages.diagnose.agreement import Agreement, Part, agreement
+from stages.diagnose.agreement import Agreement, Part, agreement, chance_of_name
 from stages.diagnose.channels import Seen
-from stages.diagnose.inference import SURE, UNKNOWN
+from stages.diagnose.inference import SURE
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
@@ -39,23 +39,6 @@ _ROCKING_P = 0.01
 _TURNED = 0.01
 
 
-def chance_of_name(p_value: float, doubts: int, agreements: Sequence[Agreement]) -> float:
-    """Return the probability that the named cause made it, and not chance, a rival, or something unknown.
-
-    Chance weighs −e p ln p, the most that a p-value can say for it (T. Sellke, M. J. Bayarri and J. O.
-    Berger, "Calibration of p values for testing precise null hypotheses", Am. Stat., 2001). Rivals that were
-    not told apart, and all else that speaks against the name, weigh as much as it. What is unknown loses by
-    the likelihood ratio of the best second prediction, or wins by that of one that fails; those of one
-    recording share its pictures and count once.
-    """
-    p = float(np.clip(p_value, 1e-300, 1 / np.e))
-    nothing = -np.e * p * np.log(p)
-    ratios = [a.ratio for a in agreements]
-    failed = [a.ratio for a in agreements if not a.confirmation.agrees]
-    ratio = min(failed) if failed else max(ratios, default=1.0)
-    return float(1 / (1 + nothing + doubts + UNKNOWN / ratio))
-
-
 @dataclass(frozen=True)
 class Claim:
     """An effect that a channel other than rings and fiducials shows.
@@ -74,6 +57,10 @@ class Claim:
         As far as it was measured.
     agreements : tuple of Agreement
         Second predictions of the same physics that tell enough.
+    fits_p : float
+        Chance that what the channel is left with is noise.
+    otherwise : float
+        How likely causes without a name are, with other courses in its place, beside it.
     unknown : frozenset of str
         Effects that are not known to who claims it.
     counted : bool
@@ -89,6 +76,8 @@ class Claim:
     location: Location
     agreements: tuple[Agreement, ...] = ()
     counted: bool = True
+    fits_p: float = 1.0
+    otherwise: float = 0.0
     unknown: frozenset[str] = frozenset()
 
     @property
@@ -106,7 +95,7 @@ class Claim:
     @property
     def _chance(self) -> float:
         doubts = len(self.rivals) + (not self.counted)
-        return chance_of_name(self.p_value, doubts, self.agreements)
+        return chance_of_name(self.p_value, doubts, self.agreements, self.fits_p, self.otherwise)
 
     def not_knowing(self, names: Collection[str]) -> Claim:
         """Return the claim of one who does not know some effects."""
@@ -171,6 +160,7 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence) -> Claim:
     return Claim(
         e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value,
         tuple(n for n, _ in e.alike), travel.source, _stretch(travel, e.where, fixed_to, time), e.agreements,
+        fits_p=travel.fits_p, otherwise=e.otherwise,
     )  # fmt: skip
 
 
@@ -185,7 +175,10 @@ def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
     )
     where = (step.place - 1, step.place)
     location = _stretch(travel, where, FixedTo.TIME, "event")
-    return Claim("encoder_slip", size, words, step.p_value, (), travel.source, location, step.agreements)
+    return Claim(
+        "encoder_slip", size, words, step.p_value, (), travel.source, location, step.agreements,
+        fits_p=travel.fits_p,
+    )  # fmt: skip
 
 
 def _is_swing(line: Line) -> bool:

@@ -69,6 +69,9 @@ def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
     answer = {k: found[k] for k in _KEPT if k in found}
     answer["candidates"] = [c for c in found["candidates"] if c["probability"] > 1e-3]  # type: ignore[attr-defined]
     answer["shortcomings"] = list(missing)
+    if left_out and geometry is not None:
+        # Who knows the name fits it.
+        travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
     snr = [oracle_snr(s, geometry, travel, stated) for s in case.switches]
     return {"answer": answer, "snr": snr, "expected": geometry.expected if geometry is not None else None}
 

@@ -19,10 +19,13 @@ from stages.diagnose.correct import encoder_effects
 from stages.diagnose.profile.evidence import Condition, ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
 from stages.diagnose.result import Confirmation, Diagnosis, Verdict
+from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
 from stages.diagnose.travel.steps import StepFound
 from tests.shared_data import PROJECT_ROOT
+from tests.travel_cases import read
+from tests.travel_cases import seen as sight
 
 AGREES = Agreement(Confirmation("first half: 0.02", "second half: 0.02", True), 30.0)
 DIFFERS = Agreement(Confirmation("first half: 0.02", "second half: -0.01", False), 1e-12)
@@ -63,6 +66,16 @@ def test_what_two_parts_of_one_recording_show_alike_is_named(real_probe: Probe) 
     assert found.verdict is Verdict.NAMED
     assert found.effects[0].confirmed_by == (AGREES.confirmation,)
     assert 0.95 < found.effects[0].probability < 0.99
+
+
+def test_what_leaves_more_than_noise_or_may_go_otherwise_is_not_named(real_probe: Probe) -> None:
+    sure = replace(SCALE, agreements=(AGREES,))
+    assert of_gauge(real_probe, estimates=(replace(sure, otherwise=0.2),)).verdict is Verdict.CLASS
+    encoder = read(delay_s=0.06)
+    wrong = with_events(sight(np.random.default_rng(8)), encoder, ("time_offset", "encoder_slip"))
+    found = of_gauge(real_probe, estimates=(sure,), fit=wrong)
+    assert found.verdict is Verdict.CLASS
+    assert found.effects[0].probability < 0.9
 
 
 def test_parts_that_contradict_each_other_take_the_name_away(real_probe: Probe) -> None:

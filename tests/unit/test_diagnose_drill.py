@@ -106,6 +106,12 @@ def test_an_unknown_effect_that_no_oracle_sees_is_not_asked_about():
     assert score(trials).unknown_owned.of == 2
 
 
+def test_an_unknown_effect_that_no_oracle_sees_is_a_wrong_name_all_the_same():
+    trials = [Trial("a", (TILT,), named("baseline"), ("laser_tilt",), oracle_snr=snr) for snr in (3.0, 9.0)]
+    result = score(trials)
+    assert (result.misnamed.count, result.unknown_misnamed.count, result.unknown_misnamed.of) == (2, 2, 2)
+
+
 def test_sizes_are_judged_in_their_own_sigma():
     close, far = named("laser_tilt", value=0.61), named("laser_tilt", value=0.65)
     result = score([Trial("a", (TILT,), close), Trial("b", (TILT,), far)])

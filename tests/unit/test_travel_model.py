@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stages.diagnose.travel.events import with_events
-from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _unexplained
+from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _goes_otherwise, _unexplained
 from stages.diagnose.travel.model import EventKind
 from stages.diagnose.travel.sight import quantum_mm, readings_at
 from stages.diagnose.travel.solve import DELAY, PLAY, SCALE
@@ -124,3 +124,28 @@ def test_a_picture_is_missed_by_its_noise_when_all_others_predict_it():
     assert len(missed) == len(fit.sight.time_s)
     assert 0.7 < np.sqrt(np.mean((missed / sigma) ** 2)) < 1.3
     assert np.sqrt(np.mean(fit.stated_mm**2)) > 10 * np.sqrt(np.mean(missed**2))
+
+
+@pytest.mark.parametrize("faults", [{}, {"delay_s": 0.02}, {"play_mm": 0.5}])
+def test_what_right_effects_leave_is_noise_and_no_other_course_does_as_well(faults):
+    fit = with_events(seen(np.random.default_rng(3)), read(**faults))
+    assert fit.fits_p > 0.05
+    assert all(e.otherwise < 1e-6 for e in _estimates("gauge", fit, STATED, 0.0) if e.p_value < 1e-5)
+
+
+def test_what_wrong_effects_leave_is_no_noise_though_their_own_size_is_sure():
+    without = ("time_offset", "encoder_slip")
+    fit = with_events(seen(np.random.default_rng(8)), read(delay_s=0.06), without)
+    play = next(e for e in _estimates("gauge", fit, STATED, 0.0) if e.effect == "encoder_backlash")
+    assert play.p_value < 1e-5
+    assert fit.fits_p < 1e-3
+
+
+def test_what_goes_with_direction_beats_a_play_that_does_not():
+    fit = with_events(seen(np.random.default_rng(3)), read(play_mm=0.5))
+    columns = fit.columns.copy()
+    columns[:, PLAY] = np.random.default_rng(9).standard_normal(len(columns))
+    assert _goes_otherwise(fit, PLAY) < 1e-6
+    left = fit.whitened.residual + (fit.columns - columns) @ fit.whitened.estimate
+    wrong = replace(fit, columns=columns, whitened=replace(fit.whitened, residual=left))
+    assert _goes_otherwise(wrong, PLAY) > 1

@@ -178,13 +178,13 @@ _RATES: tuple[tuple[str, str, str, str, Callable[[Trial], bool]], ...] = (
     ("named_exactly", "Named exactly (all single effects)", "", "single", lambda t: t.exact),
     ("contained", "Name or class contains the truth (found single effects)", "≥ 99 %", "single found",
      lambda t: t.contained),
-    ("misnamed", "Confident wrong name", "≤ 0.5 %", "null or known", lambda t: t.misnamed),
+    ("misnamed", "Confident wrong name", "≤ 0.5 %", "all", lambda t: t.misnamed),
     ("pairs_named", "Pairs: both named", "≥ 90 %", "pairs", lambda t: t.exact),
     ("pairs_identifiable", "Pairs: both named, where both are identifiable", "", "pairs identifiable",
      lambda t: t.exact),
     ("unknown_owned", "Left out of the library (SNR ≥ 8): unexplained or a class of its likes", "≥ 90 %",
      "unknown", lambda t: owned(t)),
-    ("unknown_misnamed", "Left out of the library (SNR ≥ 8): confidently misnamed", "≤ 5 %", "unknown",
+    ("unknown_misnamed", "Left out of the library (any SNR): confidently misnamed", "≤ 5 %", "left out",
      lambda t: t.misnamed),
 )  # fmt: skip
 
@@ -194,11 +194,12 @@ def _sorted(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
     listed = list(trials)
     null = [t for t in listed if not t.concealed]
     known = [t for t in listed if t.concealed and not t.truth & set(t.left_out)]
+    left_out = [t for t in listed if t.truth & set(t.left_out)]
     single, pairs = ([t for t in known if (len(t.concealed) > 1) == several] for several in (False, True))
     return {
-        "null": null, "known": known, "null or known": [*null, *known], "single": single, "pairs": pairs,
+        "all": listed, "null": null, "known": known, "single": single, "pairs": pairs, "left out": left_out,
         # An effect too small even for an oracle cannot be expected to be called unexplained.
-        "unknown": [t for t in listed if t.truth & set(t.left_out) and (t.snr is None or t.snr >= SNR)],
+        "unknown": [t for t in left_out if t.snr is None or t.snr >= SNR],
         "clear": [t for t in known if t.snr is not None and t.snr >= SNR],
         "single found": [t for t in single if t.found],
         # What is on pictures alone is not in the catalogue: it has no channel.

@@ -17,7 +17,7 @@ from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import TravelFit, second_predictions
 from stages.diagnose.travel.sight import Sight, quantum_mm
-from stages.diagnose.travel.solve import DELAY, PLAY, SCALE, SMOOTH
+from stages.diagnose.travel.solve import DELAY, OFFSET, PLAY, SCALE, SMOOTH, whitened_fit
 from stages.diagnose.travel.steps import StepFound, steps_found
 
 _LEAST_FRAMES = 16
@@ -32,6 +32,8 @@ _SELDOM = 0.02
 _SHORTEST_MM = 20.0
 # 1 σ of a picture's place by fiducials, which may be put there wrongly. Debt: data/debts.md.
 PLACED_SIGMA_MM = 0.05
+# Logarithm of odds beyond which they decide anyway.
+_SURE_OF = 50.0
 # What is left of the reading is noise unless its chance is below this. Debt: data/debts.md.
 _NOISE = 1e-6
 
@@ -58,6 +60,8 @@ class TravelEstimate:
         What disjoint parts of the travel say of each other.
     where : tuple of int or None
         Places of the `Sight`, both included, between which it adds to the readings.
+    otherwise : float
+        How likely courses without a name are in its place, beside it, on average.
     """
 
     effect: str
@@ -70,6 +74,7 @@ class TravelEstimate:
     alike: tuple[tuple[str, float], ...]
     agreements: tuple[Agreement, ...] = ()
     where: tuple[int, int] | None = None
+    otherwise: float = 0.0
 
     @property
     def size_sigma(self) -> float:
@@ -119,6 +124,11 @@ class TravelEvidence:
         smooth = (e.p_value for e in self.estimates if e.p_value < _REPORTED)
         steps = (s.p_value for s in (*self.slips, *self.doubtful))
         return min((*smooth, *steps, *(line.p_value for line in self.lines)), default=1.0)
+
+    @property
+    def fits_p(self) -> float:
+        """Chance that what all effects and events leave between motion and encoder is noise."""
+        return self.fit.fits_p if self.fit is not None else 1.0
 
     def estimate(self, name: str) -> TravelEstimate | None:
         """Return the estimate of an effect, or None."""
@@ -211,10 +221,27 @@ def _estimates(
         out.append(
             TravelEstimate(
                 name, quantity.name, value, sigma, allowed, p, _DETECTED * total, alike, again,
-                _where(fit.columns[:, k]),
+                _where(fit.columns[:, k]), _goes_otherwise(fit, int(k)) if told else 0.0,
             )
         )  # fmt: skip
     return tuple(out)
+
+
+def _goes_otherwise(fit: TravelFit, column: int) -> float:
+    """Return how likely courses that nobody has a name for are in a smooth effect's place, beside it.
+
+    They go with the way, its square, the speed, its size, or its direction; the effect's own is left out. In
+    each the others that were found stay free; χ² is divided by what the fit leaves in units of the noise.
+    """
+    sight, speed = fit.sight, np.gradient(fit.sight.distance_mm, fit.sight.time_s)
+    way = (sight.distance_mm - sight.distance_mm.mean()) / max(float(np.ptp(sight.distance_mm)), 1e-9)
+    courses = {SCALE: way, DELAY: speed, PLAY: sight.direction, 4: way**2, 5: np.abs(speed)}
+    others = [fit.columns[:, column], *(c for k, c in courses.items() if k != column)]
+    found = [k for k in range(len(fit.values)) if k != column and (k == OFFSET or fit.values[k] != 0)]
+    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
+    rest = whitened_fit(difference, fit.columns[:, found], fit.noise.covariance(sight.path_mm))
+    gain = rest.gain(np.stack(others, 1))[1] / max(fit.left_over, 1.0)
+    return float(np.mean(np.exp(np.clip((gain[1:] - gain[0]) / 2, -_SURE_OF, _SURE_OF))))
 
 
 def _where(column: Float) -> tuple[int, int] | None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from scipy.stats import f as fisher
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.pages import notation
@@ -117,6 +118,17 @@ class TravelFit:
         return self.whitened.weighted[told] / own[told], own[told] ** -0.5
 
     @property
+    def left_over(self) -> float:
+        """χ² of what is left for each degree of freedom; 1 where it is the measured noise."""
+        return _left_over(self.whitened, len(self.values))
+
+    @property
+    def fits_p(self) -> float:
+        """Chance that noise leaves so much: medians tell it as well as a third of the pictures would."""
+        count = len(self.difference_mm)
+        return float(fisher.sf(self.left_over, max(count - len(self.values), 1), max(count / 3, 1.0)))
+
+    @property
     def event_z2(self) -> Float:
         """(E,) squares of the events' gains over their σ."""
         own = slice(4, 4 + len(self.events))
@@ -148,14 +160,18 @@ def fitted(
     values = end.values(covariance_mm)
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
     # Noise is measured from the pictures' usual steps: what is left in all may be more, never less.
-    left = float(whitened.residual @ whitened.weighted) / max(len(plain) - len(values), 1)
-    covariance = max(left, 1.0) * whitened.covariance
+    covariance = max(_left_over(whitened, len(values)), 1.0) * whitened.covariance
     covariance[SCALE, SCALE] += sight.scale_sigma**2
     values[4 : 4 + len(events)] += [_gain(encoder, sight, e) for e in events]
     return TravelFit(
         sight, events, values, covariance, noise, plain - np.median(plain), whitened, end.columns, told_apart,
         without,
     )  # fmt: skip
+
+
+def _left_over(whitened: Whitened, fitted_values: int) -> float:
+    count = len(whitened.residual)
+    return float(whitened.residual @ whitened.weighted) / max(count - fitted_values, 1)
 
 
 def moment(sight: Sight, encoder: Encoder, place: int) -> int:
