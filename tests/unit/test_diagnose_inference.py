@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from pipeline.adjustment.bordered import Rows
+from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import VOCABULARY
 from stages.diagnose.gauge.elimination import (
@@ -22,7 +23,7 @@ from stages.diagnose.gauge.formula import APART, joint_p
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.gauge.sets import NAMELESS
-from stages.diagnose.gauge.unknown_laws import odds_in
+from stages.diagnose.gauge.unknown_laws import known_alike, odds_in
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
 
 FRAMES, GLOBALS = 9, 5
@@ -232,6 +233,12 @@ def test_a_name_is_as_unsure_as_its_growth_with_the_radius(noise, growing, low, 
     about, nobody = evidence_of(design, measured, columns), Stated((), np.zeros((0, 0)))
     (odds,) = odds_in(about, [one], ["other"], ["same"], lambda terms: 0.0, nobody)
     assert low <= odds <= high
+
+
+def test_a_name_stands_for_as_many_unknown_laws_as_there_are_known_ones_of_its_kind():
+    every = with_courses({n: LIBRARY[n] for n in ("focal_scale", "dome_axial", "focal_drift", "baseline")})
+    alike = {n: known_alike(LIBRARY[n], every) for n in ("dome_axial", "baseline", "baseline_drift")}
+    assert alike == {"dome_axial": 3, "baseline": 1, "baseline_drift": 1}
 
 
 @pytest.mark.parametrize(

@@ -181,7 +181,6 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
     nothing = next(j for j in verdicts.judged if not j.fit.terms)
     terms, alike = best.library_terms, searched.alike
     ratio = believed(best.evidence, alike)
-    laws = len({model.law for model in library.values()})
     unsplit = not_told_apart(run, searched.nothing, terms, library, stated, alike) if terms else ()
     shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula
     return replace(
@@ -189,7 +188,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
         confirmed=confirmations(run, best, regimes, terms, stated) if terms else (),
         unsplit=unsplit,
         sizes=sizes_of(run, best, stated, alike) if terms else (),
-        unknown_laws=odds_of_unknown_laws(run, best, stated, ratio, laws),
+        unknown_laws=odds_of_unknown_laws(run, best, stated, ratio, library),
         location=location_of(run, shown, stated, ratio),
         quality=fit_quality(run, nothing, shown, regimes, stated),
     )

@@ -9,7 +9,7 @@ that the library lacked was called a shifted dome, and a shifted dome a focal le
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -19,6 +19,7 @@ from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.kinds import Drifting
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.formula import pattern_of
 from stages.diagnose.gauge.hypotheses import Judged
@@ -113,23 +114,38 @@ def excess_exponent(
 
 
 def odds_of_unknown_laws(
-    run: GaugeRun, best: Judged, stated: Stated, believed: float, laws: int
+    run: GaugeRun, best: Judged, stated: Stated, believed: float, library: Mapping[str, EffectModel]
 ) -> tuple[float, ...]:
     """Return for each effect of the likeliest hypothesis the odds, beside its name, of laws nobody knows.
 
     Such a law is like one of the effects and is there in its place, or in that of several with its harmonic
     and behaviour in time, patterns without a cause among them; or it is what several come to together, if
-    these have one direction. Two of which one has no direction of its own come to none. χ² is divided by
-    ``believed``.
+    these have one direction. Two of which one has no direction of its own come to none. Laws that nobody
+    knows are of a kind (a harmonic, of the sheet or of the picture) as often as those of the library are, and
+    a name is one of these. χ² is divided by ``believed``.
     """
+    laws = {model.law for model in library.values()}
     at, terms = best.fit.linearised, best.fit.terms
-    others = [other_growth(t, at, effect(t.model.law).fixed_to is FixedTo.LASER) for t in best.library_terms]
+    others = [other_growth(t, at, _kind(t.model)[1]) for t in best.library_terms]
     about = evidence(run, best.fit, [(o, ()) for o in others], with_spread=False)[0].deflated(believed)
 
     def before(kept: Sequence[Term]) -> float:
-        return beforehand(run, [(t.model, t.shape) for t in kept], laws)
+        return beforehand(run, [(t.model, t.shape) for t in kept], len(laws))
 
-    return odds_in(about, terms, [o.name for o in others], [pattern_of(t)[1:] for t in terms], before, stated)
+    patterns = [pattern_of(t)[1:] for t in terms]
+    odds = odds_in(about, terms, [o.name for o in others], patterns, before, stated)
+    return tuple(o * known_alike(t.model, library) for o, t in zip(odds, best.library_terms, strict=True))
+
+
+def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> int:
+    """Return how many laws of the library are of a model's kind, its own included."""
+    return len({other.law for other in library.values() if _kind(other) == _kind(model)})
+
+
+def _kind(model: EffectModel) -> tuple[int | None, bool]:
+    """Return the harmonic of a model's law, and whether it moves the laser's sheet, not the picture."""
+    known = effect(model.static.law if isinstance(model, Drifting) else model.law)
+    return known.harmonic, known.fixed_to is FixedTo.LASER
 
 
 def odds_in(
