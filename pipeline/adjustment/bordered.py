@@ -8,6 +8,7 @@ of global numbers, and three for each landmark, which leave by the Schur complem
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -17,6 +18,9 @@ from pipeline.adjustment.normal_equations import BandedCholesky, marginalised
 from pipeline.adjustment.robust import Loss, Squares
 from pipeline.arrays import Float, Int
 from pipeline.system.parallel import side_by_side
+
+# Observations whose derivatives by the instrument stay in the processor's cache while they are multiplied.
+_IN_CACHE = 1024
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ class LandmarkRows:
     surface_sigma: Float
     loss: Loss = field(default_factory=Squares)
 
-    @property
+    @cached_property
     def weight(self) -> Float:
         """Return the weights (M,) of the observations."""
         return self.loss.weight(np.linalg.norm(self.residual, axis=1), self.sigma)
@@ -128,9 +132,10 @@ class LandmarkRows:
 
     def change_by_view(self, frames: Float, border: Float) -> Float:
         """Return the change (M, 2) of the residuals by a step of frames (N, 7) and border (B,)."""
-        instrument = border[len(border) - self.by_instrument.shape[2] :]
+        count = self.by_instrument.shape[2]
         by_frames = np.einsum("mij,mj->mi", self.by_pose, frames[self.frame, :6])
-        return np.asarray(by_frames + self.by_instrument @ instrument)
+        by_instrument = self.by_instrument.reshape(-1, count) @ border[len(border) - count :]
+        return np.asarray(by_frames + by_instrument.reshape(-1, 2))
 
 
 @dataclass(frozen=True)
@@ -188,11 +193,14 @@ class BorderedSystem:
 
     def _add_instrument(self, rows: LandmarkRows, weight: Float) -> None:
         """Add the products of the instrument's derivatives with themselves."""
-        instrument = rows.by_instrument.reshape(2 * len(weight), rows.by_instrument.shape[2])
-        weighted = instrument * np.repeat(weight, 2)[:, None]
-        own = slice(len(self._sums.corner) - instrument.shape[1], None)
-        self._sums.corner[own, own] += weighted.T @ instrument
-        self._sums.right_border[own] -= weighted.T @ rows.residual.ravel()
+        count = rows.by_instrument.shape[2]
+        own = slice(len(self._sums.corner) - count, None)
+        for first in range(0, len(weight), _IN_CACHE):
+            part = slice(first, first + _IN_CACHE)
+            instrument = rows.by_instrument[part].reshape(-1, count)
+            weighted = (rows.by_instrument[part] * weight[part, None, None]).reshape(-1, count)
+            self._sums.corner[own, own] += weighted.T @ instrument
+            self._sums.right_border[own] -= weighted.T @ rows.residual[part].ravel()
 
     def factor(self, damping: float = 0.0) -> Factor:
         """Return the factorised system, the diagonal raised by a relative ``damping``.
@@ -209,34 +217,47 @@ class BorderedSystem:
             diagonal = np.arange(BLOCK)
             band[:, 0, diagonal, diagonal] *= 1 + damping
         banded = BandedCholesky.of_band(band)
-        solved = banded.solve(sums.border)
-        reduced = corner - sums.border.T @ solved
+        halfway = banded.forth(np.column_stack([sums.border, sums.right]))
+        border, right = halfway[:, :-1], halfway[:, -1]
+        reduced = corner - border.T @ border
         if not np.isfinite(reduced).all():
             raise np.linalg.LinAlgError("its equations are not finite")
-        left = cho_factor(reduced)
-        return Factor(banded, sums.border, solved, left, sums.right, sums.right_border)
+        return Factor(banded, border, cho_factor(reduced), right, sums.right_border - border.T @ right)
 
 
 @dataclass(frozen=True)
 class Factor:
-    """A factorised `BorderedSystem`."""
+    """A factorised `BorderedSystem`.
+
+    Attributes
+    ----------
+    band : BandedCholesky
+        Of the frames.
+    border : (7 N, B)
+        Multiplied by the inverse of the band's factor.
+    corner
+        Cholesky factor of the border's information, the frames eliminated.
+    right : (7 N,)
+        Multiplied like the border.
+    border_right : (B,)
+        The border's right side, the frames eliminated.
+    """
 
     band: BandedCholesky
     border: Float
-    solved_border: Float
     corner: tuple[Float, bool]
     right: Float
-    right_border: Float
+    border_right: Float
+
+    @cached_property
+    def solved_border(self) -> Float:
+        """Return by how much frames (7 N, B) fall when the border grows."""
+        return self.band.back(self.border)
 
     def step(self) -> tuple[Float, Float]:
         """Return the step of the frames (N, 7) and of the border (B,)."""
-        direct = self.band.solve(self.right[:, None])[:, 0]
-        border = cho_solve(self.corner, self.right_border - self.border.T @ direct)
-        return (direct - self.solved_border @ border).reshape(-1, BLOCK), border
-
-    def border_right(self) -> Float:
-        """Return the border's right side (B,), the frames eliminated."""
-        return self.right_border - self.border.T @ self.band.solve(self.right[:, None])[:, 0]
+        border = cho_solve(self.corner, self.border_right)
+        return self.frames_after(border), border
 
     def border_covariance(self) -> Float:
         """Return (B, B)."""
@@ -267,8 +288,8 @@ class Factor:
 
     def frames_after(self, border: Float) -> Float:
         """Return the step (N, 7) of the frames to their best place when the border steps by (B,)."""
-        direct = self.band.solve(self.right[:, None])[:, 0]
-        return np.asarray((direct - self.solved_border @ border).reshape(-1, BLOCK))
+        rest = self.right - self.border @ border
+        return self.band.back(rest[:, None]).reshape(-1, BLOCK)
 
     def frames_follow(self, border: Float) -> Float:
         """Return how frames (N, 7, S) follow S directions (B, S) of the border."""
@@ -291,7 +312,7 @@ def landmark_steps(
 ) -> Float:
     """Return the steps (L, 3) of the eliminated landmarks."""
     moved = rows.change_by_view(frame_step, border_step)
-    pull = np.einsum("mij,mi,m->mj", rows.by_point, moved, rows.weight)
+    pull = np.einsum("mij,mi->mj", rows.by_point, moved * rows.weight[:, None])
     total = np.add.reduceat(pull, rows.start[:-1], axis=0) if len(pull) else np.zeros((0, 3))
     surface = rows.surface_weight * (rows.surface_by_border @ border_step)
     return np.asarray(

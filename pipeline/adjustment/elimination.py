@@ -220,23 +220,3 @@ def _eliminate_from_frames(frame, cross, hi, g, side, band, border, right):  # t
                 own = band[f, f - frame[j], a]
                 for b in range(6):
                     own[b] -= taken[6 * j + b]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def by_point_and_pose(by_c, T_pc, xyz_c):  # type: ignore[no-untyped-def]
-    """Return derivatives by the point in P (M, 2, 3) and by the pose (M, 2, 6) from those by the point in C.
-
-    The pose moves by T = [R exp(w), t + d], (d, w), as in `stages.motion.bundle_adjustment.unknowns.moved`.
-    """
-    by_point, by_pose = np.empty((len(by_c), 2, 3)), np.empty((len(by_c), 2, 6))
-    for m in range(len(by_c)):
-        x, y, z = xyz_c[m]
-        for c in range(2):
-            j0, j1, j2 = by_c[m, c]
-            for a in range(3):
-                by_point[m, c, a] = j0 * T_pc[m, a, 0] + j1 * T_pc[m, a, 1] + j2 * T_pc[m, a, 2]
-                by_pose[m, c, a] = -by_point[m, c, a]
-            by_pose[m, c, 3] = j1 * z - j2 * y
-            by_pose[m, c, 4] = j2 * x - j0 * z
-            by_pose[m, c, 5] = j0 * y - j1 * x
-    return by_point, by_pose

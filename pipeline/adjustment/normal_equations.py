@@ -161,10 +161,15 @@ _AT_ONCE = 16  # frames a column
 
 @dataclass(frozen=True)
 class BandedCholesky:
-    """Lower Cholesky factor: ``diagonal`` blocks, and in ``below`` all that lies under each."""
+    """Lower Cholesky factor: ``diagonal`` blocks, and ``below`` each the rows that are not all 0.
+
+    ``rows`` holds their numbers. Frames that are coupled to a few others only, as those in the laser's light
+    between lit ones, leave many rows at 0.
+    """
 
     diagonal: tuple[Float, ...]
     below: tuple[Float, ...]
+    rows: tuple[Int, ...]
 
     @staticmethod
     def of_band(band: Float) -> BandedCholesky:
@@ -178,37 +183,51 @@ class BandedCholesky:
             When it is not positive definite.
         """
         frames, lags, size = band.shape[:3]
-        diagonal: list[Float] = []
-        below: list[Float] = []
-        taken = np.zeros((0, 0))  # what the columns so far take from the rows that they reach
+        factor = BandedCholesky((), (), ())
+        reached, taken = np.zeros(0, np.int64), np.zeros((0, 0))  # rows, and what columns so far take of them
         for first, last in pairwise([*range(0, frames, _AT_ONCE), frames]):
-            width = (last - first) * size
+            start, width = first * size, (last - first) * size
             column = _dense(band, first, min(last - 1 + lags, frames), last)
-            reached = len(taken)
-            column[:reached, :reached] -= taken[:, :width]
-            diagonal.append(cholesky(column[:width], lower=True, check_finite=False))
-            low = solve_triangular(diagonal[-1], column[width:].T, lower=True, check_finite=False).T
-            below.append(low)
-            more = low @ low.T
-            still = max(reached - width, 0)
-            more[:still, :still] += taken[width:, width:]
+            own = int(np.searchsorted(reached, start + width))
+            column[np.ix_(reached - start, reached[:own] - start)] -= taken[:, :own]
+            diagonal = cholesky(column[:width], lower=True, check_finite=False)
+            below = np.flatnonzero(column[width:].any(axis=1)) + start + width
+            before, reached = reached[own:], np.union1d(below, reached[own:])
+            low = solve_triangular(diagonal, column[reached - start].T, lower=True, check_finite=False).T
+            factor = factor._followed_by(diagonal, low, reached)
+            more, at = low @ low.T, np.searchsorted(reached, before)
+            more[np.ix_(at, at)] += taken[own:, own:]
             taken = more
-        return BandedCholesky(tuple(diagonal), tuple(below))
+        return factor
+
+    def _followed_by(self, diagonal: Float, low: Float, rows: Int) -> BandedCholesky:
+        return BandedCholesky((*self.diagonal, diagonal), (*self.below, low), (*self.rows, rows))
 
     def solve(self, right: Float) -> Float:
         """Return the solution (N, R) for right sides (N, R)."""
+        return self.back(self.forth(right))
+
+    def forth(self, right: Float) -> Float:
+        """Return right sides (N, R) multiplied by the factor's inverse."""
         out = np.array(right, float)
-        start = np.cumsum([0] + [len(d) for d in self.diagonal])
-        for k, (factor, low) in enumerate(zip(self.diagonal, self.below, strict=True)):
-            own, reached = slice(start[k], start[k + 1]), slice(start[k + 1], start[k + 1] + len(low))
+        for own, factor, low, rows in self._columns():
             out[own] = solve_triangular(factor, out[own], lower=True, check_finite=False)
-            out[reached] -= low @ out[own]
-        for k in range(len(self.diagonal) - 1, -1, -1):
-            factor, low = self.diagonal[k], self.below[k]
-            own, reached = slice(start[k], start[k + 1]), slice(start[k + 1], start[k + 1] + len(low))
-            part = out[own] - low.T @ out[reached]
+            out[rows] -= low @ out[own]
+        return out
+
+    def back(self, right: Float) -> Float:
+        """Return right sides (N, R) multiplied by the inverse of the factor's transpose."""
+        out = np.array(right, float)
+        for own, factor, low, rows in reversed(self._columns()):
+            part = out[own] - low.T @ out[rows]
             out[own] = solve_triangular(factor, part, lower=True, trans="T", check_finite=False)
         return out
+
+    def _columns(self) -> list[tuple[slice, Float, Float, Int]]:
+        """Return place, diagonal block, what lies below it, and where, of every column."""
+        start = np.cumsum([0] + [len(d) for d in self.diagonal])
+        own = [slice(int(a), int(b)) for a, b in pairwise(start)]
+        return list(zip(own, self.diagonal, self.below, self.rows, strict=True))
 
 
 @numba.njit(cache=True, nogil=True)

@@ -10,7 +10,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from types import FrameType
 from typing import ParamSpec, TypeVar, cast
@@ -21,6 +21,9 @@ from threadpoolctl import threadpool_limits
 Item = TypeVar("Item")
 Made = TypeVar("Made")
 _AHEAD = 2
+_BESIDE = ThreadPoolExecutor(1 << 10, "beside")
+"""Threads of `side_by_side`. Idle ones are taken first, since starting one costs as much as much of the work
+given to it; there may be so many that calls within calls never wait for each other."""
 
 
 def in_threads(function: Callable[[Item], Made], items: Iterable[Item], threads: int) -> Iterator[Made]:
@@ -40,9 +43,12 @@ def in_threads(function: Callable[[Item], Made], items: Iterable[Item], threads:
 
 def side_by_side(function: Callable[[Item], Made], items: Sequence[Item]) -> list[Made]:
     """Return ``function`` of a few items, the first on the caller's thread, each other on one of its own."""
-    with ThreadPoolExecutor(max(len(items) - 1, 1)) as pool:
-        others = [pool.submit(function, item) for item in items[1:]]
-        return [function(items[0]), *(other.result() for other in others)]
+    others = [_BESIDE.submit(function, item) for item in items[1:]]
+    try:
+        first = function(items[0])
+    finally:
+        wait(others)
+    return [first, *(other.result() for other in others)]
 
 
 @contextmanager

@@ -136,7 +136,7 @@ def test_the_border_follows_with_frames_at_their_best() -> None:
     np.testing.assert_allclose(factor.border_rows(rows) * root, own, atol=1e-9)
     np.testing.assert_allclose(factor.border_information(), own.T @ own, rtol=1e-8)
     np.testing.assert_allclose(
-        factor.border_right(), -own.T @ (rows.residual * root[:, 0]), rtol=1e-7, atol=1e-9
+        factor.border_right, -own.T @ (rows.residual * root[:, 0]), rtol=1e-7, atol=1e-9
     )
     _, response = factor.response(np.array([2, 0]))
     wanted = marginalised(own.T @ own, np.zeros(border), np.array([1, 3])).follow[:, ::-1]

@@ -101,13 +101,16 @@ def test_steps_and_covariances_are_those_of_the_dense_normal_equations(seed: int
         np.testing.assert_allclose(block, covariance[at, at], rtol=1e-7, atol=1e-10)
 
 
-@pytest.mark.parametrize(("frames", "lags"), [(1, 1), (2, 2), (23, 5), (40, 20), (40, 3), (9, 1), (35, 35)])
-def test_the_banded_factor_solves_banded_systems(frames: int, lags: int) -> None:
+@pytest.mark.parametrize("sparse", [False, True], ids=["full", "every other frame sees its neighbours only"])
+@pytest.mark.parametrize(("frames", "lags"), [(1, 1), (2, 2), (23, 5), (40, 20), (40, 3), (9, 1), (70, 35)])
+def test_the_banded_factor_solves_banded_systems(frames: int, lags: int, sparse: bool) -> None:
     random = np.random.default_rng(frames)
     size = 3 * frames
     a = random.standard_normal((size, size))
     lag = np.abs(np.subtract.outer(np.arange(size) // 3, np.arange(size) // 3))
-    full = np.where(lag < lags, a + a.T, 0) + 4 * size * np.eye(size)
+    dark = np.arange(size) // 3 % 2 > 0
+    coupled = lag < np.where(sparse & (dark | dark[:, None]), min(lags, 3), lags)
+    full = np.where(coupled, a + a.T, 0) + 4 * size * np.eye(size)
     band = np.zeros((frames, lags, 3, 3))
     for f in range(frames):
         for back in range(min(lags, f + 1)):

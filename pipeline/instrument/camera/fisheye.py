@@ -101,11 +101,15 @@ class RadialCamera(ABC):
         z = np.where(valid, np.asarray(xyz_c, float)[..., 2], np.nan)
         slope = self._slope(polar.theta, polar.rho)
         c, s = polar.unit[..., 0], polar.unit[..., 1]
-        by_theta = np.stack([c * z, s * z, -polar.r], -1) * (slope / (polar.r**2 + z**2))[..., None]
-        by_psi = np.stack([-s, c, np.zeros_like(c)], -1) * (polar.rho / polar.r)[..., None]
-        normal = np.stack([-s, c], -1)
-        by_point = polar.unit[..., None] * by_theta[..., None, :] + normal[..., None] * by_psi[..., None, :]
-        return ProjectionJacobian(self.affine_matrix @ by_point, self._by_parameters(polar))
+        by_angle, around = slope / (polar.r * polar.r + z * z), polar.rho / polar.r
+        outward, mixed = z * by_angle, c * s * (z * by_angle - around)
+        by_x = c * c * outward + s * s * around, mixed, -c * polar.r * by_angle
+        by_y = mixed, s * s * outward + c * c * around, -s * polar.r * by_angle
+        by_point = np.empty((*z.shape, 2, 3))
+        for i, (a, b) in enumerate(self.affine_matrix.tolist()):
+            for k in range(3):
+                by_point[..., i, k] = a * by_x[k] + b * by_y[k]
+        return ProjectionJacobian(by_point, self._by_parameters(polar))
 
     def unproject_jacobian(self, uv: Float) -> RaysJacobian:
         """Return d ray / d uv (..., 3, 2) and d ray / d parameters (..., 3, P); NaN where invalid."""
@@ -182,7 +186,8 @@ class Equidistant(RadialCamera):
         m = polar.rho[..., None] * polar.unit
         out[..., 0, 0], out[..., 1, 1] = m[..., 0], m[..., 1]
         out[..., 0, 2], out[..., 1, 3] = 1, 1
-        return np.where(np.isnan(polar.theta)[..., None, None], np.nan, out)
+        out[np.isnan(polar.theta)] = np.nan
+        return out
 
 
 # Nodes of the table that an inversion starts from; Newton's steps do the rest.
@@ -259,8 +264,9 @@ class KannalaBrandt(RadialCamera):
         m = polar.rho[..., None] * polar.unit
         out[..., 0, 0], out[..., 1, 1] = m[..., 0], m[..., 1]
         out[..., 0, 2], out[..., 1, 3] = 1, 1
+        power, focal = polar.theta, np.array(self.focal_px)
         for i in range(4):
-            out[..., :, 4 + i] = (
-                (polar.theta ** (2 * i + 3))[..., None] * polar.unit * np.array(self.focal_px)
-            )
-        return np.where(np.isnan(polar.theta)[..., None, None], np.nan, out)
+            power = power * polar.theta * polar.theta
+            out[..., :, 4 + i] = power[..., None] * polar.unit * focal
+        out[np.isnan(polar.theta)] = np.nan
+        return out

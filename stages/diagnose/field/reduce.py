@@ -56,7 +56,7 @@ def reduced(system: FieldSystem, frames: int) -> Reduced:
         inverse, _ = bordered.add_landmarks(system.texture)
         factor = bordered.factor()
         own = np.arange(system.border - len(system.names))
-        left = marginalised(factor.border_information(), factor.border_right(), own)
+        left = marginalised(factor.border_information(), factor.border_right, own)
     information = left.information - np.diag(system.held)
     return Reduced(factor, information, left.right, left.follow, left.step, inverse)
 

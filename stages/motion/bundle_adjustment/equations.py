@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
-from pipeline.adjustment.elimination import by_point_and_pose
 from pipeline.adjustment.motion_priors import LOOSE, smooth_motion_rows
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, robust_spread
 from pipeline.arrays import Float
@@ -18,6 +17,7 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.probe import Probe
 from pipeline.system.parallel import in_threads
 from stages.motion.bundle_adjustment import residuals
+from stages.motion.bundle_adjustment.observations import observe
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
@@ -39,14 +39,10 @@ _REDESCENT = 2.5
 counts. The usual tuning constant; not measured here."""
 _LEAST_EXCESS = 0.3
 """Matches are never believed to be more than three times better than predicted. Not measured."""
-_NO_PIXEL_PX = 1000.0
-"""Residual of a landmark that projects nowhere."""
 _DAMPED = 1e-5
 """Relative damping with which covariances are computed where rounding made the equations singular."""
 LEAST_REACH = 4
 """Frames that are coupled at least: a third difference has four."""
-_FIRST_RAD, _KNOT_RAD = np.radians(38.0), np.radians(10.0)
-"""First knot and way to the next: five cover the polar angles at which texture is tracked by default."""
 _AT_ONCE, _THREADS = 16384, 2
 
 
@@ -240,10 +236,10 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     residual, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
     by_pose, by_instrument = np.empty((count, 2, 6)), np.empty((count, 2, unsure + MATCH_BIASES))
 
+    arrays = residual, by_point, by_pose, by_instrument
+
     def fill(part: slice) -> None:
-        found = _observed(state, T_cp, measured, parameters.match_bias_px, part)
-        for whole, own in zip((residual, by_point, by_pose, by_instrument), found, strict=True):
-            whole[part] = own
+        _observe(state, T_cp, measured, parameters.match_bias_px, part, tuple(a[part] for a in arrays))
 
     T_cp = inverse(state.T_pc)
     parts = [slice(a, a + _AT_ONCE) for a in range(0, count, _AT_ONCE)]
@@ -258,25 +254,20 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     )  # fmt: skip
 
 
-def _observed(
-    state: State, T_cp: Float, measured: Measurements, match_bias_px: float, part: slice
-) -> tuple[Float, Float, Float, Float]:
-    """Return residuals of some observations and their derivatives by point, pose and instrument."""
+def _observe(
+    state: State, T_cp: Float, measured: Measurements, bias_px: float, part: slice, out: tuple[Float, ...]
+) -> None:
+    """Write residuals of some observations and their derivatives by point, pose and instrument."""
     tracks, camera = measured.tracks, measured.camera_at(state)
-    T, back = state.T_pc[tracks.frame[part]], T_cp[tracks.frame[part]]
-    xyz_c = transform(back, state.xyz_p[tracks.landmark[part]])
-    bias = _match_bias(xyz_c, tracks.uv[part] - camera.centre_px) * match_bias_px
-    residual = camera.project(xyz_c).uv + bias @ state.instrument[-MATCH_BIASES:] - tracks.uv[part]
+    frame, uv = tracks.frame[part], tracks.uv[part]
+    xyz_c = transform(T_cp[frame], state.xyz_p[tracks.landmark[part]])
     by_c, by_parameters = camera.project_jacobian(xyz_c)
     unsure = measured.unsure[: by_parameters.shape[2]]
-    by_camera = by_parameters.reshape(2 * len(T), len(unsure)) @ unsure
-    by_instrument = np.concatenate([by_camera.reshape(len(T), 2, unsure.shape[1]), bias], -1)
-    by_point, by_pose = by_point_and_pose(by_c, T, xyz_c)
-    nowhere = ~np.isfinite(residual).all(1)
-    residual[nowhere] = _NO_PIXEL_PX
-    for derivative in (by_point, by_pose, by_instrument):
-        derivative[nowhere] = 0.0
-    return residual, by_point, by_pose, by_instrument
+    off, biases = camera.project(xyz_c).uv - uv, state.instrument[-MATCH_BIASES:]
+    observe(
+        off, by_c, by_parameters, unsure, xyz_c, state.T_pc[frame], uv - camera.centre_px, bias_px, biases,
+        *out,
+    )  # fmt: skip
 
 
 def _excess_of(size: Float, sigma: Float) -> float:
@@ -284,16 +275,3 @@ def _excess_of(size: Float, sigma: Float) -> float:
     if not len(size):
         return 1.0
     return max(float(np.median(size / sigma) / np.sqrt(2 * np.log(2))), _LEAST_EXCESS)
-
-
-def _match_bias(xyz_c: Float, from_centre_px: Float) -> Float:
-    """Return the derivatives (M, 2, 2) of pixels by systematic errors of matching, the same all round.
-
-    They are radial and piecewise linear in the polar angle: light that falls off across a patch, blur that
-    grows with distance and compression shift matches along the radius, which must not be taken for the lens.
-    """
-    theta = np.arctan2(np.hypot(xyz_c[:, 0], xyz_c[:, 1]), xyz_c[:, 2])
-    radial = from_centre_px / np.maximum(np.linalg.norm(from_centre_px, axis=1), 1.0)[:, None]
-    place = np.clip((theta - _FIRST_RAD) / _KNOT_RAD, 0, MATCH_BIASES - 1)
-    share = np.maximum(1 - np.abs(place[:, None] - np.arange(MATCH_BIASES)), 0)
-    return np.asarray(radial[:, :, None] * share[:, None, :])
