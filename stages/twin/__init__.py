@@ -19,6 +19,7 @@ from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
 from stages.twin.glints import told_apart
+from stages.twin.lamp_power import lamp_power
 from stages.twin.locate import (
     LEAST_CONTRAST,
     ImagePlace,
@@ -209,7 +210,8 @@ def compared_with(
     _report(comparison, found, context)
     return Twin(
         np.array([v.frame for v in comparison.views]), frames.withheld is not None,
-        noise_figures(state.noise), (*state_figures(state), *unnamed_map), comparison.regions(), found,
+        noise_figures(state.noise), (*state_figures(state), *lamp_power(samples), *unnamed_map),
+        comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
         maps_of(samples), comparison.levels(), worst_places(samples), (*withdrawn, *unsure),
@@ -265,7 +267,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "18",
+    "19",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

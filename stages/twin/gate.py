@@ -147,7 +147,7 @@ _OF_PROFILE = 0.02
 
 
 def _withdrawn(found: Mismatch, fall: Float, told: float) -> Mismatch:
-    words = found.name.replace("_", " ")
+    words = found.name.replace("_", " ") or "what has no name"
     why = (
         f"{len(fall)} frames rendered again with it fit no better beyond chance ({told:+.1f} σ)"
         if len(fall) >= _FEWEST

@@ -15,7 +15,8 @@ import numpy as np
 from scipy.stats import norm
 
 from pipeline.adjustment.robust import spread_about_median
-from pipeline.arrays import Bool, Float32
+from pipeline.arrays import Bool, Float, Float32
+from pipeline.artefacts.twin import Mismatch
 from stages.twin.compare import BLOCK_PX
 
 _RING_BLOCKS, _FEWEST_OF_RING = 4, 30
@@ -140,6 +141,17 @@ def beside(places: tuple[ImagePlace, ...], others: tuple[ImagePlace, ...]) -> tu
         for p in places
         if all(np.hypot(p.u_px - o.u_px, p.v_px - o.v_px) > apart + p.radius_px + o.radius_px for o in others)
     )
+
+
+def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
+    """Return what is on the window without what names the same spot a second time, and less well."""
+    kept: list[tuple[Float, Mismatch]] = []
+    for one in sorted(found, key=lambda m: m.chi2_after - m.chi2_before):
+        at = np.array([p.value for p in one.place])
+        same = [np.hypot(*(at - o)[:2]) < at[2] + o[2] + 2 * BLOCK_PX for o, m in kept if m.name == one.name]
+        if not any(same):
+            kept.append((at, one))
+    return tuple(m for _, m in kept)
 
 
 def _spread_of_rings(change: Float32, known: Bool) -> Float32:

@@ -53,6 +53,8 @@ class BlockSamples:
         Of its cell on the wall.
     away : float
         How far from the image's middle, in radii of the line: the wall is seen the more from the side.
+    log_light : float
+        Logarithm of the light that even lamps throw there, as in `LitSight`.
     first_mm, cell_mm : float
         Distance at which the first cell begins, and the side of a cell.
     number : (F,) int
@@ -71,6 +73,7 @@ class BlockSamples:
     cell_mm: float
     number: Int
     away: Float
+    log_light: Float
 
     @cached_property
     def orders(self) -> dict[str, Int]:
@@ -171,14 +174,15 @@ class BlocksOfFrames:
         middle = (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2
         rows, columns = ratio.shape
         distance, azimuth = (a[middle][:rows, :columns] for a in (twin.distance_mm, twin.azimuth_rad))
-        level, variance = (of_blocks(a) for a in (twin.level, twin.variance))
-        self.parts.append((ratio, level, variance, distance, azimuth))
+        assert twin.irradiance is not None
+        level, variance, light = (of_blocks(a) for a in (twin.level, twin.variance, twin.irradiance))
+        self.parts.append((ratio, level, variance, distance, azimuth, light))
         self.number.append(frame)
 
     def samples(self) -> BlockSamples | None:
         """Return all blocks; None where there are none."""
         found, cell_mm = [], 2 * np.pi * self.ring.radius_mm / WALL_COLUMNS
-        for k, (ratio, level, variance, distance, azimuth) in enumerate(self.parts):
+        for k, (ratio, level, variance, distance, azimuth, light) in enumerate(self.parts):
             row, column = np.nonzero(np.isfinite(ratio) & np.isfinite(distance))
             if not len(row):
                 continue
@@ -191,10 +195,13 @@ class BlocksOfFrames:
                 (a + 0.5) * BLOCK_PX - c for a, c in zip((column, row), self.ring.centre_px, strict=True)
             ]
             away = np.hypot(*aside) / self.ring.radius_px
-            found.append((change, bright, weight, away, np.full(len(row), k), row, column, along, around))
+            lit = np.log(np.maximum(light[row, column], 1e-6))
+            found.append(
+                (change, bright, weight, away, lit, np.full(len(row), k), row, column, along, around)
+            )
         if not found:
             return None
-        change, bright, weight, away, *place = (np.concatenate(c) for c in zip(*found, strict=True))
+        change, bright, weight, away, lit, *place = (np.concatenate(c) for c in zip(*found, strict=True))
         frame, row, column, along, around = (p.astype(np.int64) for p in place)
         first = int(along.min())
         return BlockSamples(
@@ -210,6 +217,7 @@ class BlocksOfFrames:
             cell_mm,
             np.array(self.number),
             away,
+            lit.astype(float),
         )
 
 

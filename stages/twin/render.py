@@ -48,6 +48,8 @@ class TwinFrame:
         `Region`.
     distance_mm, azimuth_rad : float32
         Place on the wall; NaN where none is known.
+    irradiance : float32 or None
+        As in `LitSight`; None in frames of the laser alone.
     """
 
     level: Float32
@@ -55,6 +57,7 @@ class TwinFrame:
     region: Byte
     distance_mm: Float32
     azimuth_rad: Float32
+    irradiance: Float32 | None = None
 
     def brighter(self, factor: float | Float32, noise: CameraNoise) -> TwinFrame:
         """Return the frame with another exposure, or seen through a window that lets pass (H, W)."""
@@ -121,7 +124,8 @@ class Renderer:
         _finish(
             made.level, made.variance, made.region, state.outside, state.edge, white, *state.noise.polynomial
         )
-        return TwinFrame(made.level, made.variance, made.region, made.distance_mm, made.azimuth_rad)
+        place = made.distance_mm, made.azimuth_rad
+        return TwinFrame(made.level, made.variance, made.region, *place, made.irradiance)
 
     def _light_wall(self, made: _Canvas, frame: int) -> None:
         """Put lit wall into a dark frame."""
@@ -132,6 +136,7 @@ class Renderer:
                     np.float32(self.state.power - 1), made.region)  # fmt: skip
         _sharpened(even, made.region, self._sharp, self._place_variance, made.level, made.variance)
         made.distance_mm, made.azimuth_rad = sight.distance_mm, sight.azimuth_rad
+        made.irradiance = sight.irradiance
 
     def _draw_line(self, made: _Canvas, frame: int) -> None:
         """Put the laser line into a frame."""
@@ -159,6 +164,7 @@ class _Canvas:
     region: Byte
     distance_mm: Float32
     azimuth_rad: Float32
+    irradiance: Float32 | None = None
 
     @staticmethod
     def dark(shape: tuple[int, ...]) -> _Canvas:

@@ -16,8 +16,9 @@ from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, exposure_of
 from stages.twin.gate import judged
 from stages.twin.glints import SpotsOfFrames
+from stages.twin.lamp_power import power_of_lamps
 from stages.twin.lamps import uneven_lamps
-from stages.twin.locate import ImagePlace
+from stages.twin.locate import ImagePlace, told_once
 from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image
@@ -25,7 +26,7 @@ from stages.twin.render import Renderer
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
 from stages.twin.switched import Shown
-from stages.twin.window import WindowPlace, told_once
+from stages.twin.window import WindowPlace
 
 _MOST_STRAY = 8
 """Laser frames that are looked at for stray light: each takes as long as a lit frame."""
@@ -84,7 +85,7 @@ class Sums:
     def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
         """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
-        judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
+        judged = [w.judged(to, samples) for w, to in zip(self.window, fixed_to, strict=True)]
         return told_once([m for m in judged if m is not None])
 
     def glints(self) -> tuple[Mismatch, ...]:
@@ -112,6 +113,7 @@ class Sums:
         first = (
             *self.whole.suspected(self._state.sharpness),
             *response_of(samples, self._scene.ring),
+            *power_of_lamps(samples, self._scene.ring),
             *(
                 ()
                 if led_failed
@@ -138,6 +140,7 @@ class Sums:
                     above, twin.brighter(exposure, noise), above < noise.white - noise.black.value,
                     self._scene, partial(self._again, frame, exposure),
                     partial(self._renderer.frame, frame, Illumination.LED), self.whole.direction(frame),
+                    frame,
                 ),
             )  # fmt: skip
 

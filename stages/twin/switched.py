@@ -57,6 +57,8 @@ class Shown:
         Renders the frame as the LEDs would show it.
     direction : (2, 2) float
         Cosine and sine of twice the angle of the frame's blur, as each half of the picture tells it.
+    number : int
+        Of the frame.
     """
 
     above: Float32
@@ -66,6 +68,7 @@ class Shown:
     again: Callable[..., Float32]
     lit: Callable[[], TwinFrame]
     direction: Float
+    number: int = -1
 
     @property
     def wall(self) -> Bool:

@@ -17,8 +17,9 @@ from scipy.stats import t
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
-from stages.twin.compare import BLOCK_PX
 from stages.twin.locate import FALSE_ALARM, LEAST_ASIDE_PX, ImagePlace
+from stages.twin.photo_behind import without_photo
+from stages.twin.reference import BlockSamples
 from stages.twin.render import Region, TwinFrame
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
@@ -159,8 +160,11 @@ class WindowPlace:
             made.append(np.asarray(drop, np.float32))
         return made
 
-    def judged(self, fixed_to: str) -> Mismatch | None:
-        """Return what is at the place; None where other frames fit no better with any law."""
+    def judged(self, fixed_to: str, samples: BlockSamples | None = None) -> Mismatch | None:
+        """Return what is at the place; None where other frames fit no better with any law.
+
+        ``samples`` tell what of it is in the photo, too.
+        """
         if len(self.frame) < _FEWEST_FRAMES:
             return None
         spots = np.stack(self.spots)
@@ -181,14 +185,15 @@ class WindowPlace:
             return None
         more = {n: sigmas(tried[name].fall - fit.fall) for n, fit in tried.items() if n != name}
         rivals = [n for n, by in more.items() if by < _SURE and not bends]
-        return self._mismatch([name, *rivals], fixed_to or "image", tried[name], chance)
+        law = tried[name]
+        if name == "window_dirt":
+            law = replace(law, size=without_photo(law.size, self.place, samples))
+        return self._mismatch([name, *rivals], fixed_to or "image", law, chance)
 
     def _mismatch(self, names: list[str], fixed_to: str, law: _Fitted, chance: float) -> Mismatch:
         place, size = self.place, law.size
-        where = tuple(
-            NamedFigure(n, value, place.radius_px / 2, "px")
-            for n, value in (("u_px", place.u_px), ("v_px", place.v_px), ("radius_px", place.radius_px))
-        )
+        names_of_place = ("u_px", "v_px", "radius_px")
+        where = tuple(NamedFigure(n, getattr(place, n), place.radius_px / 2, "px") for n in names_of_place)
         before = sum(self.square) / sum(self.pixels)
         brighter = names[0] == "window_dirt" and size.value < 0
         after = before - float(law.fall.sum()) / sum(self.pixels)
@@ -207,17 +212,6 @@ class WindowPlace:
         share = "the light" if names[0] == "droplet" else f"{100 * min(size, 1.0):.0f} % of the light"
         others = "".join(f", or {_STATED[n]} it" for n in names[1:])
         return f"{at}, in all frames, {_STATED[names[0]]} {share}{others}."
-
-
-def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
-    """Return what is on the window without what names the same spot a second time, and less well."""
-    kept: list[tuple[Float, Mismatch]] = []
-    for one in sorted(found, key=lambda m: m.chi2_after - m.chi2_before):
-        at = np.array([p.value for p in one.place])
-        same = [np.hypot(*(at - o)[:2]) < at[2] + o[2] + 2 * BLOCK_PX for o, m in kept if m.name == one.name]
-        if not any(same):
-            kept.append((at, one))
-    return tuple(m for _, m in kept)
 
 
 def beside_blur(

@@ -111,7 +111,7 @@ def _samples(change, frames=8, still=False):
     value = 0.01 * random.standard_normal(len(frame)) + change(frame, row, column, along)
     return BlockSamples(
         value, 4 + 0 * value, 32 + 0 * value, frame, row, column, along, column, 100.0, 2.5,
-        np.arange(frames), row / 40,
+        np.arange(frames), row / 40, 0 * value,
     )  # fmt: skip
 
 

@@ -6,9 +6,9 @@ import pytest
 
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.compare import BLOCK_PX, block_textures
-from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image
+from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image, told_once
 from stages.twin.render import Region, TwinFrame
-from stages.twin.window import WindowPlace, beside_blur, told_once
+from stages.twin.window import WindowPlace, beside_blur
 
 
 def _frame(level):

@@ -1,0 +1,98 @@
+"""How strongly brightness follows the lamps' distance: a response that is no straight line, or bounced light.
+
+Lamps that come nearer to a side of the bore brighten it as the inverse square of their distance says. Frames
+in which the same wall, and the same place of the image, is lit more or less strongly tell the power p to
+which brightness follows that light: 1 for a linear camera and direct light. A response grey = light^p gives p
+itself, whatever the photo was made with. Light that bounces about the bore hardly changes when the lamps
+move, so that a share q of it gives 1 − q. The lamps' lobe depends on the place in the image alone, and takes
+no part.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from scipy.stats import t
+
+from pipeline.arrays import Float, Float32, Int
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.cells import centred
+from stages.twin.gate import Suspected
+from stages.twin.locate import FALSE_ALARM, full_size
+from stages.twin.reference import BlockSamples
+from stages.twin.scene import Ring
+from stages.twin.switched import Pair, Shown
+
+_LEAST, _SURE = 0.25, 3.0
+"""Least departure of the power from 1, also by three of its σ: a pale bore throws back some tenths of its
+light, and what the lamps' lobe and the wall's gloss change is below a tenth."""
+_OF_LIGHT, _FEWEST_FRAMES = 0.02, 6
+"""1 σ of a power for want of knowing the black level: one grey level of fifty changes it by so much. Fewest
+lit frames."""
+
+
+def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
+    """Return the power to which brightness follows the lamps' light; nothing where frames are too few."""
+    if samples is None or samples.frame.max() + 1 < _FEWEST_FRAMES:
+        return ()
+    told = _products(samples)
+    without = told.sum(0) - told
+    power, *others = (1 + float(a[0] / max(a[1], 1e-12)) for a in (told.sum(0), *without))
+    n = len(told)
+    spread = (n - 1) / n * float(np.sum((np.array(others) - power) ** 2))
+    return (NamedFigure("lamp_power", power, float(np.hypot(np.sqrt(spread), _OF_LIGHT))),)
+
+
+def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:
+    """Return that brightness follows the lamps' light to another power than 1, if it does."""
+    figure = lamp_power(samples)
+    if samples is None or not figure:
+        return ()
+    told, power, sd = _products(samples), figure[0].value, figure[0].sd
+    chance = float(2 * t.sf(abs(power - 1) / max(sd, 1e-9), len(told) - 1))
+    if abs(power - 1) < max(_LEAST, _SURE * sd) or chance > FALSE_ALARM:
+        return ()
+    nan, name = float("nan"), "response" if power > 1 else "response or interreflection"
+    said = (
+        f"Where the lamps come nearer, the wall brightens as their light to the power {power:.2f} ± {sd:.2f}:"
+        f" the camera's response is grey = light^{power:.2f}"
+    )
+    said += "." if power > 1 else f", or {100 * (1 - power):.0f} % of the light has bounced about the bore."
+    found = Mismatch(
+        name, "intensity", "image", (), (NamedFigure("exponent", power, sd),), chance, nan, nan, said,
+        ring.whole(int(samples.number[0])),
+    )  # fmt: skip
+    law = partial(_to_power, samples.number, _other_light(samples))
+    return (Suspected(found, law, samples.number, told, lambda mean: np.array([1 + mean[0] / mean[1]])),)
+
+
+def _centred(samples: BlockSamples) -> tuple[Float, Float]:
+    """Return logarithms (N,) of light and brightness less means over image, wall and frames.
+
+    What is left of the light is by how much a place is lit otherwise than its photo was.
+    """
+    groups = samples.orders["image"], samples.orders["wall"], samples.frame
+    bright = np.log1p(np.maximum(samples.change, -0.99))
+    return centred(samples.log_light, *groups), centred(bright, *groups)
+
+
+def _products(samples: BlockSamples) -> Float:
+    """Return of each frame (F, 2) the sums of light times brightness, and of light's square."""
+    light, bright = _centred(samples)
+    frames = samples.frame.max() + 1
+    return np.stack([np.bincount(samples.frame, light * a, frames) for a in (bright, light)], 1)
+
+
+def _other_light(samples: BlockSamples) -> Float32:
+    """Return the logarithm (F, rows, columns) of the light of blocks over that of their photo."""
+    out = np.zeros((samples.frame.max() + 1, samples.row.max() + 1, samples.column.max() + 1), np.float32)
+    out[samples.frame, samples.row, samples.column] = _centred(samples)[0]
+    return out
+
+
+def _to_power(number: Int, light: Float32, shown: Shown, told: Float) -> Pair:
+    """Return a frame whose light departs from that of the photo to a power ``told``."""
+    level = shown.twin.level
+    more = full_size(light[int(np.searchsorted(number, shown.number))], level.shape, 0.0)
+    return Pair(level, level * np.exp(np.float32(told[0] - 1) * more), shown.wall, "scale")

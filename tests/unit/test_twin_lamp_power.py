@@ -1,0 +1,74 @@
+"""The power to which brightness follows the lamps' light, told by blocks of a probe that wanders."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stages.twin.compare import BLOCK_PX
+from stages.twin.gate import judged
+from stages.twin.lamp_power import power_of_lamps
+from stages.twin.locate import full_size
+from stages.twin.reference import BlockSamples
+from stages.twin.render import Region, TwinFrame
+from stages.twin.scene import Ring
+from stages.twin.switched import Shown
+
+FRAMES = 12
+RING = Ring((96.0, 64.0), 40.0, 50.0, 20.0)
+
+
+def _samples(power, photo_wrong=0.0, wandering=0.12):
+    """Return blocks of a wall lit from a probe off the axis; the photo may hold the light's error, too."""
+    random = np.random.default_rng(3)
+    frame, row, column = (a.ravel() for a in np.mgrid[0:FRAMES, 0:16, 0:24])
+    turn = np.arctan2(row - 8.0, column - 12.0)
+    off = wandering * np.stack([np.sin(0.9 * frame), np.cos(1.7 * frame)])
+    light = off[0] * np.cos(turn) + off[1] * np.sin(turn) - 0.02 * np.hypot(row - 8, column - 12)
+    along = row + 3 * frame
+    log = (power - 1) * light + photo_wrong * np.sin(along) + 0.01 * random.standard_normal(len(frame))
+    return BlockSamples(
+        np.expm1(log), 4 + 0 * log, 32 + 0 * log, frame, row, column, along, column, 0.0, 2.5,
+        10 * np.arange(FRAMES), row / 40, light,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("power", "name"), [(0.45, "response or interreflection"), (1.6, "response")])
+def test_a_response_is_told_by_how_the_wall_brightens_where_lamps_come_nearer(power, name):
+    (found,) = power_of_lamps(_samples(power, photo_wrong=0.05), RING)
+    (size,) = found.mismatch.parameters
+    assert found.mismatch.name == name
+    assert size.value == pytest.approx(power, abs=3 * size.sd)
+    assert size.sd < 0.05
+    assert found.by_others(10)[0] == pytest.approx(power, abs=0.1)
+
+
+@pytest.mark.parametrize("power", [1.0, 0.85])
+def test_light_as_the_lamps_throw_it_or_a_little_of_it_bounced_is_no_response(power):
+    assert power_of_lamps(_samples(power), RING) == ()
+
+
+def test_a_probe_that_keeps_to_its_place_tells_nothing():
+    assert power_of_lamps(_samples(0.45, wandering=0.0), RING) == ()
+
+
+def test_few_frames_tell_nothing():
+    assert power_of_lamps(None, RING) == ()
+
+
+def test_frames_rendered_again_with_the_power_bear_it_out():
+    samples = _samples(0.45)
+    (found,) = power_of_lamps(samples, RING)
+    level = np.full((16 * BLOCK_PX, 24 * BLOCK_PX), 100, np.float32)
+    region, unknown = np.full(level.shape, Region.WALL, np.uint8), np.full_like(level, np.nan)
+    twin = TwinFrame(level, np.full_like(level, 4.0), region, unknown, unknown)
+
+    def shown(number):
+        own = samples.number[samples.frame] == number
+        above = level * full_size(1 + samples.change[own].reshape(16, 24).astype(np.float32), level.shape)
+        everywhere, even = np.ones(level.shape, bool), np.eye(2)
+        return number, Shown(above, twin, everywhere, SimpleNamespace(), None, None, even, int(number))
+
+    kept, withdrawn = judged([found], lambda frames: map(shown, frames))
+    assert not withdrawn
+    assert kept[0].chi2_after < 0.5 * kept[0].chi2_before
