@@ -24,9 +24,10 @@ def _samples(power, photo_wrong=0.0, wandering=0.12):
     frame, row, column = (a.ravel() for a in np.mgrid[0:FRAMES, 0:16, 0:24])
     turn = np.arctan2(row - 8.0, column - 12.0)
     off = wandering * np.stack([np.sin(0.9 * frame), np.cos(1.7 * frame)])
-    light = off[0] * np.cos(turn) + off[1] * np.sin(turn) - 0.02 * np.hypot(row - 8, column - 12)
+    nearer = off[0] * np.cos(turn) + off[1] * np.sin(turn)
+    light = nearer - 0.02 * np.hypot(row - 8, column - 12)  # the second part is learned as the lamps' falloff
     along = row + 3 * frame
-    log = (power - 1) * light + photo_wrong * np.sin(along) + 0.01 * random.standard_normal(len(frame))
+    log = (power - 1) * nearer + photo_wrong * np.sin(along) + 0.01 * random.standard_normal(len(frame))
     return BlockSamples(
         np.expm1(log), 4 + 0 * log, 32 + 0 * log, frame, row, column, along, column, 0.0, 2.5,
         10 * np.arange(FRAMES), row / 40, light,
