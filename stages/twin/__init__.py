@@ -20,6 +20,7 @@ from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
 from stages.twin.glints import told_apart
 from stages.twin.lamp_power import lamp_power
+from stages.twin.lamps import flicker_of_measured
 from stages.twin.locate import (
     LEAST_CONTRAST,
     ImagePlace,
@@ -196,6 +197,7 @@ def compared_with(
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
     over_time = causes(*sums.cells(), scene.probe.lighting, scene.ring)
+    over_time = (*over_time, *flicker_of_measured(photometry.state, over_time, scene.ring))
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
     on_window, unsure = beside_blur(sums.on_window(samples), whole)

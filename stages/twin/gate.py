@@ -25,6 +25,8 @@ _MOST_SQUARE = 25.0
 """Square of z that a pixel counts with at most: a glint of thirty σ would outweigh a thousand pixels."""
 _MOST_ALIKE = 0.9
 """Correlation of neighbours that counts at most: of so few frames it is not told better."""
+_LEAST_FALL = 0.05
+"""Of the usual fall: frames that an effect should change by less say nothing of it. Chosen."""
 _FEWEST_PIXELS = 200
 """Pixels at which an effect acts, from which a frame judges it."""
 
@@ -80,16 +82,16 @@ def judged(suspected: Sequence[Suspected], again: Again) -> tuple[tuple[Mismatch
 
 def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     """Return the mismatch as frames rendered again have it, and whether its name stays."""
-    squares, sizes = [np.zeros((0, 3))], []
+    squares, sizes = [np.zeros((0, 4))], []
     for frame, shown in again(one.judges):
         numbers = one.by_others(frame)
         squares.append(_squares(shown, one.law(shown, numbers))[None])
         if one.measured is not None:
             sizes.append(one.measured(shown, numbers))
-    before, after, pixels = np.concatenate(squares).T
+    before, after, foretold, pixels = np.concatenate(squares).T
     seen = pixels >= _FEWEST_PIXELS
     fall = (before - after)[seen]
-    told, chance = _over_frames(fall)
+    told, chance = _borne_out(fall, foretold[seen])
     total = max(float(pixels[seen].sum()), 1.0)
     chi2 = [float(squares[seen].sum()) / total for squares in (before, after)]
     found = replace(one.mismatch, chi2_before=chi2[0], chi2_after=chi2[1])
@@ -97,6 +99,21 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
         return _withdrawn(found, fall, told), False
     found = found if not sizes else replace(found, parameters=_with_size(found, sizes))
     return replace(found, probability=float(np.nanmax([chance, found.probability]))), True
+
+
+def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
+    """Return by how many σ falls (F,) are above 0, and the chance of that.
+
+    An effect that some frames show ten times as strongly as others makes their falls as unequal, which looks
+    like chance. Falls over what the effect should make them, where it acts, are alike. Of both the surer one
+    counts, at twice its chance.
+    """
+    each = [_over_frames(fall)]
+    acts = foretold > _LEAST_FALL * np.median(foretold) if len(foretold) else foretold > 0
+    if acts.sum() >= _FEWEST:
+        each.append(_over_frames(fall[acts] / foretold[acts]))
+    told, chance = max(each, key=lambda e: -e[1])
+    return told, min(1.0, 2 * chance)
 
 
 def _over_frames(fall: Float) -> tuple[float, float]:
@@ -114,14 +131,14 @@ def _over_frames(fall: Float) -> tuple[float, float]:
 
 
 def _squares(shown: Shown, pair: Pair) -> Float:
-    """Return the squares of z of a frame without and with an effect, and the pixels that count."""
+    """Return squares of z of a frame without and with an effect, of the effect, and the pixels that count."""
     above = np.asarray(shown.above[pair.use])
     weight = np.asarray(1 / shown.twin.variance[pair.use], np.float32)
-    made = [
-        float(np.minimum(weight * (above - _taken_up(level[pair.use], above, weight, pair.free_of)) ** 2,
-                         _MOST_SQUARE).sum(dtype=float))
-        for level in (pair.without, pair.with_it)
-    ]  # fmt: skip
+    levels = [
+        _taken_up(level[pair.use], above, weight, pair.free_of) for level in (pair.without, pair.with_it)
+    ]
+    rests = [above - levels[0], above - levels[1], levels[1] - levels[0]]
+    made = [float(np.minimum(weight * r**2, _MOST_SQUARE).sum(dtype=float)) for r in rests]
     return np.array([*made, float(len(above))])
 
 

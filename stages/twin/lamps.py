@@ -1,10 +1,12 @@
-"""Lamps that shine unevenly in all frames: one LED that sends less, or something else.
+"""Lamps that shine unevenly, around the picture or from frame to frame, in frames that were measured.
 
 The lamps' pattern around the picture is described by two harmonics. A single LED that is dim gives both, in a
 ratio and at angles that its place and the bore foretell; what gives others has no name.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,7 +16,8 @@ from stages.twin.cells import SECTORS, sector_azimuth_rad
 from stages.twin.gate import Suspected
 from stages.twin.lamp_light import LampLight
 from stages.twin.laws import LED_AZIMUTHS, dim_share
-from stages.twin.scene import Scene
+from stages.twin.scene import Ring, Scene
+from stages.twin.state import PhotometricState
 from stages.twin.switched import dim_led, lamp_pattern
 
 _LEAST, _LEFT, _SURE = 0.012, 0.003, 5.0
@@ -24,6 +27,9 @@ _LOSSES = np.linspace(0.1, 1.0, 19)
 """Losses at which the pattern is worked out; between them it is nearly straight."""
 _OF_SECOND = 2.0
 """Relative σ of the first harmonic, for want of the lobe, by which the second may be another: order two."""
+_VARIES, _FEWEST_FRAMES = {"flicker": 0.02, "laser_flicker": 0.08}, 8
+"""Spread of brightness from frame to frame that is named, twice what the compared frames need: the photo
+is made from the measured ones. Fewest of them."""
 
 
 def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Suspected, ...]:
@@ -78,3 +84,32 @@ def _harmonics(lamp: LampLight, scene: Scene) -> tuple[Float, float]:
     each = np.average(each, axis=2, weights=theta)
     first = each[-1, :, 0]
     return each.mean(1), float(np.ptp(first) / 2 / abs(first.mean()))
+
+
+def flicker_of_measured(
+    state: PhotometricState, found: Sequence[Mismatch], ring: Ring
+) -> tuple[Mismatch, ...]:
+    """Return flicker that measured frames show; ``found`` is what the compared ones, told first, show.
+
+    Compared frames lie at regular steps, and lights that flicker in step with them look steady.
+    """
+    courses = (
+        ("flicker", "LEDs", "intensity", None if state.lamp is None else state.lamp.gain),
+        ("laser_flicker", "laser", "line", None if state.line is None else state.line.course),
+    )
+    told = {name for m in found for name in m.name.split(" or ")}
+    made = []
+    for name, light, channel, course in courses:
+        if course is None or name in told or len(course.frame) < _FEWEST_FRAMES:
+            continue
+        spread, nan = course.spread, float("nan")
+        if spread < max(_VARIES[name], _SURE * float(np.median(course.sd))):
+            continue
+        size = NamedFigure("exposure", spread, spread / np.sqrt(2 * (len(course.frame) - 1)), "relative")
+        said = (
+            f"Measured frames lit by the {light} vary in brightness by {100 * spread:.1f} % (1 σ) from "
+            "frame to frame. The compared frames do not show it: lights may flicker in step with them."
+        )
+        look = ring.whole(int(course.frame[0]))
+        made.append(Mismatch(name, channel, "time", (), (size,), nan, nan, nan, said, look))
+    return tuple(made)

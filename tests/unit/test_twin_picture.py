@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from stages.twin.gate import _over_frames, judged
+from stages.twin.gate import _borne_out, _over_frames, judged
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import _plain_line
 from stages.twin.name import focus_of, response_of
@@ -28,7 +28,8 @@ SCENE = SimpleNamespace(
 
 def _twin(level, region):
     place = (50.0 * 70 / np.maximum(AWAY, 20)).astype(np.float32)
-    return TwinFrame(level, np.full(SHAPE, 2.0, np.float32), region.astype(np.uint8), place, PHI)
+    noise, even = np.full(SHAPE, 2.0, np.float32), np.ones(SHAPE, np.float32)
+    return TwinFrame(level, noise, region.astype(np.uint8), place, PHI, even)
 
 
 def _lit(random):
@@ -208,3 +209,13 @@ def test_a_second_ring_is_found_and_a_glint_is_none():
     assert _named(laser=lambda p, r: p + second) == ["second_line"]
     glint = 60 * np.exp(-0.5 * (((U - 240) / 6) ** 2 + ((V - 120) / 6) ** 2))
     assert "second_line" not in _named(laser=lambda p, r: p + glint)
+
+
+def test_an_effect_that_frames_show_unequally_is_borne_out_where_it_acts():
+    random = np.random.default_rng(8)
+    foretold = np.array([4.0, 9, 900, 30, 60, 14, 25])
+    alike = foretold * (0.8 + 0.1 * random.standard_normal(7))
+    assert _over_frames(alike)[0] < 3 < _borne_out(alike, foretold)[0]
+    by_chance = foretold * (-1 + 0.8 * random.standard_normal(7))
+    assert _borne_out(by_chance, foretold)[0] < 3
+    assert _borne_out(np.zeros(0), np.zeros(0)) == (0.0, 1.0)

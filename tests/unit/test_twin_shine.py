@@ -11,7 +11,7 @@ from pipeline.instrument.probe import Lighting
 from pipeline.recording.base import Illumination
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_light import Course, LampLight
-from stages.twin.lamps import uneven_lamps
+from stages.twin.lamps import flicker_of_measured, uneven_lamps
 from stages.twin.laws import dim_share
 from stages.twin.on_wall import touching, unnamed
 from stages.twin.reference import BlocksOfFrames
@@ -29,7 +29,8 @@ def _twin(number, region=Region.WALL):
     level = np.full(SHAPE, 80.0, np.float32)
     along = ((V + STEP_PX * number) * np.float32(50 / 90)).astype(np.float32)
     around = (U / np.float32(90.0)).astype(np.float32)
-    return TwinFrame(level, np.full(SHAPE, 4.0, np.float32), np.full(SHAPE, region, np.uint8), along, around)
+    kind, even = np.full(SHAPE, region, np.uint8), np.ones(SHAPE, np.float32)
+    return TwinFrame(level, np.full(SHAPE, 4.0, np.float32), kind, along, around, even)
 
 
 def _spot(u, v, grey=120.0):
@@ -138,3 +139,17 @@ def test_a_dim_led_is_told_from_lamps_that_shine_unevenly():
     (other,) = uneven_lamps(_lamp(0.2 * np.cos(2 * azimuth) + 0.05 * np.cos(azimuth)), SCENE, frames)
     assert other.mismatch.name == ""
     assert not uneven_lamps(_lamp(0 * azimuth), SCENE, frames)
+
+
+def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_measured_ones():
+    random = np.random.default_rng(2)
+
+    def told(spread, found=()):
+        course = Course(np.arange(12), spread * random.standard_normal(12), np.full(12, 1e-3))
+        state = SimpleNamespace(lamp=replace(_lamp(np.zeros(36)), gain=course), line=None)
+        return flicker_of_measured(state, found, RING)
+
+    (flicker,) = told(0.06)
+    assert flicker.parameters[0].value == pytest.approx(0.06, abs=2 * flicker.parameters[0].sd)
+    assert not told(0.004)
+    assert not told(0.06, (flicker,))
