@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import norm, t
 
-from pipeline.adjustment.robust import spread_about_median
+from pipeline.adjustment.robust import robust_spread, spread_about_median
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
@@ -46,6 +46,9 @@ _SHAPE, _NARROW_DEG, _OF_WIDTH = 0.03, 20.0, 0.08
 """1 σ of a sector's loss for want of its shape. Of one narrower than two cells only loss times width shows,
 and widths are tried in steps of a quarter: relative 1 σ of the loss, half a step over √3."""
 _OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
+_USUAL, _FEW = 0.4, 10
+"""Robust spread of steps from frame to frame over the spread of all: 1 for normal numbers, more for a sine. A
+weld or a joint changes the whole bore in a few frames, and is no flicker. Frames that tell it. Chosen."""
 _HALF_SECTORS = 3
 """Sectors side by side in the same half, when one half of the picture is to foretell the other."""
 
@@ -281,7 +284,8 @@ def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch
     foretold = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])
     before, after = (float(cells.chi2(k).sum() / max(cells.counted.sum(), 1)) for k in (known, foretold))
     name = "flicker" if light == "LEDs" else "laser_flicker"
-    if chance > FALSE_ALARM or spread < _LEAST[name] or after >= before:
+    often = frames < _FEW or robust_spread(np.diff(parts.mean(0))) > _USUAL * np.sqrt(2) * spread
+    if chance > FALSE_ALARM or spread < _LEAST[name] or after >= before or not often:
         return []
     sd = float(product.std()) / np.sqrt(frames) / (2 * spread)
     place = tuple(

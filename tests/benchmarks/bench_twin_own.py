@@ -41,7 +41,8 @@ _STAGES = (*PIPELINE[: PIPELINE.index(TEXTURE) + 1], PHOTOMETRY, TWIN)
 _WITHHOLD, _SHRINK = 4, 2
 _NEAR_PX, _NEAR_DEG = 24.0, 20.0
 _PEAK = 0.6
-"""Of the line: at the scenes' own .9 speckle clips it, which the twin rightly tells."""
+"""Of the line: at the scenes' own .9 speckle clips it, and one of them has a glossy wall, which the twin
+rightly tells. Nulls are dull, and have a line that fits into the range."""
 _OTHER = 3
 """A case is also scored by the answer of the third one after it."""
 _NULLS = ("straight-4-inch", "oval-3-inch", "welded-4-inch", "corroded-4-inch", "vibrating-3-inch")
@@ -106,8 +107,11 @@ def scene_of(name: str, case: Case | None, frames: int, seed: int) -> Scene:
     """Return a shipped scene at half its size, with an effect switched on."""
     on = () if case is None else (Switch(case.effect, case.numbers),)
     scene = smaller(shipped(name), _SHRINK, frames, seed=seed, probe_seed=seed)
-    sound = scene.laser.model_copy(update={"peak": _PEAK})
-    scene = scene.model_copy(update={"effects": {s.key: s.numbers for s in on}, "laser": sound})
+    laser = scene.laser.model_copy(update={"peak": _PEAK})
+    dull = scene.pipe.surface.model_copy(update={"gloss": 0.0})
+    pipe = scene.pipe.model_copy(update={"surface": dull})
+    effects = {s.key: s.numbers for s in on}
+    scene = scene.model_copy(update={"effects": effects, "laser": laser, "pipe": pipe})
     for section, key, value in case.changes if case else ():
         part = getattr(scene, section) if section else scene
         part = part.model_copy(update={key: value})

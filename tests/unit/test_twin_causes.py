@@ -94,6 +94,12 @@ def test_flicker_of_one_light_is_told():
     assert laser.name == "laser_flicker"
 
 
+def test_welds_that_a_few_frames_see_are_no_flicker():
+    random, few = np.random.default_rng(2), np.zeros(FRAMES)
+    few[[4, 5, FRAMES // 2, FRAMES // 2 + 1]] = 0.2, 0.15, -0.25, -0.2
+    assert not _found(0.0, (few + 0.004 * random.standard_normal(FRAMES))[:, None])
+
+
 def test_a_change_of_single_sectors_is_no_flicker():
     random = np.random.default_rng(3)
     assert not _found(0.04 * random.standard_normal((FRAMES, SECTORS)))
