@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from pipeline.arrays import Bool, Float, Float32
+from pipeline.arrays import Bool, Float, Float32, Int
 from stages.twin.lamp_light import Figure
 
 _WINDOW_PX = 12
@@ -23,6 +23,8 @@ _MOST_ALIKE = 0.5
 _LEVELS, _FEWEST = 14, 40
 _LEAST_VARIANCE = 1 / 12
 """Of rounding to whole grey levels."""
+_PILE = 16
+"""Grey levels within which a lossy codec leaves clipped pixels: H.264 leaves them within eight. Chosen."""
 _RANGE_FOR_GAMMA = 3.0
 """Ratio of brightest to darkest level needed to tell the response's exponent."""
 
@@ -171,8 +173,20 @@ def black_and_white(images: list[Float32]) -> tuple[Figure, float]:
     dark = [float(np.median(i[i <= np.quantile(i, 0.1)])) for i in images]
     black = Figure(float(np.median(dark)), float(np.std(dark) / np.sqrt(len(dark))))
     every = [np.bincount(np.clip(i, 0, 255).astype(np.uint8).ravel(), minlength=256) for i in images]
-    counts = np.sum(every, 0)
-    top = int(np.flatnonzero(counts)[-1])
-    near = counts[max(top - 6, 0) : top]
-    piled = len(near) and counts[top] > 3 * max(float(near.max()), 1.0)
-    return black, float(top) if piled else float(np.inf)
+    return black, _full_scale(np.sum(every, 0))
+
+
+def _full_scale(count: Int) -> float:
+    """Return the level from which pixels, counted by level (256,), are clipped; infinite where none pile up.
+
+    A lossy codec spreads the pile over some levels to both sides: its peak and its upper side tell it.
+    """
+    top = int(np.flatnonzero(count)[-1])
+    first = max(top - _PILE, 1)
+    peak = first + int(np.argmax(count[first : top + 1]))
+    before = count[max(peak - 2 * _PILE, 0) : max(peak - _PILE // 2, 1)]
+    if not before.size or count[peak] <= 3 * max(float(before.max()), 1.0):
+        return float(np.inf)
+    above = np.arange(top + 1 - peak)
+    spread = float(np.sqrt(np.average(above**2, weights=count[peak : top + 1])))
+    return float(np.floor(peak - 2 * spread))

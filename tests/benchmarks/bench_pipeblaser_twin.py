@@ -4,7 +4,8 @@ Sixteen single frames of one smooth pipe, without texture, motion or photo: what
 profile, the background and the noise. The profile of every other frame is tried on those between, by a noise
 that pixels along the line tell: neither frames nor profile that are judged have a part in it. Brightness
 and background of each frame's line are its own, in blocks of 1.5°. Writes recorded | re-rendered | z of the
-worst frame into OUT.
+worst frame into OUT, maps of z of all frames (z.png: grey is none, white +8, black −8), and says of what kind
+the rest is that the noise does not explain: each kind is foretold by pixels that have no part in it.
 
 Noise is told by pixels two apart, which see no more than what is white, and ten apart, beyond a block of the
 coder (these pictures were JPEGs: steps of the luma's coefficients 8 6 6 7 7 8, quality 75) and beyond grains
@@ -30,6 +31,8 @@ from stages.twin.line_blocks import BlockLight, LineBlocks, light_of
 from tests.shared_data import shared
 
 RED, RED_NM, WHITE = 2, 650.0, 250.0
+WIDE = 6.0
+"""Widths of the line, to each side, that are looked at for what remains."""
 BLOCKS, HALF_PX, BROAD_PX, BINS = 240, 12.0, 8.0, 24
 CENTRE = (0.445, 0.524)
 WHITE_PX, APART_PX, ASIDE, FEWEST = 2, 10, 0.04, 30
@@ -139,7 +142,7 @@ def main(out: Path) -> None:
     """Print profile, noise and χ² of frames that had no part in them; write the worst frame."""
     files = sorted((shared() / "real" / "pipeblaser_cmu" / "rings_v1").glob("*.png"))
     frames = [real_frame(f) for f in files]
-    worst: tuple[float, int, Float] = (0.0, 0, np.zeros(0))
+    left: dict[int, Float] = {}
     chi2 = np.zeros((4, len(frames)))
     for half in (0, 1):
         learned = frames[half::2]
@@ -159,8 +162,7 @@ def main(out: Path) -> None:
             z = [_z(frames[k], *by) for by in ((gauss, noise), (light, noise), (light, white))]
             use = ~frames[k].blocks.clipped
             chi2[:, k] = *(np.mean(a[use] ** 2) for a in z), np.mean(_z_dark(frames[k], noise) ** 2)
-            if chi2[1, k] > worst[0]:
-                worst = chi2[1, k], k, z[1]
+            left[k] = np.where(use, z[1], 0.0)
             print(
                 f"{files[k].name}: line, normal profile {chi2[0, k]:.2f}, learned {chi2[1, k]:.2f}, "
                 f"by white noise alone {chi2[2, k]:.2f}, background {chi2[3, k]:.2f}"
@@ -169,7 +171,11 @@ def main(out: Path) -> None:
     print(f"learned profile fits better in {better} of {len(frames)} withheld frames")
     names = ("normal", "learned", "by white noise alone", "background")
     print("median χ²:", ", ".join(f"{n} {x:.2f}" for n, x in zip(names, np.median(chi2, 1), strict=True)))
-    _write(frames[worst[1]], worst[2], light, out / f"worst-{files[worst[1]].stem}.png")
+    worst = int(chi2[1].argmax())
+    rest = [left[k] for k in range(len(frames))]
+    _write(frames[worst], rest[worst], light, out / f"worst-{files[worst].stem}.png")
+    _write_maps(frames, rest, out / "z.png")
+    print(_remaining(frames, rest))
 
 
 def _z(frame: RealFrame, light: BlockLight, noise: Float) -> Float:
@@ -190,6 +196,56 @@ def _write(frame: RealFrame, z: Float, light: BlockLight, file: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     pictures = [np.clip(p, 0, 255).astype(np.uint8) for p in (frame.grey, made, map_of_z)]
     cv2.imwrite(str(file), np.concatenate(pictures, 1))
+
+
+def _remaining(frames: list[RealFrame], left: list[Float]) -> str:
+    """Return in words what part of the squares of z each kind of cell foretells, one after the other."""
+    z = np.concatenate(left)
+    frame = np.repeat(np.arange(len(frames)), [len(part) for part in left])
+    blocks = [f.blocks for f in frames]
+    azimuth = np.concatenate([(b.azimuth_rad[b.block] + np.pi) / (2 * np.pi) for b in blocks])
+    across = np.concatenate([b.offset_px / b.width_px[b.block] for b in blocks])
+    step = np.floor(2 * np.clip(across, -WIDE, WIDE) + 2 * WIDE).astype(int)
+    place = (azimuth * BLOCKS).astype(int) % BLOCKS
+    tile = np.concatenate([(f.row // 2 + f.column // 2) % 2 for f in frames])
+    steps = int(4 * WIDE + 1)
+    kinds = (
+        ("a profile of another shape, alike in all frames", step, frame % 2),
+        ("what is fixed to the image: lens, dirt, mount", place * steps + step, frame % 2),
+        ("the line's own shape, which changes from degree to degree and frame to frame: speckle, wall",
+         (frame * BLOCKS + place) * steps + step, tile),
+    )  # fmt: skip
+    total, said = float((z**2).mean()), []
+    for words, cell, half in kinds:
+        foretold = _by_other_half(z, cell, half)
+        said.append(f"{(z**2 - (z - foretold) ** 2).mean():.2f} {words}")
+        z = z - foretold
+    return (
+        f"of χ² {total:.2f}: " + "; ".join(said) + f"; {float((z**2).mean()):.2f} single pixels (1 is noise)"
+    )
+
+
+def _by_other_half(z: Float, cell: Int, half: Int) -> Float:
+    """Return what the other half of the pixels (N,) in a cell has on average, drawn to 0 by its noise."""
+    other, own = 2 * cell + 1 - half, 2 * cell + half
+    count, total = (np.bincount(own, v, 2 * cell.max() + 2) for v in (None, z))
+    between = max(float((total[other] / np.maximum(count[other], 1) * z).mean()), 1e-6)
+    return np.asarray(total[other] / (count[other] + 1 / between))
+
+
+def _write_maps(frames: list[RealFrame], left: list[Float], file: Path) -> None:
+    """Write maps of z of all frames, four in a row, a third as large; the largest of nine pixels shows."""
+    made = []
+    for frame, z in zip(frames, left, strict=True):
+        whole = np.zeros(frame.grey.shape, np.float32)
+        whole[frame.row, frame.column] = z
+        rows, columns = (3 * (n // 3) for n in whole.shape)
+        nine = whole[:rows, :columns].reshape(rows // 3, 3, columns // 3, 3).transpose(0, 2, 1, 3)
+        nine = nine.reshape(rows // 3, columns // 3, 9)
+        most = np.take_along_axis(nine, np.abs(nine).argmax(-1)[..., None], -1)[..., 0]
+        made.append(np.clip(128 + 16 * most, 0, 255).astype(np.uint8))
+    sheet = np.concatenate([np.concatenate(made[k : k + 4], 1) for k in range(0, len(made), 4)], 0)
+    cv2.imwrite(str(file), sheet)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from stages.twin.lamp_light import Figure
 from stages.twin.line_light import LineSamples
 from stages.twin.locate import ImagePlace
 from stages.twin.name import _not_sharp, clipped, left_over
-from stages.twin.noise import CameraNoise, photon_transfer, windows_of
+from stages.twin.noise import CameraNoise, black_and_white, photon_transfer, windows_of
 from stages.twin.on_wall import unnamed
 from stages.twin.rays import wall_seen
 from stages.twin.reference import BlockSamples, in_image
@@ -289,3 +289,14 @@ def test_what_the_window_takes_away_is_no_map_of_its_own():
     assert abs(seen.change.mean()) < 0.01
     np.testing.assert_allclose(np.exp(seen.log_level - dark.log_level)[dark.row < 20], 0.5)
     assert dark.seen_through(None) is dark
+
+
+def test_clipped_wall_is_told_behind_a_codec_and_bright_wall_is_none():
+    random = np.random.default_rng(4)
+    light = np.clip(120 + 60 * random.standard_normal((400, 300)), 0, 400)
+    exact = np.minimum(light, 219).astype(np.float32) + 16
+    coded = exact + 1.5 * random.standard_normal(light.shape).astype(np.float32)
+    assert black_and_white([exact] * 2)[1] == 235
+    assert 228 <= black_and_white([coded] * 2)[1] <= 235
+    bright = (16 + np.minimum(0.6 * light, 200)).astype(np.float32)
+    assert black_and_white([bright + random.standard_normal(light.shape).astype(np.float32)])[1] == np.inf
