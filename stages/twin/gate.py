@@ -105,15 +105,14 @@ def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
     """Return by how many σ falls (F,) are above 0, and the chance of that.
 
     An effect that some frames show ten times as strongly as others makes their falls as unequal, which looks
-    like chance. Falls over what the effect should make them, where it acts, are alike. Of both the surer one
-    counts, at twice its chance.
+    like chance. Falls over what the effect should make them, where it acts, are alike: of both the surer one
+    counts.
     """
     each = [_over_frames(fall)]
     acts = foretold > _LEAST_FALL * np.median(foretold) if len(foretold) else foretold > 0
     if acts.sum() >= _FEWEST:
         each.append(_over_frames(fall[acts] / foretold[acts]))
-    told, chance = max(each, key=lambda e: -e[1])
-    return told, min(1.0, 2 * chance)
+    return min(each, key=lambda e: e[1])
 
 
 def _over_frames(fall: Float) -> tuple[float, float]:
