@@ -184,8 +184,8 @@ def _full_scale(count: Int) -> float:
     top = int(np.flatnonzero(count)[-1])
     first = max(top - _PILE, 1)
     peak = first + int(np.argmax(count[first : top + 1]))
-    before = count[max(peak - 2 * _PILE, 0) : max(peak - _PILE // 2, 1)]
-    if not before.size or count[peak] <= 3 * max(float(before.max()), 1.0):
+    before = count[max(peak - _PILE, 0) : max(peak - _PILE // 2, 1)]
+    if not before.size or count[peak] <= 2 * max(float(before.max()), 1.0):
         return float(np.inf)
     above = np.arange(top + 1 - peak)
     spread = float(np.sqrt(np.average(above**2, weights=count[peak : top + 1])))

@@ -50,12 +50,13 @@ class Sums:
     def add(self, frame: int, kind: Illumination, image: Image) -> None:
         """Compare a frame (H, W) with its twin."""
         noise, self._light[frame] = self._state.noise, kind
-        above = image.astype(np.float32) - np.float32(noise.black.value)
+        white = noise.white - noise.black.value
+        # A codec leaves clipped pixels a little above full scale, where no twin can be.
+        above = np.minimum(image.astype(np.float32) - np.float32(noise.black.value), np.float32(white))
         before = self._renderer.frame(frame, kind)
         gain, aside = self._state.gain_map, self._state.aside
         bent = before.drawn_aside(aside)
         after = bent if gain is None else bent.brighter(gain, noise)
-        white = noise.white - noise.black.value
         free = above < white
         if kind != Illumination.LASER:
             self.lit.add(frame, above, after, white, self._sector)
