@@ -34,6 +34,8 @@ _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 3
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
 _FLATNESS = (0.7, 5.0)
 """Bounds of a spot's flatness: 1 is Gaussian, 2 has a flat middle and a steep rim, 5 is a disc."""
+_OF_CONTRAST = 0.15
+"""Most by which the photo has more or less texture than frames: half a pixel of blur does as much."""
 _OF_LIGHT = 0.005
 """1 σ of a share of the light for want of knowing the light about the spot: half of a photo's error."""
 _LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
@@ -170,10 +172,10 @@ class WindowPlace:
         spots = np.stack(self.spots)
         place = np.array([self.place.u_px, self.place.v_px, self.place.radius_px]) - (*self.corner, 0.0)
         u, v, radius = place / self._step
-        start = np.array([[0.3, u, v, f * radius, 1.0] for f in (0.5, 1.5)])
+        start = np.array([[0.3, u, v, f * radius, 1.0, 0.0] for f in (0.5, 1.5)])
         tried = {
-            "window_dirt": _fall_of_spot(spots[:, 0], start),
-            "window_scatter": _fall_of_spot(spots[:, 1], start),
+            "window_dirt": _fall_of_spot(spots[:, 0], start, 0.0),
+            "window_scatter": _fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
             "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
         }
         bends = self.bends and tried["droplet"].chance < FALSE_ALARM
@@ -192,8 +194,8 @@ class WindowPlace:
 
     def _mismatch(self, names: list[str], fixed_to: str, law: _Fitted, chance: float) -> Mismatch:
         place, size = self.place, law.size
-        names_of_place = ("u_px", "v_px", "radius_px")
-        where = tuple(NamedFigure(n, getattr(place, n), place.radius_px / 2, "px") for n in names_of_place)
+        numbers = ("u_px", "v_px", "radius_px")
+        where = tuple(NamedFigure(n, getattr(place, n), place.radius_px / 2, "px") for n in numbers)
         before = sum(self.square) / sum(self.pixels)
         brighter = names[0] == "window_dirt" and size.value < 0
         after = before - float(law.fall.sum()) / sum(self.pixels)
@@ -241,44 +243,46 @@ def _fall_of_drop(sums: Float, aside_px: float) -> _Fitted:
     return _Fitted(fall, NamedFigure("power", _DROPS[best][0], _POWER_STEP / 2))
 
 
-def _fall_of_spot(sums: Float32, start: Float) -> _Fitted:
+def _fall_of_spot(sums: Float32, start: Float, beyond: float) -> _Fitted:
     """Return the spot that fits best, its depth as its size.
 
-    ``sums`` is (F, 2, h, w); ``start`` (K, 5) holds spots that the search starts from.
+    ``sums`` is (F, 2, h, w); ``start`` (K, 6) holds spots that the search starts from. Beside the spot the
+    law may act by up to ``beyond``, as where the photo has less texture: the spot's depth is relative to it.
     The σ holds what leaving out parts of the frames changes, and by how much the spot's middle differs from
     the fitted shape.
     """
     frames, fall = np.arange(len(sums)), np.zeros(len(sums))
     whole = sums.sum(0)
-    best = _fitted_spot(whole, start)
+    best = _fitted_spot(whole, start, beyond)
     for half in (frames % 2 == 0, frames % 2 == 1):
-        shape = _spot(_fitted_spot(sums[half].sum(0), best[None]), sums.shape[2:])
+        shape = _spot(_fitted_spot(sums[half].sum(0), best[None], beyond), sums.shape[2:])
         fall[~half] = (2 * shape * sums[~half, 0] - shape**2 * sums[~half, 1]).sum((1, 2))
     parts = np.array_split(frames, min(_PARTS, len(frames)))
-    without = np.array([_fitted_spot(whole - sums[p].sum(0), best[None])[0] for p in parts])
+    fits = np.array([_fitted_spot(whole - sums[p].sum(0), best[None], beyond) for p in parts])
+    without = fits[:, 0] / (1 - fits[:, 5])
     spread = (len(parts) - 1) / len(parts) * float(((without - without.mean()) ** 2).sum())
     shape = _spot(best, sums.shape[2:])
-    middle = np.exp(-0.5 * ((1 - shape / max(abs(best[0]), 1e-9)) / _MIDDLE) ** 2) * (shape != 0)
+    inside = (shape - best[5]) / (best[0] or 1e-9)
+    middle = np.exp(-0.5 * ((1 - inside) / _MIDDLE) ** 2)
     weight = max(float((middle * whole[1]).sum()), 1e-9)
     off = float((middle * (whole[0] - shape * whole[1])).sum()) / weight
     sd = float(np.sqrt(spread + off**2 + _OF_LIGHT**2))
-    return _Fitted(fall, NamedFigure("share", float(best[0]), sd))
+    return _Fitted(fall, NamedFigure("share", float(best[0] / (1 - best[5])), sd))
 
 
 def _spot(place: Float, shape: tuple[int, ...]) -> Float:
-    """Return a spot (h, w): d exp(−½ (r²/w²)^q) about a column and row, of depth d, width w, flatness q."""
-    v, u = np.mgrid[: shape[0], : shape[1]]
-    return _spot_at(place, u, v)
+    """Return a spot (h, w): d exp(−½ (r²/w²)^q) + b about a column and row, depth d, width w, flatness q."""
+    return _spot_at(place, *np.mgrid[: shape[0], : shape[1]][::-1])
 
 
 def _spot_at(place: Float, u: Int, v: Int) -> Float:
-    depth, at_u, at_v, width, flat = place
+    depth, at_u, at_v, width, flat, beside = place
     square = ((u - at_u) ** 2 + (v - at_v) ** 2) / width**2
-    return np.asarray(depth * np.exp(-0.5 * square**flat))
+    return np.asarray(depth * np.exp(-0.5 * square**flat) + beside)
 
 
-def _fitted_spot(sums: Float32, start: Float) -> Float:
-    """Return depth, column, row, width and flatness of the spot that fits best; ``sums`` is (2, h, w)."""
+def _fitted_spot(sums: Float32, start: Float, beyond: float) -> Float:
+    """Return depth, column, row, width, flatness and rest of the spot that fits; ``sums`` is (2, h, w)."""
     rows, columns = np.nonzero(sums[1] > 0)
     weight = np.sqrt(sums[1][rows, columns].astype(float))
     value = sums[0][rows, columns] / weight
@@ -287,8 +291,9 @@ def _fitted_spot(sums: Float32, start: Float) -> Float:
         return np.asarray(_spot_at(p, columns, rows) * weight - value)
 
     reach = start[:, 3].max()
-    low = np.array([-3.0, *(start[0, 1:3] - reach), _LEAST_WIDTH_PX, _FLATNESS[0]])
-    high = np.array([3.0, *(start[0, 1:3] + reach), 2 * max(reach, _LEAST_REACH_PX), _FLATNESS[1]])
-    begin = np.clip(start, low + 1e-3, high - 1e-3)
-    made = [least_squares(rest, s, bounds=(low, high), x_scale=[0.1, 1, 1, 3, 0.3]) for s in begin]
+    widest, beside = 2 * max(reach, _LEAST_REACH_PX), beyond + 1e-6
+    low = np.array([-3.0, *(start[0, 1:3] - reach), _LEAST_WIDTH_PX, _FLATNESS[0], -beside])
+    high = np.array([3.0, *(start[0, 1:3] + reach), widest, _FLATNESS[1], beside])
+    begin = np.clip(start, low + 1e-3 * (high - low), high - 1e-3 * (high - low))
+    made = [least_squares(rest, s, bounds=(low, high), x_scale=[0.1, 1, 1, 3, 0.3, 0.1]) for s in begin]
     return np.asarray(min(made, key=lambda r: r.cost).x)

@@ -57,6 +57,20 @@ def test_what_is_on_the_window_is_told_by_frames_or_withdrawn(name):
     assert found.chi2_after < found.chi2_before
 
 
+@pytest.mark.parametrize("texture", [1.0, 0.92, 1.06])
+def test_what_is_scattered_is_told_whatever_texture_the_photo_has(texture):
+    random = np.random.default_rng(3)
+    place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
+    for frame in range(9):
+        level = _textured(random)
+        recorded = _dirty_picture(level, "window_scatter") + 2 * random.standard_normal(level.shape)
+        photo = (90 + texture * (level - 90)).astype(np.float32)
+        place.add(frame, recorded.astype(np.float32), _frame(photo), np.ones(level.shape, bool))
+    (share,) = place.judged("image").parameters
+    assert share.value == pytest.approx(0.6, abs=max(0.02, 2 * share.sd))
+    assert share.sd < 0.04
+
+
 @pytest.mark.parametrize("drawn_px", [3.0, 0.0])
 def test_a_weak_drop_is_found_by_where_texture_lies_and_named(drawn_px):
     random, shifts = np.random.default_rng(3), []
