@@ -88,7 +88,7 @@ def _chosen(
         most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED loses more than it has
         if not _LEAST[best.law.name] < size < most:
             break
-        if best.law.name == "step" and not _shows_at_once(best, cells):
+        if best.law.name == "step" and _at_once(best, cells) / best.size <= 0.5:
             break
         if best.probability > FALSE_ALARM:
             unsure = best
@@ -112,12 +112,12 @@ def _same_sector(one: Fitted, other: Fitted) -> bool:
     return bool(away < (one.place[1] + other.place[1]) / 2 + 360 / SECTORS)
 
 
-def _shows_at_once(step: Fitted, cells: Cells) -> bool:
-    """Return whether the frames next to a step differ by half of it or more: drift may make up the rest."""
+def _at_once(step: Fitted, cells: Cells) -> float:
+    """Return by how much the frames next to a step differ: drift may make up the rest of it."""
     mean = cells.log_ratio.sum(1) / np.maximum(cells.usable.sum(1), 1)
     first = int(step.place[0])
     after, before = mean[first : first + _BESIDE], mean[max(first - _BESIDE, 0) : first]
-    return float((after.mean() - before.mean()) / step.size) > 0.5
+    return float(after.mean() - before.mean())
 
 
 def _places(law: Law) -> int:
@@ -203,9 +203,9 @@ def _steps(
             continue  # told already
         own = _OWN_STEP[light]
         name = {True: "exposure_step", False: own, None: f"exposure_step or {own}"}[same]
-        size = NamedFigure(
-            "change", float(np.expm1(best.size)), float(np.exp(best.size)) * best.sd, "relative"
-        )
+        # All frames tell it by one drift, those next to it by none: their disagreement counts.
+        sd = float(np.exp(best.size) * np.hypot(best.sd, _at_once(best, cells) - best.size))
+        size = NamedFigure("change", float(np.expm1(best.size)), sd, "relative")
         what = {
             True: "all frames are",
             False: f"frames lit by the {light} alone are",

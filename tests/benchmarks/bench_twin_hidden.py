@@ -171,8 +171,9 @@ def _score(case: Hidden, found: tuple[Mismatch, ...]) -> Any:
     named = [m for m in right if any(n in m.name.split(" or ") for n in case.names)]
     told = named[0].parameters[0] if named and case.size is not None else None
     inside = told is not None and case.size is not None and abs(told.value - case.size) < 2 * told.sd
-    # What a flicker or a step does to both lights may be told of each.
-    alike = {"flicker": ("laser_flicker",), "exposure_step": ("lamp_step", "laser_step")}
+    # What a flicker or a step does to both lights may be told of each; charge leaks from clipped pixels.
+    alike = {"flicker": ("laser_flicker",), "exposure_step": ("lamp_step", "laser_step"),
+             "bloom": ("saturation",)}  # fmt: skip
     allowed = {a for n in case.names for a in (n, *alike.get(n, ()))}
     false = [m for m in found if m not in right and not set(m.name.split(" or ")) & allowed]
     return np.array([bool(right), bool(named), inside, told is not None, len(false)], int)

@@ -52,6 +52,16 @@ def test_a_step_belongs_to_the_exposure_or_to_one_light(lit, line, name):
     assert step.chi2_after < step.chi2_before
 
 
+def test_a_step_beside_an_error_that_changes_slowly_is_as_large_as_its_sigma_says():
+    inside = 0
+    for phase in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+        slow = 0.003 * np.sin(np.arange(FRAMES) / 2.5 + phase)[:, None]
+        both = (_cells(np.log(1.06) * _step(8) + slow + np.zeros(SECTORS), k, 0.001) for k in (0, 1))
+        (step,) = causes(*both, Lighting(), RING)
+        inside += abs(step.parameters[0].value - 0.06) < 2 * step.parameters[0].sd
+    assert inside >= 11
+
+
 def test_an_led_that_fails_is_told_from_a_step():
     away = np.radians(AZIMUTH_DEG - 60)
     share = (1 + 0.3 * np.cos(away) + 0.05 * np.cos(2 * away)) / 8
