@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.scene import read_scene
+from stages.diagnose.effects.base import ImagePoints, Shape
+from stages.diagnose.effects.camera import MotionBlur
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import GENERIC, STEADY
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
@@ -16,6 +19,9 @@ from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.formula import says_the_same
 from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.scan import scan
+from stages.diagnose.gauge.search import prepare
+from stages.diagnose.inference import stated_belief
 from stages.diagnose.result import Verdict
 from tests.benchmarks.ring_level import RingLevelRun, ring_level_run
 
@@ -64,6 +70,22 @@ def test_a_tilt_is_named_with_its_size():
     assert found.best is not None
     assert says_the_same(run, formula_fit, found.best.fit)
     assert not says_the_same(run, formula_fit, other)
+
+
+class ShorterExposure(MotionBlur):
+    """An exposure whose law has the wrong sign, so that a longer one looks shorter than none."""
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        return -super().image_shift_px(points, shape, amplitude)
+
+
+def test_a_size_that_cannot_be_is_no_evidence():
+    run = measured(("motion_blur=0.08",), 65)
+    measurements, start = prepare(run.measured)
+    nothing, stated = fit(measurements, start, ()), stated_belief(run.truth.stated)
+    (control,) = scan(measurements, nothing, {"motion_blur": MotionBlur()}, stated)
+    assert control.p_value < 1e-4
+    assert scan(measurements, nothing, {"motion_blur": ShorterExposure()}, stated) == []
 
 
 def test_a_tilt_that_the_library_lacks_is_not_misnamed_but_described():

@@ -23,6 +23,8 @@ _THIN_RINGS, _THIN_EDGES = 8, 4
 _ITERATIONS = 3
 # A drop of χ² that one free number makes by chance two times in three.
 _AS_GOOD = 1.0
+# Small enough that no upper limit of the catalogue matters, only on which side of nothing a size lies.
+_LITTLE = 1e-6
 # The search of steps may have come out one cell beside the best one.
 _CELLS = 2
 
@@ -89,11 +91,20 @@ def _best(
         around = Around.of(here, stated, given)
         for model, shape in part:
             result = around.score(places_of(here, model, shape))
-            if result is not None and (
-                model.name not in best or result.statistic > best[model.name].score.statistic
-            ):
+            if result is None or not _some_size_is_possible(model, shape, result.amplitude):
+                continue
+            if model.name not in best or result.statistic > best[model.name].score.statistic:
                 best[model.name] = Scored(model, shape, result, 1)
     return list(best.values())
+
+
+def _some_size_is_possible(model: EffectModel, shape: Shape, amplitude: Float) -> bool:
+    """Return whether the effect may be that large, or a little of it with the same sign.
+
+    What points to an exposure shorter than none is no evidence of another exposure, however many σ it has. It
+    had turned the answer about a probe with nothing wrong into "something that no known effect explains".
+    """
+    return model.possible(shape, amplitude) or model.possible(shape, _LITTLE * amplitude)
 
 
 def _portions(asked: Sequence[tuple[EffectModel, Shape]]) -> list[list[tuple[EffectModel, Shape]]]:
